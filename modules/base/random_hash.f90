@@ -1,0 +1,46 @@
+!> Random numbers that depend on a seed and a counter only, so that any rank draws the same for the same body.
+module gravier_random_hash
+  use gravier_kinds, only: dp, i8
+  implicit none
+  private
+  public :: hash_uniform
+
+contains
+
+  !> A number in the open interval (0, 1) that is a function of (seed, counter, stream) alone.
+  !> The mixer is a Feistel network of four half-word rounds, applied once per argument.
+  pure real(dp) function hash_uniform(seed, counter, stream) result(x)
+    integer, intent(in) :: seed
+    !> for instance the identifier of a body
+    integer(i8), intent(in) :: counter
+    !> tells apart the several numbers drawn for one counter
+    integer, intent(in) :: stream
+    integer(i8) :: s
+
+    s = mix(ieor(mix(int(seed, i8)), mix(counter + 1000003_i8)))
+    s = mix(ieor(s, mix(int(stream, i8) + 77_i8)))
+    x = (real(shiftr(s, 12), dp) + 0.5_dp)*2.0_dp**(-52)
+  end function hash_uniform
+
+  !> Bijective mixing of 64 bits by shifts and multiplications of 32-bit halves, so that nothing overflows.
+  pure integer(i8) function mix(word) result(z)
+    integer(i8), intent(in) :: word
+    integer(i8), parameter :: low_half = int(z'FFFFFFFF', i8)
+    integer(i8), parameter :: factor(2) = [int(z'6C62272E', i8), int(z'5BD1E995', i8)]
+    integer(i8) :: low, high
+    integer :: k
+
+    z = ieor(word, shiftr(word, 30))
+    do k = 1, 2
+      low = iand(z, low_half)
+      high = shiftr(z, 32)
+      ! one Feistel round on each half keeps the map bijective
+      high = ieor(high, iand(shiftr(low*factor(k), 15), low_half))
+      low = ieor(low, iand(shiftr(high*factor(3 - k), 13), low_half))
+      high = iand(high + shiftr(low*factor(k), 17), low_half)
+      low = iand(low + shiftr(high*factor(3 - k), 16) + 2654435769_i8, low_half)
+      z = ior(shiftl(low, 32), high)
+    end do
+  end function mix
+
+end module gravier_random_hash
