@@ -1,0 +1,170 @@
+!> Bodies in packed arrays: grains (disks in 2D, spheres in 3D) that move, and walls that do not.
+module gravier_body_store
+  use gravier_kinds, only: dp, i8
+  implicit none
+  private
+  public :: body_set_t, wall_set_t, append_bodies
+
+  !> Grains of one subdomain, or of any batch. Velocities hold the translation first, then the spin where the
+  !> scene has one: (vx, vy[, omega]) in 2D, (vx, vy, vz[, wx, wy, wz]) in 3D, all in global axes.
+  type :: body_set_t
+    integer :: n = 0
+    !> space dimension
+    integer :: nd = 0
+    !> degrees of freedom of a grain
+    integer :: nv = 0
+    !> global, stable identifiers (n)
+    integer(i8), allocatable :: id(:)
+    !> (nd, n) [m]
+    real(dp), allocatable :: position(:, :)
+    !> (nv, n) [m/s, rad/s]
+    real(dp), allocatable :: velocity(:, :)
+    !> (n) [m]
+    real(dp), allocatable :: radius(:)
+    !> (n) [kg]
+    real(dp), allocatable :: mass(:)
+    !> about any axis through the centre, (n) [kg m^2]
+    real(dp), allocatable :: inertia(:)
+  contains
+    procedure :: init => body_set_init
+    procedure :: record_words => body_set_record_words
+    procedure :: get_record => body_set_get_record
+    procedure :: set_record => body_set_set_record
+    procedure :: reorder => body_set_reorder
+    procedure :: keep_only => body_set_keep_only
+  end type body_set_t
+
+  !> Fixed half-spaces (half-planes in 2D): few, and the same on every rank.
+  type :: wall_set_t
+    integer :: n = 0
+    !> (n)
+    integer(i8), allocatable :: id(:)
+    !> a point of the surface, (nd, n) [m]
+    real(dp), allocatable :: point(:, :)
+    !> unit normal towards the free side, (nd, n)
+    real(dp), allocatable :: normal(:, :)
+  end type wall_set_t
+
+contains
+
+  !> Make room for `n` grains of `nv` degrees of freedom in `nd` dimensions.
+  subroutine body_set_init(self, nd, nv, n)
+    class(body_set_t), intent(inout) :: self
+    integer, intent(in) :: nd, nv, n
+
+    self%n = n
+    self%nd = nd
+    self%nv = nv
+    if (allocated(self%id)) deallocate (self%id, self%position, self%velocity, self%radius, self%mass, self%inertia)
+    allocate (self%id(n), self%position(nd, n), self%velocity(nv, n), self%radius(n), self%mass(n), self%inertia(n))
+  end subroutine body_set_init
+
+  !> Words of one grain when it travels between subdomains.
+  pure integer function body_set_record_words(self) result(words)
+    class(body_set_t), intent(in) :: self
+    words = 4 + self%nd + self%nv
+  end function body_set_record_words
+
+  !> Write grain `k` into `record` (record_words).
+  pure subroutine body_set_get_record(self, k, record)
+    class(body_set_t), intent(in) :: self
+    integer, intent(in) :: k
+    integer(i8), intent(out) :: record(:)
+    integer :: d
+
+    record(1) = self%id(k)
+    record(2) = transfer(self%radius(k), 0_i8)
+    record(3) = transfer(self%mass(k), 0_i8)
+    record(4) = transfer(self%inertia(k), 0_i8)
+    do d = 1, self%nd
+      record(4 + d) = transfer(self%position(d, k), 0_i8)
+    end do
+    do d = 1, self%nv
+      record(4 + self%nd + d) = transfer(self%velocity(d, k), 0_i8)
+    end do
+  end subroutine body_set_get_record
+
+  !> Read grain `k` from `record` (record_words).
+  pure subroutine body_set_set_record(self, k, record)
+    class(body_set_t), intent(inout) :: self
+    integer, intent(in) :: k
+    integer(i8), intent(in) :: record(:)
+    integer :: d
+
+    self%id(k) = record(1)
+    self%radius(k) = transfer(record(2), 0.0_dp)
+    self%mass(k) = transfer(record(3), 0.0_dp)
+    self%inertia(k) = transfer(record(4), 0.0_dp)
+    do d = 1, self%nd
+      self%position(d, k) = transfer(record(4 + d), 0.0_dp)
+    end do
+    do d = 1, self%nv
+      self%velocity(d, k) = transfer(record(4 + self%nd + d), 0.0_dp)
+    end do
+  end subroutine body_set_set_record
+
+  !> Keep the grains order(1), order(2), ... in this order; `order` may leave some out.
+  subroutine body_set_reorder(self, order)
+    class(body_set_t), intent(inout) :: self
+    integer, intent(in), contiguous :: order(:)
+    type(body_set_t) :: old
+    integer :: k
+
+    old = self
+    call self%init(old%nd, old%nv, size(order))
+    do k = 1, size(order)
+      self%id(k) = old%id(order(k))
+      self%position(:, k) = old%position(:, order(k))
+      self%velocity(:, k) = old%velocity(:, order(k))
+      self%radius(k) = old%radius(order(k))
+      self%mass(k) = old%mass(order(k))
+      self%inertia(k) = old%inertia(order(k))
+    end do
+  end subroutine body_set_reorder
+
+  !> Drop the grains whose mask is false.
+  subroutine body_set_keep_only(self, mask)
+    class(body_set_t), intent(inout) :: self
+    !> (n)
+    logical, intent(in), contiguous :: mask(:)
+    integer, allocatable :: kept(:)
+    integer :: k, n
+
+    allocate (kept(count(mask)))
+    n = 0
+    do k = 1, self%n
+      if (.not. mask(k)) cycle
+      n = n + 1
+      kept(n) = k
+    end do
+    call self%reorder(kept)
+  end subroutine body_set_keep_only
+
+  !> Add the grains of `more` behind those of `bodies`.
+  subroutine append_bodies(bodies, more)
+    type(body_set_t), intent(inout) :: bodies
+    type(body_set_t), intent(in) :: more
+    type(body_set_t) :: old
+    integer :: n
+
+    if (more%n == 0) return
+    old = bodies
+    n = old%n
+    call bodies%init(more%nd, more%nv, n + more%n)
+    if (n > 0) then
+      bodies%id(1:n) = old%id
+      bodies%position(:, 1:n) = old%position
+      bodies%velocity(:, 1:n) = old%velocity
+      bodies%radius(1:n) = old%radius
+      bodies%mass(1:n) = old%mass
+      bodies%inertia(1:n) = old%inertia
+    end if
+    bodies%id(n + 1:) = more%id
+    bodies%position(:, n + 1:) = more%position
+    bodies%velocity(:, n + 1:) = more%velocity
+    bodies%radius(n + 1:) = more%radius
+    bodies%mass(n + 1:) = more%mass
+    bodies%inertia(n + 1:) = more%inertia
+  end subroutine append_bodies
+
+end module gravier_body_store
