@@ -1,0 +1,238 @@
+!> The contact problem of one step, subdomain by subdomain, and the quantities that judge its solution.
+module gravier_contact_problem
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
+  use gravier_kinds, only: dp, i8
+  use gravier_communicator, only: communicator_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_contact_kernels, only: kernels_t
+  implicit none
+  private
+  public :: subproblem_t, contact_problem_t
+
+  !> The contacts of one subdomain and the bodies they touch, packed in sweep order.
+  !> Bodies 1 to n_bodies are grains, n_bodies + 1 to n_columns are walls, which do not move.
+  type :: subproblem_t
+    !> global number of the subdomain, from 1
+    integer :: subdomain = 0
+    integer :: n_bodies = 0, n_columns = 0, n_contacts = 0
+    !> identifiers of grains, then walls (n_columns)
+    integer(i8), allocatable :: id(:)
+    !> subdomain that holds the centre of each grain (n_bodies)
+    integer, allocatable :: home(:)
+    !> subdomains in which each grain carries contacts (n_bodies)
+    integer, allocatable :: multiplicity(:)
+    !> centres of grains at q_m (nd, n_bodies) [m]; velocity at the start of the step is v_start (nv, n_bodies)
+    real(dp), allocatable :: position(:, :)
+    !> velocity without contacts, M^-1 R^d (nv, n_columns) [m/s, rad/s]
+    real(dp), allocatable :: v_free(:, :)
+    !> velocity under the scheme's present loads (nv, n_columns)
+    real(dp), allocatable :: velocity(:, :)
+    !> velocity of the undivided bodies under all impulses (nv, n_columns), made by `evaluate`
+    real(dp), allocatable :: v_global(:, :)
+    !> work space, H r (nv, n_columns) [N s, N m s]
+    real(dp), allocatable :: reaction(:, :)
+    !> 1/m and 1/I of the undivided bodies, 0 for walls (2, n_columns)
+    real(dp), allocatable :: inverse_mass(:, :)
+    !> the same as the scheme shares masses out (2, n_columns)
+    real(dp), allocatable :: weight(:, :)
+    !> (2, n_contacts), (nh, n_contacts), (nc, n_contacts): see gravier_contact_kernels
+    integer, allocatable :: pair(:, :)
+    real(dp), allocatable :: hot(:, :)
+    real(dp), allocatable :: impulse(:, :)
+    !> gap at q_m (n_contacts) [m]
+    real(dp), allocatable :: gap(:)
+  contains
+    procedure :: share_masses => subproblem_share_masses
+    procedure :: update_local_operator => subproblem_update_local_operator
+    procedure :: local_operator => subproblem_local_operator
+  end type subproblem_t
+
+  type :: contact_problem_t
+    type(communicator_t), pointer :: comm => null()
+    type(kernels_t) :: kernels
+    !> subdomains of this rank
+    type(subproblem_t), allocatable :: sub(:)
+    type(shared_exchange_t) :: shared
+    !> subdomains of the scene
+    integer :: n_subdomains = 1
+    !> contacts of the scene
+    integer(i8) :: n_contacts = 0
+    !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
+    real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
+  contains
+    procedure :: evaluate => contact_problem_evaluate
+    procedure :: residual => contact_problem_residual
+    procedure :: jump => contact_problem_jump
+    procedure :: own_reactions => contact_problem_own_reactions
+    procedure :: any_impulse => contact_problem_any_impulse
+  end type contact_problem_t
+
+contains
+
+  !> Set the masses that sweeps work with: undivided, or shared equally between the copies, M~ = M/m (7)-(8).
+  subroutine subproblem_share_masses(self, shared)
+    class(subproblem_t), intent(inout) :: self
+    logical, intent(in) :: shared
+    integer :: b
+
+    self%weight(:, :) = self%inverse_mass
+    if (shared) then
+      do b = 1, self%n_bodies
+        self%weight(:, b) = self%multiplicity(b)*self%inverse_mass(:, b)
+      end do
+    end if
+    call self%update_local_operator()
+  end subroutine subproblem_share_masses
+
+  !> Diagonal of the local operators from `weight`, into `hot`.
+  pure subroutine subproblem_update_local_operator(self)
+    class(subproblem_t), intent(inout) :: self
+    integer :: c, nd
+    real(dp) :: w(2)
+
+    nd = size(self%position, 1)
+    do c = 1, self%n_contacts
+      call self%local_operator(c, self%weight, w)
+      self%hot(nd + 2, c) = 1.0_dp/w(1)
+      if (size(self%hot, 1) > nd + 2) self%hot(nd + 3, c) = 1.0_dp/w(2)
+    end do
+  end subroutine subproblem_update_local_operator
+
+  !> W_nn and W_tt of contact `c` [1/kg]; W_tt = W_nn without friction.
+  pure subroutine subproblem_local_operator(self, c, weight, w)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: c
+    !> (2, n_columns)
+    real(dp), intent(in), contiguous :: weight(:, :)
+    real(dp), intent(out) :: w(2)
+    integer :: nd, i, j
+
+    nd = size(self%position, 1)
+    i = self%pair(1, c)
+    j = self%pair(2, c)
+    w(:) = weight(1, i) + weight(1, j)
+    if (size(self%hot, 1) > nd + 2) then
+      w(2) = w(2) + self%hot(nd + 4, c)**2*weight(2, i) + self%hot(nd + 5, c)**2*weight(2, j)
+    end if
+  end subroutine subproblem_local_operator
+
+  !> R_E = H_E r_E of subdomain `s` of this rank, into `reaction`.
+  subroutine contact_problem_own_reactions(self, s)
+    class(contact_problem_t), intent(inout) :: self
+    integer, intent(in) :: s
+
+    associate (sub => self%sub(s))
+      sub%reaction(:, :) = 0.0_dp
+      call self%kernels%add_reaction(sub%pair, sub%hot, sub%impulse, sub%reaction)
+    end associate
+  end subroutine contact_problem_own_reactions
+
+  !> Velocities of the undivided bodies under all impulses, v_global = M^-1 (R^d + H r), with no decomposition in it
+  !> but the order of the sums. Collective.
+  subroutine contact_problem_evaluate(self)
+    class(contact_problem_t), intent(inout) :: self
+    integer :: s, k, b, nv
+
+    nv = self%kernels%nv
+    do s = 1, size(self%sub)
+      call self%own_reactions(s)
+      call self%shared%load(s, self%sub(s)%reaction)
+    end do
+    call self%shared%pass()
+    do s = 1, size(self%sub)
+      associate (sub => self%sub(s), part => self%shared%part(s))
+        do k = 1, part%n_shared
+          b = part%body(k)
+          call self%shared%add_copies(s, k, sub%reaction(:, b))
+        end do
+        call add_impulses(sub)
+      end associate
+    end do
+
+  contains
+
+    subroutine add_impulses(sub)
+      type(subproblem_t), intent(inout) :: sub
+      integer :: b, nd
+
+      nd = self%kernels%nd
+      do b = 1, sub%n_columns
+        sub%v_global(1:nd, b) = sub%v_free(1:nd, b) + sub%inverse_mass(1, b)*sub%reaction(1:nd, b)
+        sub%v_global(nd + 1:nv, b) = sub%v_free(nd + 1:nv, b) + sub%inverse_mass(2, b)*sub%reaction(nd + 1:nv, b)
+      end do
+    end subroutine add_impulses
+
+  end subroutine contact_problem_evaluate
+
+  !> The residual of the impulses: how far each is from its own exact local solve under all others, relative to
+  !> the norm of all impulses (or to force_scale where all are zero). It knows of no method. NaN where some
+  !> impulse is not finite. Collective.
+  subroutine contact_problem_residual(self, residual, defect)
+    class(contact_problem_t), intent(inout) :: self
+    real(dp), intent(out) :: residual
+    !> the same, not divided by the norm of the impulses [N s]
+    real(dp), intent(out) :: defect
+    real(dp), allocatable :: parts(:, :)
+    real(dp) :: sums(2)
+    integer :: s
+
+    call self%evaluate()
+    allocate (parts(2, size(self%sub)))
+    do s = 1, size(self%sub)
+      associate (sub => self%sub(s))
+        call self%kernels%residual(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, parts(:, s))
+      end associate
+    end do
+    call self%comm%sum_parts(parts, sums)
+    if (.not. all(ieee_is_finite(sums))) then
+      residual = ieee_value(residual, ieee_quiet_nan)
+      defect = residual
+      return
+    end if
+    defect = sqrt(sums(1))
+    if (sums(2) > 0.0_dp) then
+      residual = sqrt(sums(1)/sums(2))
+    else if (sums(1) > 0.0_dp) then
+      residual = defect/self%force_scale
+    else
+      residual = 0.0_dp
+    end if
+  end subroutine contact_problem_residual
+
+  !> Largest difference of translation velocity between two copies of a body under the present loads of the
+  !> subdomains, relative to velocity_scale. Collective.
+  real(dp) function contact_problem_jump(self) result(jump)
+    class(contact_problem_t), intent(inout) :: self
+    integer :: s, k, j, nd
+
+    nd = self%kernels%nd
+    do s = 1, size(self%sub)
+      call self%shared%load(s, self%sub(s)%velocity)
+    end do
+    call self%shared%pass()
+    jump = 0.0_dp
+    do s = 1, size(self%sub)
+      associate (part => self%shared%part(s))
+        do j = 1, part%n_slots
+          k = part%body(part%slot_shared(j))
+          jump = max(jump, norm2(part%recv(1:nd, j) - self%sub(s)%velocity(1:nd, k)))
+        end do
+      end associate
+    end do
+    jump = self%comm%highest(jump)
+    if (self%velocity_scale > 0.0_dp) jump = jump/self%velocity_scale
+  end function contact_problem_jump
+
+  !> Whether some impulse is not zero. Collective.
+  logical function contact_problem_any_impulse(self) result(any_impulse)
+    class(contact_problem_t), intent(in) :: self
+    integer :: s
+
+    any_impulse = .false.
+    do s = 1, size(self%sub)
+      any_impulse = any_impulse .or. any(abs(self%sub(s)%impulse) > 0.0_dp)
+    end do
+    any_impulse = self%comm%any_true(any_impulse)
+  end function contact_problem_any_impulse
+
+end module gravier_contact_problem

@@ -1,0 +1,145 @@
+!> The iterations of one solve: run a method until its impulses meet the tolerance.
+module gravier_solve
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_timers, only: start_timer, stop_timer, phase_check
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t
+  implicit none
+  private
+  public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
+  public :: solve_converged, solve_exhausted, solve_diverged
+
+  integer, parameter :: solve_converged = 0, solve_exhausted = 1, solve_diverged = 2
+
+  !> growth of the defect, relative to its largest value in the first `growth_window` checks, taken for divergence
+  real(dp), parameter :: growth_limit = 1.0e6_dp
+  integer, parameter :: growth_window = 3
+
+  type :: solve_control_t
+    real(dp) :: tolerance = 1.0e-4_dp
+    integer :: max_iterations = 10000
+    !> iterations between two checks
+    integer :: check_every = 10
+    !> keep the figures of every check
+    logical :: trace = .false.
+  end type solve_control_t
+
+  !> The known impulses of a problem, for the criterion 'error'.
+  type, abstract :: exact_solution_t
+  contains
+    procedure(error_of), deferred :: error
+  end type exact_solution_t
+
+  abstract interface
+    !> |r - r_exact| / |r_exact|. Collective.
+    real(dp) function error_of(self, problem)
+      import :: exact_solution_t, contact_problem_t, dp
+      implicit none
+      class(exact_solution_t), intent(in) :: self
+      type(contact_problem_t), intent(in) :: problem
+    end function error_of
+  end interface
+
+  type :: solve_report_t
+    !> solve_converged, solve_exhausted (tolerance not met in max_iterations) or solve_diverged
+    integer :: status = solve_exhausted
+    integer :: iterations = 0
+    real(dp) :: residual = 0.0_dp, jump = 0.0_dp
+    !> relative error on the impulses, negative where no exact solution is known
+    real(dp) :: error = -1.0_dp
+    !> one column a check: iteration, residual, jump, error (4, n_trace)
+    integer :: n_trace = 0
+    real(dp), allocatable :: trace(:, :)
+  end type solve_report_t
+
+contains
+
+  !> Solve. The state is checked at the start, every check_every iterations and at the end, by the residual, or by
+  !> the error where `exact` is given. Collective.
+  subroutine solve_contacts(problem, scheme, control, report, error, exact)
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(out) :: report
+    type(error_t), allocatable, intent(inout) :: error
+    !> criterion 'error'
+    class(exact_solution_t), intent(in), optional :: exact
+    real(dp) :: reference
+    logical :: measure, done
+    integer :: checks
+
+    if (control%trace) allocate (report%trace(4, 64))
+    reference = 0.0_dp
+    checks = 0
+    call scheme%start(problem, error)
+    if (allocated(error)) return
+    call check(done)
+    do while (.not. done)
+      report%iterations = report%iterations + 1
+      measure = mod(report%iterations, control%check_every) == 0 .or. report%iterations == control%max_iterations
+      call scheme%iterate(problem, measure, report%jump, error)
+      if (allocated(error)) return
+      if (measure) call check(done)
+    end do
+
+  contains
+
+    subroutine check(finished)
+      logical, intent(out) :: finished
+      real(dp) :: defect, figure
+
+      call start_timer(phase_check)
+      call problem%residual(report%residual, defect)
+      figure = report%residual
+      if (present(exact)) then
+        report%error = exact%error(problem)
+        figure = report%error
+      end if
+      if (control%trace) call keep_trace(report)
+      call judge(figure, defect, finished)
+      call stop_timer(phase_check)
+    end subroutine check
+
+    subroutine judge(figure, defect, finished)
+      real(dp), intent(in) :: figure, defect
+      logical, intent(out) :: finished
+
+      finished = .true.
+      checks = checks + 1
+      if (.not. (ieee_is_finite(figure) .and. ieee_is_finite(defect))) then
+        report%status = solve_diverged
+        return
+      end if
+      if (checks <= growth_window) reference = max(reference, defect, problem%force_scale)
+      if (figure <= control%tolerance) then
+        report%status = solve_converged
+      else if (defect > growth_limit*reference) then
+        report%status = solve_diverged
+      else if (report%iterations >= control%max_iterations) then
+        report%status = solve_exhausted
+      else
+        finished = .false.
+      end if
+    end subroutine judge
+
+  end subroutine solve_contacts
+
+  subroutine keep_trace(report)
+    type(solve_report_t), intent(inout) :: report
+    real(dp), allocatable :: longer(:, :)
+
+    if (report%n_trace == size(report%trace, 2)) then
+      allocate (longer(4, 2*report%n_trace))
+      longer(:, 1:report%n_trace) = report%trace
+      call move_alloc(longer, report%trace)
+    end if
+    report%n_trace = report%n_trace + 1
+    report%trace(1, report%n_trace) = report%iterations
+    report%trace(2, report%n_trace) = report%residual
+    report%trace(3, report%n_trace) = report%jump
+    report%trace(4, report%n_trace) = report%error
+  end subroutine keep_trace
+
+end module gravier_solve
