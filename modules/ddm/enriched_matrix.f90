@@ -1,0 +1,258 @@
+!> The enriched matrices M_E + H_E l_E H_E^T of the subdomains of a rank, and their factors.
+module gravier_enriched_matrix
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_sweep
+  use gravier_contact_kernels, only: kernels_t, contact_jacobian
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_scheme, only: scheme_t
+  use gravier_sparse_direct, only: sparse_factor_t
+  implicit none
+  private
+  public :: search_direction_t, enriched_matrix_t, enriched_part_t, sweep_all_recording
+
+  !> The search direction r~ - r + l (v~ - v) = 0, l >= 0.
+  type :: search_direction_t
+    !> l, in units of 1/W_aa or in kg
+    real(dp) :: value = 1.0_dp
+    logical :: relative = .true.
+    !> l on active contacts only: r_n > 0 for the normal part, |r_t| < mu r_n for the tangential one
+    logical :: active_only = .false.
+  end type search_direction_t
+
+  !> What one subdomain adds to its contact problem.
+  type :: enriched_part_t
+    !> l of each component (nc, n_contacts) [kg]
+    real(dp), allocatable :: direction(:, :)
+    !> velocity that solved the law at each contact's last update (nc, n_contacts) [m/s]
+    real(dp), allocatable :: law_velocity(:, :)
+    !> work spaces: contact values (nc, n_contacts), body values (nv, n_columns)
+    real(dp), allocatable :: contact_work(:, :), body_work(:, :)
+    type(sparse_factor_t) :: factor
+  end type enriched_part_t
+
+  type :: enriched_matrix_t
+    type(search_direction_t) :: direction
+    type(enriched_part_t), allocatable :: part(:)
+  contains
+    procedure :: start => enriched_matrix_start
+    procedure :: update => enriched_matrix_update
+    procedure :: solve => enriched_matrix_solve
+    procedure :: counts => enriched_matrix_counts
+    procedure :: free => enriched_matrix_free
+  end type enriched_matrix_t
+
+contains
+
+  !> Make ready for a new problem. Factors of the last problem are kept, in case the matrices are the same.
+  subroutine enriched_matrix_start(self, problem, error)
+    class(enriched_matrix_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    if (allocated(self%part)) then
+      if (size(self%part) /= size(problem%sub)) call self%free()
+    end if
+    if (.not. allocated(self%part)) allocate (self%part(size(problem%sub)))
+    do s = 1, size(self%part)
+      if (.not. self%part(s)%factor%is_alive()) call self%part(s)%factor%init_local(error)
+      call make_room(self%part(s), problem%kernels, problem%sub(s))
+    end do
+  end subroutine enriched_matrix_start
+
+  subroutine make_room(part, kernels, sub)
+    type(enriched_part_t), intent(inout) :: part
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+
+    if (allocated(part%direction)) deallocate (part%direction, part%law_velocity, part%contact_work, part%body_work)
+    allocate (part%direction(kernels%nc, sub%n_contacts), part%law_velocity(kernels%nc, sub%n_contacts), &
+      & part%contact_work(kernels%nc, sub%n_contacts), part%body_work(kernels%nv, sub%n_columns), source=0.0_dp)
+  end subroutine make_room
+
+  !> Set l and factorise the matrices that it or the problem changed.
+  subroutine enriched_matrix_update(self, problem, changed, error)
+    class(enriched_matrix_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    !> whether some matrix of this rank was factorised anew
+    logical, intent(out) :: changed
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: row(:), column(:)
+    real(dp), allocatable :: value(:)
+    integer(i8) :: before
+    integer :: s
+
+    changed = .false.
+    call start_timer(phase_factorise)
+    do s = 1, size(self%part)
+      associate (part => self%part(s), sub => problem%sub(s))
+        if (sub%n_bodies == 0) cycle
+        call set_direction(self%direction, problem%kernels, sub, part%direction)
+        call assemble(problem%kernels, sub, part%direction, row, column, value)
+        before = part%factor%factorisations
+        call part%factor%factorise(sub%n_bodies*problem%kernels%nv, row, column, value, error)
+        changed = changed .or. part%factor%factorisations > before
+      end associate
+    end do
+    call stop_timer(phase_factorise)
+  end subroutine enriched_matrix_update
+
+  !> l of every component of every contact, with W_aa of the undivided bodies.
+  pure subroutine set_direction(rule, kernels, sub, direction)
+    type(search_direction_t), intent(in) :: rule
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(out), contiguous :: direction(:, :)
+    real(dp) :: w(2)
+    integer :: c
+
+    do c = 1, sub%n_contacts
+      direction(:, c) = rule%value
+      if (rule%relative) then
+        call sub%local_operator(c, sub%inverse_mass, w)
+        direction(1, c) = rule%value/w(1)
+        direction(2:, c) = rule%value/w(2)
+      end if
+      if (.not. rule%active_only) cycle
+      if (.not. sub%impulse(1, c) > 0.0_dp) then
+        direction(:, c) = 0.0_dp
+      else if (kernels%nc > 1) then
+        if (norm2(sub%impulse(2:, c)) >= sub%hot(kernels%nh, c)*sub%impulse(1, c)) direction(2:, c) = 0.0_dp
+      end if
+    end do
+  end subroutine set_direction
+
+  !> Lower triangle of M + H l H^T with the masses in `weight`, as triplets.
+  subroutine assemble(kernels, sub, direction, row, column, value)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(in), contiguous :: direction(:, :)
+    integer, allocatable, intent(out) :: row(:), column(:)
+    real(dp), allocatable, intent(out) :: value(:)
+    real(dp) :: jacobian(kernels%nc, kernels%nv, 2)
+    integer :: b, c, d, n, nv, side, on_wall
+
+    nv = kernels%nv
+    on_wall = count(sub%pair(2, :) > sub%n_bodies)
+    n = sub%n_bodies*nv + on_wall*(nv*(nv + 1))/2 + (sub%n_contacts - on_wall)*(nv*(nv + 1) + nv*nv)
+    allocate (row(n), column(n), value(n))
+    n = 0
+    do b = 1, sub%n_bodies
+      do d = 1, nv
+        call add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp/sub%weight(merge(1, 2, d <= kernels%nd), b))
+      end do
+    end do
+    do c = 1, sub%n_contacts
+      call contact_jacobian(kernels%nd, kernels%nc, sub%hot(:, c), jacobian(:, :, 1), jacobian(:, :, 2))
+      do side = 1, 2
+        if (sub%pair(side, c) <= sub%n_bodies) call add_block(sub%pair(side, c), sub%pair(side, c), side, side)
+      end do
+      if (sub%pair(2, c) > sub%n_bodies) cycle
+      if (sub%pair(1, c) > sub%pair(2, c)) then
+        call add_block(sub%pair(1, c), sub%pair(2, c), 1, 2)
+      else
+        call add_block(sub%pair(2, c), sub%pair(1, c), 2, 1)
+      end if
+    end do
+
+  contains
+
+    !> J_a^T l J_b at bodies (i, j), i >= j; of a diagonal block only the lower triangle.
+    subroutine add_block(i, j, a, b)
+      integer, intent(in) :: i, j, a, b
+      integer :: p, q
+      real(dp) :: x
+
+      do p = 1, nv
+        do q = 1, merge(p, nv, i == j)
+          x = sum(jacobian(:, p, a)*direction(:, c)*jacobian(:, q, b))
+          call add((i - 1)*nv + p, (j - 1)*nv + q, x)
+        end do
+      end do
+    end subroutine add_block
+
+    subroutine add(i, j, x)
+      integer, intent(in) :: i, j
+      real(dp), intent(in) :: x
+      n = n + 1
+      row(n) = i
+      column(n) = j
+      value(n) = x
+    end subroutine add
+
+  end subroutine assemble
+
+  !> Solve (M + H l H^T) y = b in subdomain `s`, in place; walls have no velocity.
+  subroutine enriched_matrix_solve(self, problem, s, b, error)
+    class(enriched_matrix_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (nv, n_columns) [N s, N m s] in, [m/s, rad/s] out
+    real(dp), intent(inout), contiguous :: b(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: flat(:, :)
+    integer :: k, nv
+
+    nv = problem%kernels%nv
+    allocate (flat(nv*problem%sub(s)%n_bodies, 1))
+    do k = 1, problem%sub(s)%n_bodies
+      flat((k - 1)*nv + 1:k*nv, 1) = b(:, k)
+    end do
+    if (size(flat) > 0) call self%part(s)%factor%solve(flat, error)
+    do k = 1, problem%sub(s)%n_bodies
+      b(:, k) = flat((k - 1)*nv + 1:k*nv, 1)
+    end do
+    b(:, problem%sub(s)%n_bodies + 1:) = 0.0_dp
+  end subroutine enriched_matrix_solve
+
+  !> Analyses and factorisations done on this rank.
+  pure subroutine enriched_matrix_counts(self, analyses, factorisations)
+    class(enriched_matrix_t), intent(in) :: self
+    integer(i8), intent(out) :: analyses, factorisations
+    integer :: s
+
+    analyses = 0
+    factorisations = 0
+    if (.not. allocated(self%part)) return
+    do s = 1, size(self%part)
+      analyses = analyses + self%part(s)%factor%analyses
+      factorisations = factorisations + self%part(s)%factor%factorisations
+    end do
+  end subroutine enriched_matrix_counts
+
+  subroutine enriched_matrix_free(self)
+    class(enriched_matrix_t), intent(inout) :: self
+    integer :: s
+
+    if (.not. allocated(self%part)) return
+    do s = 1, size(self%part)
+      call self%part(s)%factor%free()
+    end do
+    deallocate (self%part)
+  end subroutine enriched_matrix_free
+
+  !> As sweep_all, keeping in the last sweep the velocity that solved each contact's law.
+  subroutine sweep_all_recording(scheme, problem, matrix)
+    class(scheme_t), intent(inout) :: scheme
+    type(contact_problem_t), intent(inout) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    integer :: s, k
+
+    call start_timer(phase_sweep)
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do k = 1, scheme%sweeps - 1
+          call problem%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
+        end do
+        call problem%kernels%sweep_recording(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, &
+          & matrix%part(s)%law_velocity)
+        scheme%work%relaxations = scheme%work%relaxations + int(scheme%sweeps, i8)*sub%n_contacts
+      end associate
+    end do
+    scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
+    scheme%work%iterations = scheme%work%iterations + 1
+    call stop_timer(phase_sweep)
+  end subroutine sweep_all_recording
+
+end module gravier_enriched_matrix

@@ -1,0 +1,107 @@
+!> Parallel conjugate gradient on the interface problem (paper, (34) and Algorithm 1): X_eta is never formed, its product
+!> with a vector is one solve with the factors of M_eta,E in every subdomain and one exchange.
+module gravier_interface_cg
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_text, only: to_text
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_enriched_matrix, only: enriched_matrix_t
+  use gravier_interface_problem, only: interface_field_t, interface_solver_t, make_field, chain_differences, load_transpose, &
+    & dot_field
+  implicit none
+  private
+  public :: interface_cg_t
+
+  type, extends(interface_solver_t) :: interface_cg_t
+    !> |b - X f| / |b| at which to stop
+    real(dp) :: tolerance = 1.0e-12_dp
+    integer :: max_iterations = 10000
+  contains
+    procedure :: prepare => interface_cg_prepare
+    procedure :: solve => interface_cg_solve
+    procedure :: free => interface_cg_free
+  end type interface_cg_t
+
+contains
+
+  !> Nothing is formed: the factors of the subdomains are all it takes.
+  subroutine interface_cg_prepare(self, problem, matrix, error)
+    class(interface_cg_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (size(problem%sub) /= size(matrix%part)) call raise(error, status_failure, "interface problem without its matrices")
+    self%tolerance = max(self%tolerance, epsilon(1.0_dp))
+  end subroutine interface_cg_prepare
+
+  subroutine interface_cg_solve(self, problem, matrix, b, f, error)
+    class(interface_cg_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    type(interface_field_t), intent(in) :: b(:)
+    type(interface_field_t), intent(inout) :: f(:)
+    type(error_t), allocatable, intent(inout) :: error
+    type(interface_field_t), allocatable :: r(:), p(:), xp(:)
+    real(dp) :: bound, rr, rr_old, step
+    integer :: k
+
+    call make_field(problem, r)
+    call make_field(problem, xp)
+    bound = self%tolerance**2*dot_field(problem, b, b)
+    call apply(problem, matrix, f, xp, error)
+    call combine(r, b, -1.0_dp, xp)
+    p = r
+    rr = dot_field(problem, r, r)
+    do k = 1, self%max_iterations
+      if (rr <= bound .or. allocated(error)) return
+      call apply(problem, matrix, p, xp, error)
+      step = rr/dot_field(problem, p, xp)
+      call combine(f, f, step, p)
+      call combine(r, r, -step, xp)
+      rr_old = rr
+      rr = dot_field(problem, r, r)
+      call combine(p, r, rr/rr_old, p)
+      self%iterations = self%iterations + 1
+    end do
+    if (rr > bound) call raise(error, status_failure, "conjugate gradient on the interface: "// &
+      & to_text(self%max_iterations)//" iterations did not reach cg_tolerance = "//to_text(self%tolerance, 3))
+  end subroutine interface_cg_solve
+
+  !> xf := X_eta f. Collective; an error is the same on all ranks.
+  subroutine apply(problem, matrix, f, xf, error)
+    type(contact_problem_t), intent(inout) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    type(interface_field_t), intent(in) :: f(:)
+    type(interface_field_t), intent(inout) :: xf(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    do s = 1, size(f)
+      call load_transpose(problem, s, f(s), matrix)
+      call matrix%solve(problem, s, matrix%part(s)%body_work, error)
+    end do
+    call chain_differences(problem, matrix, xf)
+    call problem%comm%agree(error)
+  end subroutine apply
+
+  !> result := a + c b, on all multipliers.
+  pure subroutine combine(result, a, c, b)
+    type(interface_field_t), intent(inout) :: result(:)
+    type(interface_field_t), intent(in) :: a(:)
+    real(dp), intent(in) :: c
+    type(interface_field_t), intent(in) :: b(:)
+    integer :: s
+
+    do s = 1, size(result)
+      result(s)%upper(:, :) = a(s)%upper + c*b(s)%upper
+      result(s)%lower(:, :) = a(s)%lower + c*b(s)%lower
+    end do
+  end subroutine combine
+
+  subroutine interface_cg_free(self)
+    class(interface_cg_t), intent(inout) :: self
+    self%iterations = 0
+  end subroutine interface_cg_free
+
+end module gravier_interface_cg

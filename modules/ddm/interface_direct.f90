@@ -1,0 +1,381 @@
+!> Direct solution of the interface problem: X_eta is assembled from the dense blocks of the subdomains, each rank
+!> giving its own, and factorised by all ranks together.
+!>
+!> A parallel factorisation does not round the same way on every number of ranks. The solution is therefore refined in
+!> extended precision, with residuals that do not depend on the ranks, far beyond the working precision: rounded back, it
+!> has the same bits on any number of ranks.
+module gravier_interface_direct
+  use gravier_kinds, only: dp, qp, i8
+  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_enriched_matrix, only: enriched_matrix_t
+  use gravier_sparse_direct, only: sparse_factor_t
+  use gravier_interface_problem, only: interface_field_t, interface_solver_t
+  implicit none
+  private
+  public :: interface_direct_t
+
+  !> What one subdomain adds to X_eta.
+  type :: block_t
+    !> M_eta^-1 between the degrees of freedom of its shared bodies (nv n_shared, nv n_shared) [1/kg]
+    real(dp), allocatable :: compliance(:, :)
+    !> numbers of the first unknown of the upper and lower multiplier of each shared body, 0 beyond the ends (n_shared)
+    integer, allocatable :: upper(:), lower(:)
+  end type block_t
+
+  type :: extended_field_t
+    real(qp), allocatable :: upper(:, :), lower(:, :)
+  end type extended_field_t
+
+  type, extends(interface_solver_t) :: interface_direct_t
+    type(sparse_factor_t) :: factor
+    type(block_t), allocatable, private :: blocks(:)
+    !> unknowns of all ranks, and the first one of each rank (ranks + 1)
+    integer, private :: n = 0
+    integer, allocatable, private :: first_row(:)
+  contains
+    procedure :: prepare => interface_direct_prepare
+    procedure :: solve => interface_direct_solve
+    procedure :: free => interface_direct_free
+  end type interface_direct_t
+
+  !> relative size of a correction at which refinement stops, and steps it may take
+  real(dp), parameter :: enough = 1.0e-28_dp
+  integer, parameter :: most_refinements = 12
+  !> right-hand sides solved together
+  integer, parameter :: block_width = 64
+
+contains
+
+  subroutine interface_direct_prepare(self, problem, matrix, error)
+    class(interface_direct_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: row(:), column(:)
+    real(dp), allocatable :: value(:)
+    integer :: s
+
+    if (.not. self%factor%is_alive()) call self%factor%init_distributed(problem%comm, error)
+    call number_unknowns(self, problem, error)
+    if (self%n == 0 .or. allocated(error)) return
+    do s = 1, size(self%blocks)
+      call find_compliance(problem, matrix, s, self%blocks(s)%compliance, error)
+    end do
+    call problem%comm%agree(error)
+    if (allocated(error)) return
+    call assemble(self%blocks, problem%kernels%nv, row, column, value)
+    call self%factor%factorise(self%n, row, column, value, error)
+    call problem%comm%agree(error)
+  end subroutine interface_direct_prepare
+
+  !> Number the multipliers: those of a subdomain after those of the one before; a multiplier belongs to the lower of
+  !> the two subdomains that it ties. Collective.
+  subroutine number_unknowns(self, problem, error)
+    class(interface_direct_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: first(:)
+    integer(i8) :: mine, next
+    integer :: s, k, at, nv
+
+    nv = problem%kernels%nv
+    mine = 0
+    do s = 1, size(problem%sub)
+      associate (part => problem%shared%part(s))
+        do k = 1, part%n_shared
+          if (part%rung(k) < part%multiplicity(k)) mine = mine + nv
+        end do
+      end associate
+    end do
+    next = problem%comm%offset(mine) + 1
+    if (problem%comm%total(mine) > huge(0)) call raise(error, status_failure, &
+      & "the interface has more than 2^31 unknowns; choose interface = 'cg'")
+    if (allocated(error)) return
+    self%n = int(problem%comm%total(mine))
+    allocate (first(problem%comm%size + 1), source=0_i8)
+    first(problem%comm%rank + 1) = next
+    call problem%comm%sum_counts(first)
+    first(problem%comm%size + 1) = self%n + 1
+    self%first_row = int(first)
+    if (allocated(self%blocks)) deallocate (self%blocks)
+    allocate (self%blocks(size(problem%sub)))
+    do s = 1, size(problem%sub)
+      associate (part => problem%shared%part(s), block => self%blocks(s))
+        allocate (block%upper(part%n_shared), block%lower(part%n_shared), source=0)
+        do k = 1, part%n_shared
+          if (part%rung(k) == part%multiplicity(k)) cycle
+          block%upper(k) = int(next)
+          next = next + nv
+        end do
+        do k = 1, part%n_slots
+          part%send(:, k) = block%upper(part%slot_shared(k))
+        end do
+      end associate
+    end do
+    call problem%shared%pass()
+    do s = 1, size(problem%sub)
+      associate (part => problem%shared%part(s), block => self%blocks(s))
+        do k = 1, part%n_shared
+          at = part%first(k) + part%rung(k) - 1
+          if (at > part%first(k)) block%lower(k) = nint(part%recv(1, part%slot(at - 1)))
+        end do
+      end associate
+    end do
+  end subroutine number_unknowns
+
+  !> Columns of M_eta,E^-1 of the shared bodies, at the shared bodies.
+  subroutine find_compliance(problem, matrix, s, compliance, error)
+    type(contact_problem_t), intent(in) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    integer, intent(in) :: s
+    real(dp), allocatable, intent(out) :: compliance(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: dof(:)
+    real(dp), allocatable :: columns(:, :)
+    integer :: k, d, nv, from, width, j
+
+    nv = problem%kernels%nv
+    allocate (dof(nv*problem%shared%part(s)%n_shared))
+    do k = 1, problem%shared%part(s)%n_shared
+      do d = 1, nv
+        dof((k - 1)*nv + d) = (problem%shared%part(s)%body(k) - 1)*nv + d
+      end do
+    end do
+    allocate (compliance(size(dof), size(dof)))
+    do from = 1, size(dof), block_width
+      width = min(block_width, size(dof) - from + 1)
+      allocate (columns(nv*problem%sub(s)%n_bodies, width), source=0.0_dp)
+      do j = 1, width
+        columns(dof(from + j - 1), j) = 1.0_dp
+      end do
+      call matrix%part(s)%factor%solve(columns, error)
+      do j = 1, width
+        do k = 1, size(dof)
+          compliance(k, from + j - 1) = columns(dof(k), j)
+        end do
+      end do
+      deallocate (columns)
+    end do
+  end subroutine find_compliance
+
+  !> Lower triangle of the blocks A_E M_eta,E^-1 A_E^T of this rank, as triplets.
+  subroutine assemble(blocks, nv, row, column, value)
+    type(block_t), intent(in) :: blocks(:)
+    integer, intent(in) :: nv
+    integer, allocatable, intent(out) :: row(:), column(:)
+    real(dp), allocatable, intent(out) :: value(:)
+    integer :: s, round, n
+
+    do round = 1, 2
+      n = 0
+      do s = 1, size(blocks)
+        call scan_block(blocks(s))
+      end do
+      if (round == 1) allocate (row(n), column(n), value(n))
+    end do
+
+  contains
+
+    subroutine scan_block(block)
+      type(block_t), intent(in) :: block
+      integer :: k, l
+
+      do l = 1, size(block%upper)
+        do k = 1, size(block%upper)
+          call add_pair(block, k, l, block%upper(k), block%upper(l), 1.0_dp)
+          call add_pair(block, k, l, block%upper(k), block%lower(l), -1.0_dp)
+          call add_pair(block, k, l, block%lower(k), block%upper(l), -1.0_dp)
+          call add_pair(block, k, l, block%lower(k), block%lower(l), 1.0_dp)
+        end do
+      end do
+    end subroutine scan_block
+
+    subroutine add_pair(block, k, l, first_row, first_column, factor)
+      type(block_t), intent(in) :: block
+      integer, intent(in) :: k, l, first_row, first_column
+      real(dp), intent(in) :: factor
+      integer :: p, q
+
+      if (first_row == 0 .or. first_column == 0) return
+      do q = 0, nv - 1
+        do p = 0, nv - 1
+          if (first_row + p < first_column + q) cycle
+          n = n + 1
+          if (round == 1) cycle
+          row(n) = first_row + p
+          column(n) = first_column + q
+          value(n) = factor*block%compliance((k - 1)*nv + p + 1, (l - 1)*nv + q + 1)
+        end do
+      end do
+    end subroutine add_pair
+
+  end subroutine assemble
+
+  subroutine interface_direct_solve(self, problem, matrix, b, f, error)
+    class(interface_direct_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(enriched_matrix_t), intent(inout) :: matrix
+    type(interface_field_t), intent(in) :: b(:)
+    type(interface_field_t), intent(inout) :: f(:)
+    type(error_t), allocatable, intent(inout) :: error
+    type(extended_field_t), allocatable :: x(:), r(:)
+    real(dp), allocatable :: rows(:)
+    real(dp) :: size_now(2), last
+    integer :: k, s
+
+    if (self%n == 0 .or. size(matrix%part) /= size(f)) return
+    allocate (x(size(b)), r(size(b)))
+    do s = 1, size(b)
+      allocate (x(s)%upper(size(b(s)%upper, 1), size(b(s)%upper, 2)), source=0.0_qp)
+      allocate (x(s)%lower(size(b(s)%upper, 1), size(b(s)%upper, 2)), source=0.0_qp)
+      r(s)%upper = b(s)%upper
+    end do
+    allocate (rows(self%first_row(problem%comm%rank + 2) - self%first_row(problem%comm%rank + 1)))
+    last = huge(1.0_dp)
+    do k = 1, most_refinements
+      call gather_rows(self, problem, r, rows)
+      call self%factor%solve_rows(self%first_row, rows, error)
+      call problem%comm%agree(error)
+      if (allocated(error)) return
+      call add_rows(self, problem, rows, x, size_now)
+      self%iterations = self%iterations + 1
+      if (size_now(1) <= enough*size_now(2) .or. size_now(1) >= 0.5_dp*last) exit
+      last = size_now(1)
+      call extended_residual(self, problem, b, x, r)
+    end do
+    do s = 1, size(f)
+      f(s)%upper(:, :) = real(x(s)%upper, dp)
+      f(s)%lower(:, :) = real(x(s)%lower, dp)
+    end do
+  end subroutine interface_direct_solve
+
+  !> The residual on the unknowns of this rank, in working precision.
+  subroutine gather_rows(self, problem, r, rows)
+    class(interface_direct_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    type(extended_field_t), intent(in) :: r(:)
+    real(dp), intent(inout), contiguous :: rows(:)
+    integer :: s, k, at, nv
+
+    nv = problem%kernels%nv
+    do s = 1, size(r)
+      do k = 1, size(self%blocks(s)%upper)
+        if (self%blocks(s)%upper(k) == 0) cycle
+        at = self%blocks(s)%upper(k) - self%first_row(problem%comm%rank + 1)
+        rows(at + 1:at + nv) = real(r(s)%upper(:, k), dp)
+      end do
+    end do
+  end subroutine gather_rows
+
+  !> Add a correction to x on both sides of each multiplier. Collective.
+  subroutine add_rows(self, problem, rows, x, size_now)
+    class(interface_direct_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp), intent(in), contiguous :: rows(:)
+    type(extended_field_t), intent(inout) :: x(:)
+    !> largest entry of the correction and of x
+    real(dp), intent(out) :: size_now(2)
+    integer :: s, k, at, nv
+
+    nv = problem%kernels%nv
+    size_now(:) = 0.0_dp
+    do s = 1, size(x)
+      associate (part => problem%shared%part(s), block => self%blocks(s))
+        do k = 1, part%n_slots
+          part%send(:, k) = 0.0_dp
+          if (block%upper(part%slot_shared(k)) == 0) cycle
+          at = block%upper(part%slot_shared(k)) - self%first_row(problem%comm%rank + 1)
+          part%send(:, k) = rows(at + 1:at + nv)
+        end do
+        do k = 1, part%n_shared
+          if (block%upper(k) == 0) cycle
+          at = block%upper(k) - self%first_row(problem%comm%rank + 1)
+          x(s)%upper(:, k) = x(s)%upper(:, k) + rows(at + 1:at + nv)
+          size_now(1) = max(size_now(1), maxval(abs(rows(at + 1:at + nv))))
+          size_now(2) = max(size_now(2), maxval(abs(real(x(s)%upper(:, k), dp))))
+        end do
+      end associate
+    end do
+    call problem%shared%pass()
+    do s = 1, size(x)
+      associate (part => problem%shared%part(s))
+        do k = 1, part%n_shared
+          at = part%first(k) + part%rung(k) - 1
+          if (at > part%first(k)) x(s)%lower(:, k) = x(s)%lower(:, k) + part%recv(:, part%slot(at - 1))
+        end do
+      end associate
+    end do
+    call problem%comm%highest_of(size_now)
+  end subroutine add_rows
+
+  !> r := b - X x in extended precision, on upper multipliers. Collective.
+  subroutine extended_residual(self, problem, b, x, r)
+    class(interface_direct_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(interface_field_t), intent(in) :: b(:)
+    type(extended_field_t), intent(in) :: x(:)
+    type(extended_field_t), intent(inout) :: r(:)
+    type(extended_field_t), allocatable :: y(:)
+    real(qp), allocatable :: v(:, :)
+    integer :: s, k, at, half
+
+    allocate (y(size(x)))
+    do s = 1, size(x)
+      v = x(s)%upper - x(s)%lower
+      call multiply(self%blocks(s)%compliance, v, y(s)%upper)
+      r(s)%upper(:, :) = b(s)%upper - y(s)%upper
+    end do
+    ! the neighbour's values travel as the sum of two numbers of working precision
+    do half = 1, 2
+      do s = 1, size(x)
+        associate (part => problem%shared%part(s))
+          do k = 1, part%n_slots
+            part%send(:, k) = real(y(s)%upper(:, part%slot_shared(k)), dp)
+          end do
+          y(s)%upper(:, :) = y(s)%upper - real(y(s)%upper, dp)
+        end associate
+      end do
+      call problem%shared%pass()
+      do s = 1, size(x)
+        associate (part => problem%shared%part(s))
+          do k = 1, part%n_shared
+            at = part%first(k) + part%rung(k) - 1
+            if (at < part%first(k + 1) - 1) r(s)%upper(:, k) = r(s)%upper(:, k) + part%recv(:, part%slot(at + 1))
+          end do
+        end associate
+      end do
+    end do
+  end subroutine extended_residual
+
+  !> y := compliance v, in extended precision.
+  pure subroutine multiply(compliance, v, y)
+    real(dp), intent(in), contiguous :: compliance(:, :)
+    real(qp), intent(in) :: v(:, :)
+    real(qp), allocatable, intent(out) :: y(:, :)
+    real(qp) :: flat(size(compliance, 1))
+    integer :: k, d, column, nv
+
+    nv = size(v, 1)
+    flat(:) = 0.0_qp
+    do k = 1, size(v, 2)
+      do d = 1, nv
+        column = (k - 1)*nv + d
+        flat(:) = flat + compliance(:, column)*v(d, k)
+      end do
+    end do
+    allocate (y(nv, size(v, 2)))
+    do k = 1, size(v, 2)
+      y(:, k) = flat((k - 1)*nv + 1:k*nv)
+    end do
+  end subroutine multiply
+
+  subroutine interface_direct_free(self)
+    class(interface_direct_t), intent(inout) :: self
+    call self%factor%free()
+    if (allocated(self%blocks)) deallocate (self%blocks)
+    self%n = 0
+    self%iterations = 0
+  end subroutine interface_direct_free
+
+end module gravier_interface_direct

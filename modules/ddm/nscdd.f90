@@ -1,0 +1,68 @@
+!> NSCDD: dual domain decomposition with shared masses (paper, (10)-(14)).
+module gravier_nscdd
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_timers, only: start_timer, stop_timer, phase_exchange
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t, start_velocities, sweep_all
+  implicit none
+  private
+  public :: nscdd_t, average_copies
+
+  type, extends(scheme_t) :: nscdd_t
+  contains
+    procedure :: start => nscdd_start
+    procedure :: iterate => nscdd_iterate
+  end type nscdd_t
+
+contains
+
+  subroutine nscdd_start(self, problem, error)
+    class(nscdd_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    self%work%solves = self%work%solves + 1
+    call start_velocities(problem, shared_masses=.true.)
+  end subroutine nscdd_start
+
+  subroutine nscdd_iterate(self, problem, measure, jump, error)
+    class(nscdd_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(in) :: measure
+    real(dp), intent(out) :: jump
+    type(error_t), allocatable, intent(inout) :: error
+
+    jump = 0.0_dp
+    if (allocated(error)) return
+    call sweep_all(self, problem)
+    if (measure) jump = problem%jump()
+    call average_copies(problem)
+    self%work%interface_solves = self%work%interface_solves + 1
+  end subroutine nscdd_iterate
+
+  !> Solve the interface problem X F = sum_E A_E M~_E^-1 (R_E + R_E^d) (11) in closed form: with masses shared equally,
+  !> every copy of a body takes the mean of its copies' velocities. Collective.
+  subroutine average_copies(problem)
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s, k, b
+
+    call start_timer(phase_exchange)
+    do s = 1, size(problem%sub)
+      call problem%shared%load(s, problem%sub(s)%velocity)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(problem%sub)
+      associate (part => problem%shared%part(s), velocity => problem%sub(s)%velocity)
+        do k = 1, part%n_shared
+          b = part%body(k)
+          call problem%shared%add_copies(s, k, velocity(:, b))
+          velocity(:, b) = velocity(:, b)/part%multiplicity(k)
+        end do
+      end associate
+    end do
+    call stop_timer(phase_exchange)
+  end subroutine average_copies
+
+end module gravier_nscdd

@@ -1,0 +1,193 @@
+!> NSCDD-EP: NSCDD with an enriched interface problem (paper, (24)-(29), with v_E restored in (27)).
+module gravier_nscdd_ep
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_timers, only: start_timer, stop_timer, phase_interface_solve, phase_factorise
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: work_t
+  use gravier_nscdd, only: nscdd_t
+  use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
+  use gravier_interface_problem, only: interface_field_t, interface_solver_t, make_field, chain_differences
+  implicit none
+  private
+  public :: nscdd_ep_t
+
+  !> With l = 0 it is NSCDD, bit for bit.
+  type, extends(nscdd_t) :: nscdd_ep_t
+    type(enriched_matrix_t) :: matrix
+    class(interface_solver_t), allocatable :: interface_solver
+    !> multipliers F now and at the iteration before, and the right-hand side of the interface problem
+    type(interface_field_t), allocatable, private :: f(:), f_old(:), b(:)
+    logical, private :: prepared = .false.
+  contains
+    procedure :: start => nscdd_ep_start
+    procedure :: iterate => nscdd_ep_iterate
+    procedure :: free => nscdd_ep_free
+    procedure :: work_done => nscdd_ep_work_done
+  end type nscdd_ep_t
+
+contains
+
+  subroutine nscdd_ep_start(self, problem, error)
+    class(nscdd_ep_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    call self%nscdd_t%start(problem, error)
+    if (.not. is_enriched(self)) return
+    call make_field(problem, self%f)
+    call make_field(problem, self%f_old)
+    call make_field(problem, self%b)
+    call start_multipliers(problem, self%f)
+    call self%matrix%start(problem, error)
+    call problem%comm%agree(error)
+    self%prepared = .false.
+  end subroutine nscdd_ep_start
+
+  pure logical function is_enriched(self)
+    class(nscdd_ep_t), intent(in) :: self
+    is_enriched = self%matrix%direction%value > 0.0_dp
+  end function is_enriched
+
+  !> Multipliers that agree with the impulses at the start, where all copies have one velocity: on rung q of a body
+  !> of multiplicity m, (A^T F)_q = R_q - (sum of R)/m. Collective.
+  subroutine start_multipliers(problem, f)
+    type(contact_problem_t), intent(inout) :: problem
+    type(interface_field_t), intent(inout) :: f(:)
+    real(dp) :: mean(problem%kernels%nv)
+    integer :: s, k, j
+
+    do s = 1, size(f)
+      call problem%own_reactions(s)
+      call problem%shared%load(s, problem%sub(s)%reaction)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(f)
+      associate (part => problem%shared%part(s), own => problem%sub(s)%reaction)
+        do k = 1, part%n_shared
+          mean(:) = own(:, part%body(k))
+          call problem%shared%add_copies(s, k, mean)
+          mean(:) = mean/part%multiplicity(k)
+          do j = part%first(k), part%first(k) + part%rung(k) - 1
+            f(s)%lower(:, k) = f(s)%upper(:, k)
+            if (part%slot(j) == 0) then
+              f(s)%upper(:, k) = f(s)%upper(:, k) + (own(:, part%body(k)) - mean)
+            else
+              f(s)%upper(:, k) = f(s)%upper(:, k) + (part%recv(:, part%slot(j)) - mean)
+            end if
+          end do
+          if (part%rung(k) == part%multiplicity(k)) f(s)%upper(:, k) = 0.0_dp
+        end do
+      end associate
+    end do
+  end subroutine start_multipliers
+
+  subroutine nscdd_ep_iterate(self, problem, measure, jump, error)
+    class(nscdd_ep_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(in) :: measure
+    real(dp), intent(out) :: jump
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    jump = 0.0_dp
+    if (allocated(error)) return
+    if (.not. is_enriched(self)) then
+      call self%nscdd_t%iterate(problem, measure, jump, error)
+      return
+    end if
+    call sweep_all_recording(self, problem, self%matrix)
+    if (measure) jump = problem%jump()
+    call prepare(self, problem, error)
+    if (allocated(error)) return
+    call start_timer(phase_interface_solve)
+    do s = 1, size(problem%sub)
+      call enriched_velocities(self, problem, s, error)
+      self%f_old(s)%upper(:, :) = self%f(s)%upper
+      self%f_old(s)%lower(:, :) = self%f(s)%lower
+    end do
+    call chain_differences(problem, self%matrix, self%b)
+    call problem%comm%agree(error)
+    if (allocated(error)) return
+    call self%interface_solver%solve(problem, self%matrix, self%b, self%f, error)
+    do s = 1, size(problem%sub)
+      call take_multipliers(self, problem, s)
+    end do
+    call stop_timer(phase_interface_solve)
+    self%work%interface_solves = self%work%interface_solves + 1
+  end subroutine nscdd_ep_iterate
+
+  !> Factorise what is not factorised yet: at the first iteration of a solve, and when the active contacts changed.
+  !> Collective.
+  subroutine prepare(self, problem, error)
+    class(nscdd_ep_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: changed
+
+    if (self%prepared .and. .not. self%matrix%direction%active_only) return
+    call self%matrix%update(problem, changed, error)
+    call problem%comm%agree(error)
+    if (self%prepared) changed = problem%comm%any_true(changed)
+    call start_timer(phase_factorise)
+    if (changed .or. .not. self%prepared) call self%interface_solver%prepare(problem, self%matrix, error)
+    call stop_timer(phase_factorise)
+    self%prepared = .true.
+  end subroutine prepare
+
+  !> M_eta,E^-1 [R_E^d + H_E (r_E + l_E v_E)] of (28), into body_work.
+  subroutine enriched_velocities(self, problem, s, error)
+    class(nscdd_ep_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: b, nd
+
+    nd = problem%kernels%nd
+    associate (part => self%matrix%part(s), sub => problem%sub(s))
+      part%contact_work(:, :) = sub%impulse + part%direction*part%law_velocity
+      part%body_work(:, :) = 0.0_dp
+      do b = 1, sub%n_bodies
+        part%body_work(1:nd, b) = sub%v_free(1:nd, b)/sub%weight(1, b)
+        part%body_work(nd + 1:, b) = sub%v_free(nd + 1:, b)/sub%weight(2, b)
+      end do
+      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
+      call self%matrix%solve(problem, s, part%body_work, error)
+    end associate
+  end subroutine enriched_velocities
+
+  !> V_E changes by M~_E^-1 A_E^T (F_old - F).
+  subroutine take_multipliers(self, problem, s)
+    class(nscdd_ep_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: s
+    real(dp) :: change(problem%kernels%nv)
+    integer :: k, b, nd
+
+    nd = problem%kernels%nd
+    associate (part => problem%shared%part(s), sub => problem%sub(s), old => self%f_old(s), new => self%f(s))
+      do k = 1, part%n_shared
+        b = part%body(k)
+        change(:) = (old%upper(:, k) - old%lower(:, k)) - (new%upper(:, k) - new%lower(:, k))
+        sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1, b)*change(1:nd)
+        sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(2, b)*change(nd + 1:)
+      end do
+    end associate
+  end subroutine take_multipliers
+
+  subroutine nscdd_ep_free(self)
+    class(nscdd_ep_t), intent(inout) :: self
+    call self%matrix%free()
+    if (allocated(self%interface_solver)) call self%interface_solver%free()
+    self%work = work_t()
+  end subroutine nscdd_ep_free
+
+  type(work_t) function nscdd_ep_work_done(self) result(work)
+    class(nscdd_ep_t), intent(in) :: self
+    work = self%work
+    call self%matrix%counts(work%analyses, work%factorisations)
+    work%interface_iterations = self%interface_solver%iterations
+  end function nscdd_ep_work_done
+
+end module gravier_nscdd_ep

@@ -1,0 +1,111 @@
+!> Schwarz-NSCD-EC: Schwarz with enriched impulses on the interface (paper, (30)-(33)).
+module gravier_schwarz_ec
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t, work_t, start_velocities
+  use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
+  use gravier_schwarz, only: neighbour_load_t, start_neighbour_loads, take_neighbour_loads
+  implicit none
+  private
+  public :: schwarz_ec_t
+
+  type, extends(scheme_t) :: schwarz_ec_t
+    type(enriched_matrix_t) :: matrix
+    type(neighbour_load_t), allocatable :: load(:)
+    logical, private :: prepared = .false.
+  contains
+    procedure :: start => schwarz_ec_start
+    procedure :: iterate => schwarz_ec_iterate
+    procedure :: free => schwarz_ec_free
+    procedure :: work_done => schwarz_ec_work_done
+  end type schwarz_ec_t
+
+contains
+
+  subroutine schwarz_ec_start(self, problem, error)
+    class(schwarz_ec_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    self%work%solves = self%work%solves + 1
+    call start_velocities(problem, shared_masses=.false.)
+    call start_neighbour_loads(problem, self%load)
+    call self%matrix%start(problem, error)
+    self%prepared = .false.
+    call problem%comm%agree(error)
+  end subroutine schwarz_ec_start
+
+  subroutine schwarz_ec_iterate(self, problem, measure, jump, error)
+    class(schwarz_ec_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(in) :: measure
+    real(dp), intent(out) :: jump
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: changed
+    integer :: s
+
+    jump = 0.0_dp
+    if (allocated(error)) return
+    call sweep_all_recording(self, problem, self%matrix)
+    if (measure) jump = problem%jump()
+    if (self%matrix%direction%active_only .or. .not. self%prepared) call self%matrix%update(problem, changed, error)
+    self%prepared = .true.
+    call start_timer(phase_interface_solve)
+    do s = 1, size(problem%sub)
+      call enriched_reactions(self, problem, s, error)
+      call problem%shared%load(s, self%matrix%part(s)%body_work)
+    end do
+    call stop_timer(phase_interface_solve)
+    call problem%comm%agree(error)
+    call start_timer(phase_exchange)
+    call take_neighbour_loads(problem, self%load)
+    call stop_timer(phase_exchange)
+    self%work%interface_solves = self%work%interface_solves + 1
+  end subroutine schwarz_ec_iterate
+
+  !> R~_E = (I + L_E M_E^-1)^-1 ( R_E - L_E M_E^-1 (R_E^d + R_E^ddm) + H_E l_E v_E ) with L_E = H_E l_E H_E^T. Since
+  !> I + L M^-1 = (M + L) M^-1, this is R~ = M y with (M + L) y = H ( r + l (v - H^T U) ), where
+  !> U = M^-1 (R^d + R^ddm) and v is the velocity that solved the law. Into body_work.
+  subroutine enriched_reactions(self, problem, s, error)
+    class(schwarz_ec_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k, b, nd
+
+    nd = problem%kernels%nd
+    associate (part => self%matrix%part(s), sub => problem%sub(s), shared => problem%shared%part(s))
+      part%body_work(:, :) = sub%v_free
+      do k = 1, shared%n_shared
+        b = shared%body(k)
+        part%body_work(1:nd, b) = sub%v_free(1:nd, b) + sub%weight(1, b)*self%load(s)%value(1:nd, k)
+        part%body_work(nd + 1:, b) = sub%v_free(nd + 1:, b) + sub%weight(2, b)*self%load(s)%value(nd + 1:, k)
+      end do
+      call problem%kernels%contact_velocity(sub%pair, sub%hot, part%body_work, part%contact_work)
+      part%contact_work(:, :) = sub%impulse + part%direction*(part%law_velocity - part%contact_work)
+      part%body_work(:, :) = 0.0_dp
+      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
+      call self%matrix%solve(problem, s, part%body_work, error)
+      do b = 1, sub%n_bodies
+        part%body_work(1:nd, b) = part%body_work(1:nd, b)/sub%weight(1, b)
+        part%body_work(nd + 1:, b) = part%body_work(nd + 1:, b)/sub%weight(2, b)
+      end do
+    end associate
+  end subroutine enriched_reactions
+
+  subroutine schwarz_ec_free(self)
+    class(schwarz_ec_t), intent(inout) :: self
+    call self%matrix%free()
+    self%work = work_t()
+  end subroutine schwarz_ec_free
+
+  type(work_t) function schwarz_ec_work_done(self) result(work)
+    class(schwarz_ec_t), intent(in) :: self
+    work = self%work
+    call self%matrix%counts(work%analyses, work%factorisations)
+  end function schwarz_ec_work_done
+
+end module gravier_schwarz_ec
