@@ -1,0 +1,187 @@
+!> From the &scene group to bodies, walls and the physics of their contacts.
+module gravier_scene
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_random_hash, only: hash_uniform
+  use gravier_communicator, only: communicator_t
+  use gravier_bodies_file, only: bodies_data_t, read_bodies
+  use gravier_body_store, only: body_set_t, wall_set_t
+  use gravier_motion, only: grain_mass, grain_inertia
+  use gravier_config_types, only: config_t, scene_config_t
+  implicit none
+  private
+  public :: scene_t, make_scene
+
+  !> room around a grain of the largest radius in a lattice, relative to its diameter
+  real(dp), parameter :: lattice_room = 1.05_dp
+
+  !> A scene as it starts. Grains are spread over the ranks in any way; walls are on all of them.
+  type :: scene_t
+    type(body_set_t) :: grains
+    type(wall_set_t) :: walls
+    !> grains of all ranks
+    integer(i8) :: n_grains = 0
+    !> of all ranks [m]; 0 without grains
+    real(dp) :: largest_radius = 0.0_dp
+    !> some contact has friction; some grain turns
+    logical :: friction = .false., rotation = .false.
+  end type scene_t
+
+contains
+
+  !> Make the bodies of a scene. Errors are the same on all ranks. Collective.
+  subroutine make_scene(comm, config, scene, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(out) :: scene
+    type(error_t), allocatable, intent(inout) :: error
+    type(bodies_data_t) :: data
+
+    scene%friction = config%scene%friction > 0.0_dp .or. config%scene%wall_friction > 0.0_dp
+    select case (config%scene%bodies)
+    case ("column")
+      call make_column(comm, config%scene, data)
+    case ("lattice")
+      call make_lattice(comm, config%scene, data)
+    case default
+      call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error)
+    end select
+    call check_exact_solution(config, error)
+    if (allocated(error)) return
+    call take_data(comm, config%scene, data, scene)
+  end subroutine make_scene
+
+  !> The criterion 'error' knows the impulses of a column that gravity presses on the ground.
+  subroutine check_exact_solution(config, error)
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: nd
+
+    if (config%solver%criterion /= "error") return
+    nd = config%scene%dimension
+    if (any(abs(config%scene%gravity(1:nd - 1)) > 0.0_dp) .or. config%scene%gravity(nd) >= 0.0_dp) &
+      & call raise(error, status_input, config%file//": &scene gravity: criterion = 'error' knows the column under gravity "// &
+      & "along its axis only; expected zeros, then a negative last component")
+  end subroutine check_exact_solution
+
+  !> First and last of `total` bodies that this rank makes.
+  pure subroutine share_of_rank(comm, total, first, last)
+    type(communicator_t), intent(in) :: comm
+    integer(i8), intent(in) :: total
+    integer(i8), intent(out) :: first, last
+    first = (total*comm%rank)/comm%size + 1
+    last = (total*(comm%rank + 1))/comm%size
+  end subroutine share_of_rank
+
+  !> `total` bodies at rest, with room for those of this rank, and walls through the origin facing up each axis.
+  subroutine make_room(comm, dimension, total, n_walls, data)
+    type(communicator_t), intent(in) :: comm
+    integer, intent(in) :: dimension, n_walls
+    integer(i8), intent(in) :: total
+    type(bodies_data_t), intent(out) :: data
+    integer(i8) :: first, last
+    integer :: w
+
+    call share_of_rank(comm, total, first, last)
+    data%n = int(last - first + 1)
+    data%total = total
+    allocate (data%id(data%n), data%radius(data%n), data%mass(data%n))
+    allocate (data%position(dimension, data%n), source=0.0_dp)
+    allocate (data%velocity(3*dimension - 3, data%n), source=0.0_dp)
+    data%n_walls = n_walls
+    allocate (data%wall_id(n_walls))
+    allocate (data%wall_point(dimension, n_walls), data%wall_normal(dimension, n_walls), source=0.0_dp)
+    do w = 1, n_walls
+      data%wall_id(w) = total + w
+    end do
+    do w = 1, data%n
+      data%id(w) = first + w - 1
+    end do
+  end subroutine make_room
+
+  !> Equal grains, one upon the other on a ground: the columns of the paper, section 5.
+  subroutine make_column(comm, scene, data)
+    type(communicator_t), intent(in) :: comm
+    type(scene_config_t), intent(in) :: scene
+    type(bodies_data_t), intent(out) :: data
+    integer :: k
+
+    call make_room(comm, scene%dimension, int(scene%column_count, i8), 1, data)
+    data%radius(:) = scene%radius
+    data%mass(:) = scene%mass
+    do k = 1, data%n
+      data%position(scene%dimension, k) = (2*data%id(k) - 1)*scene%radius
+    end do
+    data%wall_normal(scene%dimension, 1) = 1.0_dp
+  end subroutine make_column
+
+  !> Grains of random radii, each somewhere in its own cell of a lattice, in a box without lid. What a grain gets
+  !> depends on its identifier and the seed alone.
+  subroutine make_lattice(comm, scene, data)
+    type(communicator_t), intent(in) :: comm
+    type(scene_config_t), intent(in) :: scene
+    type(bodies_data_t), intent(out) :: data
+    real(dp) :: edge, free
+    integer :: k, d, nd, count(3)
+    integer(i8) :: place
+
+    nd = scene%dimension
+    count(:) = 1
+    count(1:nd) = scene%lattice_count(1:nd)
+    edge = lattice_room*2.0_dp*scene%radius_max
+    call make_room(comm, nd, product(int(count, i8)), 2*nd - 1, data)
+    do k = 1, data%n
+      data%radius(k) = scene%radius_min + (scene%radius_max - scene%radius_min)*hash_uniform(scene%seed, data%id(k), 0)
+      data%mass(k) = grain_mass(nd, data%radius(k), scene%density)
+      free = edge - 2.0_dp*data%radius(k)
+      place = data%id(k) - 1
+      do d = 1, nd
+        data%position(d, k) = (mod(place, int(count(d), i8)) + 0.5_dp)*edge + &
+          & free*(hash_uniform(scene%seed, data%id(k), d) - 0.5_dp)
+        place = place/count(d)
+      end do
+    end do
+    data%wall_normal(nd, 1) = 1.0_dp
+    do d = 1, nd - 1
+      data%wall_normal(d, 2*d) = 1.0_dp
+      data%wall_normal(d, 2*d + 1) = -1.0_dp
+      data%wall_point(d, 2*d + 1) = count(d)*edge
+    end do
+  end subroutine make_lattice
+
+  !> Turn the rows of a file, or made rows, into bodies; find out what the scene has. Collective.
+  subroutine take_data(comm, scene_config, data, scene)
+    type(communicator_t), intent(in) :: comm
+    type(scene_config_t), intent(in) :: scene_config
+    type(bodies_data_t), intent(in) :: data
+    type(scene_t), intent(inout) :: scene
+    logical :: turning
+    integer :: k, nd, nv
+
+    nd = scene_config%dimension
+    turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp))
+    scene%rotation = scene%friction .or. turning
+    nv = merge(3*nd - 3, nd, scene%rotation)
+    call scene%grains%init(nd, nv, data%n)
+    do k = 1, data%n
+      scene%grains%id(k) = data%id(k)
+      scene%grains%position(:, k) = data%position(:, k)
+      scene%grains%velocity(:, k) = data%velocity(1:nv, k)
+      scene%grains%radius(k) = data%radius(k)
+      if (allocated(data%mass)) then
+        scene%grains%mass(k) = data%mass(k)
+      else
+        scene%grains%mass(k) = grain_mass(nd, data%radius(k), scene_config%density)
+      end if
+      scene%grains%inertia(k) = grain_inertia(nd, data%radius(k), scene%grains%mass(k))
+    end do
+    scene%n_grains = data%total
+    if (data%n > 0) scene%largest_radius = maxval(data%radius)
+    scene%largest_radius = comm%highest(scene%largest_radius)
+    scene%walls%n = data%n_walls
+    scene%walls%id = data%wall_id
+    scene%walls%point = data%wall_point
+    scene%walls%normal = data%wall_normal
+  end subroutine take_data
+
+end module gravier_scene
