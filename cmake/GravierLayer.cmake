@@ -1,0 +1,32 @@
+# gravier_compile_options(TARGET): the language standard, the warnings and the flags of each build type.
+function(gravier_compile_options target)
+  target_compile_options(${target} PRIVATE
+    -std=f2008 -Wall -Wextra -Wimplicit-interface -Warray-temporaries
+    $<$<BOOL:${GRAVIER_WERROR}>:-Werror>
+    $<$<CONFIG:Release>:-O3 -march=${GRAVIER_ARCH}>
+    $<$<CONFIG:Debug>:-Og -g -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow>
+    $<$<CONFIG:Sanitize>:-O1 -g -fbacktrace -fsanitize=address,undefined -fno-omit-frame-pointer>)
+  target_link_options(${target} PRIVATE $<$<CONFIG:Sanitize>:-fsanitize=address,undefined>)
+endfunction()
+
+set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds")
+
+# gravier_layer(NAME [USES LOWER] [LIBRARIES ...]): the static library gravier_NAME of modules/NAME/*.f90,
+# with a module directory of its own. USES names the next layer below, whose modules and those beneath it are seen.
+function(gravier_layer name)
+  cmake_parse_arguments(LAYER "" "USES" "LIBRARIES" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.f90 ${PROJECT_SOURCE_DIR}/modules/${name}/*.F90)
+  set(target gravier_${name})
+  add_library(${target} STATIC ${sources})
+  add_library(gravier::${name} ALIAS ${target})
+  set(mod_dir ${PROJECT_BINARY_DIR}/mod/${name})
+  set_target_properties(${target} PROPERTIES Fortran_MODULE_DIRECTORY ${mod_dir} EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${mod_dir}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/gravier/${name}>)
+  gravier_compile_options(${target})
+  if(LAYER_USES)
+    target_link_libraries(${target} PUBLIC gravier_${LAYER_USES})
+  endif()
+  target_link_libraries(${target} PUBLIC ${LAYER_LIBRARIES})
+  set_property(GLOBAL APPEND PROPERTY GRAVIER_LAYERS ${target})
+endfunction()

@@ -1,0 +1,94 @@
+# Declaring tests: gravier_test for Fortran programs under MPI, gravier_python_test for unittest scripts.
+
+# The python3 that has what scripts and tests import; the first in PATH need not be the one.
+if(NOT GRAVIER_PYTHON)
+  foreach(python $ENV{GRAVIER_PYTHON} python3 /usr/bin/python3)
+    execute_process(COMMAND ${python} -c "import h5py, numpy, matplotlib" RESULT_VARIABLE status OUTPUT_QUIET ERROR_QUIET)
+    if(status EQUAL 0)
+      set(GRAVIER_PYTHON ${python} CACHE STRING "python3 with h5py, numpy and matplotlib")
+      break()
+    endif()
+  endforeach()
+endif()
+if(NOT GRAVIER_PYTHON)
+  message(WARNING "no python3 with h5py, numpy and matplotlib: the tests written in Python are left out")
+endif()
+
+set(gravier_test_environment
+  OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+  # tests run side by side, some on more ranks than there are cores
+  OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
+  OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
+  OMPI_MCA_btl_vader_single_copy_mechanism=none
+  OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+  MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support
+  ASAN_OPTIONS=detect_leaks=0
+  GRAVIER_PYTHON=${GRAVIER_PYTHON} GRAVIER_BIN_DIR=${PROJECT_BINARY_DIR}/bin GRAVIER_SOURCE_DIR=${PROJECT_SOURCE_DIR}
+  MPIEXEC=${MPIEXEC_EXECUTABLE})
+
+# gravier_test(NAME SOURCES ... [RANKS 1 2 4] [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds] [EXPECT text])
+# One test for each number of ranks, NAME or NAME_npN when on several, each in a directory of its own.
+# LIBRARIES defaults to the application (the top layer while there is none). With EXPECT the program must fail
+# and print the text. Called again with the same NAME and SOURCES it adds tests of the same program.
+function(gravier_test name)
+  cmake_parse_arguments(TEST "" "TIMEOUT;EXPECT" "SOURCES;RANKS;LIBRARIES;LABELS" ${ARGN})
+  if(NOT TEST_LIBRARIES)
+    set(TEST_LIBRARIES $<IF:$<TARGET_EXISTS:gravier_app>,gravier_app,gravier_ddm>)
+  endif()
+  if(NOT TEST_RANKS)
+    set(TEST_RANKS 1)
+  endif()
+  if(NOT TEST_TIMEOUT)
+    set(TEST_TIMEOUT 300)
+  endif()
+  set(target test_${name})
+  if(NOT TARGET ${target})
+    add_executable(${target} ${TEST_SOURCES})
+    set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests/bin
+      Fortran_MODULE_DIRECTORY ${PROJECT_BINARY_DIR}/mod/tests/${name})
+    target_link_libraries(${target} PRIVATE gravier_test_support ${TEST_LIBRARIES})
+    gravier_compile_options(${target})
+  endif()
+  foreach(ranks ${TEST_RANKS})
+    set(test ${name})
+    if(NOT TEST_RANKS STREQUAL "1")
+      set(test ${name}_np${ranks})
+    endif()
+    set(command ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${MPIEXEC_PREFLAGS} $<TARGET_FILE:${target}>
+      ${MPIEXEC_POSTFLAGS})
+    if(TEST_EXPECT)
+      string(REPLACE ";" "|" command "${command}")
+      set(command ${CMAKE_COMMAND} "-DCOMMAND=${command}" "-DEXPECT=${TEST_EXPECT}"
+        -P ${PROJECT_SOURCE_DIR}/tests/support/expect_failure.cmake)
+    endif()
+    gravier_add_test(${test} ${TEST_TIMEOUT} ${ranks} "${TEST_LABELS}" "${command}")
+  endforeach()
+endfunction()
+
+# gravier_python_test(NAME FILE [LABELS ...] [TIMEOUT seconds])
+# A unittest script. Its environment names GRAVIER_BIN_DIR, GRAVIER_SOURCE_DIR and MPIEXEC; tests/support is on its path.
+function(gravier_python_test name file)
+  cmake_parse_arguments(TEST "" "TIMEOUT" "LABELS" ${ARGN})
+  if(NOT GRAVIER_PYTHON)
+    return()
+  endif()
+  if(NOT TEST_TIMEOUT)
+    set(TEST_TIMEOUT 600)
+  endif()
+  get_filename_component(directory ${file} DIRECTORY)
+  get_filename_component(script ${file} NAME)
+  gravier_add_test(${name} ${TEST_TIMEOUT} 2 "${TEST_LABELS}"
+    "${GRAVIER_PYTHON};-m;unittest;discover;-v;-s;${directory};-p;${script}")
+endfunction()
+
+# gravier_add_test(NAME TIMEOUT RANKS LABELS COMMAND): in a directory of its own, with the environment of tests
+function(gravier_add_test name timeout ranks labels command)
+  set(directory ${PROJECT_BINARY_DIR}/tests/work/${name})
+  file(MAKE_DIRECTORY ${directory})
+  if(ranks GREATER 2)
+    set(ranks 2)
+  endif()
+  add_test(NAME ${name} COMMAND ${command} WORKING_DIRECTORY ${directory})
+  set_tests_properties(${name} PROPERTIES PROCESSORS ${ranks} TIMEOUT ${timeout} LABELS "${labels}"
+    ENVIRONMENT "${gravier_test_environment}")
+endfunction()

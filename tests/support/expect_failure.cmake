@@ -1,0 +1,11 @@
+# The COMMAND, its words separated by |, must end with a status other than 0 and print EXPECT.
+string(REPLACE "|" ";" COMMAND "${COMMAND}")
+execute_process(COMMAND ${COMMAND} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE errors)
+message(STATUS "status ${status}\n${output}${errors}")
+if(status EQUAL 0)
+  message(FATAL_ERROR "the command was expected to fail")
+endif()
+string(FIND "${output}" "${EXPECT}" position)
+if(position LESS 0)
+  message(FATAL_ERROR "the command was expected to print '${EXPECT}'")
+endif()

@@ -1,0 +1,779 @@
+!> Input files: values, defaults, syntax, and the message of every rule.
+program test_config
+  use, intrinsic :: iso_fortran_env, only: iostat_end
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, status_input
+  use gravier_config, only: config_t, parse_config, write_active, write_key_reference
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  character(len=*), parameter :: newline = achar(10), tab = achar(9), carriage = achar(13)
+  !> a group &time that is in order
+  character(len=*), parameter :: time = " &time step = 0.1, steps = 5 / "
+  !> an input that is in order, to which a group can be added
+  character(len=*), parameter :: column = "&scene bodies = 'column' /" // time
+  character(len=*), parameter :: lattice_keys = " lattice_count = 4, 5 radius_min = 0.1 radius_max = 0.2 "
+  character(len=*), parameter :: positive = "expected a finite real number > 0"
+
+  call MPI_Init()
+  call test_whole_file()
+  call test_defaults()
+  call test_defaults_in_space()
+  call test_derived_values()
+  call test_limits()
+  call test_words_of_choices()
+  call test_syntax_of_names()
+  call test_syntax_of_values()
+  call test_syntax_of_texts()
+  call test_long_texts()
+  call test_failures_leave_nothing_behind()
+  call test_refused_files()
+  call test_refused_names()
+  call test_refused_duplicates()
+  call test_refused_kinds()
+  call test_refused_numbers()
+  call test_refused_entries()
+  call test_rules_of_scene()
+  call test_rules_of_bodies()
+  call test_rules_of_lattice()
+  call test_rules_of_time_and_solver()
+  call test_rules_of_decomposition()
+  call test_rules_of_enriched_and_output()
+  call test_active_options()
+  call test_round_trip()
+  call test_reference()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  !> Parses a text that must be in order.
+  subroutine accept(text, name, config)
+    character(len=*), intent(in) :: text, name
+    type(config_t), intent(out) :: config
+    type(error_t), allocatable :: error
+    call parse_config("case.nml", text, config, error)
+    if (allocated(error)) then
+      call check_equal(error%message, "", name // " is accepted")
+    else
+      call check(.true., name // " is accepted")
+    end if
+  end subroutine accept
+
+  !> Parses a text that must be refused with this message after the name of the file.
+  subroutine refuse(text, message)
+    character(len=*), intent(in) :: text, message
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    call parse_config("case.nml", text, config, error)
+    call check(allocated(error), "refused: " // message)
+    if (.not. allocated(error)) return
+    call check_equal(error%message, "case.nml: " // message, "message")
+    call check_equal(error%status, status_input, "status of: " // message)
+    call check(index(error%message, newline) == 0, "one line: " // message)
+  end subroutine refuse
+
+  !> Text of an input: keys of &scene, and groups after it.
+  pure function scene(keys, groups) result(text)
+    character(len=*), intent(in) :: keys
+    character(len=*), intent(in), optional :: groups
+    character(len=:), allocatable :: text
+    text = "&scene " // keys // " /" // time
+    if (present(groups)) text = text // groups
+  end function scene
+
+  subroutine test_whole_file()
+    type(config_t) :: config
+    character(len=:), allocatable :: text
+
+    text = whole_file()
+    call accept(text, "a file with every group", config)
+    call check_equal(config%file, "case.nml", "file")
+    call check_equal(config%text, text, "text")
+    call check_equal(config%scene%title, "three spheres", "title")
+    call check_equal(config%scene%dimension, 3, "dimension")
+    call check_close(config%scene%gravity(1), 0.5_dp, 0.0_dp, "gravity(1)")
+    call check_close(config%scene%gravity(2), -0.25_dp, 0.0_dp, "gravity(2)")
+    call check_close(config%scene%gravity(3), -1.5_dp, 0.0_dp, "gravity(3)")
+    call check_equal(config%scene%bodies, "column", "bodies")
+    call check_equal(config%scene%column_count, 7, "column_count")
+    call check_close(config%scene%radius, 0.5_dp, 0.0_dp, "radius")
+    call check_close(config%scene%mass, 2.0_dp, 0.0_dp, "mass")
+    call check_close(config%scene%friction, 0.375_dp, 0.0_dp, "friction")
+    call check_close(config%scene%wall_friction, 0.625_dp, 0.0_dp, "wall_friction")
+    call check_close(config%scene%alert_distance, 0.125_dp, 0.0_dp, "alert_distance")
+    call check(config%scene%alert_given, "alert_given")
+    call check_close(config%time%step, 0.0078125_dp, 0.0_dp, "step")
+    call check_equal(config%time%steps, 40, "steps")
+    call check_close(config%time%theta, 0.75_dp, 0.0_dp, "theta")
+    call check_whole_methods(config)
+  end subroutine test_whole_file
+
+  pure function whole_file() result(text)
+    character(len=:), allocatable :: text
+    text = "&scene title = 'three spheres', dimension = 3, gravity = 0.5, -0.25, -1.5" // newline &
+      // "  bodies = 'column', column_count = 7, radius = 0.5, mass = 2.0, friction = 0.375" // newline &
+      // "  wall_friction = 0.625, alert_distance = 0.125" // newline // "/" // newline &
+      // "&time step = 0.0078125, steps = 40, theta = 0.75 /" // newline &
+      // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
+      // "  check_every = 5, warm_start = .false., on_failure = 'stop' /" // newline &
+      // "&decomposition partition = 'grid', kind = 'primal', grid = 1, 2, 3, subdomains = 6" // newline &
+      // "  repartition_every = 9 /" // newline &
+      // "&enriched direction = 2.5, direction_unit = 'absolute', contacts = 'active', interface = 'cg'" // newline &
+      // "  cg_tolerance = 0.0625, cg_max_iterations = 77 /" // newline &
+      // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true. /" // newline
+  end function whole_file
+
+  subroutine check_whole_methods(config)
+    type(config_t), intent(in) :: config
+
+    call check_equal(config%solver%method, "nscdd_ep", "method")
+    call check_equal(config%solver%criterion, "error", "criterion")
+    call check_close(config%solver%tolerance, 0.03125_dp, 0.0_dp, "tolerance")
+    call check_equal(config%solver%max_iterations, 50, "max_iterations")
+    call check_equal(config%solver%sweeps, 3, "sweeps")
+    call check_equal(config%solver%check_every, 5, "check_every")
+    call check(.not. config%solver%warm_start, "warm_start")
+    call check_equal(config%solver%on_failure, "stop", "on_failure")
+    call check_equal(config%decomposition%partition, "grid", "partition")
+    call check_equal(config%decomposition%kind, "primal", "kind")
+    call check(all(config%decomposition%grid == [1, 2, 3]), "grid")
+    call check_equal(config%decomposition%subdomains, 6, "subdomains")
+    call check_equal(config%decomposition%repartition_every, 9, "repartition_every")
+    call check_close(config%enriched%direction, 2.5_dp, 0.0_dp, "direction")
+    call check_equal(config%enriched%direction_unit, "absolute", "direction_unit")
+    call check_equal(config%enriched%contacts, "active", "contacts of enriched")
+    call check_equal(config%enriched%interface, "cg", "interface")
+    call check_close(config%enriched%cg_tolerance, 0.0625_dp, 0.0_dp, "cg_tolerance")
+    call check_equal(config%enriched%cg_max_iterations, 77, "cg_max_iterations")
+    call check_equal(config%output%directory, "out", "directory")
+    call check_equal(config%output%every, 4, "every")
+    call check(.not. config%output%contacts, "contacts of output")
+    call check(config%output%trace, "trace")
+    call check(config%output%final_bodies, "final_bodies")
+  end subroutine check_whole_methods
+
+  subroutine test_defaults()
+    type(config_t) :: config
+
+    call accept(column, "the shortest file", config)
+    call check_equal(config%scene%title, "", "default title")
+    call check_equal(config%scene%dimension, 2, "default dimension")
+    call check_close(config%scene%gravity(1), 0.0_dp, 0.0_dp, "default gravity(1)")
+    call check_close(config%scene%gravity(2), -9.81_dp, 0.0_dp, "default gravity(2) in 2D")
+    call check_close(config%scene%gravity(3), 0.0_dp, 0.0_dp, "default gravity(3) in 2D")
+    call check_equal(config%scene%bodies_file, "", "default bodies_file")
+    call check_equal(config%scene%column_count, 3, "default column_count")
+    call check_close(config%scene%radius, 1.0_dp, 0.0_dp, "default radius")
+    call check_close(config%scene%mass, 1.0_dp, 0.0_dp, "default mass")
+    call check_close(config%scene%density, 2500.0_dp, 0.0_dp, "default density")
+    call check(all(config%scene%lattice_count == 0), "default lattice_count")
+    call check_close(config%scene%radius_min, 0.0_dp, 0.0_dp, "default radius_min")
+    call check_close(config%scene%radius_max, 0.0_dp, 0.0_dp, "default radius_max")
+    call check_equal(config%scene%seed, 1, "default seed")
+    call check_close(config%scene%friction, 0.0_dp, 0.0_dp, "default friction")
+    call check_close(config%scene%wall_friction, 0.0_dp, 0.0_dp, "default wall_friction")
+    call check(config%scene%alert_distance < 0.0_dp, "default alert_distance")
+    call check(.not. config%scene%alert_given, "default alert_given")
+    call check_close(config%time%theta, 0.5_dp, 0.0_dp, "default theta")
+    call check_default_methods(config)
+  end subroutine test_defaults
+
+  subroutine check_default_methods(config)
+    type(config_t), intent(in) :: config
+
+    call check_equal(config%solver%method, "nlgs", "default method")
+    call check_equal(config%solver%criterion, "residual", "default criterion")
+    call check_close(config%solver%tolerance, 1.0e-4_dp, 0.0_dp, "default tolerance")
+    call check_equal(config%solver%max_iterations, 10000, "default max_iterations")
+    call check_equal(config%solver%sweeps, 1, "default sweeps")
+    call check_equal(config%solver%check_every, 10, "default check_every")
+    call check(config%solver%warm_start, "default warm_start")
+    call check_equal(config%solver%on_failure, "continue", "default on_failure")
+    call check_equal(config%decomposition%partition, "grid", "default partition")
+    call check_equal(config%decomposition%kind, "dual", "default kind")
+    call check(all(config%decomposition%grid == 0), "default grid")
+    call check_equal(config%decomposition%subdomains, 1, "default subdomains")
+    call check_equal(config%decomposition%repartition_every, 0, "default repartition_every")
+    call check_close(config%enriched%direction, 1.0_dp, 0.0_dp, "default direction")
+    call check_equal(config%enriched%direction_unit, "relative", "default direction_unit")
+    call check_equal(config%enriched%contacts, "all", "default contacts of enriched")
+    call check_equal(config%enriched%interface, "mumps", "default interface")
+    call check_close(config%enriched%cg_tolerance, 1.0e-12_dp, 0.0_dp, "default cg_tolerance")
+    call check_equal(config%enriched%cg_max_iterations, 10000, "default cg_max_iterations")
+    call check_equal(config%output%directory, "results", "default directory")
+    call check_equal(config%output%every, 1, "default every")
+    call check(config%output%contacts, "default contacts of output")
+    call check(.not. config%output%trace, "default trace")
+    call check(.not. config%output%final_bodies, "default final_bodies")
+  end subroutine check_default_methods
+
+  subroutine test_defaults_in_space()
+    type(config_t) :: config
+
+    call accept(scene("bodies = 'column' dimension = 3"), "3D", config)
+    call check_close(config%scene%gravity(2), 0.0_dp, 0.0_dp, "default gravity(2) in 3D")
+    call check_close(config%scene%gravity(3), -9.81_dp, 0.0_dp, "default gravity(3) in 3D")
+    call accept(scene("gravity(1) = 1.5 bodies = 'column' dimension = 3"), "gravity before dimension", config)
+    call check_close(config%scene%gravity(1), 1.5_dp, 0.0_dp, "gravity(1) given alone")
+    call check_close(config%scene%gravity(3), -9.81_dp, 0.0_dp, "gravity(3) where only gravity(1) is given")
+  end subroutine test_defaults_in_space
+
+  subroutine test_derived_values()
+    type(config_t) :: config
+
+    call accept(scene("bodies = 'column' friction = 0.25"), "friction alone", config)
+    call check_close(config%scene%wall_friction, 0.25_dp, 0.0_dp, "wall_friction follows friction")
+    call accept(scene("bodies = 'column' friction = 0.25 wall_friction = 0"), "wall_friction", config)
+    call check_close(config%scene%wall_friction, 0.0_dp, 0.0_dp, "wall_friction given as 0")
+    call accept(scene("bodies = 'column' alert_distance = 0"), "alert_distance = 0", config)
+    call check(config%scene%alert_given, "alert_given where alert_distance = 0")
+    call accept(scene("bodies = 'lattice'" // lattice_keys), "a lattice in 2D", config)
+    call check(all(config%scene%lattice_count == [4, 5, 1]), "one layer of a lattice in 2D")
+    call accept(scene("bodies = 'file' bodies_file = 'a.h5' density = 3"), "a bodies file", config)
+    call check_equal(config%scene%bodies_file, "a.h5", "bodies_file")
+    call accept(column // "&solver method = 'nscdd' / &decomposition grid = 3, 4 /", "a grid in 2D", config)
+    call check_equal(config%decomposition%subdomains, 12, "subdomains of a grid")
+    call check(all(config%decomposition%grid == [3, 4, 1]), "one layer of a grid in 2D")
+    call accept(column // "&solver method = 'nscdd' / &decomposition grid = 3, 4, 1, subdomains = 12 /", "both", config)
+    call accept(column // "&solver method = 'schwarz' / &decomposition partition = 'metis', subdomains = 5 /", "metis", config)
+    call check_equal(config%decomposition%subdomains, 5, "subdomains alone")
+    call accept(column // "&decomposition grid = 1, 1 /", "nlgs on a grid of one box", config)
+    call accept(column // "&decomposition partition = 'metis' grid = 3*0 /", "a grid of zeros, which is none", config)
+    call accept(column // "&enriched interface = 'cg' /", "enriched keys with another method", config)
+  end subroutine test_derived_values
+
+  !> Values at the ends of what is allowed.
+  subroutine test_limits()
+    type(config_t) :: config
+
+    call accept("&scene bodies = 'column' column_count = 1 / &time step = 1, steps = 0, theta = 1 /", "no step", config)
+    call check_equal(config%time%steps, 0, "steps = 0")
+    call accept("&scene bodies = 'column' / &time step = 1, steps = 1, theta = 0.5 /", "theta = 0.5", config)
+    call accept(column // "&solver max_iterations = 1, sweeps = 1, check_every = 1 /", "counts of 1", config)
+    call accept(column // "&enriched direction = 0, cg_max_iterations = 1 / &output every = 0 /", "direction = 0", config)
+    call check_close(config%enriched%direction, 0.0_dp, 0.0_dp, "direction = 0")
+    call check_equal(config%output%every, 0, "every = 0")
+    call accept(scene("bodies = 'lattice' lattice_count = 1, 1 radius_min = 1 radius_max = 1 seed = -3"), "one radius", config)
+    call check_equal(config%scene%seed, -3, "seed = -3")
+  end subroutine test_limits
+
+  !> Every word of every choice, and any case.
+  subroutine test_words_of_choices()
+    call accept_words("solver", "method", "nlgs schwarz schwarz_ec nscdd nscdd_ep")
+    call accept_words("solver", "criterion", "residual error")
+    call accept_words("solver", "on_failure", "continue stop discard")
+    call accept_words("decomposition", "partition", "grid metis")
+    call accept_words("decomposition", "kind", "dual primal")
+    call accept_words("enriched", "direction_unit", "relative absolute")
+    call accept_words("enriched", "contacts", "all active")
+    call accept_words("enriched", "interface", "mumps cg CG")
+  end subroutine test_words_of_choices
+
+  subroutine accept_words(group, key, words)
+    character(len=*), intent(in) :: group, key
+    !> separated by blanks
+    character(len=*), intent(in) :: words
+    type(config_t) :: config
+    integer :: first, length
+
+    first = 1
+    do while (first <= len(words))
+      length = index(words(first:) // " ", " ") - 1
+      call accept(column // "&" // group // " " // key // " = '" // words(first:first + length - 1) // "' /", &
+        key // " = " // words(first:first + length - 1), config)
+      first = first + length + 1
+    end do
+    call refuse(column // "&" // group // " " // key // " = 'others' /", &
+      "&" // group // " " // key // " = 'others': expected " // listed(group, key))
+  end subroutine accept_words
+
+  pure function listed(group, key) result(text)
+    character(len=*), intent(in) :: group, key
+    character(len=:), allocatable :: text
+    select case (group // " " // key)
+    case ("solver method")
+      text = "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd' or 'nscdd_ep'"
+    case ("solver criterion")
+      text = "'residual' or 'error'"
+    case ("solver on_failure")
+      text = "'continue', 'stop' or 'discard'"
+    case ("decomposition partition")
+      text = "'grid' or 'metis'"
+    case ("decomposition kind")
+      text = "'dual' or 'primal'"
+    case ("enriched direction_unit")
+      text = "'relative' or 'absolute'"
+    case ("enriched contacts")
+      text = "'all' or 'active'"
+    case default
+      text = "'mumps' or 'cg'"
+    end select
+  end function listed
+
+  subroutine test_syntax_of_names()
+    type(config_t) :: config
+
+    call accept("&SCENE BODIES='column'/&Time Step=0.1 STEPS=5&End", "any case, no blanks, &end", config)
+    call check_equal(config%time%steps, 5, "steps before &End")
+    call accept("&scene" // carriage // newline // "bodies" // tab // "=" // tab // "'column'" // carriage // newline &
+      // "/" // carriage // newline // time // carriage // newline, "CRLF and tabs", config)
+    call check_equal(config%scene%bodies, "column", "bodies between CRLF and tabs")
+    call accept("&scene bodies = 'column' / &time steps" // newline // "=" // newline // "5" // newline // "step = 0.1 /", &
+      "an assignment on three lines", config)
+    call check_equal(config%time%steps, 5, "steps on three lines")
+    call accept("! first = 1 /" // newline // "&scene ! &time" // newline // "bodies = 'column'! it's" // newline &
+      // "friction = 0.5 ! friction = 0.75" // newline // "/ ! end" // newline // time, "comments", config)
+    call check_close(config%scene%friction, 0.5_dp, 0.0_dp, "friction before a comment")
+    call accept(char(239) // char(187) // char(191) // column, "a byte order mark", config)
+    call accept(column // "&solver / &output&end", "groups without keys", config)
+    call accept("&scene, bodies = 'column',, friction = 0.5, /" // time, "commas between assignments", config)
+  end subroutine test_syntax_of_names
+
+  subroutine test_syntax_of_values()
+    type(config_t) :: config
+
+    call accept(scene("bodies='column'friction=.5 wall_friction=+1d-1,dimension=02"), "numbers", config)
+    call check_close(config%scene%friction, 0.5_dp, 0.0_dp, "friction = .5")
+    call check_close(config%scene%wall_friction, 0.1_dp, 0.0_dp, "wall_friction = +1d-1")
+    call check_equal(config%scene%dimension, 2, "dimension = 02")
+    call accept("&scene bodies = 'column' radius = 1 mass = 2. / &time step = 1E-2, steps = +7,/", "more numbers", config)
+    call check_close(config%time%step, 0.01_dp, 0.0_dp, "step = 1E-2")
+    call check_equal(config%time%steps, 7, "steps = +7")
+    call accept(scene("bodies = 'column' gravity = 2*0.5 ! two" // newline // ", 0"), "a repeat count on two lines", config)
+    call check_close(config%scene%gravity(2), 0.5_dp, 0.0_dp, "gravity(2) by a repeat count")
+    call check_close(config%scene%gravity(3), 0.0_dp, 0.0_dp, "gravity(3) after a comment")
+    call accept(scene("bodies = 'column' gravity = , -1.5"), "a null value", config)
+    call check_close(config%scene%gravity(1), 0.0_dp, 0.0_dp, "gravity(1) by default")
+    call check_close(config%scene%gravity(2), -1.5_dp, 0.0_dp, "gravity(2) after a null value")
+    call accept(scene("dimension = 3 bodies = 'column' gravity (2) = 1 gravity( 1 ) = 2, gravity(3:3) = 4"), "entries", config)
+    call check_close(config%scene%gravity(1), 2.0_dp, 0.0_dp, "gravity( 1 )")
+    call check_close(config%scene%gravity(2), 1.0_dp, 0.0_dp, "gravity (2)")
+    call check_close(config%scene%gravity(3), 4.0_dp, 0.0_dp, "gravity(3:3)")
+    call accept(column // "&output contacts = F trace = true final_bodies = .T. every = 3 /", "logicals", config)
+    call check(.not. config%output%contacts, "contacts = F")
+    call check(config%output%trace, "trace = true")
+    call check(config%output%final_bodies, "final_bodies = .T.")
+    call check_equal(config%output%every, 3, "the key after a logical")
+  end subroutine test_syntax_of_values
+
+  subroutine test_syntax_of_texts()
+    type(config_t) :: config
+
+    call accept(scene("bodies = 'column' title = 'it''s / & ! = ""a"" friction = 1'"), "single quotes", config)
+    call check_equal(config%scene%title, "it's / & ! = ""a"" friction = 1", "title in single quotes")
+    call accept(scene("bodies = ""column"" title = ""it's """"here"""" /"""), "double quotes", config)
+    call check_equal(config%scene%title, "it's ""here"" /", "title in double quotes")
+    call accept(scene("bodies = 'column' title = ''"), "an empty text", config)
+    call check_equal(config%scene%title, "", "an empty title")
+    call accept(scene("bodies = 'column' title = ''''"), "a text of one quote", config)
+    call check_equal(config%scene%title, "'", "a title of one quote")
+    call accept(scene("bodies = 'column' title = '  two  blanks'"), "blanks in a text", config)
+    call check_equal(config%scene%title, "  two  blanks", "blanks in a title")
+    call accept(scene("title = 'results/run 1' bodies = 'column'"), "a path", config)
+    call check_equal(config%scene%bodies, "column", "the key after a path")
+  end subroutine test_syntax_of_texts
+
+  !> A text has 4096 characters at most, doubled quotes counted once.
+  subroutine test_long_texts()
+    type(config_t) :: config
+
+    call accept(scene("bodies = 'column' title = '" // repeat("a", 4095) // "b'"), "4096 characters", config)
+    call check_equal(config%scene%title, repeat("a", 4095) // "b", "a title of 4096 characters")
+    call accept(scene("bodies = 'column' title = '" // repeat("''", 4096) // "'"), "4096 quotes", config)
+    call check_equal(config%scene%title, repeat("'", 4096), "a title of 4096 quotes")
+    call refuse(scene("bodies = 'column' title = '" // repeat("a", 4097) // "'"), &
+      "&scene title = '" // repeat("a", 79) // "...: expected a text in quotes, at most 4096 characters")
+    call refuse(scene("bodies = 'column' title = '" // repeat("''", 4097) // "'"), &
+      "&scene title = '" // repeat("'", 79) // "...: expected a text in quotes, at most 4096 characters")
+  end subroutine test_long_texts
+
+  !> The library of gfortran 12 skips the first namelist read after some that failed.
+  subroutine test_failures_leave_nothing_behind()
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    character(len=4), parameter :: bad(*) = ["1e- ", "1e=3", "1.d$", "abc ", "1.0."]
+    integer :: i
+
+    do i = 1, size(bad)
+      call refuse("&scene bodies = 'column' / &time step = " // trim(bad(i)) // " /", &
+        "&time step = " // trim(bad(i)) // ": " // positive // " (s)")
+      ! nothing in between: any write to a variable would hide what a failed read leaves behind
+      call parse_config("case.nml", "&scene bodies = 'column' / &time step = " // bad(i) // " /", config, error)
+      call parse_config("case.nml", column, config, error)
+      call check(.not. allocated(error), "a file after step = " // bad(i) // " is accepted")
+      call check_close(config%time%step, 0.1_dp, 0.0_dp, "step after " // bad(i))
+      call check_equal(config%time%steps, 5, "steps after " // bad(i))
+    end do
+  end subroutine test_failures_leave_nothing_behind
+
+  subroutine test_refused_files()
+    character(len=*), parameter :: outside = &
+      "' stands outside a group (a group is &name key = value ... /, and a text needs quotes)"
+    character(len=*), parameter :: empty = "empty file: expected namelist groups, &scene and &time at least"
+
+    call refuse("", empty)
+    call refuse(" " // newline // tab // "! nothing = 0" // newline, empty)
+    call refuse("scene: 3 bodies" // newline // column, "not a namelist: line 1: 'scene: 3 bodies" // outside)
+    call refuse(column // newline // "end" // newline, "not a namelist: line 2: 'end" // outside)
+    call refuse("&scene bodies = 'column' / friction = 1" // newline // time, "not a namelist: line 1: 'friction = 1" // outside)
+    call refuse(column // newline // "&output directory = a/b /", "not a namelist: line 2: 'b /" // outside)
+    call refuse("&scene bodies = 'column'" // newline // time, &
+      "group &scene (line 1) is not closed: expected / before &time (line 2)")
+    call refuse("&scene bodies = 'column' /" // newline // "&time step = 1 steps = 1 ! /", &
+      "group &time (line 2) is not closed: expected / before the end of the file")
+    call refuse("&scene bodies = 'column", "&scene bodies = 'column: expected a quote that closes on its line (line 1)")
+    call refuse("&scene" // newline // "title = ""a' / " // newline // "/" // time, &
+      "&scene title = ""a' /: expected a quote that closes on its line (line 2)")
+    call refuse("& scene bodies = 'column' /" // time, "line 1: expected the name of a group after &")
+    call refuse("&scene" // newline // "bodies 'column' /" // time, &
+      "&scene (line 2): expected key = value, found 'bodies 'column' / &time step = 0.1, steps = 5 /'")
+    call refuse("&scene 3 = 4 /" // time, "&scene (line 1): expected key = value, found '3 = 4 / &time step = 0.1, steps = 5 /'")
+    call refuse("&scene friction(1 = 2 /" // newline // ") /", "&scene (line 1): expected key = value, found 'friction(1 = 2 /'")
+    call refuse("&scene friction(1", "&scene (line 1): expected key = value, found 'friction(1'")
+    call refuse("&scene friction", "&scene (line 1): expected key = value, found 'friction'")
+    call refuse("&scene friction =", "group &scene (line 1) is not closed: expected / before the end of the file")
+    call refuse("&", "line 1: expected the name of a group after &")
+  end subroutine test_refused_files
+
+  subroutine test_refused_names()
+    call refuse(column // "&solvr /", "unknown group &solvr; did you mean &solver?")
+    call refuse(column // "&physics /", &
+      "unknown group &physics: expected one of &scene &time &solver &decomposition &enriched &output")
+    call refuse(column // "&solver methd = 'nlgs' /", "unknown key 'methd' in &solver; did you mean 'method'?")
+    call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
+    call refuse(column // "&time sweeps = 3 /", "group &time is given twice (lines 1 and 1): expected once")
+    call refuse("&scene / &time sweeps = 3 /", "unknown key 'sweeps' in &time; it belongs to &solver")
+    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of step steps theta")
+    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of step steps theta")
+    call refuse("&scene / &time " // repeat("step", 15) // " = 3 /", &
+      "unknown key '" // repeat("step", 15) // "' in &time: expected one of step steps theta")
+    call refuse("&scene bodies = 'column' /", "group &time is missing: expected &time ... /")
+    call refuse(time, "group &scene is missing: expected &scene ... /")
+    call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice' or 'file'")
+    call refuse("&scene bodies = 'column' / &time steps = 1 /", &
+      "&time step is missing: expected a finite real number > 0 (s)")
+    call refuse("&scene bodies = 'column' / &time step = 1 /", "&time steps is missing: expected an integer >= 0")
+  end subroutine test_refused_names
+
+  subroutine test_refused_duplicates()
+    call refuse(column // newline // "&scene /", "group &scene is given twice (lines 1 and 2): expected once")
+    call refuse(scene("bodies = 'column' friction = 0.5 friction = 0.25"), &
+      "&scene friction = 0.25: expected once, but it is given twice, first as friction = 0.5")
+    call refuse(scene("bodies = 'column' gravity(2) = 1 gravity = 3*0"), &
+      "&scene gravity = 3*0: expected once, but it is given twice, first as gravity(2) = 1")
+    call refuse(scene("bodies = 'column' gravity(1:2) = 0, 1 gravity(3) = 0 gravity(2) = 5"), &
+      "&scene gravity(2) = 5: expected once, but it is given twice, first as gravity(1:2) = 0, 1, gravity(3) = 0")
+    call refuse(scene("dimension = 2 dimension = 3 bodies = 'column'"), &
+      "&scene dimension = 3: expected once, but it is given twice, first as dimension = 2")
+  end subroutine test_refused_duplicates
+
+  !> Values that are not of the key's kind.
+  subroutine test_refused_kinds()
+    call refuse(scene("bodies = column"), "&scene bodies = column: expected 'column', 'lattice' or 'file'")
+    call refuse(scene("bodies = 'columns'"), "&scene bodies = 'columns': expected 'column', 'lattice' or 'file'")
+    call refuse(scene("bodies = 'column lattice'"), "&scene bodies = 'column lattice': expected 'column', 'lattice' or 'file'")
+    call refuse(scene("bodies = ''"), "&scene bodies = '': expected 'column', 'lattice' or 'file'")
+    call refuse(scene("bodies = 3"), "&scene bodies = 3: expected 'column', 'lattice' or 'file'")
+    call refuse(scene("bodies = 'column' title = 3"), "&scene title = 3: expected a text in quotes, at most 4096 characters")
+    call refuse(scene("bodies = 'column' title = 'a', 'b'"), &
+      "&scene title = 'a', 'b': expected a text in quotes, at most 4096 characters")
+    call refuse(scene("bodies = 'column' column_count = 2.5"), "&scene column_count = 2.5: expected an integer >= 1")
+    call refuse(scene("bodies = 'column' column_count = 'a'"), "&scene column_count = 'a': expected an integer >= 1")
+    call refuse(scene("bodies = 'column' column_count = 99999999999"), &
+      "&scene column_count = 99999999999: expected an integer >= 1")
+    call refuse(column // "&output trace = yes /", "&output trace = yes: expected .true. or .false.")
+    call refuse(column // "&output trace = tomato /", "&output trace = tomato: expected .true. or .false.")
+    call refuse(column // "&output trace = 1 /", "&output trace = 1: expected .true. or .false.")
+    call refuse(column // "&output trace = /", "&output trace = (nothing): expected .true. or .false.")
+    call refuse(column // "&output directory = , /", &
+      "&output directory = (nothing): expected a text in quotes, not empty, at most 4096 characters")
+  end subroutine test_refused_kinds
+
+  !> Numbers that are none, or not finite.
+  subroutine test_refused_numbers()
+    call refuse_radius("1,5")
+    call refuse_radius("1 2")
+    call refuse_radius("1;")
+    call refuse_radius("one")
+    call refuse_radius("1.0f")
+    call refuse_radius("(1, 2)")
+    call refuse_radius("1*")
+    call refuse_radius("NaN")
+    call refuse_radius("inf")
+    call refuse_radius("-Infinity")
+    call refuse_radius("1e999")
+    call refuse_radius("1 .5 ! a comment" // newline // "2", "1 .5 2")
+    call refuse(scene("bodies = 'column' radius = mass = 1"), "&scene radius = (nothing): " // positive // " (m)")
+    call refuse(scene("bodies = 'column' gravity = 0, nan"), &
+      "&scene gravity = 0, nan: expected at most 3 finite real numbers (m/s^2)")
+    call refuse(column // "&solver tolerance = 1e400 /", "&solver tolerance = 1e400: " // positive)
+  end subroutine test_refused_numbers
+
+  subroutine refuse_radius(value, shown)
+    character(len=*), intent(in) :: value
+    !> the value in the message, if not the same
+    character(len=*), intent(in), optional :: shown
+    character(len=:), allocatable :: quoted
+    quoted = value
+    if (present(shown)) quoted = shown
+    call refuse(scene("bodies = 'column' radius = " // value), "&scene radius = " // quoted // ": " // positive // " (m)")
+  end subroutine refuse_radius
+
+  !> Entries that a key does not have.
+  subroutine test_refused_entries()
+    call refuse(scene("bodies = 'column' gravity = 4*0"), &
+      "&scene gravity = 4*0: expected at most 3 finite real numbers (m/s^2)")
+    call refuse(column // "&decomposition grid(4) = 1 /", "&decomposition grid(4) = 1: expected at most 3 integers >= 1")
+    call refuse(column // "&decomposition grid(0) = 1 /", "&decomposition grid(0) = 1: expected at most 3 integers >= 1")
+    call refuse(column // "&decomposition grid(a) = 1 /", "&decomposition grid(a) = 1: expected at most 3 integers >= 1")
+    call refuse(column // "&decomposition grid() = 1 /", "&decomposition grid() = 1: expected at most 3 integers >= 1")
+    call refuse(column // "&solver sweeps(1) = 1 /", "&solver sweeps(1) = 1: expected sweeps without an index")
+  end subroutine test_refused_entries
+
+  subroutine test_rules_of_scene()
+    call refuse(scene("bodies = 'column' dimension = 4"), "&scene dimension = 4: expected an integer 2 or 3")
+    call refuse(scene("bodies = 'column' dimension = 1"), "&scene dimension = 1: expected an integer 2 or 3")
+    call refuse(scene("bodies = 'column' gravity = 0, 0, -9.81"), &
+      "&scene gravity = 0, 0, -9.81: expected a third component of 0 where dimension = 2")
+    call refuse(scene("bodies = 'column' friction = -0.5"), &
+      "&scene friction = -0.5: expected a finite real number >= 0")
+    call refuse(scene("bodies = 'column' wall_friction = -1"), &
+      "&scene wall_friction = -1: expected a finite real number >= 0")
+    call refuse(scene("bodies = 'column' alert_distance = -1"), &
+      "&scene alert_distance = -1: expected a finite real number >= 0 (m)")
+    call refuse(scene("bodies = 'column' column_count = 0"), "&scene column_count = 0: expected an integer >= 1")
+    call refuse(scene("bodies = 'column' radius = 0"), "&scene radius = 0: " // positive // " (m)")
+    call refuse(scene("bodies = 'column' mass = 0"), "&scene mass = 0: " // positive // " (kg)")
+    call refuse(scene("bodies = 'file' bodies_file = 'a.h5' density = 0"), &
+      "&scene density = 0: " // positive // " (kg/m^3, kg/m^2 in 2D)")
+    call refuse(scene("bodies = 'file'"), "&scene bodies_file is missing: expected a text in quotes, not empty, " &
+      // "at most 4096 characters, required by bodies = 'file'")
+    call refuse(scene("bodies = 'file' bodies_file = ' '"), &
+      "&scene bodies_file = ' ': expected a text in quotes, not empty, at most 4096 characters")
+  end subroutine test_rules_of_scene
+
+  !> Keys that belong to another kind of bodies.
+  subroutine test_rules_of_bodies()
+    call refuse_stranger("column", "", "bodies_file = 'a.h5'", "'file'")
+    call refuse_stranger("column", "", "density = 1", "'lattice' or 'file'")
+    call refuse_stranger("column", "", "lattice_count = 1, 1", "'lattice'")
+    call refuse_stranger("column", "", "radius_min = 1", "'lattice'")
+    call refuse_stranger("column", "", "radius_max = 1", "'lattice'")
+    call refuse_stranger("column", "", "seed = 1", "'lattice'")
+    call refuse_stranger("file", "bodies_file = 'a.h5'", "column_count = 3", "'column'")
+    call refuse_stranger("file", "bodies_file = 'a.h5'", "seed = 1", "'lattice'")
+    call refuse_stranger("lattice", lattice_keys, "column_count = 3", "'column'")
+    call refuse_stranger("lattice", lattice_keys, "radius = 1", "'column'")
+    call refuse_stranger("lattice", lattice_keys, "mass = 1", "'column'")
+    call refuse_stranger("lattice", lattice_keys, "bodies_file = 'a.h5'", "'file'")
+  end subroutine test_rules_of_bodies
+
+  subroutine refuse_stranger(bodies, keys, assignment, owners)
+    !> the kind of bodies, and the keys that it needs
+    character(len=*), intent(in) :: bodies, keys
+    !> what does not belong there, and to what it belongs
+    character(len=*), intent(in) :: assignment, owners
+    character(len=:), allocatable :: key
+    key = assignment(:index(assignment, " ") - 1)
+    call refuse(scene("bodies = '" // bodies // "' " // keys // " " // assignment), "&scene " // assignment // ": " // key &
+      // " belongs to bodies = " // owners // ", expected without it where bodies = '" // bodies // "'")
+  end subroutine refuse_stranger
+
+  subroutine test_rules_of_lattice()
+    character(len=*), parameter :: lattice = "bodies = 'lattice' radius_min = 0.1 radius_max = 0.2 "
+    character(len=*), parameter :: counted = "bodies = 'lattice' lattice_count = 2, 2 "
+
+    call refuse(scene(lattice), &
+      "&scene lattice_count is missing: expected at most 3 integers >= 1, required by bodies = 'lattice'")
+    call refuse(scene(lattice // "lattice_count = 3"), &
+      "&scene lattice_count = 3: expected 2 integers >= 1 where dimension = 2")
+    call refuse(scene(lattice // "lattice_count = 3, 4, 5"), &
+      "&scene lattice_count = 3, 4, 5: expected 2 integers >= 1 where dimension = 2")
+    call refuse(scene(lattice // "lattice_count = 3, 4 dimension = 3"), &
+      "&scene lattice_count = 3, 4: expected 3 integers >= 1 where dimension = 3")
+    call refuse(scene(lattice // "lattice_count = 3, -4"), &
+      "&scene lattice_count = 3, -4: expected 2 integers >= 1 where dimension = 2")
+    call refuse(scene(lattice // "lattice_count = 2*65536"), &
+      "&scene lattice_count = 2*65536: expected at most 2147483647 bodies")
+    call refuse(scene(counted // "radius_max = 1"), &
+      "&scene radius_min is missing: " // positive // " (m), required by bodies = 'lattice'")
+    call refuse(scene(counted // "radius_min = 1"), &
+      "&scene radius_max is missing: " // positive // " (m), required by bodies = 'lattice'")
+    call refuse(scene(counted // "radius_min = 0 radius_max = 1"), "&scene radius_min = 0: " // positive // " (m)")
+    call refuse(scene(counted // "radius_min = 1 radius_max = -1"), "&scene radius_max = -1: " // positive // " (m)")
+    call refuse(scene(counted // "radius_min = 1 radius_max = 0"), "&scene radius_max = 0: " // positive // " (m)")
+    call refuse(scene(counted // "radius_min = 2 radius_max = 1"), &
+      "&scene radius_min = 2: expected at most radius_max, here radius_max = 1")
+    call refuse(scene(counted // "radius_min = 1 radius_max = 1 density = -1"), &
+      "&scene density = -1: " // positive // " (kg/m^3, kg/m^2 in 2D)")
+  end subroutine test_rules_of_lattice
+
+  subroutine test_rules_of_time_and_solver()
+    character(len=*), parameter :: bodies = "&scene bodies = 'column' / "
+
+    call refuse(bodies // "&time step = 0 steps = 1 /", "&time step = 0: " // positive // " (s)")
+    call refuse(bodies // "&time step = -1e-3 steps = 1 /", "&time step = -1e-3: " // positive // " (s)")
+    call refuse(bodies // "&time step = 1 steps = -1 /", "&time steps = -1: expected an integer >= 0")
+    call refuse(bodies // "&time step = 1 steps = 1 theta = 0.25 /", &
+      "&time theta = 0.25: expected a finite real number in [0.5, 1]")
+    call refuse(bodies // "&time step = 1 steps = 1 theta = 1.5 /", &
+      "&time theta = 1.5: expected a finite real number in [0.5, 1]")
+    call refuse(scene("bodies = 'lattice'" // lattice_keys, "&solver criterion = 'error' /"), &
+      "&solver criterion = 'error': expected 'residual': the exact solution, and so the error, is known for " &
+      // "bodies = 'column' only")
+    call refuse(column // "&solver tolerance = 0 /", "&solver tolerance = 0: " // positive)
+    call refuse(column // "&solver max_iterations = 0 /", "&solver max_iterations = 0: expected an integer >= 1")
+    call refuse(column // "&solver sweeps = 0 /", "&solver sweeps = 0: expected an integer >= 1")
+    call refuse(column // "&solver check_every = 0 /", "&solver check_every = 0: expected an integer >= 1")
+  end subroutine test_rules_of_time_and_solver
+
+  subroutine test_rules_of_decomposition()
+    character(len=*), parameter :: nscdd = column // "&solver method = 'nscdd' / &decomposition "
+    character(len=*), parameter :: one = &
+      "expected one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'"
+
+    call refuse(nscdd // "subdomains = 0 /", "&decomposition subdomains = 0: expected an integer >= 1")
+    call refuse(nscdd // "repartition_every = -1 /", "&decomposition repartition_every = -1: expected an integer >= 0")
+    call refuse(nscdd // "partition = 'metis' grid = 2, 2 /", &
+      "&decomposition grid = 2, 2: expected no grid where partition = 'metis': give subdomains, or partition = 'grid'")
+    call refuse(nscdd // "grid = 2 /", "&decomposition grid = 2: expected 2 integers >= 1 where dimension = 2")
+    call refuse(nscdd // "grid = 2, 2, 2 /", "&decomposition grid = 2, 2, 2: expected 2 integers >= 1 where dimension = 2")
+    call refuse(nscdd // "grid = 2, -2 /", "&decomposition grid = 2, -2: expected 2 integers >= 1 where dimension = 2")
+    call refuse(nscdd // "grid = 2*1000000 /", "&decomposition grid = 2*1000000: expected at most 2147483647 subdomains")
+    call refuse(scene("bodies = 'column' dimension = 3", "&solver method = 'nscdd' / &decomposition grid(1:2) = 2, 2 /"), &
+      "&decomposition grid(1:2) = 2, 2: expected 3 integers >= 1 where dimension = 3")
+    call refuse(nscdd // "grid(2) = 3 grid(1) = 2 subdomains = 5 /", &
+      "&decomposition subdomains = 5: expected 6, the product of grid(2) = 3, grid(1) = 2")
+    call refuse(column // "&decomposition subdomains = 4 /", "&decomposition subdomains = 4: " // one)
+    call refuse(column // "&decomposition grid = 2, 3 /", "&decomposition grid = 2, 3: " // one)
+  end subroutine test_rules_of_decomposition
+
+  subroutine test_rules_of_enriched_and_output()
+    call refuse(column // "&enriched direction = -1 /", &
+      "&enriched direction = -1: expected a finite real number >= 0 (1/W_aa or kg)")
+    call refuse(column // "&enriched cg_tolerance = 0 /", "&enriched cg_tolerance = 0: expected a finite real number in (0, 1)")
+    call refuse(column // "&enriched cg_tolerance = 1 /", "&enriched cg_tolerance = 1: expected a finite real number in (0, 1)")
+    call refuse(column // "&enriched cg_max_iterations = 0 /", "&enriched cg_max_iterations = 0: expected an integer >= 1")
+    call refuse(column // "&output directory = '' /", &
+      "&output directory = '': expected a text in quotes, not empty, at most 4096 characters")
+    call refuse(column // "&output every = -1 /", "&output every = -1: expected an integer >= 0")
+  end subroutine test_rules_of_enriched_and_output
+
+  !> The options in force are those that count: none of another kind of bodies.
+  subroutine test_active_options()
+    type(config_t) :: config
+    character(len=:), allocatable :: text
+
+    call accept(column // "&solver tolerance = 2.5d-7 /", "a file to write back", config)
+    call write_active(text, config)
+    call check_line(text, "&scene")
+    call check_line(text, "  bodies = 'column'")
+    call check_line(text, "  step = 0.1")
+    call check_line(text, "  tolerance = 2.5E-7")
+    call check_line(text, "  cg_tolerance = 1.0E-12")
+    call check_line(text, "  gravity = 0.0, -9.81, 0.0")
+    call check_line(text, "  column_count = 3")
+    call check_line(text, "  warm_start = .true.")
+    call check_line(text, "  ! alert_distance = 0.1 of the largest radius")
+    call check(index(text, "seed") == 0, "no line of a key of the lattice")
+    call check(index(text, "bodies_file") == 0, "no line of a key of the bodies file")
+    call check_written(text, config)
+  end subroutine test_active_options
+
+  subroutine check_line(text, line)
+    character(len=*), intent(in) :: text, line
+    call check(index(newline // text, newline // line // newline) > 0, "written line: " // line)
+  end subroutine check_line
+
+  !> The unit gets the same text, line by line.
+  subroutine check_written(text, config)
+    character(len=*), intent(in) :: text
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: written
+    character(len=100) :: line
+    integer :: unit, status
+
+    open (newunit=unit, status="scratch", action="readwrite")
+    call write_active(unit, config)
+    rewind (unit)
+    written = ""
+    do
+      read (unit, "(a)", iostat=status) line
+      if (status /= 0) exit
+      written = written // trim(line) // newline
+    end do
+    close (unit)
+    call check_equal(written, text, "options written to a unit")
+  end subroutine check_written
+
+  !> What is written back reads as the same.
+  subroutine test_round_trip()
+    call check_round_trip(column, "a column")
+    call check_round_trip(whole_file(), "a whole file")
+    call check_round_trip(scene("bodies = 'lattice' alert_distance = 1e-300 density = 1234567.125" // lattice_keys), &
+      "a lattice")
+    call check_round_trip(scene("bodies = 'file' bodies_file = 'it''s/here' friction = 0.1 " &
+      // "wall_friction = 0.30000000000000004"), "a bodies file")
+    call check_round_trip(column // "&solver method = 'nscdd' tolerance = 1.7976931348623157e308 / " &
+      // "&decomposition grid = 3, 2 /", "a grid")
+  end subroutine test_round_trip
+
+  subroutine check_round_trip(text, name)
+    character(len=*), intent(in) :: text, name
+    type(config_t) :: config, again
+    character(len=:), allocatable :: written, written_again
+
+    call accept(text, name, config)
+    call write_active(written, config)
+    call accept(written, name // " written back", again)
+    call write_active(written_again, again)
+    call check_equal(written_again, written, name // " written back twice")
+    call check_close(again%scene%density, config%scene%density, 0.0_dp, "density of " // name)
+    call check_close(again%scene%wall_friction, config%scene%wall_friction, 0.0_dp, "wall_friction of " // name)
+    call check_close(again%scene%alert_distance, config%scene%alert_distance, 0.0_dp, "alert_distance of " // name)
+    call check_close(again%solver%tolerance, config%solver%tolerance, 0.0_dp, "tolerance of " // name)
+    call check_equal(again%scene%bodies_file, config%scene%bodies_file, "bodies_file of " // name)
+    call check_equal(again%decomposition%subdomains, config%decomposition%subdomains, "subdomains of " // name)
+  end subroutine check_round_trip
+
+  !> doc/keys.md is what write_key_reference writes; with GRAVIER_WRITE_KEYS=1 in the environment it is written again.
+  subroutine test_reference()
+    character(len=1000) :: directory, again
+    integer :: unit, written, line
+    character(len=1000) :: expected, found
+    integer :: status, status_written
+
+    call get_environment_variable("GRAVIER_SOURCE_DIR", directory, status=status)
+    if (status /= 0) directory = "."
+    call get_environment_variable("GRAVIER_WRITE_KEYS", again)
+    if (again == "1") call write_reference(trim(directory) // "/doc/keys.md")
+    open (newunit=written, status="scratch", action="readwrite")
+    call write_key_reference(written)
+    rewind (written)
+    open (newunit=unit, file=trim(directory) // "/doc/keys.md", status="old", action="read", iostat=status)
+    call check_equal(status, 0, "doc/keys.md can be read")
+    line = 0
+    do while (status == 0)
+      line = line + 1
+      read (written, "(a)", iostat=status_written) expected
+      read (unit, "(a)", iostat=status) found
+      call check_equal(status, status_written, "lines of doc/keys.md (GRAVIER_WRITE_KEYS=1 writes it again)")
+      if (status == 0) call check_equal(found, expected, "doc/keys.md (GRAVIER_WRITE_KEYS=1 writes it again)")
+    end do
+    call check_equal(status, iostat_end, "doc/keys.md is read to its end")
+    call check(line > 60, "doc/keys.md has a line for each key")
+    close (written)
+    if (status == iostat_end) close (unit)
+  end subroutine test_reference
+
+  subroutine write_reference(path)
+    character(len=*), intent(in) :: path
+    integer :: unit
+    open (newunit=unit, file=path, status="replace", action="write")
+    call write_key_reference(unit)
+    close (unit)
+  end subroutine write_reference
+
+end program test_config

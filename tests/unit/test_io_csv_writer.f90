@@ -1,0 +1,139 @@
+!> Tables written row by row: exact content, exact numbers, and the errors.
+program test_io_csv_writer
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_negative_inf
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, status_failure
+  use gravier_finite, only: is_finite
+  use gravier_csv_writer, only: csv_writer_t
+  use gravier_check, only: check, check_equal, finish_checks
+  implicit none
+  character(len=*), parameter :: newline = new_line("a")
+  character(len=:), allocatable :: path
+
+  call MPI_Init()
+  path = scratch("io_csv_writer.csv")
+  call test_finite()
+  call test_content()
+  call test_exact_numbers()
+  call test_errors()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  !> A path for files of this test.
+  function scratch(name) result(path)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: path
+    character(len=1000) :: directory
+    integer :: length, stat
+
+    call get_environment_variable("GRAVIER_TEST_DIR", directory, length, stat)
+    path = name
+    if (stat == 0 .and. length > 0) path = directory(1:length)//"/"//name
+  end function scratch
+
+  subroutine test_finite()
+    call check(all(is_finite([0.0_dp, -1.0_dp, huge(1.0_dp), -huge(1.0_dp), tiny(1.0_dp)])), "finite numbers")
+    call check(.not. is_finite(ieee_value(1.0_dp, ieee_quiet_nan)), "NaN")
+    call check(.not. is_finite(ieee_value(1.0_dp, ieee_positive_inf)), "infinity")
+    call check(.not. is_finite(ieee_value(1.0_dp, ieee_negative_inf)), "minus infinity")
+  end subroutine test_finite
+
+  subroutine test_content()
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+
+    call table%open(path, "step,time,name,flag,count", error)
+    call check(table%is_open(), "open")
+    call check_equal(content(), "step,time,name,flag,count"//newline, "header")
+    call table%add(-3)
+    call table%add(0.25_dp)
+    call table%add("plain")
+    call table%add(.true.)
+    call table%add(9007199254740993_i8)
+    call check_equal(content(), "step,time,name,flag,count"//newline, "nothing of an unfinished row")
+    call table%end_row(error)
+    call check_equal(content(), "step,time,name,flag,count"//newline// &
+      & "-3,2.5000000000000000E-001,plain,T,9007199254740993"//newline, "a row is in the file at once")
+    call table%add(1)
+    call table%add(ieee_value(1.0_dp, ieee_quiet_nan))
+    call table%add('a "b", c')
+    call table%add(ieee_value(1.0_dp, ieee_positive_inf))
+    call table%add(ieee_value(1.0_dp, ieee_negative_inf))
+    call table%end_row(error)
+    call table%close(error)
+    call check(.not. allocated(error), "no error")
+    call check(.not. table%is_open(), "closed")
+    call check(index(content(), newline//'1,nan,"a ""b"", c",inf,-inf'//newline) > 0, "quotes and numbers not finite: "//content())
+  end subroutine test_content
+
+  !> 17 significant digits give every double back.
+  subroutine test_exact_numbers()
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+    real(dp), parameter :: values(6) = [1.0_dp/3, -0.1_dp, huge(1.0_dp), tiny(1.0_dp), 4.0_dp*atan(1.0_dp), nearest(1.0_dp, 1.0_dp)]
+    real(dp) :: found
+    integer :: i, unit, stat
+
+    call table%open(path, "value", error)
+    do i = 1, size(values)
+      call table%add(values(i))
+      call table%end_row(error)
+    end do
+    call table%close(error)
+    open (newunit=unit, file=path, status="old", action="read")
+    read (unit, *)
+    do i = 1, size(values)
+      read (unit, *, iostat=stat) found
+      call check(stat == 0 .and. .not. (found < values(i) .or. found > values(i)), "a number comes back exactly")
+    end do
+    close (unit)
+  end subroutine test_exact_numbers
+
+  subroutine test_errors()
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+
+    call table%open(path, "a,b", error)
+    call table%add(1)
+    call table%end_row(error)
+    call expect(error, path//": a row of 1 cells under a header of 2", "a row too short")
+    call table%add(1)
+    call table%add(2)
+    call table%end_row(error)
+    call table%close(error)
+    call check_equal(content(), "a,b"//newline//"1,2"//newline, "a refused row leaves no trace")
+
+    call table%open(path//"/none.csv", "a", error)
+    call expect(error, "none.csv: cannot create this file: Not a directory", "no such directory")
+    call table%open("/dev/full", "a", error)
+    call expect(error, "/dev/full: cannot write to this file: no space left on device", "a full disk")
+    call table%close(error)
+    call check(.not. allocated(error), "close after an error")
+  end subroutine test_errors
+
+  subroutine expect(error, part, name)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=*), intent(in) :: part, name
+
+    call check(allocated(error), name//": an error")
+    if (.not. allocated(error)) return
+    call check_equal(error%status, status_failure, name//": status")
+    call check(index(error%message, part) > 0, name//': "'//part//'" in: '//error%message)
+    deallocate (error)
+  end subroutine expect
+
+  function content() result(text)
+    character(len=:), allocatable :: text
+    integer :: unit, length
+
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old")
+    inquire (unit=unit, size=length)
+    allocate (character(len=length) :: text)
+    if (length > 0) read (unit) text
+    close (unit)
+  end function content
+
+end program test_io_csv_writer

@@ -1,0 +1,166 @@
+!> Directories, renames, reservation of disk space, and text files whose writes are checked.
+program test_io_file_system
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: i8
+  use gravier_errors, only: error_t, status_input, status_failure
+  use gravier_file_system, only: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, &
+    & text_file_t
+  use gravier_check, only: check, check_equal, finish_checks
+  implicit none
+  character(len=:), allocatable :: here
+
+  call MPI_Init()
+  here = scratch("io_file_system")
+  call test_directories()
+  call test_text_files()
+  call test_renames()
+  call test_reservation()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  !> A path for files of this test.
+  function scratch(name) result(path)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: path
+    character(len=1000) :: directory
+    integer :: length, stat
+
+    call get_environment_variable("GRAVIER_TEST_DIR", directory, length, stat)
+    path = name
+    if (stat == 0 .and. length > 0) path = directory(1:length)//"/"//name
+  end function scratch
+
+  subroutine expect(error, status, part, name)
+    type(error_t), allocatable, intent(inout) :: error
+    integer, intent(in) :: status
+    character(len=*), intent(in) :: part, name
+
+    call check(allocated(error), name//": an error")
+    if (.not. allocated(error)) return
+    call check_equal(error%status, status, name//": status")
+    call check(index(error%message, part) > 0, name//': "'//part//'" in: '//error%message)
+    call check(index(error%message, new_line("a")) == 0, name//": one line")
+    deallocate (error)
+  end subroutine expect
+
+  subroutine expect_none(error, name)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=*), intent(in) :: name
+
+    if (allocated(error)) then
+      call check(.false., name//": "//error%message)
+      deallocate (error)
+    else
+      call check(.true., name)
+    end if
+  end subroutine expect_none
+
+  subroutine test_directories()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+
+    call make_directory(here//"/a/b/c", error)
+    call expect_none(error, "nested directories")
+    call make_directory(here//"/a/b/c", error)
+    call expect_none(error, "a directory that exists")
+    call make_directory(here//"/a//d/", error)
+    call expect_none(error, "a path with slashes to spare")
+    call file%create(here//"/a/d/file", error)
+    call file%close(error)
+    call expect_none(error, "a file in the new directory")
+    call make_directory(here//"/a/d/file", error)
+    call expect(error, status_failure, here//"/a/d/file", "a file where a directory should be")
+    call make_directory(here//"/a/d/file/e", error)
+    call expect(error, status_failure, "Not a directory", "a directory below a file")
+    call make_directory("/proc/gravier", error)
+    call expect(error, status_failure, "/proc/gravier: cannot make this directory", "a directory that may not be made")
+    call make_directory("/proc/self", error)
+    call expect(error, status_failure, "/proc/self: this directory cannot be written to", "a directory that exists, not writable")
+    call make_directory("", error)
+    call expect_none(error, "the current directory")
+  end subroutine test_directories
+
+  subroutine test_text_files()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+
+    call file%create(here//"/text", error)
+    call check(file%is_open(), "open after create")
+    call file%append("one"//new_line("a"), error)
+    call file%append("", error)
+    call file%append("two", error)
+    call check_equal(content(here//"/text"), "one"//new_line("a")//"two", "content before the file is closed")
+    call file%close(error)
+    call check(.not. file%is_open(), "not open after close")
+    call file%close(error)
+    call expect_none(error, "text file")
+
+    call file%create(here//"/missing/text", error)
+    call expect(error, status_failure, "missing/text: cannot create this file: No such file", "create in a missing directory")
+    call file%create("/dev/full", error)
+    call file%append("some text", error)
+    call expect(error, status_failure, "/dev/full: cannot write to this file: no space left on device: 9 bytes needed", &
+      & "append to a full device")
+    call file%close(error)
+    call check_readable(here//"/none", error)
+    call expect(error, status_input, "none: cannot read this file: No such file", "reading what is not there")
+    call check_creatable(here, error)
+    call expect(error, status_failure, "cannot create this file: Is a directory", "creating a file over a directory")
+  end subroutine test_text_files
+
+  subroutine test_renames()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+
+    call file%create(here//"/new", error)
+    call file%append("new", error)
+    call file%create(here//"/old", error)
+    call file%append("old", error)
+    call file%close(error)
+    call rename_file(here//"/new", here//"/old", error)
+    call expect_none(error, "rename")
+    call check_equal(content(here//"/old"), "new", "a rename replaces")
+    call rename_file(here//"/new", here//"/old", error)
+    call expect(error, status_failure, "new: cannot rename to ", "rename of what is not there")
+    call remove_file(here//"/old")
+    call remove_file(here//"/old")
+    call check_readable(here//"/old", error)
+    call expect(error, status_input, "No such file", "removed")
+  end subroutine test_renames
+
+  !> What a full disk does is tested on a small file system in test_io_full_disk.
+  subroutine test_reservation()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+
+    call file%create(here//"/reserved", error)
+    call file%append("12345", error)
+    call file%close(error)
+    call reserve_space(here//"/reserved", 100000_i8, error)
+    call reserve_space(here//"/reserved", 0_i8, error)
+    call expect_none(error, "reservation")
+    call check_equal(content(here//"/reserved"), "12345", "a reservation leaves the file as it is")
+    call reserve_space(here//"/nowhere", 1_i8, error)
+    call expect(error, status_failure, "nowhere: cannot write to this file: No such file", "reservation for no file")
+    ! 4 EiB: more than any disk
+    call reserve_space(here//"/reserved", 4611686018427387904_i8, error)
+    call expect(error, status_failure, "4611686018427387904 bytes needed; what was written before stays readable", &
+      & "reservation of more than there is")
+    call check_equal(content(here//"/reserved"), "12345", "the file after a reservation refused")
+  end subroutine test_reservation
+
+  function content(path) result(text)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: text
+    integer :: unit, length
+
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old")
+    inquire (unit=unit, size=length)
+    allocate (character(len=length) :: text)
+    if (length > 0) read (unit) text
+    close (unit)
+  end function content
+
+end program test_io_file_system
