@@ -42,6 +42,8 @@ module gravier_simulation
     type(impulse_memory_t) :: memory
     type(column_solution_t) :: column
     integer(i8) :: n_grains = 0
+    !> messages between ranks, and numbers in them, that iterations of this rank have sent
+    integer(i8) :: messages = 0, values = 0
     integer :: step = 0
     !> [s]
     real(dp) :: time = 0.0_dp
@@ -190,6 +192,8 @@ contains
     else
       call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error)
     end if
+    self%messages = self%messages + self%problem%shared%messages
+    self%values = self%values + self%problem%shared%values
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
     nd = self%decomposition%nd

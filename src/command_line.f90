@@ -1,0 +1,91 @@
+!> The command line of the program, and how it ends.
+module gravier_command_line
+  use, intrinsic :: iso_c_binding, only: c_int
+  use gravier_errors, only: error_t, raise, status_input
+  implicit none
+  private
+  public :: arguments_t, read_arguments, argument, leave
+  public :: action_run, action_check, action_help, action_version, action_keys
+
+  integer, parameter :: action_run = 1, action_check = 2, action_help = 3, action_version = 4, action_keys = 5
+
+  character(len=*), parameter :: nl = new_line("a")
+  character(len=*), parameter :: usage = &
+    & "usage: gravier CASE.nml            run a case (mpirun -n RANKS gravier CASE.nml)"//nl// &
+    & "       gravier --check CASE.nml    read and check it, say what a run would do, run nothing"//nl// &
+    & "       gravier --keys              reference of all input keys, in Markdown"//nl// &
+    & "       gravier --version | --help"//nl// &
+    & "exit status: 0 done and converged; 2 bad input or usage; 3 a solve did not reach its tolerance; 4 anything else"
+
+  type :: arguments_t
+    integer :: action = action_run
+    !> the input file
+    character(len=:), allocatable :: file
+    !> the whole command line
+    character(len=:), allocatable :: command
+    character(len=:), allocatable :: usage
+  end type arguments_t
+
+  interface
+    subroutine c_exit(status) bind(C, name="exit")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: status
+    end subroutine c_exit
+  end interface
+
+contains
+
+  !> Read the command line; the same on all ranks.
+  subroutine read_arguments(arguments, error)
+    type(arguments_t), intent(out) :: arguments
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: word
+    integer :: k
+
+    arguments%usage = usage
+    arguments%file = ""
+    arguments%command = "gravier"
+    do k = 1, command_argument_count()
+      word = argument(k)
+      arguments%command = arguments%command//" "//word
+      select case (word)
+      case ("--check")
+        arguments%action = action_check
+      case ("--help", "-h")
+        arguments%action = action_help
+      case ("--version")
+        arguments%action = action_version
+      case ("--keys")
+        arguments%action = action_keys
+      case default
+        if (index(word, "-") == 1) then
+          call raise(error, status_input, "unknown option "//word//"; see gravier --help")
+        else if (arguments%file /= "") then
+          call raise(error, status_input, "more than one input file: "//arguments%file//" and "//word//"; expected one")
+        end if
+        arguments%file = word
+      end select
+    end do
+    if (arguments%action <= action_check .and. arguments%file == "") &
+      & call raise(error, status_input, "no input file; see gravier --help")
+  end subroutine read_arguments
+
+  !> Word `k` of the command line.
+  function argument(k) result(word)
+    integer, intent(in) :: k
+    character(len=:), allocatable :: word
+    integer :: length
+
+    call get_command_argument(k, length=length)
+    allocate (character(len=length) :: word)
+    call get_command_argument(k, word)
+  end function argument
+
+  !> End the process with an exit status, without the lines that STOP prints.
+  subroutine leave(status)
+    integer, intent(in) :: status
+    call c_exit(int(status, c_int))
+  end subroutine leave
+
+end module gravier_command_line

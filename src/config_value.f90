@@ -1,0 +1,253 @@
+!> Reads the text of one value through a namelist read of one internal record.
+module gravier_config_value
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, ieee_set_halting_mode, &
+    ieee_support_halting, ieee_overflow
+  use gravier_kinds, only: dp
+  use gravier_text, only: lower
+  use gravier_config_types, only: text_length, choice_length
+  use gravier_config_keys, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_slots, only: slot_t
+  implicit none
+  private
+  public :: read_value, number_of, most_entries
+
+  !> entries of the longest key
+  integer, parameter :: most_entries = 3
+  !> room for a text whose quotes are all doubled
+  integer, parameter :: longest_text = 2 * text_length + 2
+
+contains
+
+  !> Reads `key(index) = value` into the variable of the key.
+  !> Fails when the value is not of the key's kind, is not finite, does not fit, is not one of the choices or sets nothing.
+  subroutine read_value(key, index, value, slot, touched, failed)
+    type(key_t), intent(in) :: key
+    !> with its parentheses, or empty
+    character(len=*), intent(in) :: index
+    !> a text without `/` and `&` outside quotes, as scan_groups gives it
+    character(len=*), intent(in) :: value
+    !> the variable, of the kind and count of the key; unchanged on failure
+    type(slot_t), intent(inout) :: slot
+    !> the entries that the value sets
+    logical, intent(out) :: touched(most_entries)
+    logical, intent(out) :: failed
+
+    touched = .false.
+    failed = key%count == 1 .and. index /= ""
+    if (failed) return
+    select case (key%kind)
+    case (kind_integer)
+      call read_integer(key, index // " = " // value, slot, touched, failed)
+    case (kind_real)
+      call read_real(key, index // " = " // value, slot, touched, failed)
+    case (kind_logical)
+      call read_logical(value, slot, touched, failed)
+    case default
+      call read_text(key, value, slot, touched, failed)
+    end select
+  end subroutine read_value
+
+  !> Are the entries set by a value some of the first `count`, and one at least?
+  pure logical function fits(touched, count)
+    logical, intent(in) :: touched(:)
+    integer, intent(in) :: count
+    fits = any(touched) .and. .not. any(touched(count + 1:))
+  end function fits
+
+  subroutine read_integer(key, assignment, slot, touched, failed)
+    type(key_t), intent(in) :: key
+    !> from the index on
+    character(len=*), intent(in) :: assignment
+    type(slot_t), intent(inout) :: slot
+    logical, intent(out) :: touched(most_entries)
+    logical, intent(out) :: failed
+    integer :: values(most_entries), again(most_entries), status
+
+    ! a null value sets nothing: what two reads leave as they found it was not set
+    values = 0
+    again = 1
+    call integers_of_record(assignment, values, status)
+    if (status == 0) call integers_of_record(assignment, again, status)
+    touched = values == again
+    failed = status /= 0 .or. .not. fits(touched, key%count)
+    if (failed) return
+    if (key%count == 1) slot%integer = values(1)
+    if (key%count > 1) where (touched) slot%integers = values
+  end subroutine read_integer
+
+  subroutine read_real(key, assignment, slot, touched, failed)
+    type(key_t), intent(in) :: key
+    !> from the index on
+    character(len=*), intent(in) :: assignment
+    type(slot_t), intent(inout) :: slot
+    logical, intent(out) :: touched(most_entries)
+    logical, intent(out) :: failed
+    real(dp) :: values(most_entries), again(most_entries)
+    integer :: status
+
+    values = 0.0_dp
+    again = 1.0_dp
+    call reals_of_record(assignment, values, status)
+    if (status == 0) call reals_of_record(assignment, again, status)
+    failed = status /= 0 .or. .not. all(ieee_is_finite(values))
+    if (failed) return
+    touched = abs(values - again) < 0.5_dp
+    failed = .not. fits(touched, key%count)
+    if (failed) return
+    if (key%count == 1) slot%real = values(1)
+    if (key%count > 1) where (touched) slot%reals = values
+  end subroutine read_real
+
+  !> Only T, F, TRUE and FALSE, with or without full stops: the intrinsic read would take `tomato` as true.
+  subroutine read_logical(value, slot, touched, failed)
+    character(len=*), intent(in) :: value
+    type(slot_t), intent(inout) :: slot
+    logical, intent(out) :: touched(most_entries)
+    logical, intent(out) :: failed
+    logical :: read_one
+    integer :: status
+
+    touched = .false.
+    select case (lower(value))
+    case ("t", "f", ".t.", ".f.", "true", "false", ".true.", ".false.")
+      call logical_of_record("= " // value, read_one, status)
+      failed = status /= 0
+    case default
+      failed = .true.
+    end select
+    if (failed) return
+    slot%logical = read_one
+    touched(1) = .true.
+  end subroutine read_logical
+
+  !> A text of at most text_length characters, or one of the choices of the key in any case.
+  subroutine read_text(key, value, slot, touched, failed)
+    type(key_t), intent(in) :: key
+    character(len=*), intent(in) :: value
+    type(slot_t), intent(inout) :: slot
+    logical, intent(out) :: touched(most_entries)
+    logical, intent(out) :: failed
+    character(len=longest_text) :: read_one
+    integer :: status
+
+    touched = .false.
+    failed = .not. is_quoted(value)
+    if (failed) return
+    call text_of_record("= " // value, read_one, status)
+    failed = status /= 0 .or. len_trim(read_one) > text_length
+    if (failed) return
+    if (key%kind == kind_choice) then
+      failed = .not. is_choice(lower(trim(read_one)), trim(key%allowed))
+      if (.not. failed) slot%choice = lower(trim(read_one))
+    else
+      slot%text = read_one(:text_length)
+    end if
+    touched(1) = .not. failed
+  end subroutine read_text
+
+  !> Is it one text in quotes, short enough for the reading?
+  pure logical function is_quoted(value)
+    character(len=*), intent(in) :: value
+    integer :: n
+    n = len(value)
+    is_quoted = .false.
+    if (n < 2 .or. n > longest_text) return
+    is_quoted = scan(value(1:1), "'""") == 1 .and. value(n:n) == value(1:1)
+  end function is_quoted
+
+  pure logical function is_choice(word, words)
+    !> without blanks at the end
+    character(len=*), intent(in) :: word
+    !> separated by blanks
+    character(len=*), intent(in) :: words
+    is_choice = word /= "" .and. index(word, " ") == 0 .and. index(" " // words // " ", " " // word // " ") > 0
+  end function is_choice
+
+  subroutine integers_of_record(assignment, value, status)
+    !> `(index) = values`
+    character(len=*), intent(in) :: assignment
+    integer, intent(inout) :: value(most_entries)
+    !> not 0: it is not a list of integers
+    integer, intent(out) :: status
+    character(len=:), allocatable :: record
+    namelist /one/ value
+
+    record = "&one value" // assignment // " /"
+    status = 1
+    if (index(assignment, ";") == 0) read (record, nml=one, iostat=status)
+    if (status /= 0) call forget_failed_read()
+  end subroutine integers_of_record
+
+  subroutine reals_of_record(assignment, value, status)
+    !> `(index) = values`
+    character(len=*), intent(in) :: assignment
+    real(dp), intent(inout) :: value(most_entries)
+    !> not 0: it is not a list of reals
+    integer, intent(out) :: status
+    character(len=:), allocatable :: record
+    logical :: halting
+    namelist /one/ value
+
+    record = "&one value" // assignment // " /"
+    status = 1
+    ! a number too large, as 1e999, reads as infinity and must not end a program that traps overflows
+    call ieee_get_halting_mode(ieee_overflow, halting)
+    if (ieee_support_halting(ieee_overflow)) call ieee_set_halting_mode(ieee_overflow, .false.)
+    if (index(assignment, ";") == 0) read (record, nml=one, iostat=status)
+    call ieee_set_flag(ieee_overflow, .false.)
+    if (ieee_support_halting(ieee_overflow)) call ieee_set_halting_mode(ieee_overflow, halting)
+    if (status /= 0) call forget_failed_read()
+  end subroutine reals_of_record
+
+  subroutine logical_of_record(assignment, value, status)
+    character(len=*), intent(in) :: assignment
+    logical, intent(out) :: value
+    integer, intent(out) :: status
+    character(len=:), allocatable :: record
+    namelist /one/ value
+
+    value = .false.
+    record = "&one value " // assignment // " /"
+    read (record, nml=one, iostat=status)
+    if (status /= 0) call forget_failed_read()
+  end subroutine logical_of_record
+
+  subroutine text_of_record(assignment, value, status)
+    character(len=*), intent(in) :: assignment
+    character(len=longest_text), intent(out) :: value
+    integer, intent(out) :: status
+    character(len=:), allocatable :: record
+    namelist /one/ value
+
+    value = ""
+    record = "&one value " // assignment // " /"
+    read (record, nml=one, iostat=status)
+    if (status /= 0) call forget_failed_read()
+  end subroutine text_of_record
+
+  !> The real number that a text says, infinite when it is too large; the text must be a number.
+  function number_of(text) result(number)
+    character(len=*), intent(in) :: text
+    real(dp) :: number
+    real(dp) :: values(most_entries)
+    integer :: status
+
+    values = 0.0_dp
+    call reals_of_record(" = " // text, values, status)
+    number = values(1)
+  end function number_of
+
+  !> A read of no consequence. The library of gfortran 12 keeps the rest of a record that it could not read, as
+  !> `1e-` for a real number, and the next namelist read of the program sets nothing and reports success.
+  subroutine forget_failed_read()
+    character(len=16) :: record
+    integer :: value, status
+    namelist /one/ value
+
+    value = 0
+    record = "&one value = 1 /"
+    read (record, nml=one, iostat=status)
+  end subroutine forget_failed_read
+
+end module gravier_config_value

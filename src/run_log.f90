@@ -1,0 +1,278 @@
+!> The log of a run: what a person reads, on the terminal and in run.log.
+module gravier_run_log
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t, mpi_library
+  use gravier_timers, only: gather_timers, phase_names, n_phases
+  use gravier_file_system, only: text_file_t
+  use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
+  use gravier_scheme, only: work_t
+  use gravier_solve, only: solve_converged, solve_diverged
+  use gravier_problem_builder, only: interface_figures_t, n_multiplicities
+  use gravier_config, only: config_t, write_active
+  use gravier_simulation, only: simulation_t, step_figures_t
+  implicit none
+  private
+  public :: run_log_t, banner_text
+
+  character(len=*), parameter :: newline = new_line("a")
+
+  !> Lines go to the standard output, and to a file once it is open. On other ranks than 0 nothing is written, but
+  !> collective calls must still be made there.
+  type :: run_log_t
+    type(communicator_t), pointer :: comm => null()
+    type(text_file_t) :: file
+    !> kept until the file is open
+    character(len=:), allocatable :: early
+  contains
+    procedure :: init => run_log_init
+    procedure :: open => run_log_open
+    procedure :: line => run_log_line
+    procedure :: write_start => run_log_write_start
+    procedure :: write_step => run_log_write_step
+    procedure :: write_interface => run_log_write_interface
+    procedure :: write_memory => run_log_write_memory
+    procedure :: write_end => run_log_write_end
+    procedure :: close => run_log_close
+  end type run_log_t
+
+contains
+
+  subroutine run_log_init(self, comm)
+    class(run_log_t), intent(inout) :: self
+    type(communicator_t), target, intent(in) :: comm
+    self%comm => comm
+    self%early = ""
+  end subroutine run_log_init
+
+  !> Open DIRECTORY/run.log and write into it what was said so far. Rank 0 may fail; the caller makes it known.
+  subroutine run_log_open(self, path, error)
+    class(run_log_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (self%comm%rank /= 0) return
+    call self%file%create(path, error)
+    call self%file%append(self%early, error)
+    self%early = ""
+  end subroutine run_log_open
+
+  subroutine run_log_line(self, text, error)
+    class(run_log_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (self%comm%rank /= 0) return
+    write (output_unit, "(a)") text
+    flush (output_unit)
+    if (self%file%is_open()) then
+      call self%file%append(text//newline, error)
+    else
+      self%early = self%early//text//newline
+    end if
+  end subroutine run_log_line
+
+  !> Lines of a text, each ended by a newline.
+  subroutine write_lines(self, text, indent, error)
+    class(run_log_t), intent(inout) :: self
+    character(len=*), intent(in) :: text, indent
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: first, last
+
+    first = 1
+    do while (first <= len(text))
+      last = index(text(first:), newline)
+      if (last == 0) last = len(text) - first + 2
+      call self%line(indent//text(first:first + last - 2), error)
+      first = first + last
+    end do
+  end subroutine write_lines
+
+  !> Name, version and libraries of the program, in lines.
+  function banner_text() result(text)
+    character(len=:), allocatable :: text
+    text = "Gravier "//version//" ("//revision//"), dense granular matter by nonsmooth contact dynamics"//newline// &
+      & "built by "//compiler//", "//build_type//"; "//mpi_library()//", HDF5 "//hdf5_version//", MUMPS "//mumps_version// &
+      & ", METIS "//metis_version//newline
+  end function banner_text
+
+  !> Banner, scene, decomposition and the options in force.
+  subroutine run_log_write_start(self, simulation, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: options
+
+    call write_lines(self, banner_text(), "", error)
+    associate (config => simulation%config, kernels => simulation%problem%kernels)
+      call self%line("case        "//config%file//"  "//trim(config%scene%title), error)
+      call self%line("ranks       "//to_text(self%comm%size)//", subdomains "//to_text(simulation%decomposition%n_subdomains)// &
+        & " ("//boxes_text(simulation)//", "//trim(config%decomposition%kind)//" rule)", error)
+      if (self%comm%size > simulation%decomposition%n_subdomains) call self%line("warning     "// &
+        & to_text(self%comm%size - simulation%decomposition%n_subdomains)//" ranks own no subdomain and stay idle", error)
+      call self%line("bodies      "//to_text(simulation%n_grains)//" grains, "// &
+        & to_text(simulation%decomposition%walls%n)//" walls", error)
+      call self%line("effects     "//effects_text(simulation)//": "//to_text(kernels%nv)//" degrees of freedom a grain, "// &
+        & to_text(kernels%nc)//" unknowns a contact", error)
+      call self%line("options in force", error)
+      call write_active(options, config)
+      call write_lines(self, options, "  ", error)
+    end associate
+  end subroutine run_log_write_start
+
+  function boxes_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    integer :: d
+
+    if (allocated(simulation%decomposition%partition%subdomain_of_cell)) then
+      text = "METIS on "//to_text(size(simulation%decomposition%partition%subdomain_of_cell))//" cells"
+      return
+    end if
+    text = "grid "//to_text(simulation%decomposition%partition%boxes(1))
+    do d = 2, simulation%decomposition%nd
+      text = text//" x "//to_text(simulation%decomposition%partition%boxes(d))
+    end do
+  end function boxes_text
+
+  !> The effects that the scene has, and those that it could have and does not pay for.
+  function effects_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (kernels => simulation%problem%kernels)
+      text = to_text(kernels%nd)//"D, friction "//trim(merge("on ", "off", kernels%nc > 1))//", rotation "// &
+        & trim(merge("on ", "off", kernels%nv > kernels%nd))//", gravity "// &
+        & trim(merge("on ", "off", any(abs(simulation%physics%gravity(1:kernels%nd)) > 0.0_dp)))
+    end associate
+  end function effects_text
+
+  !> Contacts and interface as the partition makes them now.
+  subroutine run_log_write_interface(self, figures, error)
+    class(run_log_t), intent(inout) :: self
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: text
+    integer :: m
+
+    associate (interface => figures%interface)
+      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(interface%least_contacts)//" to "// &
+        & to_text(interface%most_contacts)//" a subdomain); interface: "//to_text(interface%bodies)//" bodies, "// &
+        & to_text(interface%interactions)//" interactions; multiplicity"
+      do m = 2, n_multiplicities
+        if (interface%multiplicity(m) == 0) cycle
+        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "//to_text(interface%multiplicity(m))
+      end do
+      if (interface%bodies == 0) text = text//" 1 only"
+    end associate
+    call self%line(text, error)
+  end subroutine run_log_write_interface
+
+  !> Bytes of the arrays of a contact and of a grain in the solve.
+  subroutine run_log_write_memory(self, simulation, figures, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: contact, body, home, total
+
+    associate (kernels => simulation%problem%kernels)
+      ! pair, hot, impulse, gap
+      contact = 2*4 + 8*(kernels%nh + kernels%nc + 1)
+      ! v_free, velocity, v_global, reaction, two inverse masses; identifier, owner, multiplicity, position
+      body = 8*(4*kernels%nv + 4) + 8 + 4 + 4 + 8*kernels%nd
+      home = 8*(kernels%nd + kernels%nv + 4)
+    end associate
+    total = (contact*figures%contacts + (body + home)*simulation%n_grains)/1024 + 1
+    call self%line("memory      "//to_text(contact)//" bytes a contact, "//to_text(body)// &
+      & " bytes a grain in contact and subdomain, "//to_text(home)//" bytes a grain at home: about "//to_text(total)// &
+      & " KiB in all", error)
+  end subroutine run_log_write_memory
+
+  !> One line a step; the first one comes with the names of the columns.
+  subroutine run_log_write_step(self, simulation, figures, seconds, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    real(dp), intent(in) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=160) :: row
+
+    if (simulation%step == 1) call self%line("    step       time [s]    contacts  iterations   residual       jump"// &
+      & "    overlap [m]  energy [J]  wall [s]", error)
+    write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3)") simulation%step, simulation%time, figures%contacts, &
+      & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, seconds
+    call self%line(trim(row), error)
+    if (figures%solve%status /= solve_converged) call self%line("  *** "//failure_text(simulation, figures), error)
+  end subroutine run_log_write_step
+
+  !> What went wrong in a step.
+  function failure_text(simulation, figures) result(text)
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    character(len=:), allocatable :: text
+
+    associate (solve => figures%solve, solver => simulation%config%solver)
+      if (solve%status == solve_diverged) then
+        text = "DIVERGED after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
+      else
+        text = "NOT CONVERGED: "//trim(solver%criterion)//" "// &
+          & to_text(merge(solve%error, solve%residual, solver%criterion == "error"), 3)//" above the tolerance "// &
+          & to_text(solver%tolerance, 3)//" after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
+      end if
+    end associate
+  end function failure_text
+
+  !> Closing table: time by phase over the ranks, and the work of the solver over all ranks. Collective.
+  subroutine run_log_write_end(self, simulation, seconds, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    !> wall time of the run [s]
+    real(dp), intent(in) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: mean(n_phases), least(n_phases), most(n_phases)
+    character(len=100) :: row
+    integer :: p
+
+    call gather_timers(self%comm, mean, least, most)
+    call self%line("phase                         mean [s]     min [s]     max [s]   share", error)
+    do p = 1, n_phases
+      write (row, "(a28,3f12.4,f7.1,' %')") phase_names(p), mean(p), least(p), most(p), 100.0_dp*mean(p)/max(seconds, tiny(seconds))
+      call self%line(trim(row), error)
+    end do
+    write (row, "(a28,f12.4)") "whole run                   ", seconds
+    call self%line(trim(row), error)
+    call write_work(self, simulation, error)
+  end subroutine run_log_write_end
+
+  subroutine write_work(self, simulation, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+    type(work_t) :: work
+    integer(i8) :: counts(5)
+
+    work = simulation%scheme%work_done()
+    counts(1) = work%relaxations
+    counts(2) = work%analyses
+    counts(3) = work%factorisations
+    counts(4) = simulation%messages
+    counts(5) = simulation%values
+    call self%comm%sum_counts(counts)
+    call self%line("solver      "//to_text(work%solves)//" solves, "//to_text(work%iterations)//" iterations, "// &
+      & to_text(work%sweeps)//" sweeps, "//to_text(counts(1))//" contact relaxations", error)
+    call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
+      & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
+      & " factorisations", error)
+    call self%line("messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB", error)
+  end subroutine write_work
+
+  subroutine run_log_close(self, error)
+    class(run_log_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%close(error)
+  end subroutine run_log_close
+
+end module gravier_run_log

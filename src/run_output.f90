@@ -1,0 +1,222 @@
+!> The files of a run: results.h5, history.csv, trace.csv and the final bodies.
+module gravier_run_output
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_communicator, only: communicator_t
+  use gravier_timers, only: start_timer, stop_timer, phase_output
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t
+  use gravier_csv_writer, only: csv_writer_t
+  use gravier_bodies_file, only: write_bodies
+  use gravier_build_info, only: version
+  use gravier_simulation, only: simulation_t, step_figures_t
+  implicit none
+  private
+  public :: run_output_t
+
+  type :: run_output_t
+    private
+    type(communicator_t), pointer :: comm => null()
+    character(len=:), allocatable :: directory
+    type(results_file_t) :: results
+    type(csv_writer_t) :: history, trace
+    integer :: last_written = -1
+  contains
+    procedure :: open => run_output_open
+    procedure :: write_row => run_output_write_row
+    procedure :: write_state => run_output_write_state
+    procedure :: finish => run_output_finish
+  end type run_output_t
+
+contains
+
+  !> Create the files in the output directory, which exists. Collective; errors are the same on all ranks.
+  subroutine run_output_open(self, simulation, command, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    !> the command line of the program
+    character(len=*), intent(in) :: command
+    type(error_t), allocatable, intent(inout) :: error
+
+    self%comm => simulation%comm
+    self%directory = trim(simulation%config%output%directory)//"/"
+    call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
+      & simulation%config%scene%dimension, error)
+    associate (walls => simulation%decomposition%walls)
+      call self%results%write_walls(walls%id, walls%point, walls%normal, error)
+    end associate
+    if (self%comm%rank == 0) then
+      call self%history%open(self%directory//"history.csv", "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,"// &
+        & "kinetic_energy,wall_seconds,interface_bodies,converged", error)
+      if (simulation%config%output%trace) call self%trace%open(self%directory//"trace.csv", "step,iteration,residual,jump"// &
+        & trim(merge(",error", "      ", simulation%config%solver%criterion == "error")), error)
+    end if
+    call self%comm%agree(error)
+  end subroutine run_output_open
+
+  !> A row of the history, and the trace of the step. Collective.
+  subroutine run_output_write_row(self, simulation, figures, seconds, converged, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    !> wall time of the step [s]
+    real(dp), intent(in) :: seconds
+    logical, intent(in) :: converged
+    type(error_t), allocatable, intent(inout) :: error
+
+    call start_timer(phase_output)
+    if (self%comm%rank == 0) then
+      call self%history%add(simulation%step)
+      call self%history%add(simulation%time)
+      call self%history%add(figures%contacts)
+      call self%history%add(figures%solve%iterations)
+      call self%history%add(figures%solve%iterations*simulation%config%solver%sweeps)
+      call self%history%add(figures%solve%residual)
+      call self%history%add(figures%solve%jump)
+      call self%history%add(figures%max_overlap)
+      call self%history%add(figures%kinetic_energy)
+      call self%history%add(seconds)
+      call self%history%add(figures%interface%bodies)
+      call self%history%add(merge(1, 0, converged))
+      call self%history%end_row(error)
+      if (self%trace%is_open()) call write_trace(self, simulation, figures, error)
+    end if
+    call self%comm%agree(error)
+    call stop_timer(phase_output)
+  end subroutine run_output_write_row
+
+  subroutine write_trace(self, simulation, figures, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    do k = 1, figures%solve%n_trace
+      call self%trace%add(simulation%step)
+      call self%trace%add(nint(figures%solve%trace(1, k)))
+      call self%trace%add(figures%solve%trace(2, k))
+      call self%trace%add(figures%solve%trace(3, k))
+      if (simulation%config%solver%criterion == "error") call self%trace%add(figures%solve%trace(4, k))
+      call self%trace%end_row(error)
+    end do
+  end subroutine write_trace
+
+  !> Write bodies, and contacts when asked for, as step `step` of results.h5; a step written before is left. Collective.
+  subroutine run_output_write_state(self, simulation, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+    type(body_rows_t) :: bodies
+    type(contact_rows_t) :: contacts
+
+    if (self%last_written == simulation%step) return
+    call start_timer(phase_output)
+    call collect_bodies(simulation, bodies)
+    if (simulation%config%output%contacts .and. simulation%step > 0) then
+      call collect_contacts(simulation, contacts)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts)
+    else
+      call self%results%write_step(simulation%step, simulation%time, bodies, error)
+    end if
+    self%last_written = simulation%step
+    call stop_timer(phase_output)
+  end subroutine run_output_write_state
+
+  !> Grains of this rank; grains without spin are written with zeros for it.
+  subroutine collect_bodies(simulation, rows)
+    type(simulation_t), intent(in) :: simulation
+    type(body_rows_t), intent(out) :: rows
+    integer :: s, n, next, nd, nv
+
+    nd = simulation%decomposition%nd
+    nv = simulation%decomposition%nv
+    n = 0
+    do s = 1, size(simulation%decomposition%home)
+      n = n + simulation%decomposition%home(s)%n
+    end do
+    allocate (rows%id(n), rows%position(nd, n), rows%velocity(3*nd - 3, n), rows%radius(n))
+    next = 0
+    do s = 1, size(simulation%decomposition%home)
+      associate (home => simulation%decomposition%home(s))
+        n = home%n
+        rows%id(next + 1:next + n) = home%id
+        rows%position(:, next + 1:next + n) = home%position
+        rows%velocity(1:nv, next + 1:next + n) = home%velocity
+        rows%velocity(nv + 1:, next + 1:next + n) = 0.0_dp
+        rows%radius(next + 1:next + n) = home%radius
+        next = next + n
+      end associate
+    end do
+  end subroutine collect_bodies
+
+  !> Contacts of this rank; without friction the tangential impulses are written as zeros.
+  subroutine collect_contacts(simulation, rows)
+    type(simulation_t), intent(in) :: simulation
+    type(contact_rows_t), intent(out) :: rows
+    integer :: s, c, n, nd, nc
+
+    nd = simulation%problem%kernels%nd
+    nc = simulation%problem%kernels%nc
+    n = 0
+    do s = 1, size(simulation%problem%sub)
+      n = n + simulation%problem%sub(s)%n_contacts
+    end do
+    allocate (rows%candidate(n), rows%antagonist(n), rows%normal(nd, n), rows%gap(n))
+    allocate (rows%impulse(nd, n), source=0.0_dp)
+    n = 0
+    do s = 1, size(simulation%problem%sub)
+      associate (sub => simulation%problem%sub(s))
+        do c = 1, sub%n_contacts
+          n = n + 1
+          rows%candidate(n) = sub%id(sub%pair(1, c))
+          rows%antagonist(n) = sub%id(sub%pair(2, c))
+          rows%normal(:, n) = sub%hot(1:nd, c)
+          rows%gap(n) = sub%gap(c)
+          rows%impulse(1:nc, n) = sub%impulse(:, c)
+        end do
+      end associate
+    end do
+  end subroutine collect_contacts
+
+  !> Write the last state and the final bodies, and close. Collective.
+  subroutine run_output_finish(self, simulation, keep_last, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    !> whether the present state is one to keep
+    logical, intent(in) :: keep_last
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (keep_last) then
+      call self%write_state(simulation, error)
+      if (simulation%config%output%final_bodies) call write_final_bodies(self, simulation, error)
+    end if
+    call self%results%close(error)
+    call self%history%close(error)
+    if (self%trace%is_open()) call self%trace%close(error)
+    call self%comm%agree(error)
+  end subroutine run_output_finish
+
+  !> A bodies file from which another scene can start.
+  subroutine write_final_bodies(self, simulation, error)
+    class(run_output_t), intent(in) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+    type(body_rows_t) :: rows
+    real(dp), allocatable :: mass(:)
+    integer :: s, next, n
+
+    call collect_bodies(simulation, rows)
+    allocate (mass(size(rows%id)))
+    next = 0
+    do s = 1, size(simulation%decomposition%home)
+      n = simulation%decomposition%home(s)%n
+      mass(next + 1:next + n) = simulation%decomposition%home(s)%mass
+      next = next + n
+    end do
+    associate (walls => simulation%decomposition%walls)
+      call write_bodies(self%comm, self%directory//"final_bodies.h5", simulation%config%scene%dimension, rows%id, rows%position, &
+        & rows%velocity, rows%radius, mass, walls%id, walls%point, walls%normal, error)
+    end associate
+  end subroutine write_final_bodies
+
+end module gravier_run_output
