@@ -24,7 +24,7 @@ module gravier_graph_partition
       import :: c_int32_t, c_int, c_ptr
       implicit none
       integer(c_int32_t), intent(in) :: nvtxs, ncon
-      integer(c_int32_t), intent(in) :: xadj(*), adjncy(*)
+      integer(c_int32_t), intent(inout) :: xadj(*), adjncy(*)
       type(c_ptr), value :: vwgt, vsize, adjwgt
       integer(c_int32_t), intent(in) :: nparts
       type(c_ptr), value :: tpwgts, ubvec
@@ -39,10 +39,11 @@ contains
 
   !> Cut a graph into `n_parts` parts. The result depends on the arguments alone (the seed is fixed).
   subroutine partition_graph(first, neighbour, vertex_weight, edge_weight, n_parts, part, error)
-    !> first neighbour of each vertex, from 1, and one more entry (vertices + 1)
-    integer(c_int32_t), intent(in), contiguous :: first(:)
+    !> first neighbour of each vertex, from 1, and one more entry (vertices + 1); METIS renumbers it while it works,
+    !> and puts it back
+    integer(c_int32_t), intent(inout), contiguous :: first(:)
     !> vertices from 1; each edge stands twice (2 edges)
-    integer(c_int32_t), intent(in), contiguous :: neighbour(:)
+    integer(c_int32_t), intent(inout), contiguous :: neighbour(:)
     integer(c_int32_t), intent(in), contiguous, target :: vertex_weight(:), edge_weight(:)
     integer, intent(in) :: n_parts
     !> (vertices) from 1

@@ -1,0 +1,324 @@
+!> Bodies and walls from a comma-separated table: one row a body or plane, columns by name in any order.
+module gravier_bodies_csv
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text, lower
+  use gravier_communicator, only: communicator_t
+  use gravier_csv_table, only: csv_table_t
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit
+  implicit none
+  private
+  public :: read_bodies_csv
+
+  !> Places of the columns in the table, 0 for a column that the file does not have.
+  type :: layout_t
+    integer :: id = 0, radius = 0, mass = 0, shape = 0
+    !> (dimension)
+    integer, allocatable :: position(:), normal(:)
+    !> (3 or 6)
+    integer, allocatable :: velocity(:)
+  end type layout_t
+
+contains
+
+  !> Read the rows of this rank and all walls. Two passes of the file on each rank, line by line: memory holds no more
+  !> than the rows of the rank. Failure: status_input, with file, line, column, value and what was expected. Collective.
+  subroutine read_bodies_csv(comm, path, dimension, bodies, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    !> 2 or 3
+    integer, intent(in) :: dimension
+    type(bodies_data_t), intent(out) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    type(csv_table_t) :: table
+    type(layout_t) :: layout
+    integer(i8) :: n_grains, n_planes, first
+    integer :: n
+
+    if (allocated(error)) return
+    n_grains = 0
+    n_planes = 0
+    if (comm%rank == 0) then
+      call open_table(table, path, dimension, layout, error)
+      call count_rows(table, layout, n_grains, n_planes, error)
+      call table%close()
+    end if
+    call comm%agree(error)
+    if (allocated(error)) return
+    bodies%total = comm%total(n_grains)
+    call find_own_rows(comm, bodies%total, first, n)
+    call allocate_bodies(bodies, dimension, n)
+    call allocate_walls(bodies, dimension, int(comm%total(n_planes)))
+    call open_table(table, path, dimension, layout, error)
+    if (layout%mass > 0) allocate (bodies%mass(n), source=0.0_dp)
+    call read_rows(table, layout, first, bodies, error)
+    call table%close()
+    call comm%agree(error)
+    call settle_masses(comm, path, bodies, error)
+  end subroutine read_bodies_csv
+
+  !> Open the table and find its columns.
+  subroutine open_table(table, path, dimension, layout, error)
+    type(csv_table_t), intent(inout) :: table
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: dimension
+    type(layout_t), intent(out) :: layout
+    type(error_t), allocatable, intent(inout) :: error
+
+    call table%open(path, error)
+    if (allocated(error)) return
+    layout%id = table%column("id")
+    layout%radius = table%column("radius")
+    layout%mass = table%column("mass")
+    layout%shape = table%column("shape")
+    call find_columns(table, position_names(dimension), layout%position)
+    call find_columns(table, normal_names(dimension), layout%normal)
+    call find_columns(table, velocity_names(dimension), layout%velocity)
+    call check_columns(table, dimension, layout, error)
+  end subroutine open_table
+
+  !> Places of columns by their names, given with ", " between.
+  pure subroutine find_columns(table, names, columns)
+    type(csv_table_t), intent(in) :: table
+    character(len=*), intent(in) :: names
+    integer, allocatable, intent(out) :: columns(:)
+    integer :: i, k, start, length
+
+    i = 1
+    do k = 1, len(names)
+      if (names(k:k) == ",") i = i + 1
+    end do
+    allocate (columns(i))
+    start = 1
+    do k = 1, size(columns)
+      length = index(names(start:)//",", ",") - 1
+      columns(k) = table%column(names(start:start + length - 1))
+      start = start + length + 2
+    end do
+  end subroutine find_columns
+
+  pure function position_names(dimension) result(names)
+    integer, intent(in) :: dimension
+    character(len=:), allocatable :: names
+    names = "x, y"
+    if (dimension == 3) names = "x, y, z"
+  end function position_names
+
+  pure function normal_names(dimension) result(names)
+    integer, intent(in) :: dimension
+    character(len=:), allocatable :: names
+    names = "nx, ny"
+    if (dimension == 3) names = "nx, ny, nz"
+  end function normal_names
+
+  pure function velocity_names(dimension) result(names)
+    integer, intent(in) :: dimension
+    character(len=:), allocatable :: names
+    names = "vx, vy, omega"
+    if (dimension == 3) names = "vx, vy, vz, wx, wy, wz"
+  end function velocity_names
+
+  !> Refuse a table without the columns that every body needs, or with a column of no meaning.
+  subroutine check_columns(table, dimension, layout, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: dimension
+    type(layout_t), intent(in) :: layout
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: known, required
+    integer :: k
+
+    required = "id, "//position_names(dimension)//", radius"
+    known = required//", "//velocity_names(dimension)//", mass, shape, "//normal_names(dimension)
+    if (layout%id == 0 .or. layout%radius == 0 .or. any(layout%position == 0)) then
+      call table%refuse_file("in "//to_text(dimension)//"D the columns "//required//" are required, but the first line is: "// &
+        & header_text(table), error)
+    end if
+    do k = 1, table%column_count()
+      if (k == layout%id .or. k == layout%radius .or. k == layout%mass .or. k == layout%shape) cycle
+      if (any(k == layout%position) .or. any(k == layout%normal) .or. any(k == layout%velocity)) cycle
+      call table%refuse_file("column "//table%column_name(k)//" is unknown in "//to_text(dimension)//"D; known are "//known, error)
+      return
+    end do
+  end subroutine check_columns
+
+  pure function header_text(table) result(text)
+    type(csv_table_t), intent(in) :: table
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = table%column_name(1)
+    do k = 2, table%column_count()
+      text = text//","//table%column_name(k)
+    end do
+  end function header_text
+
+  !> Number of bodies and of planes in the table.
+  subroutine count_rows(table, layout, n_grains, n_planes, error)
+    type(csv_table_t), intent(inout) :: table
+    type(layout_t), intent(in) :: layout
+    integer(i8), intent(inout) :: n_grains, n_planes
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: found, plane
+
+    do
+      call table%next_row(found, error)
+      if (.not. found .or. allocated(error)) return
+      call get_shape(table, layout, plane, error)
+      if (plane) then
+        n_planes = n_planes + 1
+      else
+        n_grains = n_grains + 1
+      end if
+    end do
+  end subroutine count_rows
+
+  !> Whether the row is a plane.
+  subroutine get_shape(table, layout, plane, error)
+    type(csv_table_t), intent(in) :: table
+    type(layout_t), intent(in) :: layout
+    logical, intent(out) :: plane
+    type(error_t), allocatable, intent(inout) :: error
+
+    plane = .false.
+    if (table%is_empty(layout%shape)) return
+    select case (lower(table%get_text(layout%shape)))
+    case ("plane")
+      plane = .true.
+    case ("grain")
+      continue
+    case default
+      call table%refuse(layout%shape, "grain or plane", error)
+    end select
+  end subroutine get_shape
+
+  !> Read bodies `first` (from 0) and following, as many as there is room for, and all planes.
+  subroutine read_rows(table, layout, first, bodies, error)
+    type(csv_table_t), intent(inout) :: table
+    type(layout_t), intent(in) :: layout
+    integer(i8), intent(in) :: first
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: grain
+    integer :: wall
+    logical :: found, plane
+
+    grain = 0
+    wall = 0
+    do
+      call table%next_row(found, error)
+      if (.not. found .or. allocated(error)) exit
+      call get_shape(table, layout, plane, error)
+      if (plane) then
+        wall = wall + 1
+        if (wall <= bodies%n_walls) call read_plane(table, layout, wall, bodies, error)
+      else
+        grain = grain + 1
+        if (grain > first .and. grain <= first + bodies%n) call read_grain(table, layout, int(grain - first), bodies, error)
+      end if
+    end do
+    if (grain /= bodies%total .or. wall /= bodies%n_walls) then
+      call table%refuse_file("this file is not the same for all ranks, or changed while it was read", error)
+    end if
+  end subroutine read_rows
+
+  subroutine read_grain(table, layout, i, bodies, error)
+    type(csv_table_t), intent(in) :: table
+    type(layout_t), intent(in) :: layout
+    integer, intent(in) :: i
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: ignored(3)
+
+    call read_id(table, layout%id, bodies%id(i), error)
+    call read_numbers(table, layout%position, .true., bodies%position(:, i), error)
+    call read_numbers(table, layout%velocity, .false., bodies%velocity(:, i), error)
+    call read_numbers(table, layout%normal, .false., ignored, error)
+    call read_positive(table, layout%radius, "a radius > 0", bodies%radius(i), error)
+    if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
+  end subroutine read_grain
+
+  subroutine read_plane(table, layout, i, bodies, error)
+    type(csv_table_t), intent(in) :: table
+    type(layout_t), intent(in) :: layout
+    integer, intent(in) :: i
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: ignored(6)
+    logical :: possible
+
+    call read_id(table, layout%id, bodies%wall_id(i), error)
+    call read_numbers(table, layout%position, .true., bodies%wall_point(:, i), error)
+    call read_numbers(table, layout%velocity, .false., ignored, error)
+    if (.not. table%is_empty(layout%radius)) call table%get_real(layout%radius, ignored(1), error)
+    if (.not. table%is_empty(layout%mass)) call table%get_real(layout%mass, ignored(1), error)
+    if (any(layout%normal == 0)) then
+      call table%refuse(layout%shape, "a grain (a plane needs the columns "//normal_names(bodies%dimension)//")", error)
+      return
+    end if
+    call read_numbers(table, layout%normal, .true., bodies%wall_normal(:, i), error)
+    if (allocated(error)) return
+    call make_unit(bodies%wall_normal(:, i), possible)
+    if (.not. possible) call table%refuse(layout%normal(1), "a normal that is not zero", error)
+  end subroutine read_plane
+
+  subroutine read_id(table, column, id, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: column
+    integer(i8), intent(inout) :: id
+    type(error_t), allocatable, intent(inout) :: error
+
+    call table%get_integer(column, id, error)
+    if (allocated(error)) return
+    if (id < 1) call table%refuse(column, "an id >= 1", error)
+  end subroutine read_id
+
+  subroutine read_positive(table, column, expected, value, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: column
+    character(len=*), intent(in) :: expected
+    real(dp), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+
+    call table%get_real(column, value, error)
+    if (allocated(error)) return
+    if (value <= 0) call table%refuse(column, expected, error)
+  end subroutine read_positive
+
+  !> Read numbers from several columns; a cell that is empty or missing leaves its value, unless it is required.
+  subroutine read_numbers(table, columns, required, values, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: columns(:)
+    logical, intent(in) :: required
+    real(dp), intent(inout) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    do k = 1, size(columns)
+      if (table%is_empty(columns(k)) .and. .not. required) cycle
+      call table%get_real(columns(k), values(k), error)
+    end do
+  end subroutine read_numbers
+
+  !> All bodies have a mass or none has: with none the masses are left to the caller.
+  subroutine settle_masses(comm, path, bodies, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i
+
+    if (allocated(error) .or. .not. allocated(bodies%mass)) return
+    if (.not. comm%any_true(any(bodies%mass > 0))) then
+      deallocate (bodies%mass)
+      return
+    end if
+    do i = 1, bodies%n
+      if (bodies%mass(i) > 0) cycle
+      call raise(error, status_input, path//": id "//to_text(bodies%id(i))//": column mass: empty, but other bodies "// &
+        & "have a mass; a mass for all or for none was expected")
+      exit
+    end do
+    call comm%agree(error)
+  end subroutine settle_masses
+
+end module gravier_bodies_csv

@@ -1,0 +1,136 @@
+!> Bodies and walls as read from a file, and the checks common to all formats.
+module gravier_bodies_data
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t
+  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_sorting, only: argsort
+  implicit none
+  private
+  public :: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit, check_unique_ids
+
+  !> The rows of this rank, in the order of the file, and all walls. SI units.
+  type :: bodies_data_t
+    !> 2 or 3
+    integer :: dimension = 0
+    !> rows of this rank, and of all ranks together
+    integer :: n = 0
+    integer(i8) :: total = 0
+    !> (n): >= 1, unique among bodies and walls of all ranks
+    integer(i8), allocatable :: id(:)
+    !> (dimension, n)
+    real(dp), allocatable :: position(:, :)
+    !> 2D (3, n): vx, vy, omega; 3D (6, n): vx, vy, vz, wx, wy, wz; zero where the file has none
+    real(dp), allocatable :: velocity(:, :)
+    !> (n): > 0
+    real(dp), allocatable :: radius(:)
+    !> (n): > 0; not allocated when the file has no masses
+    real(dp), allocatable :: mass(:)
+    !> the same on all ranks
+    integer :: n_walls = 0
+    !> (n_walls)
+    integer(i8), allocatable :: wall_id(:)
+    !> (dimension, n_walls): a point of each plane, and its unit normal towards the free side
+    real(dp), allocatable :: wall_point(:, :), wall_normal(:, :)
+  end type bodies_data_t
+
+contains
+
+  !> Room for n bodies at rest, without masses.
+  subroutine allocate_bodies(bodies, dimension, n)
+    type(bodies_data_t), intent(inout) :: bodies
+    integer, intent(in) :: dimension, n
+
+    bodies%dimension = dimension
+    bodies%n = n
+    allocate (bodies%id(n), bodies%position(dimension, n), bodies%radius(n))
+    allocate (bodies%velocity(3*(dimension - 1), n), source=0.0_dp)
+  end subroutine allocate_bodies
+
+  !> Room for n walls.
+  subroutine allocate_walls(bodies, dimension, n)
+    type(bodies_data_t), intent(inout) :: bodies
+    integer, intent(in) :: dimension, n
+
+    bodies%n_walls = n
+    allocate (bodies%wall_id(n), bodies%wall_point(dimension, n), bodies%wall_normal(dimension, n))
+  end subroutine allocate_walls
+
+  !> The block of rows of this rank: `n` rows from `first` (from 0) on; blocks differ by one row at most.
+  pure subroutine find_own_rows(comm, total, first, n)
+    type(communicator_t), intent(in) :: comm
+    integer(i8), intent(in) :: total
+    integer(i8), intent(out) :: first
+    integer, intent(out) :: n
+
+    first = total*comm%rank/comm%size
+    n = int(total*(comm%rank + 1)/comm%size - first)
+  end subroutine find_own_rows
+
+  !> Scale a vector to length one; impossible for the zero vector. Safe for every size of a finite vector.
+  pure subroutine make_unit(vector, possible)
+    real(dp), intent(inout) :: vector(:)
+    logical, intent(out) :: possible
+    real(dp) :: greatest
+
+    greatest = maxval(abs(vector))
+    possible = greatest > 0
+    if (.not. possible) return
+    vector(:) = vector/greatest
+    vector(:) = vector/norm2(vector)
+  end subroutine make_unit
+
+  !> Refuse ids that appear twice among the bodies of all ranks and the walls (status_input; the least such id is
+  !> named). Collective.
+  subroutine check_unique_ids(comm, path, bodies, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(bodies_data_t), intent(in) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: ids(:, :), received(:, :)
+    integer, allocatable :: owner(:)
+    integer :: n_walls
+
+    if (allocated(error)) return
+    ! walls are known to all ranks: rank 0 speaks for them
+    n_walls = merge(bodies%n_walls, 0, comm%rank == 0)
+    allocate (ids(1, bodies%n + n_walls))
+    ids(1, 1:bodies%n) = bodies%id
+    ids(1, bodies%n + 1:) = bodies%wall_id(1:n_walls)
+    allocate (owner(size(ids, 2)))
+    owner(:) = int(mod(ids(1, :), int(comm%size, i8)))
+    call sparse_exchange(comm, ids, owner, received)
+
+    call keep_least_repeated(received, ids)
+    deallocate (owner)
+    allocate (owner(size(ids, 2)), source=0)
+    call sparse_exchange(comm, ids, owner, received)
+    if (size(received) > 0) then
+      call raise(error, status_input, path//": id "//to_text(minval(received))//" appears twice, but ids must be unique among "// &
+        & "bodies and walls")
+    end if
+    call comm%agree(error)
+  end subroutine check_unique_ids
+
+  !> The least id that appears more than once: one record, or none.
+  subroutine keep_least_repeated(ids, least)
+    !> (1, number of ids)
+    integer(i8), intent(in), contiguous :: ids(:, :)
+    integer(i8), allocatable, intent(out) :: least(:, :)
+    integer(i8), allocatable :: keys(:)
+    integer, allocatable :: order(:)
+    integer :: i
+
+    allocate (keys(size(ids, 2)), order(size(ids, 2)))
+    keys(:) = ids(1, :)
+    call argsort(keys, order)
+    do i = 2, size(keys)
+      if (keys(order(i)) /= keys(order(i - 1))) cycle
+      allocate (least(1, 1), source=keys(order(i)))
+      return
+    end do
+    allocate (least(1, 0))
+  end subroutine keep_least_repeated
+
+end module gravier_bodies_data

@@ -1,0 +1,88 @@
+!> Bodies files: reading in either format, writing in HDF5.
+module gravier_bodies_file
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: lower
+  use gravier_communicator, only: communicator_t
+  use gravier_bodies_data, only: bodies_data_t, check_unique_ids
+  use gravier_bodies_csv, only: read_bodies_csv
+  use gravier_bodies_hdf5, only: read_bodies_hdf5, write_bodies_hdf5
+  implicit none
+  private
+  public :: bodies_data_t, read_bodies, write_bodies
+
+contains
+
+  !> Read a bodies file: HDF5 or CSV by the ending of its name. Rank r of p gets rows [total r/p, total (r+1)/p) and all
+  !> walls; no rank ever holds more. Failure: status_input with one line that names the file, the column or dataset, the
+  !> line, row or id, and what was expected; the same on all ranks. Collective.
+  subroutine read_bodies(comm, path, dimension, bodies, error)
+    type(communicator_t), intent(in) :: comm
+    !> ends with .h5, .hdf5 or .csv
+    character(len=*), intent(in) :: path
+    !> 2 or 3
+    integer, intent(in) :: dimension
+    type(bodies_data_t), intent(out) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    select case (ending(path))
+    case (".csv")
+      call read_bodies_csv(comm, path, dimension, bodies, error)
+    case (".h5", ".hdf5")
+      call read_bodies_hdf5(comm, path, dimension, bodies, error)
+    case default
+      call raise(error, status_input, path//": the name of a bodies file must end with .h5, .hdf5 or .csv")
+    end select
+    call check_unique_ids(comm, path, bodies, error)
+  end subroutine read_bodies
+
+  !> Write a bodies file in HDF5, in the order of the ids whatever rank holds which body. It appears under its name only
+  !> when complete. Failure: status_failure, the same on all ranks; an older file of that name stays. Collective.
+  subroutine write_bodies(comm, path, dimension, id, position, velocity, radius, mass, wall_id, wall_point, wall_normal, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    !> 2 or 3
+    integer, intent(in) :: dimension
+    !> (n): of this rank; >= 1
+    integer(i8), intent(in), contiguous :: id(:)
+    !> (dimension, n), m; (3 or 6, n), m/s and rad/s
+    real(dp), intent(in), contiguous :: position(:, :), velocity(:, :)
+    !> (n), m
+    real(dp), intent(in), contiguous :: radius(:)
+    !> (n), kg; absent on all ranks or on none
+    real(dp), intent(in), contiguous, optional :: mass(:)
+    !> (walls): the same on all ranks
+    integer(i8), intent(in), contiguous :: wall_id(:)
+    !> (dimension, walls): a point of each plane, and unit vectors towards the free side
+    real(dp), intent(in), contiguous :: wall_point(:, :), wall_normal(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    type(bodies_data_t) :: bodies
+
+    if (allocated(error)) return
+    bodies%dimension = dimension
+    bodies%n = size(id)
+    bodies%id = id
+    bodies%position = position
+    bodies%velocity = velocity
+    bodies%radius = radius
+    if (present(mass)) bodies%mass = mass
+    bodies%n_walls = size(wall_id)
+    bodies%wall_id = wall_id
+    bodies%wall_point = wall_point
+    bodies%wall_normal = wall_normal
+    call write_bodies_hdf5(comm, path, bodies, error)
+  end subroutine write_bodies
+
+  !> What follows the last point of a name, in lower case, with the point.
+  pure function ending(path) result(text)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: text
+    integer :: point
+
+    text = ""
+    point = index(path, ".", back=.true.)
+    if (point > 0) text = lower(path(point:))
+  end function ending
+
+end module gravier_bodies_file

@@ -1,0 +1,413 @@
+!> Reading of comma-separated tables line by line: a header with the names of the columns, then rows. Blank lines and
+!> lines that begin with # are passed over; lines may end in CR LF. Not collective.
+module gravier_csv_table
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text, lower
+  use gravier_file_system, only: check_readable
+  implicit none
+  private
+  public :: csv_table_t
+
+  integer, parameter :: block_length = 65536
+  !> put by some programs before UTF-8 text
+  character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+  !> what number_size tells
+  integer, parameter :: not_a_number = 0, size_usual = 1, size_tiny = 2, size_huge = 3
+
+  !> An open table, standing on one of its rows.
+  type :: csv_table_t
+    private
+    character(len=:), allocatable :: path
+    integer :: unit = -1
+    !> bytes of the file, and how many of them have been read into `block`
+    integer(i8) :: length = 0
+    integer(i8) :: position = 0
+    character(len=:), allocatable :: block
+    integer :: block_fill = 0
+    integer :: block_next = 1
+    !> the line read last is line(1:line_length)
+    character(len=:), allocatable :: line
+    integer :: line_length = 0
+    integer(i8) :: line_number = 0
+    !> names of the columns
+    character(len=:), allocatable :: header
+    integer :: n_columns = 0
+    !> cell k of the row is line(first(k):last(k))
+    integer, allocatable :: first(:), last(:)
+    integer, allocatable :: header_first(:), header_last(:)
+  contains
+    procedure :: open => table_open
+    procedure :: close => table_close
+    procedure :: next_row => table_next_row
+    procedure :: column_count => table_column_count
+    procedure :: column_name => table_column_name
+    procedure :: column => table_column
+    procedure :: is_empty => table_is_empty
+    procedure :: get_text => table_get_text
+    procedure :: get_integer => table_get_integer
+    procedure :: get_real => table_get_real
+    procedure :: refuse => table_refuse
+    procedure :: refuse_file => table_refuse_file
+    procedure, private :: next_line
+    procedure, private :: read_block
+    procedure, private :: append_to_line
+    procedure, private :: read_header
+    procedure, private :: split
+  end type csv_table_t
+
+contains
+
+  !> Open a table and read its header. Failure (status_input): no such file, not readable, no header, two columns of
+  !> one name.
+  subroutine table_open(self, path, error)
+    class(csv_table_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=200) :: reason
+    integer :: stat
+
+    if (allocated(error)) return
+    call self%close()
+    self%path = path
+    call check_readable(path, error)
+    if (allocated(error)) return
+    open (newunit=self%unit, file=path, access="stream", form="unformatted", action="read", status="old", &
+      & iostat=stat, iomsg=reason)
+    if (stat /= 0) then
+      self%unit = -1
+      call self%refuse_file("cannot read this file: "//trim(reason), error)
+      return
+    end if
+    inquire (unit=self%unit, size=self%length)
+    self%position = 0
+    self%block_fill = 0
+    self%block_next = 1
+    self%line_number = 0
+    if (.not. allocated(self%block)) allocate (character(len=block_length) :: self%block)
+    if (.not. allocated(self%line)) allocate (character(len=256) :: self%line)
+    call self%read_header(error)
+    if (allocated(error)) call self%close()
+  end subroutine table_open
+
+  subroutine table_close(self)
+    class(csv_table_t), intent(inout) :: self
+    if (self%unit /= -1) close (self%unit)
+    self%unit = -1
+  end subroutine table_close
+
+  !> Take the names of the columns from the first line that counts.
+  subroutine read_header(self, error)
+    class(csv_table_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: found
+    integer :: k
+
+    call self%next_line(found, error)
+    if (allocated(error)) return
+    if (.not. found) then
+      call self%refuse_file("empty; a first line with the names of the columns was expected", error)
+      return
+    end if
+    call self%split()
+    self%n_columns = size(self%first)
+    self%header = lower(self%line(1:self%line_length))
+    call move_alloc(self%first, self%header_first)
+    call move_alloc(self%last, self%header_last)
+    do k = 1, self%n_columns
+      if (self%column(self%column_name(k)) /= k) then
+        call self%refuse_file("column "//self%column_name(k)//" appears twice", error)
+        return
+      end if
+    end do
+  end subroutine read_header
+
+  !> Go to the next row; `found` is false at the end of the table. Failure (status_input): a row that has not as many
+  !> cells as the header, a file that cannot be read.
+  subroutine table_next_row(self, found, error)
+    class(csv_table_t), intent(inout) :: self
+    logical, intent(out) :: found
+    type(error_t), allocatable, intent(inout) :: error
+
+    found = .false.
+    if (allocated(error)) return
+    call self%next_line(found, error)
+    if (.not. found .or. allocated(error)) return
+    call self%split()
+    if (size(self%first) /= self%n_columns) then
+      call raise(error, status_input, self%path//": line "//to_text(self%line_number)//": "//to_text(size(self%first))// &
+        & " cells, but the header has "//to_text(self%n_columns))
+      found = .false.
+    end if
+  end subroutine table_next_row
+
+  !> Read the next line that is neither blank nor a comment.
+  subroutine next_line(self, found, error)
+    class(csv_table_t), intent(inout) :: self
+    logical, intent(out) :: found
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: newline, first
+
+    do
+      self%line_length = 0
+      found = .false.
+      do
+        if (self%block_next > self%block_fill) call self%read_block(error)
+        if (allocated(error) .or. self%block_fill == 0) exit
+        found = .true.
+        newline = index(self%block(self%block_next:self%block_fill), new_line("a"))
+        if (newline > 0) then
+          call self%append_to_line(newline - 1)
+          self%block_next = self%block_next + 1
+          exit
+        end if
+        call self%append_to_line(self%block_fill - self%block_next + 1)
+      end do
+      if (allocated(error) .or. .not. found) exit
+      self%line_number = self%line_number + 1
+      first = verify(self%line(1:self%line_length), " "//achar(9)//achar(13))
+      if (first == 0) cycle
+      if (self%line(first:first) /= "#") exit
+    end do
+    if (allocated(error)) found = .false.
+  end subroutine next_line
+
+  !> Move `n` characters from the block to the end of the line.
+  subroutine append_to_line(self, n)
+    class(csv_table_t), intent(inout) :: self
+    integer, intent(in) :: n
+    character(len=:), allocatable :: longer
+
+    if (self%line_length + n > len(self%line)) then
+      allocate (character(len=2*(self%line_length + n)) :: longer)
+      longer(1:self%line_length) = self%line(1:self%line_length)
+      call move_alloc(longer, self%line)
+    end if
+    self%line(self%line_length + 1:self%line_length + n) = self%block(self%block_next:self%block_next + n - 1)
+    self%line_length = self%line_length + n
+    self%block_next = self%block_next + n
+  end subroutine append_to_line
+
+  !> Read the next block of the file; block_fill = 0 at its end.
+  subroutine read_block(self, error)
+    class(csv_table_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=200) :: reason
+    integer :: stat
+
+    self%block_next = 1
+    self%block_fill = int(min(int(block_length, i8), self%length - self%position))
+    if (self%block_fill <= 0) then
+      self%block_fill = 0
+      return
+    end if
+    read (self%unit, iostat=stat, iomsg=reason) self%block(1:self%block_fill)
+    if (stat /= 0) call self%refuse_file("cannot read this file: "//trim(reason), error)
+    if (self%position == 0 .and. index(self%block(1:self%block_fill), byte_order_mark) == 1) then
+      self%block_next = 1 + len(byte_order_mark)
+    end if
+    self%position = self%position + self%block_fill
+  end subroutine read_block
+
+  !> Find the cells of the line, without the blanks around them.
+  subroutine split(self)
+    class(csv_table_t), intent(inout) :: self
+    integer :: i, k, n, start
+
+    n = 1
+    do i = 1, self%line_length
+      if (self%line(i:i) == ",") n = n + 1
+    end do
+    if (allocated(self%first)) then
+      if (size(self%first) /= n) deallocate (self%first, self%last)
+    end if
+    if (.not. allocated(self%first)) allocate (self%first(n), self%last(n))
+    start = 1
+    do k = 1, n
+      i = index(self%line(start:self%line_length), ",")
+      if (i == 0) i = self%line_length - start + 2
+      self%first(k) = start
+      self%last(k) = start + i - 2
+      do while (self%first(k) <= self%last(k))
+        if (.not. is_blank(self%line(self%first(k):self%first(k)))) exit
+        self%first(k) = self%first(k) + 1
+      end do
+      do while (self%first(k) <= self%last(k))
+        if (.not. is_blank(self%line(self%last(k):self%last(k)))) exit
+        self%last(k) = self%last(k) - 1
+      end do
+      start = start + i
+    end do
+  end subroutine split
+
+  elemental logical function is_blank(letter)
+    character(len=1), intent(in) :: letter
+    is_blank = letter == " " .or. letter == achar(9) .or. letter == achar(13)
+  end function is_blank
+
+  pure integer function table_column_count(self) result(n)
+    class(csv_table_t), intent(in) :: self
+    n = self%n_columns
+  end function table_column_count
+
+  !> Name of column k in lower case.
+  pure function table_column_name(self, k) result(name)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    character(len=:), allocatable :: name
+    name = self%header(self%header_first(k):self%header_last(k))
+  end function table_column_name
+
+  !> Place of the column `name`, or 0 where there is none.
+  pure integer function table_column(self, name) result(k)
+    class(csv_table_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+
+    do k = 1, self%n_columns
+      if (self%column_name(k) == name) return
+    end do
+    k = 0
+  end function table_column
+
+  !> True when the row has nothing in column k, or when k = 0: there is no such column.
+  pure logical function table_is_empty(self, k) result(is_empty)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: k
+
+    is_empty = .true.
+    if (k > 0) is_empty = self%first(k) > self%last(k)
+  end function table_is_empty
+
+  !> What the row has in column k.
+  pure function table_get_text(self, k) result(text)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    character(len=:), allocatable :: text
+    text = self%line(self%first(k):self%last(k))
+  end function table_get_text
+
+  !> The integer in column k.
+  subroutine table_get_integer(self, k, value, error)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    integer(i8), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: cell
+    integer :: stat
+
+    if (allocated(error)) return
+    cell = self%get_text(k)
+    stat = 1
+    ! 18 digits always fit
+    if (is_integer(cell) .and. len(cell) - sign_length(cell) <= 18) read (cell, "(i20)", iostat=stat) value
+    if (stat /= 0) call self%refuse(k, "a whole number of at most 18 digits", error)
+  end subroutine table_get_integer
+
+  !> The finite real in column k.
+  subroutine table_get_real(self, k, value, error)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(dp), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: cell
+    integer :: stat
+
+    if (allocated(error)) return
+    cell = self%get_text(k)
+    select case (number_size(cell))
+    case (size_usual)
+      read (cell, *, iostat=stat) value
+      if (stat /= 0) call self%refuse(k, "a number", error)
+    case (size_tiny)
+      value = 0
+    case (size_huge)
+      call self%refuse(k, "a number below 1e308 in size", error)
+    case default
+      call self%refuse(k, "a finite number", error)
+    end select
+  end subroutine table_get_real
+
+  !> Whether a text is a decimal number such as -1.5e-3, and whether its size fits a real (deciding that by reading it
+  !> could raise a floating-point exception).
+  pure integer function number_size(text) result(size)
+    character(len=*), intent(in) :: text
+    integer :: mantissa_end, exponent
+
+    size = not_a_number
+    mantissa_end = scan(text, "eEdD") - 1
+    if (mantissa_end < 0) mantissa_end = len(text)
+    exponent = 0
+    if (mantissa_end < len(text)) then
+      if (.not. is_integer(text(mantissa_end + 2:))) return
+      exponent = bounded_integer(text(mantissa_end + 2:))
+    end if
+    associate (mantissa => text(1 + sign_length(text):mantissa_end))
+      if (verify(mantissa, "0123456789.") > 0 .or. scan(mantissa, "0123456789") == 0) return
+      if (index(mantissa, ".") /= index(mantissa, ".", back=.true.)) return
+      size = size_usual
+      if (scan(mantissa, "123456789") == 0) return
+      exponent = exponent + leading_exponent(mantissa)
+    end associate
+    if (exponent > 307) size = size_huge
+    if (exponent < -320) size = size_tiny
+  end function number_size
+
+  !> Power of ten of the first digit that is not 0.
+  pure integer function leading_exponent(mantissa) result(exponent)
+    character(len=*), intent(in) :: mantissa
+    integer :: point, first
+
+    first = scan(mantissa, "123456789")
+    point = index(mantissa, ".")
+    if (point == 0) point = len(mantissa) + 1
+    exponent = point - first
+    if (first < point) exponent = exponent - 1
+  end function leading_exponent
+
+  pure logical function is_integer(text)
+    character(len=*), intent(in) :: text
+    is_integer = len(text) > sign_length(text) .and. verify(text(1 + sign_length(text):), "0123456789") == 0
+  end function is_integer
+
+  !> Value of a text that is an integer, cut at a million in size.
+  pure integer function bounded_integer(text) result(value)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    value = 0
+    do i = 1 + sign_length(text), len(text)
+      value = min(1000000, 10*value + iachar(text(i:i)) - iachar("0"))
+    end do
+    if (text(1:1) == "-") value = -value
+  end function bounded_integer
+
+  pure integer function sign_length(text) result(length)
+    character(len=*), intent(in) :: text
+
+    length = 0
+    if (len(text) > 0) length = merge(1, 0, scan(text(1:1), "+-") == 1)
+  end function sign_length
+
+  !> Raise an error about the cell in column k of the row: file, line, column, value, and what was expected.
+  subroutine table_refuse(self, k, expected, error)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    character(len=*), intent(in) :: expected
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: found
+
+    found = "empty"
+    if (.not. self%is_empty(k)) found = '"'//self%get_text(k)//'"'
+    call raise(error, status_input, self%path//": line "//to_text(self%line_number)//": column "//self%column_name(k)//": "// &
+      & found//", but "//expected//" was expected")
+  end subroutine table_refuse
+
+  !> Raise an error about the whole file.
+  subroutine table_refuse_file(self, what, error)
+    class(csv_table_t), intent(in) :: self
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    call raise(error, status_input, self%path//": "//what)
+  end subroutine table_refuse_file
+
+end module gravier_csv_table

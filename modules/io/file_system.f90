@@ -1,0 +1,368 @@
+!> What Fortran leaves to the operating system: directories, atomic renames, reserved disk space, and text files
+!> whose every write is checked. The only file with bindings to the C library.
+module gravier_file_system
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_f_pointer, c_associated
+  use gravier_kinds, only: i8
+  use gravier_errors, only: error_t, raise, status_input, status_failure
+  use gravier_text, only: to_text
+  implicit none
+  private
+  public :: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space
+  public :: text_file_t
+
+  !> A text file written piece by piece; after a failed write it ends with the last complete piece.
+  type :: text_file_t
+    private
+    integer(c_int) :: descriptor = -1
+    !> bytes written so far
+    integer(c_int64_t) :: length = 0
+    character(len=:), allocatable :: path
+  contains
+    procedure :: create => text_file_create
+    procedure :: append => text_file_append
+    procedure :: close => text_file_close
+    procedure :: is_open => text_file_is_open
+  end type text_file_t
+
+  ! Linux values of the constants of <fcntl.h>, <errno.h> and <unistd.h>
+  integer(c_int), parameter :: o_rdonly = 0, o_wronly = 1
+  integer(c_int), parameter :: falloc_fl_keep_size = 1
+  integer(c_int), parameter :: seek_set = 0, seek_end = 2
+  integer(c_int), parameter :: eintr = 4, eexist = 17, enospc = 28, enosys = 38, eopnotsupp = 95, edquot = 122
+  !> more than the length of struct statvfs of 64-bit Linux
+  integer, parameter :: statvfs_words = 32
+  !> permissions before the user's umask
+  integer(c_int), parameter :: file_mode = int(o"666", c_int), directory_mode = int(o"777", c_int)
+
+  interface
+    integer(c_int) function c_mkdir(path, mode) bind(C, name="mkdir")
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: mode
+    end function c_mkdir
+
+    integer(c_int) function c_rename(from, to) bind(C, name="rename")
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: from(*), to(*)
+    end function c_rename
+
+    integer(c_int) function c_unlink(path) bind(C, name="unlink")
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_unlink
+
+    integer(c_int) function c_open(path, flags) bind(C, name="open")
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: flags
+    end function c_open
+
+    integer(c_int) function c_creat(path, mode) bind(C, name="creat")
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: mode
+    end function c_creat
+
+    integer(c_int) function c_close(descriptor) bind(C, name="close")
+      import :: c_int
+      integer(c_int), value :: descriptor
+    end function c_close
+
+    integer(c_int64_t) function c_write(descriptor, buffer, count) bind(C, name="write")
+      import :: c_int, c_int64_t, c_size_t, c_char
+      integer(c_int), value :: descriptor
+      character(kind=c_char), intent(in) :: buffer(*)
+      integer(c_size_t), value :: count
+    end function c_write
+
+    integer(c_int64_t) function c_lseek(descriptor, offset, whence) bind(C, name="lseek")
+      import :: c_int, c_int64_t
+      integer(c_int), value :: descriptor
+      integer(c_int64_t), value :: offset
+      integer(c_int), value :: whence
+    end function c_lseek
+
+    integer(c_int) function c_ftruncate(descriptor, length) bind(C, name="ftruncate")
+      import :: c_int, c_int64_t
+      integer(c_int), value :: descriptor
+      integer(c_int64_t), value :: length
+    end function c_ftruncate
+
+    integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name="fallocate")
+      import :: c_int, c_int64_t
+      integer(c_int), value :: descriptor, mode
+      integer(c_int64_t), value :: offset, length
+    end function c_fallocate
+
+    integer(c_int) function c_fstatvfs(descriptor, status) bind(C, name="fstatvfs")
+      import :: c_int, c_int64_t
+      integer(c_int), value :: descriptor
+      integer(c_int64_t), intent(inout) :: status(*)
+    end function c_fstatvfs
+
+    integer(c_int) function c_getpid() bind(C, name="getpid")
+      import :: c_int
+    end function c_getpid
+
+    type(c_ptr) function c_errno_location() bind(C, name="__errno_location")
+      import :: c_ptr
+    end function c_errno_location
+
+    type(c_ptr) function c_strerror(number) bind(C, name="strerror")
+      import :: c_ptr, c_int
+      integer(c_int), value :: number
+    end function c_strerror
+
+    integer(c_size_t) function c_strlen(text) bind(C, name="strlen")
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: text
+    end function c_strlen
+  end interface
+
+contains
+
+  !> Make a directory and those above it, and check that a file can be written there. Not collective: call on one
+  !> rank. Failure: status_failure, with the system's reason.
+  subroutine make_directory(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i
+    integer(c_int) :: number
+
+    if (allocated(error)) return
+    number = 0
+    do i = 1, len_trim(path)
+      if (i > 1 .and. (i == len_trim(path) .or. path(i:i) == "/")) number = make_one(path(1:i))
+      if (i == 1 .and. len_trim(path) == 1) number = make_one(path(1:1))
+    end do
+    if (number /= 0 .and. number /= eexist) then
+      call raise(error, status_failure, trim(path)//": cannot make this directory: "//reason(number))
+      return
+    end if
+    call probe_directory(trim(path), error)
+  end subroutine make_directory
+
+  !> Make one directory; the result is the system's error number, 0 for success.
+  integer(c_int) function make_one(path) result(number)
+    character(len=*), intent(in) :: path
+    number = 0
+    if (c_mkdir(c_text(path), directory_mode) /= 0) number = last_error()
+  end function make_one
+
+  !> Write and remove a small file in `path`.
+  subroutine probe_directory(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    type(text_file_t) :: probe
+    type(error_t), allocatable :: failure
+    character(len=:), allocatable :: name
+
+    name = ".gravier-probe-"//to_text(int(c_getpid(), i8))
+    if (len(path) > 0) name = path//"/"//name
+    call probe%create(name, failure)
+    call probe%append("probe", failure)
+    call probe%close(failure)
+    if (allocated(failure)) then
+      call raise(error, status_failure, path//": this directory cannot be written to: "//failure%message)
+    end if
+    call remove_file(name)
+  end subroutine probe_directory
+
+  !> Rename a file, replacing what had the new name in one indivisible operation.
+  subroutine rename_file(from, to, error)
+    character(len=*), intent(in) :: from, to
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    if (c_rename(c_text(from), c_text(to)) /= 0) then
+      call raise(error, status_failure, from//": cannot rename to "//to//": "//reason(last_error()))
+    end if
+  end subroutine rename_file
+
+  !> Remove a file if it is there.
+  subroutine remove_file(path)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: ignored
+    ignored = c_unlink(c_text(path))
+  end subroutine remove_file
+
+  !> Check that a file can be opened for reading. Failure: status_input, with the system's reason.
+  subroutine check_readable(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(c_int) :: descriptor, ignored
+
+    if (allocated(error)) return
+    descriptor = c_open(c_text(path), o_rdonly)
+    if (descriptor < 0) then
+      call raise(error, status_input, path//": cannot read this file: "//reason(last_error()))
+      return
+    end if
+    ignored = c_close(descriptor)
+  end subroutine check_readable
+
+  !> Check that a file can be created; it is left empty. Failure: status_failure, with the system's reason.
+  subroutine check_creatable(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    type(text_file_t) :: file
+
+    if (allocated(error)) return
+    call file%create(path, error)
+    if (.not. allocated(error)) call file%close(error)
+  end subroutine check_creatable
+
+  !> Reserve disk space beyond the end of a file, leaving its length as it is, so that writing it later cannot fail
+  !> for want of space. Where the file system knows no reservation, only compare with the space that is free now.
+  !> Failure: status_failure; the file is as it was.
+  subroutine reserve_space(path, bytes, error)
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: bytes
+    type(error_t), allocatable, intent(inout) :: error
+    integer(c_int) :: descriptor, number, ignored
+    integer(c_int64_t) :: length
+
+    if (allocated(error) .or. bytes <= 0) return
+    descriptor = c_open(c_text(path), o_wronly)
+    if (descriptor < 0) then
+      call raise(error, status_failure, path//": cannot write to this file: "//reason(last_error()))
+      return
+    end if
+    length = c_lseek(descriptor, 0_c_int64_t, seek_end)
+    number = allocate_beyond(descriptor, length, bytes)
+    if (number == enosys .or. number == eopnotsupp) number = compare_with_free(descriptor, bytes)
+    if (number /= 0) then
+      ! some file systems keep the part that did fit: give it back
+      ignored = c_ftruncate(descriptor, length)
+      call raise(error, status_failure, path//": "//reason(number)//": "//to_text(bytes)// &
+        & " bytes needed; what was written before stays readable")
+    end if
+    ignored = c_close(descriptor)
+  end subroutine reserve_space
+
+  !> Reserve [length, length + bytes) of an open file; the result is the system's error number, 0 for success.
+  integer(c_int) function allocate_beyond(descriptor, length, bytes) result(number)
+    integer(c_int), intent(in) :: descriptor
+    integer(c_int64_t), intent(in) :: length
+    integer(i8), intent(in) :: bytes
+
+    do
+      number = 0
+      if (c_fallocate(descriptor, falloc_fl_keep_size, length, int(bytes, c_int64_t)) /= 0) number = last_error()
+      if (number /= eintr) return
+    end do
+  end function allocate_beyond
+
+  !> ENOSPC when the file system of an open file has less free space than `bytes`, else 0.
+  integer(c_int) function compare_with_free(descriptor, bytes) result(number)
+    integer(c_int), intent(in) :: descriptor
+    integer(i8), intent(in) :: bytes
+    integer(c_int64_t) :: status(statvfs_words)
+
+    number = 0
+    if (c_fstatvfs(descriptor, status) /= 0) return
+    ! words of struct statvfs: 2 is the size of a block, 5 the number of blocks free to this user
+    if (status(5) < bytes/max(status(2), 1_c_int64_t) + 1) number = enospc
+  end function compare_with_free
+
+  !> Create an empty text file, replacing an older one. Failure: status_failure, with the system's reason.
+  subroutine text_file_create(self, path, error)
+    class(text_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    call self%close(error)
+    self%path = path
+    self%length = 0
+    self%descriptor = c_creat(c_text(path), file_mode)
+    if (self%descriptor < 0) then
+      call raise(error, status_failure, path//": cannot create this file: "//reason(last_error()))
+    end if
+  end subroutine text_file_create
+
+  !> Append text and hand it to the system at once. On failure the file is cut back to what it held before.
+  subroutine text_file_append(self, text, error)
+    class(text_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+    type(error_t), allocatable, intent(inout) :: error
+    integer(c_int64_t) :: done, written, ignored
+    integer(c_int) :: number, cut
+
+    if (allocated(error)) return
+    done = 0
+    do while (done < len(text))
+      written = c_write(self%descriptor, text(done + 1:), int(len(text) - done, c_size_t))
+      if (written >= 0) then
+        done = done + written
+        cycle
+      end if
+      number = last_error()
+      if (number == eintr) cycle
+      cut = c_ftruncate(self%descriptor, self%length)
+      ignored = c_lseek(self%descriptor, self%length, seek_set)
+      call raise(error, status_failure, self%path//": cannot write to this file: "//reason(number)//": "// &
+        & to_text(int(len(text), i8))//" bytes needed; what was written before stays readable")
+      return
+    end do
+    self%length = self%length + done
+  end subroutine text_file_append
+
+  !> Close; a failure that the system had kept to itself shows here. Without effect on a file not open.
+  subroutine text_file_close(self, error)
+    class(text_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (self%descriptor < 0) return
+    if (c_close(self%descriptor) /= 0) then
+      call raise(error, status_failure, self%path//": cannot close this file: "//reason(last_error()))
+    end if
+    self%descriptor = -1
+  end subroutine text_file_close
+
+  pure logical function text_file_is_open(self) result(is_open)
+    class(text_file_t), intent(in) :: self
+    is_open = self%descriptor >= 0
+  end function text_file_is_open
+
+  !> The text as C wants it.
+  pure function c_text(text) result(terminated)
+    character(len=*), intent(in) :: text
+    character(len=:, kind=c_char), allocatable :: terminated
+    terminated = text//c_null_char
+  end function c_text
+
+  !> errno of the last call that failed.
+  integer(c_int) function last_error() result(number)
+    integer(c_int), pointer :: errno
+    call c_f_pointer(c_errno_location(), errno)
+    number = errno
+  end function last_error
+
+  !> The system's words for an error number.
+  function reason(number) result(text)
+    integer(c_int), intent(in) :: number
+    character(len=:), allocatable :: text
+    character(kind=c_char), pointer :: letters(:)
+    type(c_ptr) :: message
+    integer(c_size_t) :: length(1)
+    integer :: i
+
+    select case (number)
+    case (enospc)
+      text = "no space left on device"
+    case (edquot)
+      text = "disk quota exceeded"
+    case default
+      text = ""
+      message = c_strerror(number)
+      if (.not. c_associated(message)) return
+      length = c_strlen(message)
+      call c_f_pointer(message, letters, length)
+      do i = 1, size(letters)
+        text = text//letters(i)
+      end do
+    end select
+  end function reason
+
+end module gravier_file_system

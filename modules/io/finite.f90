@@ -1,0 +1,16 @@
+!> Recognition of NaN and infinity without a floating-point operation, which could trap.
+module gravier_finite
+  use gravier_kinds, only: dp, i8
+  implicit none
+  private
+  public :: is_finite
+
+contains
+
+  !> True when `x` is neither NaN nor infinite, by its exponent bits (IEEE 754 binary64).
+  elemental logical function is_finite(x)
+    real(dp), intent(in) :: x
+    is_finite = ibits(transfer(x, 0_i8), 52, 11) /= 2047_i8
+  end function is_finite
+
+end module gravier_finite
