@@ -38,6 +38,7 @@ module gravier_enriched_matrix
     procedure :: start => enriched_matrix_start
     procedure :: update => enriched_matrix_update
     procedure :: solve => enriched_matrix_solve
+    procedure :: enrich => enriched_matrix_enrich
     procedure :: counts => enriched_matrix_counts
     procedure :: free => enriched_matrix_free
   end type enriched_matrix_t
@@ -205,6 +206,23 @@ contains
     end do
     b(:, problem%sub(s)%n_bodies + 1:) = 0.0_dp
   end subroutine enriched_matrix_solve
+
+  !> (M + H l H^T)^-1 H l (v - H^T V) of subdomain `s`, into body_work: v is the velocity that solved the law at each
+  !> contact's last update, V the present velocity of the bodies. It vanishes when the two agree.
+  subroutine enriched_matrix_enrich(self, problem, s, error)
+    class(enriched_matrix_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (part => self%part(s), sub => problem%sub(s))
+      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, part%contact_work)
+      part%contact_work(:, :) = part%direction*(part%law_velocity - part%contact_work)
+      part%body_work(:, :) = 0.0_dp
+      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
+      call self%solve(problem, s, part%body_work, error)
+    end associate
+  end subroutine enriched_matrix_enrich
 
   !> Analyses and factorisations done on this rank.
   pure subroutine enriched_matrix_counts(self, analyses, factorisations)

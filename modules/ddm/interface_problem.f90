@@ -1,5 +1,4 @@
-!> The interface problem of the enriched dual method, X_eta F = sum_E A_E M_eta,E^-1 [R_E^d + H_E (r_E + l_E v_E)]
-!> (paper, (28) with the missing v_E; X_eta of (29)).
+!> The interface problem of the enriched dual method, X_eta F = b, X_eta = sum_E A_E M_eta,E^-1 A_E^T (paper, (28)-(29)).
 !>
 !> The rows of A_E tie the copies of a body one to the next, over its sharers in ascending order: multiplier p of a body
 !> of multiplicity m, p = 1 to m - 1, says V_p - V_(p+1) = 0. The subdomain on rung p of a body holds multiplier p as
@@ -48,7 +47,7 @@ module gravier_interface_problem
       type(enriched_matrix_t), intent(inout) :: matrix
       !> right-hand side, by subdomain of this rank [m/s, rad/s]
       type(interface_field_t), intent(in) :: b(:)
-      !> a guess in, the solution out [N s, N m s]
+      !> a guess in, the solution out [N s, N m s]; only the iterative solver uses the guess
       type(interface_field_t), intent(inout) :: f(:)
       type(error_t), allocatable, intent(inout) :: error
     end subroutine solve_problem

@@ -1,4 +1,8 @@
 !> NSCDD-EP: NSCDD with an enriched interface problem (paper, (24)-(29), with v_E restored in (27)).
+!>
+!> The interface problem (28) is solved for the change of F. With M~_E V_E = R_E^d + H_E r_E - A_E^T F before the solve,
+!>   X_eta (F_new - F) = sum_E A_E [ V_E + M_eta,E^-1 H_E l_E (v_E - H_E^T V_E) ],
+!> which is (28) less X_eta F: the same solution, but rounding shrinks with the change, and F itself need not be kept.
 module gravier_nscdd_ep
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -16,8 +20,8 @@ module gravier_nscdd_ep
   type, extends(nscdd_t) :: nscdd_ep_t
     type(enriched_matrix_t) :: matrix
     class(interface_solver_t), allocatable :: interface_solver
-    !> multipliers F now and at the iteration before, and the right-hand side of the interface problem
-    type(interface_field_t), allocatable, private :: f(:), f_old(:), b(:)
+    !> change of the multipliers, and the right-hand side of the interface problem
+    type(interface_field_t), allocatable, private :: change(:), b(:)
     logical, private :: prepared = .false.
   contains
     procedure :: start => nscdd_ep_start
@@ -36,10 +40,8 @@ contains
     if (allocated(error)) return
     call self%nscdd_t%start(problem, error)
     if (.not. is_enriched(self)) return
-    call make_field(problem, self%f)
-    call make_field(problem, self%f_old)
+    call make_field(problem, self%change)
     call make_field(problem, self%b)
-    call start_multipliers(problem, self%f)
     call self%matrix%start(problem, error)
     call problem%comm%agree(error)
     self%prepared = .false.
@@ -49,39 +51,6 @@ contains
     class(nscdd_ep_t), intent(in) :: self
     is_enriched = self%matrix%direction%value > 0.0_dp
   end function is_enriched
-
-  !> Multipliers that agree with the impulses at the start, where all copies have one velocity: on rung q of a body
-  !> of multiplicity m, (A^T F)_q = R_q - (sum of R)/m. Collective.
-  subroutine start_multipliers(problem, f)
-    type(contact_problem_t), intent(inout) :: problem
-    type(interface_field_t), intent(inout) :: f(:)
-    real(dp) :: mean(problem%kernels%nv)
-    integer :: s, k, j
-
-    do s = 1, size(f)
-      call problem%own_reactions(s)
-      call problem%shared%load(s, problem%sub(s)%reaction)
-    end do
-    call problem%shared%pass()
-    do s = 1, size(f)
-      associate (part => problem%shared%part(s), own => problem%sub(s)%reaction)
-        do k = 1, part%n_shared
-          mean(:) = own(:, part%body(k))
-          call problem%shared%add_copies(s, k, mean)
-          mean(:) = mean/part%multiplicity(k)
-          do j = part%first(k), part%first(k) + part%rung(k) - 1
-            f(s)%lower(:, k) = f(s)%upper(:, k)
-            if (part%slot(j) == 0) then
-              f(s)%upper(:, k) = f(s)%upper(:, k) + (own(:, part%body(k)) - mean)
-            else
-              f(s)%upper(:, k) = f(s)%upper(:, k) + (part%recv(:, part%slot(j)) - mean)
-            end if
-          end do
-          if (part%rung(k) == part%multiplicity(k)) f(s)%upper(:, k) = 0.0_dp
-        end do
-      end associate
-    end do
-  end subroutine start_multipliers
 
   subroutine nscdd_ep_iterate(self, problem, measure, jump, error)
     class(nscdd_ep_t), intent(inout) :: self
@@ -104,13 +73,13 @@ contains
     call start_timer(phase_interface_solve)
     do s = 1, size(problem%sub)
       call enriched_velocities(self, problem, s, error)
-      self%f_old(s)%upper(:, :) = self%f(s)%upper
-      self%f_old(s)%lower(:, :) = self%f(s)%lower
+      self%change(s)%upper(:, :) = 0.0_dp
+      self%change(s)%lower(:, :) = 0.0_dp
     end do
     call chain_differences(problem, self%matrix, self%b)
     call problem%comm%agree(error)
     if (allocated(error)) return
-    call self%interface_solver%solve(problem, self%matrix, self%b, self%f, error)
+    call self%interface_solver%solve(problem, self%matrix, self%b, self%change, error)
     do s = 1, size(problem%sub)
       call take_multipliers(self, problem, s)
     end do
@@ -136,42 +105,34 @@ contains
     self%prepared = .true.
   end subroutine prepare
 
-  !> M_eta,E^-1 [R_E^d + H_E (r_E + l_E v_E)] of (28), into body_work.
+  !> V_E + M_eta,E^-1 H_E l_E (v_E - H_E^T V_E), into body_work.
   subroutine enriched_velocities(self, problem, s, error)
     class(nscdd_ep_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
     type(error_t), allocatable, intent(inout) :: error
-    integer :: b, nd
 
-    nd = problem%kernels%nd
-    associate (part => self%matrix%part(s), sub => problem%sub(s))
-      part%contact_work(:, :) = sub%impulse + part%direction*part%law_velocity
-      part%body_work(:, :) = 0.0_dp
-      do b = 1, sub%n_bodies
-        part%body_work(1:nd, b) = sub%v_free(1:nd, b)/sub%weight(1, b)
-        part%body_work(nd + 1:, b) = sub%v_free(nd + 1:, b)/sub%weight(2, b)
-      end do
-      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
-      call self%matrix%solve(problem, s, part%body_work, error)
+    call self%matrix%enrich(problem, s, error)
+    associate (work => self%matrix%part(s)%body_work)
+      work(:, :) = work + problem%sub(s)%velocity
     end associate
   end subroutine enriched_velocities
 
-  !> V_E changes by M~_E^-1 A_E^T (F_old - F).
+  !> V_E changes by - M~_E^-1 A_E^T (F_new - F).
   subroutine take_multipliers(self, problem, s)
     class(nscdd_ep_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
-    real(dp) :: change(problem%kernels%nv)
+    real(dp) :: load(problem%kernels%nv)
     integer :: k, b, nd
 
     nd = problem%kernels%nd
-    associate (part => problem%shared%part(s), sub => problem%sub(s), old => self%f_old(s), new => self%f(s))
+    associate (part => problem%shared%part(s), sub => problem%sub(s), change => self%change(s))
       do k = 1, part%n_shared
         b = part%body(k)
-        change(:) = (old%upper(:, k) - old%lower(:, k)) - (new%upper(:, k) - new%lower(:, k))
-        sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1, b)*change(1:nd)
-        sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(2, b)*change(nd + 1:)
+        load(:) = change%upper(:, k) - change%lower(:, k)
+        sub%velocity(1:nd, b) = sub%velocity(1:nd, b) - sub%weight(1, b)*load(1:nd)
+        sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) - sub%weight(2, b)*load(nd + 1:)
       end do
     end associate
   end subroutine take_multipliers

@@ -7,7 +7,7 @@ module gravier_schwarz
   use gravier_scheme, only: scheme_t, start_velocities, sweep_all
   implicit none
   private
-  public :: schwarz_t, neighbour_load_t, start_neighbour_loads, take_neighbour_loads
+  public :: schwarz_t, neighbour_load_t, start_neighbour_loads, shared_reactions, take_neighbour_loads
 
   !> R^ddm on the shared bodies of one subdomain (nv, n_shared) [N s]
   type :: neighbour_load_t

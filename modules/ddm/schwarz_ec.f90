@@ -6,7 +6,7 @@ module gravier_schwarz_ec
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t, work_t, start_velocities
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
-  use gravier_schwarz, only: neighbour_load_t, start_neighbour_loads, take_neighbour_loads
+  use gravier_schwarz, only: neighbour_load_t, start_neighbour_loads, shared_reactions, take_neighbour_loads
   implicit none
   private
   public :: schwarz_ec_t
@@ -66,32 +66,25 @@ contains
     self%work%interface_solves = self%work%interface_solves + 1
   end subroutine schwarz_ec_iterate
 
-  !> R~_E = (I + L_E M_E^-1)^-1 ( R_E - L_E M_E^-1 (R_E^d + R_E^ddm) + H_E l_E v_E ) with L_E = H_E l_E H_E^T. Since
-  !> I + L M^-1 = (M + L) M^-1, this is R~ = M y with (M + L) y = H ( r + l (v - H^T U) ), where
-  !> U = M^-1 (R^d + R^ddm) and v is the velocity that solved the law. Into body_work.
+  !> R~_E = (I + L_E M_E^-1)^-1 ( R_E - L_E M_E^-1 (R_E^d + R_E^ddm) + H_E l_E v_E ) with L_E = H_E l_E H_E^T, on the shared
+  !> bodies, into body_work. With I + L M^-1 = (M + L) M^-1 and M V_E = R_E^d + R_E^ddm + R_E this is
+  !>   R~_E = R_E + M_E (M_E + L_E)^-1 H_E l_E (v_E - H_E^T V_E),
+  !> v_E being the velocity that solved the law: without it R~_E = R_E.
   subroutine enriched_reactions(self, problem, s, error)
     class(schwarz_ec_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
+    type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     type(error_t), allocatable, intent(inout) :: error
     integer :: k, b, nd
 
     nd = problem%kernels%nd
-    associate (part => self%matrix%part(s), sub => problem%sub(s), shared => problem%shared%part(s))
-      part%body_work(:, :) = sub%v_free
+    call shared_reactions(problem, s, self%load(s))
+    call self%matrix%enrich(problem, s, error)
+    associate (work => self%matrix%part(s)%body_work, sub => problem%sub(s), shared => problem%shared%part(s))
       do k = 1, shared%n_shared
         b = shared%body(k)
-        part%body_work(1:nd, b) = sub%v_free(1:nd, b) + sub%weight(1, b)*self%load(s)%value(1:nd, k)
-        part%body_work(nd + 1:, b) = sub%v_free(nd + 1:, b) + sub%weight(2, b)*self%load(s)%value(nd + 1:, k)
-      end do
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, part%body_work, part%contact_work)
-      part%contact_work(:, :) = sub%impulse + part%direction*(part%law_velocity - part%contact_work)
-      part%body_work(:, :) = 0.0_dp
-      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
-      call self%matrix%solve(problem, s, part%body_work, error)
-      do b = 1, sub%n_bodies
-        part%body_work(1:nd, b) = part%body_work(1:nd, b)/sub%weight(1, b)
-        part%body_work(nd + 1:, b) = part%body_work(nd + 1:, b)/sub%weight(2, b)
+        work(1:nd, b) = sub%reaction(1:nd, b) + work(1:nd, b)/sub%weight(1, b)
+        work(nd + 1:, b) = sub%reaction(nd + 1:, b) + work(nd + 1:, b)/sub%weight(2, b)
       end do
     end associate
   end subroutine enriched_reactions
