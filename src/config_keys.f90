@@ -91,17 +91,18 @@ module gravier_config_keys
 
   type(key_t), parameter :: solver_keys(*) = [ &
     key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep", &
-      "nonlinear Gauss-Seidel on one domain, Schwarz, Schwarz with enriched conditions, " // &
-      "nonsmooth domain decomposition, the same with enriched preconditioner"), &
+      "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP"), &
     key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
       "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
     key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &
     key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
     key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
+    key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
+      "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)"), &
     key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
     key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
     key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
-      "after a solve that gave up: go on; write the results and stop; stop without writing the step")]
+      "after a solve that gave up: go on; write the step and stop; stop without it. One that diverged always stops without it")]
 
   type(key_t), parameter :: decomposition_keys(*) = [ &
     key_t("decomposition", "partition", kind_choice, "'grid'", "grid metis", &

@@ -90,6 +90,7 @@ contains
     case ("tolerance"); slot%real => config%solver%tolerance
     case ("max_iterations"); slot%integer => config%solver%max_iterations
     case ("sweeps"); slot%integer => config%solver%sweeps
+    case ("relaxation"); slot%real => config%solver%relaxation
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
     case ("on_failure"); slot%choice => config%solver%on_failure

@@ -57,6 +57,8 @@ module gravier_config_types
     character(len=choice_length) :: criterion
     real(dp) :: tolerance
     integer :: max_iterations, sweeps, check_every
+    !> in (0, 1]
+    real(dp) :: relaxation
     logical :: warm_start
     !> continue, stop or discard
     character(len=choice_length) :: on_failure

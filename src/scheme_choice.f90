@@ -22,15 +22,19 @@ contains
     type(config_t), intent(in) :: config
     class(scheme_t), allocatable, intent(out) :: scheme
     type(nscdd_ep_t), allocatable :: dual
-    type(schwarz_ec_t), allocatable :: schwarz
+    type(schwarz_t), allocatable :: schwarz
+    type(schwarz_ec_t), allocatable :: corrected
 
     select case (config%solver%method)
     case ("schwarz")
-      allocate (schwarz_t :: scheme)
-    case ("schwarz_ec")
       allocate (schwarz)
-      schwarz%matrix%direction = direction_of(config%enriched)
+      schwarz%relaxation = config%solver%relaxation
       call move_alloc(schwarz, scheme)
+    case ("schwarz_ec")
+      allocate (corrected)
+      corrected%relaxation = config%solver%relaxation
+      corrected%matrix%direction = direction_of(config%enriched)
+      call move_alloc(corrected, scheme)
     case ("nscdd")
       allocate (nscdd_t :: scheme)
     case ("nscdd_ep")

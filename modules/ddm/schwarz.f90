@@ -15,6 +15,8 @@ module gravier_schwarz
   end type neighbour_load_t
 
   type, extends(scheme_t) :: schwarz_t
+    !> share of a change of R^ddm that is taken over: 1 in the paper, less where the method would diverge
+    real(dp) :: relaxation = 1.0_dp
     type(neighbour_load_t), allocatable :: load(:)
   contains
     procedure :: start => schwarz_start
@@ -51,7 +53,7 @@ contains
       call shared_reactions(problem, s, self%load(s))
       call problem%shared%load(s, problem%sub(s)%reaction)
     end do
-    call take_neighbour_loads(problem, self%load)
+    call take_neighbour_loads(problem, self%relaxation, self%load)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
   end subroutine schwarz_iterate
@@ -96,11 +98,13 @@ contains
   end subroutine start_neighbour_loads
 
   !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* of B_E B_E*^T R_E*, and change the velocities by
-  !> what the loads have changed. Collective.
-  subroutine take_neighbour_loads(problem, load)
+  !> what the loads have changed. With under-relaxation, only a share of the change is taken over. Collective.
+  subroutine take_neighbour_loads(problem, relaxation, load)
     type(contact_problem_t), intent(inout) :: problem
+    !> in (0, 1]
+    real(dp), intent(in) :: relaxation
     type(neighbour_load_t), intent(inout) :: load(:)
-    real(dp) :: fresh(problem%kernels%nv)
+    real(dp) :: change(problem%kernels%nv)
     integer :: s, k, b, nd
 
     nd = problem%kernels%nd
@@ -109,11 +113,12 @@ contains
       associate (part => problem%shared%part(s), sub => problem%sub(s), old => load(s)%value)
         do k = 1, part%n_shared
           b = part%body(k)
-          fresh(:) = 0.0_dp
-          call problem%shared%add_copies(s, k, fresh)
-          sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1, b)*(fresh(1:nd) - old(1:nd, k))
-          sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(2, b)*(fresh(nd + 1:) - old(nd + 1:, k))
-          old(:, k) = fresh
+          change(:) = 0.0_dp
+          call problem%shared%add_copies(s, k, change)
+          change(:) = relaxation*(change - old(:, k))
+          old(:, k) = old(:, k) + change
+          sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1, b)*change(1:nd)
+          sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(2, b)*change(nd + 1:)
         end do
       end associate
     end do

@@ -13,6 +13,8 @@ module gravier_schwarz_ec
 
   type, extends(scheme_t) :: schwarz_ec_t
     type(enriched_matrix_t) :: matrix
+    !> see schwarz_t
+    real(dp) :: relaxation = 1.0_dp
     type(neighbour_load_t), allocatable :: load(:)
     logical, private :: prepared = .false.
   contains
@@ -61,7 +63,7 @@ contains
     call stop_timer(phase_interface_solve)
     call problem%comm%agree(error)
     call start_timer(phase_exchange)
-    call take_neighbour_loads(problem, self%load)
+    call take_neighbour_loads(problem, self%relaxation, self%load)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
   end subroutine schwarz_ec_iterate

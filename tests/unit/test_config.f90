@@ -188,6 +188,7 @@ contains
     call check_close(config%solver%tolerance, 1.0e-4_dp, 0.0_dp, "default tolerance")
     call check_equal(config%solver%max_iterations, 10000, "default max_iterations")
     call check_equal(config%solver%sweeps, 1, "default sweeps")
+    call check_close(config%solver%relaxation, 1.0_dp, 0.0_dp, "default relaxation")
     call check_equal(config%solver%check_every, 10, "default check_every")
     call check(config%solver%warm_start, "default warm_start")
     call check_equal(config%solver%on_failure, "continue", "default on_failure")
@@ -626,6 +627,8 @@ contains
     call refuse(column // "&solver tolerance = 0 /", "&solver tolerance = 0: " // positive)
     call refuse(column // "&solver max_iterations = 0 /", "&solver max_iterations = 0: expected an integer >= 1")
     call refuse(column // "&solver sweeps = 0 /", "&solver sweeps = 0: expected an integer >= 1")
+    call refuse(column // "&solver relaxation = 0.0 /", "&solver relaxation = 0.0: expected a finite real number in (0, 1]")
+    call refuse(column // "&solver relaxation = 1.5 /", "&solver relaxation = 1.5: expected a finite real number in (0, 1]")
     call refuse(column // "&solver check_every = 0 /", "&solver check_every = 0: expected an integer >= 1")
   end subroutine test_rules_of_time_and_solver
 
