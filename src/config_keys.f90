@@ -117,7 +117,7 @@ module gravier_config_keys
     key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again")]
 
   type(key_t), parameter :: enriched_keys(*) = [ &
-    key_t("enriched", "direction", kind_real, "1.0", ">= 0", "search direction l", unit="1/W_aa or kg"), &
+    key_t("enriched", "direction", kind_real, "0.3", ">= 0", "search direction l", unit="1/W_aa or kg"), &
     key_t("enriched", "direction_unit", kind_choice, "'relative'", "relative absolute", &
       "l in units of 1/W_aa, the inverse of the local operator of each contact, or in kg"), &
     key_t("enriched", "contacts", kind_choice, "'all'", "all active", &

@@ -42,6 +42,7 @@ contains
     if (.not. allocated(error)) call prepare_directory(comm, config, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
+    call log%write_head(error)
     call log%open(trim(config%output%directory)//"/run.log", error)
     call comm%agree(error)
     call output%open(simulation, command, error)

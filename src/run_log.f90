@@ -31,6 +31,7 @@ module gravier_run_log
     procedure :: open => run_log_open
     procedure :: line => run_log_line
     procedure :: write_start => run_log_write_start
+    procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
     procedure :: write_interface => run_log_write_interface
     procedure :: write_memory => run_log_write_memory
@@ -122,6 +123,14 @@ contains
     end associate
   end subroutine run_log_write_start
 
+  !> Names of the columns of the step lines.
+  subroutine run_log_write_head(self, error)
+    class(run_log_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%line("    step       time [s]    contacts  iterations   residual       jump    overlap [m]  energy [J]  wall [s]", &
+      & error)
+  end subroutine run_log_write_head
+
   function boxes_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
@@ -191,7 +200,7 @@ contains
       & " KiB in all", error)
   end subroutine run_log_write_memory
 
-  !> One line a step; the first one comes with the names of the columns.
+  !> One line a step.
   subroutine run_log_write_step(self, simulation, figures, seconds, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -200,8 +209,10 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=160) :: row
 
-    if (simulation%step == 1) call self%line("    step       time [s]    contacts  iterations   residual       jump"// &
-      & "    overlap [m]  energy [J]  wall [s]", error)
+    if (figures%solve%status == solve_diverged) then
+      call self%line("  *** "//failure_text(simulation, figures), error)
+      return
+    end if
     write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3)") simulation%step, simulation%time, figures%contacts, &
       & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, seconds
     call self%line(trim(row), error)
@@ -216,7 +227,8 @@ contains
 
     associate (solve => figures%solve, solver => simulation%config%solver)
       if (solve%status == solve_diverged) then
-        text = "DIVERGED after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
+        text = "DIVERGED: step "//to_text(simulation%step + 1)//" after "//to_text(solve%iterations)//" iterations of "// &
+          & trim(solver%method)//"; the step is not kept"
       else
         text = "NOT CONVERGED: "//trim(solver%criterion)//" "// &
           & to_text(merge(solve%error, solve%residual, solver%criterion == "error"), 3)//" above the tolerance "// &

@@ -99,7 +99,7 @@ contains
     end do
   end subroutine make_room
 
-  !> Equal grains, one upon the other on a ground: the columns of the paper, section 5.
+  !> Equal grains, one upon the other on a ground: the columns of the paper.
   subroutine make_column(comm, scene, data)
     type(communicator_t), intent(in) :: comm
     type(scene_config_t), intent(in) :: scene

@@ -3,12 +3,10 @@ module gravier_kinds
   use, intrinsic :: iso_fortran_env, only: real64, int32, int64
   implicit none
   private
-  public :: dp, qp, i4, i8
+  public :: dp, i4, i8
 
   !> working precision
   integer, parameter :: dp = real64
-  !> extended precision, for the refinement of interface solves only
-  integer, parameter :: qp = selected_real_kind(33)
   integer, parameter :: i4 = int32
   !> body identifiers, global counts and record words
   integer, parameter :: i8 = int64

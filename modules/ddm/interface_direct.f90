@@ -2,10 +2,11 @@
 !> giving its own, and factorised by all ranks together.
 !>
 !> A parallel factorisation does not round the same way on every number of ranks. The solution is therefore refined in
-!> extended precision, with residuals that do not depend on the ranks, far beyond the working precision: rounded back, it
-!> has the same bits on any number of ranks.
+!> twice the working precision, with residuals that do not depend on the ranks, far beyond the working precision: rounded
+!> back, it has the same bits on any number of ranks.
 module gravier_interface_direct
-  use gravier_kinds, only: dp, qp, i8
+  use gravier_kinds, only: dp, i8
+  use gravier_double_double, only: extended_product, extended_add
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_contact_problem, only: contact_problem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
@@ -23,8 +24,9 @@ module gravier_interface_direct
     integer, allocatable :: upper(:), lower(:)
   end type block_t
 
+  !> Values on the multipliers of a subdomain as sums high + low (nv, n_shared).
   type :: extended_field_t
-    real(qp), allocatable :: upper(:, :), lower(:, :)
+    real(dp), allocatable :: upper(:, :), upper_low(:, :), lower(:, :), lower_low(:, :)
   end type extended_field_t
 
   type, extends(interface_solver_t) :: interface_direct_t
@@ -219,18 +221,21 @@ contains
     type(interface_field_t), intent(in) :: b(:)
     type(interface_field_t), intent(inout) :: f(:)
     type(error_t), allocatable, intent(inout) :: error
-    type(extended_field_t), allocatable :: x(:), r(:)
+    type(extended_field_t), allocatable :: x(:)
+    type(interface_field_t), allocatable :: r(:)
     real(dp), allocatable :: rows(:)
     real(dp) :: size_now(2), last
     integer :: k, s
 
     if (self%n == 0 .or. size(matrix%part) /= size(f)) return
-    allocate (x(size(b)), r(size(b)))
+    allocate (x(size(b)))
     do s = 1, size(b)
-      allocate (x(s)%upper(size(b(s)%upper, 1), size(b(s)%upper, 2)), source=0.0_qp)
-      allocate (x(s)%lower(size(b(s)%upper, 1), size(b(s)%upper, 2)), source=0.0_qp)
-      r(s)%upper = b(s)%upper
+      allocate (x(s)%upper(size(b(s)%upper, 1), size(b(s)%upper, 2)), source=0.0_dp)
+      x(s)%upper_low = x(s)%upper
+      x(s)%lower = x(s)%upper
+      x(s)%lower_low = x(s)%upper
     end do
+    r = b
     allocate (rows(self%first_row(problem%comm%rank + 2) - self%first_row(problem%comm%rank + 1)))
     last = huge(1.0_dp)
     do k = 1, most_refinements
@@ -245,8 +250,8 @@ contains
       call extended_residual(self, problem, b, x, r)
     end do
     do s = 1, size(f)
-      f(s)%upper(:, :) = real(x(s)%upper, dp)
-      f(s)%lower(:, :) = real(x(s)%lower, dp)
+      f(s)%upper(:, :) = x(s)%upper
+      f(s)%lower(:, :) = x(s)%lower
     end do
   end subroutine interface_direct_solve
 
@@ -254,7 +259,7 @@ contains
   subroutine gather_rows(self, problem, r, rows)
     class(interface_direct_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    type(extended_field_t), intent(in) :: r(:)
+    type(interface_field_t), intent(in) :: r(:)
     real(dp), intent(inout), contiguous :: rows(:)
     integer :: s, k, at, nv
 
@@ -263,7 +268,7 @@ contains
       do k = 1, size(self%blocks(s)%upper)
         if (self%blocks(s)%upper(k) == 0) cycle
         at = self%blocks(s)%upper(k) - self%first_row(problem%comm%rank + 1)
-        rows(at + 1:at + nv) = real(r(s)%upper(:, k), dp)
+        rows(at + 1:at + nv) = r(s)%upper(:, k)
       end do
     end do
   end subroutine gather_rows
@@ -291,9 +296,9 @@ contains
         do k = 1, part%n_shared
           if (block%upper(k) == 0) cycle
           at = block%upper(k) - self%first_row(problem%comm%rank + 1)
-          x(s)%upper(:, k) = x(s)%upper(:, k) + rows(at + 1:at + nv)
+          call extended_add(x(s)%upper(:, k), x(s)%upper_low(:, k), rows(at + 1:at + nv))
           size_now(1) = max(size_now(1), maxval(abs(rows(at + 1:at + nv))))
-          size_now(2) = max(size_now(2), maxval(abs(real(x(s)%upper(:, k), dp))))
+          size_now(2) = max(size_now(2), maxval(abs(x(s)%upper(:, k))))
         end do
       end associate
     end do
@@ -302,38 +307,54 @@ contains
       associate (part => problem%shared%part(s))
         do k = 1, part%n_shared
           at = part%first(k) + part%rung(k) - 1
-          if (at > part%first(k)) x(s)%lower(:, k) = x(s)%lower(:, k) + part%recv(:, part%slot(at - 1))
+          if (at > part%first(k)) &
+            & call extended_add(x(s)%lower(:, k), x(s)%lower_low(:, k), part%recv(:, part%slot(at - 1)))
         end do
       end associate
     end do
     call problem%comm%highest_of(size_now)
   end subroutine add_rows
 
-  !> r := b - X x in extended precision, on upper multipliers. Collective.
+  !> r := b - X x, computed in twice the working precision, on upper multipliers. Collective.
   subroutine extended_residual(self, problem, b, x, r)
     class(interface_direct_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
     type(interface_field_t), intent(in) :: b(:)
     type(extended_field_t), intent(in) :: x(:)
-    type(extended_field_t), intent(inout) :: r(:)
+    type(interface_field_t), intent(inout) :: r(:)
     type(extended_field_t), allocatable :: y(:)
-    real(qp), allocatable :: v(:, :)
-    integer :: s, k, at, half
+    integer :: s, k, at
 
+    ! y%upper holds b - y of the subdomain, y%lower the velocities y that its neighbours below want
     allocate (y(size(x)))
     do s = 1, size(x)
-      v = x(s)%upper - x(s)%lower
-      call multiply(self%blocks(s)%compliance, v, y(s)%upper)
-      r(s)%upper(:, :) = b(s)%upper - y(s)%upper
+      call own_velocities(self%blocks(s)%compliance, x(s), y(s))
+      y(s)%upper = b(s)%upper
+      allocate (y(s)%upper_low(size(y(s)%upper, 1), size(y(s)%upper, 2)), source=0.0_dp)
+      call extended_add(y(s)%upper, y(s)%upper_low, -y(s)%lower)
+      call extended_add(y(s)%upper, y(s)%upper_low, -y(s)%lower_low)
     end do
-    ! the neighbour's values travel as the sum of two numbers of working precision
-    do half = 1, 2
+    call add_neighbours(high=.true.)
+    call add_neighbours(high=.false.)
+    do s = 1, size(x)
+      r(s)%upper(:, :) = y(s)%upper
+    end do
+
+  contains
+
+    !> Add the high or the low part of the velocity of the next copy on each chain.
+    subroutine add_neighbours(high)
+      logical, intent(in) :: high
+
       do s = 1, size(x)
         associate (part => problem%shared%part(s))
           do k = 1, part%n_slots
-            part%send(:, k) = real(y(s)%upper(:, part%slot_shared(k)), dp)
+            if (high) then
+              part%send(:, k) = y(s)%lower(:, part%slot_shared(k))
+            else
+              part%send(:, k) = y(s)%lower_low(:, part%slot_shared(k))
+            end if
           end do
-          y(s)%upper(:, :) = y(s)%upper - real(y(s)%upper, dp)
         end associate
       end do
       call problem%shared%pass()
@@ -341,34 +362,40 @@ contains
         associate (part => problem%shared%part(s))
           do k = 1, part%n_shared
             at = part%first(k) + part%rung(k) - 1
-            if (at < part%first(k + 1) - 1) r(s)%upper(:, k) = r(s)%upper(:, k) + part%recv(:, part%slot(at + 1))
+            if (at < part%first(k + 1) - 1) &
+              & call extended_add(y(s)%upper(:, k), y(s)%upper_low(:, k), part%recv(:, part%slot(at + 1)))
           end do
         end associate
       end do
-    end do
+    end subroutine add_neighbours
+
   end subroutine extended_residual
 
-  !> y := compliance v, in extended precision.
-  pure subroutine multiply(compliance, v, y)
+  !> M_eta^-1 A^T x at the shared bodies, into lower + lower_low of `y`.
+  pure subroutine own_velocities(compliance, x, y)
     real(dp), intent(in), contiguous :: compliance(:, :)
-    real(qp), intent(in) :: v(:, :)
-    real(qp), allocatable, intent(out) :: y(:, :)
-    real(qp) :: flat(size(compliance, 1))
-    integer :: k, d, column, nv
+    type(extended_field_t), intent(in) :: x
+    type(extended_field_t), intent(inout) :: y
+    real(dp), dimension(size(compliance, 1)) :: v_high, v_low, y_high, y_low
+    integer :: k, d, nv, at
 
-    nv = size(v, 1)
-    flat(:) = 0.0_qp
-    do k = 1, size(v, 2)
+    nv = size(x%upper, 1)
+    do k = 1, size(x%upper, 2)
       do d = 1, nv
-        column = (k - 1)*nv + d
-        flat(:) = flat + compliance(:, column)*v(d, k)
+        at = (k - 1)*nv + d
+        v_high(at) = x%upper(d, k)
+        v_low(at) = x%upper_low(d, k)
+        call extended_add(v_high(at), v_low(at), -x%lower(d, k))
+        call extended_add(v_high(at), v_low(at), -x%lower_low(d, k))
       end do
     end do
-    allocate (y(nv, size(v, 2)))
-    do k = 1, size(v, 2)
-      y(:, k) = flat((k - 1)*nv + 1:k*nv)
+    call extended_product(compliance, v_high, v_low, y_high, y_low)
+    allocate (y%lower(nv, size(x%upper, 2)), y%lower_low(nv, size(x%upper, 2)))
+    do k = 1, size(x%upper, 2)
+      y%lower(:, k) = y_high((k - 1)*nv + 1:k*nv)
+      y%lower_low(:, k) = y_low((k - 1)*nv + 1:k*nv)
     end do
-  end subroutine multiply
+  end subroutine own_velocities
 
   subroutine interface_direct_free(self)
     class(interface_direct_t), intent(inout) :: self

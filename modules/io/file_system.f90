@@ -7,8 +7,8 @@ module gravier_file_system
   use gravier_text, only: to_text
   implicit none
   private
-  public :: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space
-  public :: text_file_t
+  public :: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
+  public :: text_file_t, text_at
 
   !> A text file written piece by piece; after a failed write it ends with the last complete piece.
   type :: text_file_t
@@ -37,39 +37,46 @@ module gravier_file_system
   interface
     integer(c_int) function c_mkdir(path, mode) bind(C, name="mkdir")
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: mode
     end function c_mkdir
 
     integer(c_int) function c_rename(from, to) bind(C, name="rename")
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: from(*), to(*)
     end function c_rename
 
     integer(c_int) function c_unlink(path) bind(C, name="unlink")
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
     end function c_unlink
 
     integer(c_int) function c_open(path, flags) bind(C, name="open")
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: flags
     end function c_open
 
     integer(c_int) function c_creat(path, mode) bind(C, name="creat")
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: mode
     end function c_creat
 
     integer(c_int) function c_close(descriptor) bind(C, name="close")
       import :: c_int
+      implicit none
       integer(c_int), value :: descriptor
     end function c_close
 
     integer(c_int64_t) function c_write(descriptor, buffer, count) bind(C, name="write")
       import :: c_int, c_int64_t, c_size_t, c_char
+      implicit none
       integer(c_int), value :: descriptor
       character(kind=c_char), intent(in) :: buffer(*)
       integer(c_size_t), value :: count
@@ -77,6 +84,7 @@ module gravier_file_system
 
     integer(c_int64_t) function c_lseek(descriptor, offset, whence) bind(C, name="lseek")
       import :: c_int, c_int64_t
+      implicit none
       integer(c_int), value :: descriptor
       integer(c_int64_t), value :: offset
       integer(c_int), value :: whence
@@ -84,37 +92,44 @@ module gravier_file_system
 
     integer(c_int) function c_ftruncate(descriptor, length) bind(C, name="ftruncate")
       import :: c_int, c_int64_t
+      implicit none
       integer(c_int), value :: descriptor
       integer(c_int64_t), value :: length
     end function c_ftruncate
 
     integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name="fallocate")
       import :: c_int, c_int64_t
+      implicit none
       integer(c_int), value :: descriptor, mode
       integer(c_int64_t), value :: offset, length
     end function c_fallocate
 
     integer(c_int) function c_fstatvfs(descriptor, status) bind(C, name="fstatvfs")
       import :: c_int, c_int64_t
+      implicit none
       integer(c_int), value :: descriptor
       integer(c_int64_t), intent(inout) :: status(*)
     end function c_fstatvfs
 
     integer(c_int) function c_getpid() bind(C, name="getpid")
       import :: c_int
+      implicit none
     end function c_getpid
 
     type(c_ptr) function c_errno_location() bind(C, name="__errno_location")
       import :: c_ptr
+      implicit none
     end function c_errno_location
 
     type(c_ptr) function c_strerror(number) bind(C, name="strerror")
       import :: c_ptr, c_int
+      implicit none
       integer(c_int), value :: number
     end function c_strerror
 
     integer(c_size_t) function c_strlen(text) bind(C, name="strlen")
       import :: c_ptr, c_size_t
+      implicit none
       type(c_ptr), value :: text
     end function c_strlen
   end interface
@@ -215,12 +230,14 @@ contains
   !> Reserve disk space beyond the end of a file, leaving its length as it is, so that writing it later cannot fail
   !> for want of space. Where the file system knows no reservation, only compare with the space that is free now.
   !> Failure: status_failure; the file is as it was.
-  subroutine reserve_space(path, bytes, error)
+  subroutine reserve_space(path, bytes, error, start)
     character(len=*), intent(in) :: path
     integer(i8), intent(in) :: bytes
     type(error_t), allocatable, intent(inout) :: error
+    !> also reserve what is missing between this place (from 0) and the end
+    integer(i8), intent(in), optional :: start
     integer(c_int) :: descriptor, number, ignored
-    integer(c_int64_t) :: length
+    integer(c_int64_t) :: length, first
 
     if (allocated(error) .or. bytes <= 0) return
     descriptor = c_open(c_text(path), o_wronly)
@@ -229,7 +246,9 @@ contains
       return
     end if
     length = c_lseek(descriptor, 0_c_int64_t, seek_end)
-    number = allocate_beyond(descriptor, length, bytes)
+    first = length
+    if (present(start)) first = min(first, int(start, c_int64_t))
+    number = allocate_range(descriptor, first, length + bytes)
     if (number == enosys .or. number == eopnotsupp) number = compare_with_free(descriptor, bytes)
     if (number /= 0) then
       ! some file systems keep the part that did fit: give it back
@@ -240,18 +259,29 @@ contains
     ignored = c_close(descriptor)
   end subroutine reserve_space
 
-  !> Reserve [length, length + bytes) of an open file; the result is the system's error number, 0 for success.
-  integer(c_int) function allocate_beyond(descriptor, length, bytes) result(number)
+  !> Length of a file in bytes, 0 when there is none.
+  integer(i8) function file_length(path) result(length)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: descriptor, ignored
+
+    length = 0
+    descriptor = c_open(c_text(path), o_rdonly)
+    if (descriptor < 0) return
+    length = int(c_lseek(descriptor, 0_c_int64_t, seek_end), i8)
+    ignored = c_close(descriptor)
+  end function file_length
+
+  !> Reserve bytes [first, last) of an open file; the result is the system's error number, 0 for success.
+  integer(c_int) function allocate_range(descriptor, first, last) result(number)
     integer(c_int), intent(in) :: descriptor
-    integer(c_int64_t), intent(in) :: length
-    integer(i8), intent(in) :: bytes
+    integer(c_int64_t), intent(in) :: first, last
 
     do
       number = 0
-      if (c_fallocate(descriptor, falloc_fl_keep_size, length, int(bytes, c_int64_t)) /= 0) number = last_error()
+      if (c_fallocate(descriptor, falloc_fl_keep_size, first, last - first) /= 0) number = last_error()
       if (number /= eintr) return
     end do
-  end function allocate_beyond
+  end function allocate_range
 
   !> ENOSPC when the file system of an open file has less free space than `bytes`, else 0.
   integer(c_int) function compare_with_free(descriptor, bytes) result(number)
@@ -343,10 +373,6 @@ contains
   function reason(number) result(text)
     integer(c_int), intent(in) :: number
     character(len=:), allocatable :: text
-    character(kind=c_char), pointer :: letters(:)
-    type(c_ptr) :: message
-    integer(c_size_t) :: length(1)
-    integer :: i
 
     select case (number)
     case (enospc)
@@ -354,15 +380,26 @@ contains
     case (edquot)
       text = "disk quota exceeded"
     case default
-      text = ""
-      message = c_strerror(number)
-      if (.not. c_associated(message)) return
-      length = c_strlen(message)
-      call c_f_pointer(message, letters, length)
-      do i = 1, size(letters)
-        text = text//letters(i)
-      end do
+      text = text_at(c_strerror(number))
     end select
   end function reason
+
+  !> The text that C keeps at an address, empty for the null address.
+  function text_at(address) result(text)
+    type(c_ptr), intent(in) :: address
+    character(len=:), allocatable :: text
+    character(kind=c_char), pointer :: letters(:)
+    integer(c_size_t) :: length(1)
+    integer :: i
+
+    length = 0
+    if (c_associated(address)) length = c_strlen(address)
+    allocate (character(len=length(1)) :: text)
+    if (length(1) == 0) return
+    call c_f_pointer(address, letters, length)
+    do i = 1, len(text)
+      text(i:i) = letters(i)
+    end do
+  end function text_at
 
 end module gravier_file_system

@@ -3,14 +3,27 @@
 !> n of the N rows. Every procedure with an `error` is collective and leaves the same error on all ranks. What is
 !> wrong with a file that is read ends in status_input, what fails while writing in status_failure.
 module gravier_hdf5_file
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr, c_char, c_null_char, c_size_t, c_f_pointer, c_associated
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr, c_char, c_null_char
   use mpi_f08, only: MPI_INFO_NULL
-  use hdf5
+  use hdf5, only: h5aclose_f, h5acreate_f, h5aget_space_f, h5aget_type_f, h5aopen_by_name_f, h5aread_f, h5awrite_f, h5dclose_f, &
+    & h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5dwrite_f, h5eset_auto_f, &
+    & h5fclose_f, h5fcreate_f, h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, &
+    & h5gn_members_f, h5kind_to_type, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5olink_f, h5oopen_f, h5open_f, &
+    & h5pclose_f, h5pcreate_f, h5pset_create_inter_group_f, h5pset_dxpl_mpio_f, h5pset_fapl_mpio_f, &
+    & h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_f, &
+    & h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, &
+    & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tcopy_f, h5tget_class_f, h5tget_size_f, &
+    & h5tis_variable_str_f, h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, hsize_t, size_t, &
+    & H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, H5F_ACC_RDONLY_F, H5F_ACC_TRUNC_F, &
+    & H5F_CLOSE_STRONG_F, H5F_SCOPE_GLOBAL_F, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F, &
+    & H5P_FILE_ACCESS_F, H5P_LINK_CREATE_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_CSET_UTF8_F, H5T_C_S1, H5T_FLOAT_F, &
+    & H5T_IEEE_F64LE, H5T_INTEGER_F, H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING, H5T_STRING_F, H5T_STR_NULLPAD_F, &
+    & H5_INDEX_NAME_F, H5_INTEGER_KIND, H5_ITER_INC_F, H5_REAL_KIND
   use gravier_kinds, only: dp, i4, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: check_readable, check_creatable, reserve_space
+  use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, text_at
   implicit none
   private
   public :: h5_file_t
@@ -22,6 +35,8 @@ module gravier_hdf5_file
     character(len=:), allocatable :: path
     integer(hid_t) :: id = -1
     logical :: writable = .false.
+    !> on rank 0: length of the file when it was flushed last
+    integer(i8) :: flushed = 0
     !> the group that begin_group started, not yet seen by readers
     integer(hid_t) :: hidden = -1
     character(len=:), allocatable :: hidden_path
@@ -81,10 +96,10 @@ module gravier_hdf5_file
   end type h5_file_t
 
   !> the library is started at first use and ends with MPI
-  logical, save :: library_started = .false.
+  logical :: library_started = .false.
   !> longest text kept in an object header, whose messages hold 64 KiB; longer ones go to a heap
   integer, parameter :: longest_inline_text = 60000
-  !> reserved for an empty file, and for the link of a hidden group
+  !> reserved for an empty file, and for the link of a hidden group or other headers
   integer(i8), parameter :: bytes_of_file = 65536, bytes_of_link = 16384
 
 contains
@@ -172,6 +187,7 @@ contains
     end if
     self%comm = comm
     self%path = path
+    self%flushed = 0
   end subroutine prepare
 
   !> Access by all ranks of `comm` together.
@@ -206,9 +222,14 @@ contains
     integer :: stat
 
     if (allocated(error)) return
+    ! HDF5 waits for ever when one rank cannot write its share of the headers: give them their place first
+    if (self%comm%rank == 0) call reserve_space(self%path, bytes_of_link, error, start=self%flushed)
+    call self%comm%agree(error)
+    if (allocated(error)) return
     call h5fflush_f(self%id, H5F_SCOPE_GLOBAL_F, stat)
     if (stat < 0) call raise(error, status_failure, self%path//": cannot write to this file: is the disk full?")
     call self%comm%agree(error)
+    if (self%comm%rank == 0) self%flushed = file_length(self%path)
   end subroutine h5_flush
 
   !> Make sure of `bytes` of disk space for what will be written next, its headers included (allow 64 KiB for those of
@@ -698,17 +719,17 @@ contains
     integer(i8), intent(in) :: first
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: total
-    integer :: found, class
+    integer :: found, kind_found
 
     call self%row_count(path, total, error)
     if (allocated(error)) return
     found = self%columns(path)
-    class = class_of(self, path)
+    kind_found = class_of(self, path)
     if (found /= n_columns) then
       call self%fail(path, columns_text(found)//", but "//columns_text(n_columns)//" was expected", error)
-    else if (integers .and. class /= H5T_INTEGER_F) then
+    else if (integers .and. kind_found /= H5T_INTEGER_F) then
       call self%fail(path, "not made of integers", error)
-    else if (class /= H5T_INTEGER_F .and. class /= H5T_FLOAT_F) then
+    else if (kind_found /= H5T_INTEGER_F .and. kind_found /= H5T_FLOAT_F) then
       call self%fail(path, "not made of numbers", error)
     else if (n_rows > 0 .and. (first < 0 .or. first + n_rows > total)) then
       call self%fail(path, "rows "//to_text(first)//" to "//to_text(first + n_rows - 1)//" were asked for, but it has "// &
@@ -728,20 +749,20 @@ contains
   end function columns_text
 
   !> Class of the elements of a dataset, one of the H5T_ class constants.
-  integer function class_of(self, path) result(class)
+  integer function class_of(self, path) result(data_class)
     type(h5_file_t), intent(in) :: self
     character(len=*), intent(in) :: path
     integer(hid_t) :: place, dataset, type
     character(len=:), allocatable :: name
     integer :: stat
 
-    class = H5T_NO_CLASS_F
+    data_class = H5T_NO_CLASS_F
     call self%locate(path, place, name)
     call h5dopen_f(place, name, dataset, stat)
     if (stat < 0) return
     call h5dget_type_f(dataset, type, stat)
     if (stat == 0) then
-      call h5tget_class_f(type, class, stat)
+      call h5tget_class_f(type, data_class, stat)
       call h5tclose_f(type, stat)
     end if
     call h5dclose_f(dataset, stat)
@@ -894,10 +915,10 @@ contains
   end subroutine h5_read_real
 
   !> Read one number of the given class.
-  subroutine read_value(self, path, name, class, memory_type, buffer, error)
+  subroutine read_value(self, path, name, data_class, memory_type, buffer, error)
     class(h5_file_t), intent(in) :: self
     character(len=*), intent(in) :: path, name
-    integer, intent(in) :: class
+    integer, intent(in) :: data_class
     integer(hid_t), intent(in) :: memory_type
     type(c_ptr), intent(in) :: buffer
     type(error_t), allocatable, intent(inout) :: error
@@ -909,7 +930,7 @@ contains
     address = buffer
     call open_attribute(self, path, name, attribute, type, found, stat)
     if (stat == 0) then
-      if (found /= class) stat = -1
+      if (found /= data_class) stat = -1
       if (.not. is_scalar(attribute)) stat = -1
       if (stat == 0) call h5aread_f(attribute, memory_type, address, stat)
       call h5tclose_f(type, ignored)
@@ -965,31 +986,16 @@ contains
     integer(hid_t), intent(in) :: attribute, type
     character(len=:), allocatable, intent(inout) :: value
     integer, intent(out) :: stat
-    character(kind=c_char), pointer :: letters(:)
     type(c_ptr), target :: text
     type(c_ptr) :: address
     integer(hid_t) :: space
-    integer(c_size_t) :: length(1)
-    integer :: i, ignored
-
-    interface
-      integer(c_size_t) function c_strlen(text) bind(C, name="strlen")
-        import :: c_ptr, c_size_t
-        type(c_ptr), value :: text
-      end function c_strlen
-    end interface
+    integer :: ignored
 
     text = c_null_ptr
     address = c_loc(text)
     call h5aread_f(attribute, type, address, stat)
-    if (stat < 0 .or. .not. c_associated(text)) return
-    length = c_strlen(text)
-    call c_f_pointer(text, letters, length)
-    deallocate (value)
-    allocate (character(len=length(1)) :: value)
-    do i = 1, len(value)
-      value(i:i) = letters(i)
-    end do
+    if (stat < 0) return
+    value = text_at(text)
     call h5aget_space_f(attribute, space, ignored)
     call h5dvlen_reclaim_f(type, space, H5P_DEFAULT_F, address, ignored)
     call h5sclose_f(space, ignored)
@@ -1006,25 +1012,25 @@ contains
   end function up_to_null
 
   !> Open an attribute and its type; stat < 0 when there is none.
-  subroutine open_attribute(self, path, name, attribute, type, class, stat)
+  subroutine open_attribute(self, path, name, attribute, type, data_class, stat)
     type(h5_file_t), intent(in) :: self
     character(len=*), intent(in) :: path, name
     integer(hid_t), intent(out) :: attribute, type
-    integer, intent(out) :: class, stat
+    integer, intent(out) :: data_class, stat
     integer(hid_t) :: place
     character(len=:), allocatable :: object_name
     integer :: ignored
 
     attribute = -1
     type = -1
-    class = H5T_NO_CLASS_F
+    data_class = H5T_NO_CLASS_F
     stat = -1
     if (.not. self%exists(path)) return
     call self%locate(path, place, object_name)
     call h5aopen_by_name_f(place, object_name, name, attribute, stat)
     if (stat < 0) return
     call h5aget_type_f(attribute, type, stat)
-    if (stat == 0) call h5tget_class_f(type, class, stat)
+    if (stat == 0) call h5tget_class_f(type, data_class, stat)
     if (stat < 0) call h5aclose_f(attribute, ignored)
   end subroutine open_attribute
 

@@ -18,6 +18,8 @@ module gravier_communicator
     integer :: rank = 0
     integer :: size = 1
     logical :: alive = .false.
+    !> sparse exchanges made so far, shared by the copies of this object
+    integer, pointer :: exchanges => null()
   contains
     procedure :: init => communicator_init
     procedure :: free => communicator_free
@@ -74,12 +76,16 @@ contains
     end if
     call MPI_Comm_rank(self%mpi, self%rank)
     call MPI_Comm_size(self%mpi, self%size)
+    allocate (self%exchanges)
+    self%exchanges = 0
     self%alive = .true.
   end subroutine communicator_init
 
   subroutine communicator_free(self)
     class(communicator_t), intent(inout) :: self
-    if (self%alive) call MPI_Comm_free(self%mpi)
+    if (.not. self%alive) return
+    call MPI_Comm_free(self%mpi)
+    deallocate (self%exchanges)
     self%alive = .false.
   end subroutine communicator_free
 

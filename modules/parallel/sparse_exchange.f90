@@ -14,9 +14,8 @@ module gravier_sparse_exchange
     integer(i8), allocatable :: words(:, :)
   end type message_t
 
-  integer, parameter :: tag_base = 100
-  !> two successive exchanges never share a tag: a rank may be one exchange ahead of its neighbour
-  integer, save :: round = 0
+  !> two successive exchanges use two tags in turn: a rank may be one exchange ahead of its neighbour
+  integer, parameter :: tags(0:1) = [100, 101]
 
 contains
 
@@ -37,7 +36,7 @@ contains
     type(message_t), allocatable :: messages(:)
     integer :: i, n_messages
 
-    round = mod(round + 1, 2)
+    comm%exchanges = mod(comm%exchanges + 1, 2)
     allocate (order(size(destination)), target_rank(size(destination)))
     allocate (outgoing(size(records, 1), size(records, 2)))
     keys = int(destination, i8)
@@ -98,7 +97,7 @@ contains
       else
         n_sends = n_sends + 1
         call MPI_Issend(outgoing(:, first(i):last(i)), size(outgoing, 1)*(last(i) - first(i) + 1), MPI_INTEGER8, &
-          & target_rank(first(i)), tag_base + round, comm%mpi, requests(n_sends))
+          & target_rank(first(i)), tags(comm%exchanges), comm%mpi, requests(n_sends))
       end if
     end do
     if (comm%size == 1) return
@@ -125,11 +124,11 @@ contains
       integer(i8), allocatable :: words(:, :)
       integer :: n_words
 
-      call MPI_Iprobe(MPI_ANY_SOURCE, tag_base + round, comm%mpi, found, status)
+      call MPI_Iprobe(MPI_ANY_SOURCE, tags(comm%exchanges), comm%mpi, found, status)
       if (.not. found) return
       call MPI_Get_count(status, MPI_INTEGER8, n_words)
       allocate (words(size(outgoing, 1), n_words/size(outgoing, 1)))
-      call MPI_Recv(words, n_words, MPI_INTEGER8, status%MPI_SOURCE, tag_base + round, comm%mpi, MPI_STATUS_IGNORE)
+      call MPI_Recv(words, n_words, MPI_INTEGER8, status%MPI_SOURCE, tags(comm%exchanges), comm%mpi, MPI_STATUS_IGNORE)
       call keep(status%MPI_SOURCE, words)
     end subroutine receive_one
 

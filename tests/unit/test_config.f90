@@ -197,7 +197,7 @@ contains
     call check(all(config%decomposition%grid == 0), "default grid")
     call check_equal(config%decomposition%subdomains, 1, "default subdomains")
     call check_equal(config%decomposition%repartition_every, 0, "default repartition_every")
-    call check_close(config%enriched%direction, 1.0_dp, 0.0_dp, "default direction")
+    call check_close(config%enriched%direction, 0.3_dp, 1.0e-15_dp, "default direction")
     call check_equal(config%enriched%direction_unit, "relative", "default direction_unit")
     call check_equal(config%enriched%contacts, "all", "default contacts of enriched")
     call check_equal(config%enriched%interface, "mumps", "default interface")

@@ -1,4 +1,4 @@
-!> The columns of the paper (section 5): iteration counts of every method, exact impulses, rate of the Gauss-Seidel sweeps.
+!> The columns of the paper: iteration counts of every method, exact impulses, rate of the Gauss-Seidel sweeps.
 program test_columns
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
