@@ -3,7 +3,7 @@ module gravier_config
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
-    enriched_config_t, output_config_t
+                                  enriched_config_t, output_config_t
   use gravier_config_keys, only: groups, keys, find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
   use gravier_config_slots, only: slot_t, slot_of
@@ -59,8 +59,8 @@ contains
         cycle
       end if
       call read_value(keys(k), "", trim(keys(k)%default), slot, touched, failed)
-      if (failed) call raise(error, status_input, "table of keys: default of &" // trim(keys(k)%group) // " " &
-        // trim(keys(k)%name) // " = " // trim(keys(k)%default) // ": expected " // expected_text(keys(k)))
+      if (failed) call raise(error, status_input, "table of keys: default of &"//trim(keys(k)%group)//" " &
+                             //trim(keys(k)%name)//" = "//trim(keys(k)%default)//": expected "//expected_text(keys(k)))
     end do
   end subroutine set_defaults
 
@@ -76,17 +76,17 @@ contains
     do i = 1, found%n_groups
       g = find_group(found%groups(i)%name)
       if (g > 0) present_group(g) = .true.
-      if (g == 0) call raise(error, status_input, file // ": " // unknown_group(found%groups(i)%name))
+      if (g == 0) call raise(error, status_input, file//": "//unknown_group(found%groups(i)%name))
     end do
     do i = 1, found%n_assignments
       associate (item => found%assignments(i))
-        if (find_key(item%group, item%key) == 0) call raise(error, status_input, file // ": " // unknown_key(item))
+        if (find_key(item%group, item%key) == 0) call raise(error, status_input, file//": "//unknown_key(item))
       end associate
     end do
     do g = 1, size(groups)
       if (groups(g)%required .and. .not. present_group(g)) &
-        call raise(error, status_input, file // ": group &" // trim(groups(g)%name) // " is missing: expected &" &
-        // trim(groups(g)%name) // " ... /")
+        call raise(error, status_input, file//": group &"//trim(groups(g)%name)//" is missing: expected &" &
+                   //trim(groups(g)%name)//" ... /")
     end do
   end subroutine check_names
 
@@ -95,15 +95,15 @@ contains
     character(len=:), allocatable :: message
     integer :: g, nearest
 
-    message = "unknown group &" // excerpt(name)
+    message = "unknown group &"//excerpt(name)
     nearest = nearest_group(name)
     if (nearest > 0) then
-      message = message // "; did you mean &" // trim(groups(nearest)%name) // "?"
+      message = message//"; did you mean &"//trim(groups(nearest)%name)//"?"
       return
     end if
-    message = message // ": expected one of"
+    message = message//": expected one of"
     do g = 1, size(groups)
-      message = message // " &" // trim(groups(g)%name)
+      message = message//" &"//trim(groups(g)%name)
     end do
   end function unknown_group
 
@@ -112,20 +112,20 @@ contains
     character(len=:), allocatable :: message
     integer :: k, nearest
 
-    message = "unknown key '" // excerpt(item%key) // "' in &" // trim(item%group)
+    message = "unknown key '"//excerpt(item%key)//"' in &"//trim(item%group)
     do k = 1, size(keys)
       if (keys(k)%name /= item%key) cycle
-      message = message // "; it belongs to &" // trim(keys(k)%group)
+      message = message//"; it belongs to &"//trim(keys(k)%group)
       return
     end do
     nearest = nearest_key(item%group, item%key)
     if (nearest > 0) then
-      message = message // "; did you mean '" // trim(keys(nearest)%name) // "'?"
+      message = message//"; did you mean '"//trim(keys(nearest)%name)//"'?"
       return
     end if
-    message = message // ": expected one of"
+    message = message//": expected one of"
     do k = 1, size(keys)
-      if (keys(k)%group == item%group) message = message // " " // trim(keys(k)%name)
+      if (keys(k)%group == item%group) message = message//" "//trim(keys(k)%name)
     end do
   end function unknown_key
 
@@ -181,19 +181,19 @@ contains
 
     k = find_key(item%group, item%key)
     slot = slot_of(config, keys(k))
-    shown = item%key // excerpt(item%index) // " = " // excerpt(item%value)
-    if (item%value == "") shown = shown // "(nothing)"
-    place = config%file // ": &" // item%group // " " // shown // ": "
+    shown = item%key//excerpt(item%index)//" = "//excerpt(item%value)
+    if (item%value == "") shown = shown//"(nothing)"
+    place = config%file//": &"//item%group//" "//shown//": "
     call read_value(keys(k), item%index, item%value, slot, touched, failed)
     if (failed .and. keys(k)%count == 1 .and. item%index /= "") then
-      call raise(error, status_input, place // "expected " // item%key // " without an index")
+      call raise(error, status_input, place//"expected "//item%key//" without an index")
     else if (failed) then
-      call raise(error, status_input, place // "expected " // expected_text(keys(k)))
+      call raise(error, status_input, place//"expected "//expected_text(keys(k)))
     else if (any(given(k)%entries .and. touched)) then
-      call raise(error, status_input, place // "expected once, but it is given twice, first as " // given(k)%shown)
+      call raise(error, status_input, place//"expected once, but it is given twice, first as "//given(k)%shown)
     end if
     given(k)%entries = given(k)%entries .or. touched
-    if (allocated(given(k)%shown)) shown = given(k)%shown // ", " // shown
+    if (allocated(given(k)%shown)) shown = given(k)%shown//", "//shown
     given(k)%shown = shown
   end subroutine read_assignment
 

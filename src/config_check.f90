@@ -74,8 +74,8 @@ contains
     do k = 1, size(keys)
       needed = keys(k)%required .or. (keys(k)%note == "required" .and. keys(k)%bodies == config%scene%bodies)
       if (.not. needed .or. any(report%given(k)%entries)) cycle
-      call raise(error, status_input, report%file // ": &" // trim(keys(k)%group) // " " // trim(keys(k)%name) &
-        // " is missing: expected " // expected_text(keys(k)) // needed_by(keys(k)))
+      call raise(error, status_input, report%file//": &"//trim(keys(k)%group)//" "//trim(keys(k)%name) &
+                 //" is missing: expected "//expected_text(keys(k))//needed_by(keys(k)))
     end do
   end subroutine check_required
 
@@ -83,7 +83,7 @@ contains
     type(key_t), intent(in) :: key
     character(len=:), allocatable :: text
     text = ""
-    if (key%bodies /= "") text = ", required by bodies = " // choices_text(key%bodies)
+    if (key%bodies /= "") text = ", required by bodies = "//choices_text(key%bodies)
   end function needed_by
 
   !> Keys that belong to another kind of bodies.
@@ -96,9 +96,9 @@ contains
     do k = 1, size(keys)
       if (keys(k)%bodies == "" .or. .not. any(report%given(k)%entries)) cycle
       if (index(keys(k)%bodies, trim(config%scene%bodies)) > 0) cycle
-      call raise(error, status_input, report%file // ": &scene " // report%given(k)%shown // ": " // trim(keys(k)%name) &
-        // " belongs to bodies = " // choices_text(keys(k)%bodies) // ", expected without it where bodies = '" &
-        // trim(config%scene%bodies) // "'")
+      call raise(error, status_input, report%file//": &scene "//report%given(k)%shown//": "//trim(keys(k)%name) &
+                 //" belongs to bodies = "//choices_text(keys(k)%bodies)//", expected without it where bodies = '" &
+                 //trim(config%scene%bodies)//"'")
     end do
   end subroutine check_bodies_keys
 
@@ -109,7 +109,7 @@ contains
 
     associate (scene => config%scene)
       call expect(report, scene%dimension == 3 .or. .not. abs(scene%gravity(3)) > 0.0_dp, "scene", "gravity", error, &
-        "a third component of 0 where dimension = 2")
+                  "a third component of 0 where dimension = 2")
       call expect(report, scene%bodies /= "file" .or. scene%bodies_file /= "", "scene", "bodies_file", error)
       call expect(report, scene%density > 0.0_dp, "scene", "density", error)
       call expect(report, scene%friction >= 0.0_dp, "scene", "friction", error)
@@ -137,13 +137,13 @@ contains
 
     associate (scene => config%scene)
       call expect(report, positive(scene%lattice_count, scene%dimension), "scene", "lattice_count", error, &
-        counts_text(scene%dimension))
+                  counts_text(scene%dimension))
       call expect(report, grid_product(scene%lattice_count) > 0, "scene", "lattice_count", error, &
-        "at most " // to_text(huge(1)) // " bodies")
+                  "at most "//to_text(huge(1))//" bodies")
       call expect(report, scene%radius_min > 0.0_dp, "scene", "radius_min", error)
       call expect(report, scene%radius_max > 0.0_dp, "scene", "radius_max", error)
       call expect(report, scene%radius_min <= scene%radius_max, "scene", "radius_min", error, &
-        "at most radius_max, here " // report%given(find_key("scene", "radius_max"))%shown)
+                  "at most radius_max, here "//report%given(find_key("scene", "radius_max"))%shown)
     end associate
   end subroutine check_lattice
 
@@ -164,7 +164,7 @@ contains
 
     associate (solver => config%solver)
       call expect(report, solver%criterion /= "error" .or. config%scene%bodies == "column", "solver", "criterion", error, &
-        "'residual': the exact solution, and so the error, is known for bodies = 'column' only")
+                  "'residual': the exact solution, and so the error, is known for bodies = 'column' only")
       call expect(report, solver%tolerance > 0.0_dp, "solver", "tolerance", error)
       call expect(report, solver%max_iterations >= 1, "solver", "max_iterations", error)
       call expect(report, solver%sweeps >= 1, "solver", "sweeps", error)
@@ -183,13 +183,13 @@ contains
       call expect(report, parts%repartition_every >= 0, "decomposition", "repartition_every", error)
       if (all(parts%grid == 0)) return
       call expect(report, parts%partition == "grid", "decomposition", "grid", error, &
-        "no grid where partition = '" // trim(parts%partition) // "': give subdomains, or partition = 'grid'")
+                  "no grid where partition = '"//trim(parts%partition)//"': give subdomains, or partition = 'grid'")
       call expect(report, positive(parts%grid, config%scene%dimension), "decomposition", "grid", error, &
-        counts_text(config%scene%dimension))
+                  counts_text(config%scene%dimension))
       call expect(report, grid_product(parts%grid) > 0, "decomposition", "grid", error, &
-        "at most " // to_text(huge(1)) // " subdomains")
+                  "at most "//to_text(huge(1))//" subdomains")
       call expect(report, parts%subdomains == grid_product(parts%grid), "decomposition", "subdomains", error, &
-        to_text(grid_product(parts%grid)) // ", the product of " // report%given(find_key("decomposition", "grid"))%shown)
+                  to_text(grid_product(parts%grid))//", the product of "//report%given(find_key("decomposition", "grid"))%shown)
     end associate
   end subroutine check_decomposition
 
@@ -204,7 +204,7 @@ contains
     key = "subdomains"
     if (.not. is_given(report, "decomposition", key)) key = "grid"
     call expect(report, config%decomposition%subdomains == 1, "decomposition", key, error, &
-      "one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'")
+                "one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'")
   end subroutine check_method
 
   subroutine check_enriched(report, config, error)
@@ -215,7 +215,7 @@ contains
     associate (enriched => config%enriched)
       call expect(report, enriched%direction >= 0.0_dp, "enriched", "direction", error)
       call expect(report, enriched%cg_tolerance > 0.0_dp .and. enriched%cg_tolerance < 1.0_dp, "enriched", "cg_tolerance", &
-        error)
+                  error)
       call expect(report, enriched%cg_max_iterations >= 1, "enriched", "cg_max_iterations", error)
     end associate
   end subroutine check_enriched
@@ -246,7 +246,7 @@ contains
     if (allocated(report%given(k)%shown)) shown = report%given(k)%shown
     expected = expected_text(keys(k))
     if (present(what)) expected = what
-    call raise(error, status_input, report%file // ": &" // group // " " // shown // ": expected " // expected)
+    call raise(error, status_input, report%file//": &"//group//" "//shown//": expected "//expected)
   end subroutine expect
 
   pure logical function is_given(report, group, key)
@@ -266,7 +266,7 @@ contains
   pure function counts_text(dimension) result(text)
     integer, intent(in) :: dimension
     character(len=:), allocatable :: text
-    text = to_text(dimension) // " integers >= 1 where dimension = " // to_text(dimension)
+    text = to_text(dimension)//" integers >= 1 where dimension = "//to_text(dimension)
   end function counts_text
 
   !> Product of counts; 0 when one is not positive or when the product exceeds the largest integer.

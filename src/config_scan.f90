@@ -40,11 +40,11 @@ module gravier_config_scan
   end type cursor_t
 
   character(len=*), parameter :: tab = achar(9), newline = achar(10), carriage = achar(13)
-  character(len=*), parameter :: blanks = " " // tab // newline // carriage
+  character(len=*), parameter :: blanks = " "//tab//newline//carriage
   character(len=*), parameter :: letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-  character(len=*), parameter :: name_characters = letters // "0123456789_"
+  character(len=*), parameter :: name_characters = letters//"0123456789_"
   !> what an editor may put in front of a text in UTF-8
-  character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
+  character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
   !> longest piece of a file that a message quotes
   integer, parameter :: excerpt_length = 80
 
@@ -93,8 +93,8 @@ contains
 
     line = line_of(cursor)
     if (next(cursor) /= "&") then
-      call fail(cursor, "not a namelist: line " // to_text(line) // ": '" // excerpt(rest_of_line(cursor)) &
-        // "' stands outside a group (a group is &name key = value ... /, and a text needs quotes)", error)
+      call fail(cursor, "not a namelist: line "//to_text(line)//": '"//excerpt(rest_of_line(cursor)) &
+                //"' stands outside a group (a group is &name key = value ... /, and a text needs quotes)", error)
       return
     end if
     cursor%at = cursor%at + 1
@@ -117,10 +117,10 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     integer :: i
 
-    if (name == "") call fail(cursor, "line " // to_text(line) // ": expected the name of a group after &", error)
+    if (name == "") call fail(cursor, "line "//to_text(line)//": expected the name of a group after &", error)
     do i = 1, found%n_groups
-      if (found%groups(i)%name == name) call fail(cursor, "group &" // excerpt(name) // " is given twice (lines " &
-        // to_text(found%groups(i)%line) // " and " // to_text(line) // "): expected once", error)
+      if (found%groups(i)%name == name) call fail(cursor, "group &"//excerpt(name)//" is given twice (lines " &
+                                                 //to_text(found%groups(i)%line)//" and "//to_text(line)//"): expected once", error)
     end do
     found%n_groups = found%n_groups + 1
     found%groups(found%n_groups)%name = name
@@ -145,10 +145,10 @@ contains
       cursor%at = cursor%at + 1
       call take_name(cursor, name)
       if (name == "end") return
-      place = "&" // excerpt(name) // " (line " // to_text(line_of(cursor)) // ")"
+      place = "&"//excerpt(name)//" (line "//to_text(line_of(cursor))//")"
     end if
-    call fail(cursor, "group &" // excerpt(group) // " (line " // to_text(line) // ") is not closed: expected / before " &
-      // place, error)
+    call fail(cursor, "group &"//excerpt(group)//" (line "//to_text(line)//") is not closed: expected / before " &
+              //place, error)
   end subroutine close_group
 
   !> Scans one `key(index) = value`.
@@ -160,8 +160,8 @@ contains
     type(assignment_t) :: item
 
     if (.not. starts_assignment(cursor)) then
-      call fail(cursor, "&" // excerpt(group) // " (line " // to_text(line_of(cursor)) // "): expected key = value, found '" &
-        // excerpt(rest_of_line(cursor)) // "'", error)
+      call fail(cursor, "&"//excerpt(group)//" (line "//to_text(line_of(cursor))//"): expected key = value, found '" &
+                //excerpt(rest_of_line(cursor))//"'", error)
       return
     end if
     item%group = group
@@ -209,10 +209,10 @@ contains
     integer :: first, last
 
     place = ""
-    first = cursor%at - 1 + verify(cursor%text(cursor%at:), " " // tab)
+    first = cursor%at - 1 + verify(cursor%text(cursor%at:), " "//tab)
     if (first < cursor%at) return
     if (cursor%text(first:first) /= "(") return
-    last = first - 1 + scan(cursor%text(first:), ")" // newline)
+    last = first - 1 + scan(cursor%text(first:), ")"//newline)
     if (last < first) return
     if (cursor%text(last:last) /= ")") return
     place = cursor%text(first:last)
@@ -240,9 +240,9 @@ contains
       else
         length = bare_length(cursor)
       end if
-      if (length == 0) call fail(cursor, "&" // excerpt(item%group) // " " // excerpt(item%key // item%index) // " = " &
-        // excerpt(rest_of_line(cursor)) // ": expected a quote that closes on its line (line " &
-        // to_text(line_of(cursor)) // ")", error)
+      if (length == 0) call fail(cursor, "&"//excerpt(item%group)//" "//excerpt(item%key//item%index)//" = " &
+                                 //excerpt(rest_of_line(cursor))//": expected a quote that closes on its line (line " &
+                                 //to_text(line_of(cursor))//")", error)
       if (allocated(error)) exit
       cursor%buffer(n + 1:n + length) = cursor%text(cursor%at:cursor%at + length - 1)
       n = n + length
@@ -283,7 +283,7 @@ contains
     quote = next(cursor)
     at = cursor%at
     do
-      step = scan(cursor%text(at + 1:), quote // newline)
+      step = scan(cursor%text(at + 1:), quote//newline)
       if (step == 0) return
       at = at + step
       if (cursor%text(at:at) /= quote) return
@@ -296,7 +296,7 @@ contains
   !> Length of what stands at the cursor up to a separator, a quote, a comment or the end of the group.
   integer function bare_length(cursor) result(length)
     type(cursor_t), intent(in) :: cursor
-    length = scan(cursor%text(cursor%at:), blanks // ",!'""/&") - 1
+    length = scan(cursor%text(cursor%at:), blanks//",!'""/&") - 1
     if (length < 0) length = len(cursor%text) - cursor%at + 1
   end function bare_length
 
@@ -311,7 +311,7 @@ contains
         length = index(cursor%text(cursor%at:), newline)
         if (length == 0) length = len(cursor%text) - cursor%at + 1
         cursor%at = cursor%at + length
-      else if (scan(next(cursor), blanks // also) == 1) then
+      else if (scan(next(cursor), blanks//also) == 1) then
         cursor%at = cursor%at + 1
       else
         exit
@@ -333,7 +333,7 @@ contains
 
   pure logical function is_separator(character)
     character(len=1), intent(in) :: character
-    is_separator = scan(character, blanks // ",!") == 1
+    is_separator = scan(character, blanks//",!") == 1
   end function is_separator
 
   !> The character at the cursor, a blank after the end of the text.
@@ -353,7 +353,7 @@ contains
     type(cursor_t), intent(in) :: cursor
     character(len=:), allocatable :: rest
     integer :: length
-    length = scan(cursor%text(cursor%at:), newline // carriage) - 1
+    length = scan(cursor%text(cursor%at:), newline//carriage) - 1
     if (length < 0) length = len(cursor%text) - cursor%at + 1
     rest = trim(cursor%text(cursor%at:cursor%at + length - 1))
   end function rest_of_line
@@ -386,7 +386,7 @@ contains
     integer :: i
 
     piece = text
-    if (len(text) > excerpt_length) piece = text(:excerpt_length) // "..."
+    if (len(text) > excerpt_length) piece = text(:excerpt_length)//"..."
     do i = 1, len(piece)
       if (iachar(piece(i:i)) < 32 .or. iachar(piece(i:i)) == 127) piece(i:i) = " "
     end do
@@ -396,7 +396,7 @@ contains
     type(cursor_t), intent(in) :: cursor
     character(len=*), intent(in) :: message
     type(error_t), allocatable, intent(inout) :: error
-    call raise(error, status_input, cursor%file // ": " // message)
+    call raise(error, status_input, cursor%file//": "//message)
   end subroutine fail
 
 end module gravier_config_scan

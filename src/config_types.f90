@@ -88,28 +88,28 @@ module gravier_config_types
     character(len=choice_length) :: contacts
     !> mumps or cg (nscdd_ep only)
     character(len=choice_length) :: interface
-    real(dp) :: cg_tolerance
-    integer :: cg_max_iterations
-  end type enriched_config_t
+      real(dp) :: cg_tolerance
+      integer :: cg_max_iterations
+      end type enriched_config_t
 
-  !> &output: the results.
-  type :: output_config_t
-    character(len=text_length) :: directory
-    !> steps; 0 writes the last state only
-    integer :: every
-    logical :: contacts, trace, final_bodies
-  end type output_config_t
+      !> &output: the results.
+      type :: output_config_t
+        character(len=text_length) :: directory
+        !> steps; 0 writes the last state only
+        integer :: every
+        logical :: contacts, trace, final_bodies
+      end type output_config_t
 
-  !> A whole input file.
-  type :: config_t
-    !> path and content of the file
-    character(len=:), allocatable :: file, text
-    type(scene_config_t) :: scene
-    type(time_config_t) :: time
-    type(solver_config_t) :: solver
-    type(decomposition_config_t) :: decomposition
-    type(enriched_config_t) :: enriched
-    type(output_config_t) :: output
-  end type config_t
+      !> A whole input file.
+      type :: config_t
+        !> path and content of the file
+        character(len=:), allocatable :: file, text
+        type(scene_config_t) :: scene
+        type(time_config_t) :: time
+        type(solver_config_t) :: solver
+        type(decomposition_config_t) :: decomposition
+        type(enriched_config_t) :: enriched
+        type(output_config_t) :: output
+      end type config_t
 
-end module gravier_config_types
+      end module gravier_config_types

@@ -2,7 +2,7 @@
 module gravier_config_value
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, ieee_set_halting_mode, &
-    ieee_support_halting, ieee_overflow
+                                                                              ieee_support_halting, ieee_overflow
   use gravier_kinds, only: dp
   use gravier_text, only: lower
   use gravier_config_types, only: text_length, choice_length
@@ -15,7 +15,7 @@ module gravier_config_value
   !> entries of the longest key
   integer, parameter :: most_entries = 3
   !> room for a text whose quotes are all doubled
-  integer, parameter :: longest_text = 2 * text_length + 2
+  integer, parameter :: longest_text = 2*text_length + 2
 
 contains
 
@@ -38,9 +38,9 @@ contains
     if (failed) return
     select case (key%kind)
     case (kind_integer)
-      call read_integer(key, index // " = " // value, slot, touched, failed)
+      call read_integer(key, index//" = "//value, slot, touched, failed)
     case (kind_real)
-      call read_real(key, index // " = " // value, slot, touched, failed)
+      call read_real(key, index//" = "//value, slot, touched, failed)
     case (kind_logical)
       call read_logical(value, slot, touched, failed)
     case default
@@ -111,7 +111,7 @@ contains
     touched = .false.
     select case (lower(value))
     case ("t", "f", ".t.", ".f.", "true", "false", ".true.", ".false.")
-      call logical_of_record("= " // value, read_one, status)
+      call logical_of_record("= "//value, read_one, status)
       failed = status /= 0
     case default
       failed = .true.
@@ -134,7 +134,7 @@ contains
     touched = .false.
     failed = .not. is_quoted(value)
     if (failed) return
-    call text_of_record("= " // value, read_one, status)
+    call text_of_record("= "//value, read_one, status)
     failed = status /= 0 .or. len_trim(read_one) > text_length
     if (failed) return
     if (key%kind == kind_choice) then
@@ -161,7 +161,7 @@ contains
     character(len=*), intent(in) :: word
     !> separated by blanks
     character(len=*), intent(in) :: words
-    is_choice = word /= "" .and. index(word, " ") == 0 .and. index(" " // words // " ", " " // word // " ") > 0
+    is_choice = word /= "" .and. index(word, " ") == 0 .and. index(" "//words//" ", " "//word//" ") > 0
   end function is_choice
 
   subroutine integers_of_record(assignment, value, status)
@@ -173,7 +173,7 @@ contains
     character(len=:), allocatable :: record
     namelist /one/ value
 
-    record = "&one value" // assignment // " /"
+    record = "&one value"//assignment//" /"
     status = 1
     if (index(assignment, ";") == 0) read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
@@ -189,7 +189,7 @@ contains
     logical :: halting
     namelist /one/ value
 
-    record = "&one value" // assignment // " /"
+    record = "&one value"//assignment//" /"
     status = 1
     ! a number too large, as 1e999, reads as infinity and must not end a program that traps overflows
     call ieee_get_halting_mode(ieee_overflow, halting)
@@ -208,7 +208,7 @@ contains
     namelist /one/ value
 
     value = .false.
-    record = "&one value " // assignment // " /"
+    record = "&one value "//assignment//" /"
     read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
   end subroutine logical_of_record
@@ -221,7 +221,7 @@ contains
     namelist /one/ value
 
     value = ""
-    record = "&one value " // assignment // " /"
+    record = "&one value "//assignment//" /"
     read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
   end subroutine text_of_record
@@ -234,7 +234,7 @@ contains
     integer :: status
 
     values = 0.0_dp
-    call reals_of_record(" = " // text, values, status)
+    call reals_of_record(" = "//text, values, status)
     number = values(1)
   end function number_of
 
@@ -248,6 +248,7 @@ contains
     value = 0
     record = "&one value = 1 /"
     read (record, nml=one, iostat=status)
+    if (status /= 0) value = 0
   end subroutine forget_failed_read
 
 end module gravier_config_value

@@ -4,7 +4,7 @@ module gravier_config_write
   use gravier_text, only: to_text
   use gravier_config_types, only: config_t
   use gravier_config_keys, only: group_t, key_t, groups, keys, kind_integer, kind_real, kind_logical, kind_choice, &
-    choices_text
+                                 choices_text
   use gravier_config_slots, only: slot_t, slot_of
   use gravier_config_value, only: number_of
   implicit none
@@ -61,11 +61,11 @@ contains
     copy = config
     text = ""
     do g = 1, size(groups)
-      text = text // "&" // trim(groups(g)%name) // newline
+      text = text//"&"//trim(groups(g)%name)//newline
       do k = 1, size(keys)
-        if (keys(k)%group == groups(g)%name) text = text // active_line(copy, keys(k))
+        if (keys(k)%group == groups(g)%name) text = text//active_line(copy, keys(k))
       end do
-      text = text // "/" // newline
+      text = text//"/"//newline
     end do
   end function active_text
 
@@ -77,9 +77,9 @@ contains
 
     line = ""
     if (key%bodies /= "" .and. index(key%bodies, trim(config%scene%bodies)) == 0) return
-    line = "  " // trim(key%name) // " = " // value_text(key, slot_of(config, key)) // newline
+    line = "  "//trim(key%name)//" = "//value_text(key, slot_of(config, key))//newline
     if (key%group == "scene" .and. key%name == "alert_distance" .and. .not. config%scene%alert_given) &
-      line = "  ! alert_distance = " // trim(key%note) // newline
+      line = "  ! alert_distance = "//trim(key%note)//newline
   end function active_line
 
   !> The value of a key as it would be typed after the equal sign; reading it back gives the same value.
@@ -95,18 +95,18 @@ contains
       if (key%count == 1) text = to_text(slot%integer)
       if (key%count > 1) text = to_text(slot%integers(1))
       do i = 2, key%count
-        text = text // ", " // to_text(slot%integers(i))
+        text = text//", "//to_text(slot%integers(i))
       end do
     case (kind_real)
       if (key%count == 1) text = shortest(slot%real)
       if (key%count > 1) text = shortest(slot%reals(1))
       do i = 2, key%count
-        text = text // ", " // shortest(slot%reals(i))
+        text = text//", "//shortest(slot%reals(i))
       end do
     case (kind_logical)
       text = trim(merge(".true. ", ".false.", slot%logical))
     case (kind_choice)
-      text = "'" // trim(slot%choice) // "'"
+      text = "'"//trim(slot%choice)//"'"
     case default
       text = quoted(trim(slot%text))
     end select
@@ -119,10 +119,10 @@ contains
     integer :: i
     literal = "'"
     do i = 1, len(text)
-      literal = literal // text(i:i)
-      if (text(i:i) == "'") literal = literal // "'"
+      literal = literal//text(i:i)
+      if (text(i:i) == "'") literal = literal//"'"
     end do
-    literal = literal // "'"
+    literal = literal//"'"
   end function quoted
 
   !> The fewest digits that give the value again.
@@ -150,20 +150,20 @@ contains
 
     first = verify(scientific, "-")
     n = index(scientific, "E")
-    figures = scientific(first:first) // scientific(first + 2:n - 1)
+    figures = scientific(first:first)//scientific(first + 2:n - 1)
     read (scientific(n + 1:), *) exponent
     n = len(figures)
     if (exponent < -3 .or. exponent > 5) then
-      if (n == 1) figures = figures // "0"
-      text = figures(1:1) // "." // figures(2:) // "E" // to_text(exponent)
+      if (n == 1) figures = figures//"0"
+      text = figures(1:1)//"."//figures(2:)//"E"//to_text(exponent)
     else if (exponent < 0) then
-      text = "0." // repeat("0", -exponent - 1) // figures
+      text = "0."//repeat("0", -exponent - 1)//figures
     else if (exponent >= n - 1) then
-      text = figures // repeat("0", exponent - n + 1) // ".0"
+      text = figures//repeat("0", exponent - n + 1)//".0"
     else
-      text = figures(:exponent + 1) // "." // figures(exponent + 2:)
+      text = figures(:exponent + 1)//"."//figures(exponent + 2:)
     end if
-    if (first > 1) text = "-" // text
+    if (first > 1) text = "-"//text
   end function plain
 
   !> Writes the reference of all groups and keys in Markdown; doc/keys.md is this text.
@@ -183,26 +183,26 @@ contains
 
   pure function preface() result(text)
     character(len=:), allocatable :: text
-    text = "# Input groups and keys" // newline // newline &
-      // "<!-- written by write_key_reference (src/config_write.f90); a test compares the two -->" // newline // newline &
-      // "An input file is a text of Fortran namelist groups, `&name key = value ... /`, in any order." // newline &
-      // "Units are SI. Names and words may be in any case; texts and words stand in quotes; `!` starts a comment." // newline &
-      // "A list takes blanks or commas between its entries, `2*0.5` for `0.5, 0.5`, and `grid(2) = 4` for one entry." &
-      // newline &
-      // "A group or a key that is not on this page is refused, and so is one that is given twice." // newline // newline &
-      // "The shortest input:" // newline // newline &
-      // "    &scene bodies = 'column' /" // newline &
-      // "    &time  step = 0.01, steps = 10 /" // newline
+    text = "# Input groups and keys"//newline//newline &
+           //"<!-- written by write_key_reference (src/config_write.f90); a test compares the two -->"//newline//newline &
+           //"An input file is a text of Fortran namelist groups, `&name key = value ... /`, in any order."//newline &
+           //"Units are SI. Names and words may be in any case; texts and words stand in quotes; `!` starts a comment."//newline &
+           //"A list takes blanks or commas between its entries, `2*0.5` for `0.5, 0.5`, and `grid(2) = 4` for one entry." &
+           //newline &
+           //"A group or a key that is not on this page is refused, and so is one that is given twice."//newline//newline &
+           //"The shortest input:"//newline//newline &
+           //"    &scene bodies = 'column' /"//newline &
+           //"    &time  step = 0.01, steps = 10 /"//newline
   end function preface
 
   pure function group_heading(group) result(text)
     type(group_t), intent(in) :: group
     character(len=:), allocatable :: text
-    text = newline // "## &" // trim(group%name) // newline // newline // trim(group%meaning)
-    if (group%required) text = text // " Required."
-    if (.not. group%required) text = text // " May be absent."
-    text = text // newline // newline // "| key | value | unit | default | meaning |" // newline &
-      // "|---|---|---|---|---|" // newline
+    text = newline//"## &"//trim(group%name)//newline//newline//trim(group%meaning)
+    if (group%required) text = text//" Required."
+    if (.not. group%required) text = text//" May be absent."
+    text = text//newline//newline//"| key | value | unit | default | meaning |"//newline &
+           //"|---|---|---|---|---|"//newline
   end function group_heading
 
   !> The row of a key in the table of its group.
@@ -210,15 +210,15 @@ contains
     type(key_t), intent(in) :: key
     character(len=:), allocatable :: row
 
-    row = "| `" // trim(key%name) // "` | " // kind_text_of(key) // " | " // trim(key%unit) // " | "
+    row = "| `"//trim(key%name)//"` | "//kind_text_of(key)//" | "//trim(key%unit)//" | "
     if (key%note /= "") then
-      row = row // trim(key%note)
+      row = row//trim(key%note)
     else
-      row = row // "`" // trim(key%default) // "`"
+      row = row//"`"//trim(key%default)//"`"
     end if
-    row = row // " | " // trim(key%meaning)
-    if (key%bodies /= "") row = row // " (only with `bodies` = " // choices_text(key%bodies) // ")"
-    row = row // " |"
+    row = row//" | "//trim(key%meaning)
+    if (key%bodies /= "") row = row//" (only with `bodies` = "//choices_text(key%bodies)//")"
+    row = row//" |"
   end function key_row
 
   !> The kind, the number of entries and the allowed values.
@@ -239,11 +239,11 @@ contains
     case default
       text = "text"
     end select
-    if (key%count > 1) text = "up to " // to_text(key%count) // " " // text // "s"
+    if (key%count > 1) text = "up to "//to_text(key%count)//" "//text//"s"
     if (key%kind == kind_integer .or. key%kind == kind_real) then
-      if (key%allowed /= "") text = text // " " // trim(key%allowed)
+      if (key%allowed /= "") text = text//" "//trim(key%allowed)
     else if (key%allowed /= "") then
-      text = text // ", " // trim(key%allowed)
+      text = text//", "//trim(key%allowed)
     end if
   end function kind_text_of
 

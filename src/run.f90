@@ -135,6 +135,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(step_figures_t) :: figures
     real(dp) :: start, step_start
+    !> of a last line that cannot be written after an error
+    type(error_t), allocatable :: unsaid
     integer :: failed
     logical :: keep_last, ends
 
@@ -156,6 +158,11 @@ contains
     end do
     if (allocated(error)) keep_last = .false.
     call output%finish(simulation, keep_last, error)
+    if (allocated(error)) then
+      call log%line("stopped     *** by an error after "//to_text(simulation%step)//" steps; results until then in "// &
+        & trim(simulation%config%output%directory), unsaid)
+      return
+    end if
     call log%write_end(simulation, MPI_Wtime() - start, error)
     if (failed > 0) status = status_unconverged
     call write_verdict(simulation, log, failed, keep_last, error)

@@ -166,15 +166,15 @@ contains
     character(len=:), allocatable :: text
     integer :: m
 
-    associate (interface => figures%interface)
-      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(interface%least_contacts)//" to "// &
-        & to_text(interface%most_contacts)//" a subdomain); interface: "//to_text(interface%bodies)//" bodies, "// &
-        & to_text(interface%interactions)//" interactions; multiplicity"
+    associate (sharing => figures%sharing)
+      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(sharing%least_contacts)//" to "// &
+        & to_text(sharing%most_contacts)//" a subdomain); interface: "//to_text(sharing%bodies)//" bodies, "// &
+        & to_text(sharing%interactions)//" interactions; multiplicity"
       do m = 2, n_multiplicities
-        if (interface%multiplicity(m) == 0) cycle
-        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "//to_text(interface%multiplicity(m))
+        if (sharing%multiplicity(m) == 0) cycle
+        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "//to_text(sharing%multiplicity(m))
       end do
-      if (interface%bodies == 0) text = text//" 1 only"
+      if (sharing%bodies == 0) text = text//" 1 only"
     end associate
     call self%line(text, error)
   end subroutine run_log_write_interface

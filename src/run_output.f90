@@ -75,7 +75,7 @@ contains
       call self%history%add(figures%max_overlap)
       call self%history%add(figures%kinetic_energy)
       call self%history%add(seconds)
-      call self%history%add(figures%interface%bodies)
+      call self%history%add(figures%sharing%bodies)
       call self%history%add(merge(1, 0, converged))
       call self%history%end_row(error)
       if (self%trace%is_open()) call write_trace(self, simulation, figures, error)

@@ -25,7 +25,7 @@ module gravier_simulation
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
     type(solve_report_t) :: solve
-    type(interface_figures_t) :: interface
+    type(interface_figures_t) :: sharing
     integer(i8) :: contacts = 0
     !> [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
@@ -158,7 +158,7 @@ contains
     if (allocated(error)) return
     call self%decomposition%settle()
     call stop_timer(phase_bodies)
-    call build_problem(self%decomposition, self%problem%kernels, self%physics, self%problem, figures%interface)
+    call build_problem(self%decomposition, self%problem%kernels, self%physics, self%problem, figures%sharing)
     call start_timer(phase_setup)
     if (self%config%solver%warm_start) call self%memory%recall(self%decomposition, self%problem)
     call stop_timer(phase_setup)

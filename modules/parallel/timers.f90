@@ -17,8 +17,8 @@ module gravier_timers
     & "neighbourhood: ghosts", "detection", "interface: who shares whom", "set-up of the solve", "sweeps", "exchange", &
     & "factorisation", "interface solve", "residual checks", "output"]
 
-  real(dp), save :: elapsed(n_phases) = 0.0_dp
-  real(dp), save :: started(n_phases) = 0.0_dp
+  real(dp) :: elapsed(n_phases) = 0.0_dp
+  real(dp) :: started(n_phases) = 0.0_dp
 
 contains
 
