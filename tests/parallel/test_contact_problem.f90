@@ -1,0 +1,290 @@
+!> The contact problem and what judges it: velocities of the undivided bodies, the residual and the jump do not depend on
+!> the decomposition. Impulses and velocities follow from identifiers, so that every decomposition has the same.
+program test_contact_problem
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_is_nan, ieee_quiet_nan
+  use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_invalid
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_random_hash, only: hash_uniform
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+  character(len=*), parameter :: newline = new_line("a")
+  type(communicator_t), target :: comm
+  integer :: dimension, k
+  integer, parameter :: counts(*) = [2, 3, 9]
+
+  call start_parallel()
+  call comm%init()
+  do dimension = 2, 3
+    do k = 1, size(counts)
+      call test_against_one(dimension, counts(k), 0.3_dp)
+      call test_against_one(dimension, counts(k), 0.0_dp)
+    end do
+    call test_masses(dimension, 0.3_dp)
+    call test_masses(dimension, 0.0_dp)
+    call test_jump(dimension)
+    call test_no_impulse(dimension)
+  end do
+  call test_not_finite()
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
+  !> follow from their identifiers press some together and part others.
+  subroutine make(dimension, n_subdomains, friction, sim)
+    integer, intent(in) :: dimension, n_subdomains
+    real(dp), intent(in) :: friction
+    type(simulation_t), intent(inout) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    character(len=:), allocatable :: counts
+    integer :: s, b, d
+
+    counts = "9, 8"
+    if (dimension == 3) counts = "5, 4, 4"
+    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
+      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
+      & newline//"&time step = 1, steps = 1, theta = 1 / &solver method = 'nscdd' /"//newline// &
+      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
+    call check(.not. allocated(error), "configuration")
+    call sim%init(comm, config, error)
+    call sim%assemble(figures, error)
+    call check(.not. allocated(error), "assembly")
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do b = 1, sub%n_bodies
+          do d = 1, sim%problem%kernels%nv
+            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
+          end do
+        end do
+      end associate
+    end do
+  end subroutine make
+
+  !> Impulses that follow from the pair, in the cone of friction.
+  subroutine set_impulses(problem)
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s, c, d
+    integer(i8) :: pair
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          pair = 1000*sub%id(sub%pair(1, c)) + sub%id(sub%pair(2, c))
+          sub%impulse(1, c) = max(0.0_dp, hash_uniform(4, pair, 1) - 0.3_dp)
+          do d = 2, problem%kernels%nc
+            sub%impulse(d, c) = 0.2_dp*sub%impulse(1, c)*(hash_uniform(4, pair, d) - 0.5_dp)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine set_impulses
+
+  !> Velocities and residual of several subdomains against those of one. Differences are roundings: each velocity is a sum
+  !> of some ten terms of size up to 1/m = 2 (disks) or 20 (spheres).
+  subroutine test_against_one(dimension, n_subdomains, friction)
+    integer, intent(in) :: dimension, n_subdomains
+    real(dp), intent(in) :: friction
+    real(dp), parameter :: rounding = 1.0e-12_dp
+    type(simulation_t) :: one, many
+    real(dp) :: residual(2), defect(2)
+    real(dp), allocatable :: velocity(:, :), other(:, :)
+    logical :: same
+
+    call make(dimension, 1, friction, one)
+    call make(dimension, n_subdomains, friction, many)
+    call check_equal(many%problem%n_contacts, one%problem%n_contacts, "contacts")
+    call set_impulses(one%problem)
+    call set_impulses(many%problem)
+    call one%problem%residual(residual(1), defect(1))
+    call many%problem%residual(residual(2), defect(2))
+    call check(residual(1) > 0.1_dp, "a residual to speak of")
+    call check_close(residual(2), residual(1), rounding*residual(1), "residual")
+    call check_close(defect(2), defect(1), rounding*defect(1), "defect")
+    call gather_velocities(one%problem, int(one%n_grains), velocity, same)
+    call gather_velocities(many%problem, int(many%n_grains), other, same)
+    call check(same, "one velocity in all copies, bit for bit")
+    call check_close(maxval(abs(other - velocity)), 0.0_dp, rounding, "velocities of the undivided bodies")
+    call check(one%problem%any_impulse(), "some impulse in one subdomain")
+    call check(many%problem%any_impulse(), "some impulse in several subdomains")
+    call one%free()
+    call many%free()
+  end subroutine test_against_one
+
+  !> v_global of every grain in contact, on all ranks, and whether all its copies have the same bits.
+  subroutine gather_velocities(problem, n_grains, velocity, same)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: n_grains
+    real(dp), allocatable, intent(out) :: velocity(:, :)
+    logical, intent(out) :: same
+    real(dp), allocatable :: lowest(:, :)
+    integer :: s, b, d
+
+    allocate (velocity(problem%kernels%nv, n_grains), lowest(problem%kernels%nv, n_grains), source=-huge(1.0_dp))
+    do s = 1, size(problem%sub)
+      do b = 1, problem%sub(s)%n_bodies
+        associate (g => problem%sub(s)%id(b))
+          do d = 1, problem%kernels%nv
+            velocity(d, g) = max(velocity(d, g), problem%sub(s)%v_global(d, b))
+            lowest(d, g) = max(lowest(d, g), -problem%sub(s)%v_global(d, b))
+          end do
+        end associate
+      end do
+    end do
+    same = .true.
+    do b = 1, n_grains
+      call comm%highest_of(velocity(:, b))
+      call comm%highest_of(lowest(:, b))
+      if (velocity(1, b) < -0.5_dp*huge(1.0_dp)) velocity(:, b) = 0.0_dp
+      if (lowest(1, b) < -0.5_dp*huge(1.0_dp)) lowest(:, b) = 0.0_dp
+      same = same .and. all(abs(velocity(:, b) + lowest(:, b)) <= 0.0_dp)
+    end do
+  end subroutine gather_velocities
+
+  !> Shared masses: each copy has M/m, walls stay heavy, and the local operators follow.
+  subroutine test_masses(dimension, friction)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: friction
+    type(simulation_t) :: sim
+    integer :: s, b, c, round
+    real(dp) :: factor, w(2)
+    logical :: right
+
+    call make(dimension, 9, friction, sim)
+    right = .true.
+    do round = 1, 3
+      do s = 1, size(sim%problem%sub)
+        associate (sub => sim%problem%sub(s))
+          call sub%share_masses(round == 2)
+          do b = 1, sub%n_columns
+            factor = 1.0_dp
+            if (round == 2 .and. b <= sub%n_bodies) factor = sub%multiplicity(b)
+            right = right .and. all(abs(sub%weight(:, b) - factor*sub%inverse_mass(:, b)) <= &
+              & 2*epsilon(1.0_dp)*sub%weight(:, b))
+          end do
+          do c = 1, sub%n_contacts
+            call sub%local_operator(c, sub%weight, w)
+            call compare_operator(sim%problem, s, c, w, right)
+            right = right .and. abs(sub%hot(dimension + 2, c)*w(1) - 1.0_dp) <= 2*epsilon(1.0_dp)
+            if (friction > 0.0_dp) right = right .and. abs(sub%hot(dimension + 3, c)*w(2) - 1.0_dp) <= 2*epsilon(1.0_dp)
+          end do
+        end associate
+      end do
+    end do
+    call check(right, "masses and local operators")
+    call sim%free()
+  end subroutine test_masses
+
+  !> W_aa is the change of v_a under a unit impulse r_a alone: H^T M^-1 H on the contact's own column.
+  subroutine compare_operator(problem, s, c, w, right)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: s, c
+    real(dp), intent(in) :: w(2)
+    !> stays true where they agree
+    logical, intent(inout) :: right
+    real(dp) :: impulse(problem%kernels%nc, 1), v(problem%kernels%nc, 1)
+    integer :: d, nd
+
+    nd = problem%kernels%nd
+    associate (sub => problem%sub(s))
+      do d = 1, problem%kernels%nc
+        impulse(:, :) = 0.0_dp
+        impulse(d, 1) = 1.0_dp
+        sub%reaction(:, :) = 0.0_dp
+        call problem%kernels%add_reaction(sub%pair(:, c:c), sub%hot(:, c:c), impulse, sub%reaction)
+        sub%reaction(1:nd, sub%pair(1, c)) = sub%weight(1, sub%pair(1, c))*sub%reaction(1:nd, sub%pair(1, c))
+        sub%reaction(nd + 1:, sub%pair(1, c)) = sub%weight(2, sub%pair(1, c))*sub%reaction(nd + 1:, sub%pair(1, c))
+        sub%reaction(1:nd, sub%pair(2, c)) = sub%weight(1, sub%pair(2, c))*sub%reaction(1:nd, sub%pair(2, c))
+        sub%reaction(nd + 1:, sub%pair(2, c)) = sub%weight(2, sub%pair(2, c))*sub%reaction(nd + 1:, sub%pair(2, c))
+        call problem%kernels%contact_velocity(sub%pair(:, c:c), sub%hot(:, c:c), sub%reaction, v)
+        ! some roundings, relative to the largest entry; the other components do not move
+        v(d, 1) = v(d, 1) - w(min(d, 2))
+        right = right .and. all(abs(v) <= 32*epsilon(1.0_dp)*w(2))
+      end do
+    end associate
+  end subroutine compare_operator
+
+  !> The jump is 0 where the copies agree, and the largest difference of translations over the velocity scale where one
+  !> copy is moved off by a known amount; spins do not count.
+  subroutine test_jump(dimension)
+    integer, intent(in) :: dimension
+    type(simulation_t) :: sim
+    integer :: s, k
+
+    call make(dimension, 9, 0.3_dp, sim)
+    sim%problem%velocity_scale = 4.0_dp
+    do s = 1, size(sim%problem%sub)
+      sim%problem%sub(s)%velocity(:, :) = sim%problem%sub(s)%v_free
+    end do
+    call check_close(sim%problem%jump(), 0.0_dp, 0.0_dp, "no jump")
+    do s = 1, size(sim%problem%sub)
+      if (sim%problem%sub(s)%subdomain /= 5) cycle
+      associate (part => sim%problem%shared%part(s), velocity => sim%problem%sub(s)%velocity)
+        call check(part%n_shared > 1, "shared grains in subdomain 5")
+        ! differences of 3-4-5: 5; and 2 elsewhere
+        velocity(1, part%body(1)) = velocity(1, part%body(1)) + 3.0_dp
+        velocity(2, part%body(1)) = velocity(2, part%body(1)) - 4.0_dp
+        velocity(2, part%body(2)) = velocity(2, part%body(2)) + 2.0_dp
+        do k = 1, part%n_shared
+          velocity(dimension + 1:, part%body(k)) = 100.0_dp
+        end do
+      end associate
+    end do
+    ! a few roundings of numbers of size 5
+    call check_close(sim%problem%jump(), 1.25_dp, 32*epsilon(1.0_dp), "a known jump")
+    sim%problem%velocity_scale = 0.0_dp
+    call check_close(sim%problem%jump(), 5.0_dp, 64*epsilon(1.0_dp), "a jump without a scale")
+    call sim%free()
+  end subroutine test_jump
+
+  !> Without impulses the residual is relative to the force scale, and 0 where nothing wants to move.
+  subroutine test_no_impulse(dimension)
+    integer, intent(in) :: dimension
+    type(simulation_t) :: sim
+    real(dp) :: residual, defect
+    integer :: s
+
+    call make(dimension, 3, 0.3_dp, sim)
+    call check(.not. sim%problem%any_impulse(), "no impulse")
+    sim%problem%force_scale = 0.5_dp
+    call sim%problem%residual(residual, defect)
+    call check(defect > 0.0_dp, "grains that press each other")
+    call check_close(residual, 2*defect, 0.0_dp, "residual without impulses")
+    do s = 1, size(sim%problem%sub)
+      sim%problem%sub(s)%v_free(:, :) = 0.0_dp
+    end do
+    call sim%problem%residual(residual, defect)
+    call check_close(residual + defect, 0.0_dp, 0.0_dp, "residual of rest")
+    call sim%free()
+  end subroutine test_no_impulse
+
+  !> One NaN makes the residual NaN on all ranks.
+  subroutine test_not_finite()
+    type(simulation_t) :: sim
+    real(dp) :: residual, defect
+    integer :: s
+    logical :: halting
+
+    ! builds for debugging stop at the first operation on a NaN
+    call ieee_get_halting_mode(ieee_invalid, halting)
+    if (halting) return
+    call make(2, 4, 0.3_dp, sim)
+    call set_impulses(sim%problem)
+    do s = 1, size(sim%problem%sub)
+      if (sim%problem%sub(s)%subdomain == 4) sim%problem%sub(s)%impulse(1, 1) = ieee_value(1.0_dp, ieee_quiet_nan)
+    end do
+    call sim%problem%residual(residual, defect)
+    call check(ieee_is_nan(residual) .and. ieee_is_nan(defect), "residual of a NaN")
+    call sim%free()
+  end subroutine test_not_finite
+
+end program test_contact_problem

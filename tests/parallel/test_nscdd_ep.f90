@@ -1,0 +1,344 @@
+!> NSCDD-EP: l = 0, the enriched interface condition after each iteration, fixed points, both interface solvers, work, any
+!> number of ranks.
+program test_nscdd_ep
+  use mpi_f08, only: MPI_COMM_SELF
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_random_hash, only: hash_uniform
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t
+  use gravier_nscdd_ep, only: nscdd_ep_t
+  use gravier_solve, only: solve_report_t, solve_contacts, solve_converged
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+  character(len=*), parameter :: newline = new_line("a")
+  character(len=*), parameter :: plain = "&solver method = 'nscdd', sweeps = 2 /"
+  character(len=*), parameter :: enriched = "&solver method = 'nscdd_ep', sweeps = 2 / &enriched direction = "
+  type(communicator_t), target :: comm, alone
+  integer :: dimension, k
+  real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]
+
+  call start_parallel()
+  call comm%init()
+  call alone%init(MPI_COMM_SELF)
+  do dimension = 2, 3
+    do k = 1, size(frictions)
+      call test_zero(dimension, frictions(k))
+      call test_condition(dimension, frictions(k), "1 /")
+      call test_condition(dimension, frictions(k), "3, contacts = 'active' /")
+      call test_condition(dimension, frictions(k), "0.5, direction_unit = 'absolute' /")
+      call compare_with_one_rank(dimension, 9, frictions(k), enriched//"1 /", 4, "direct")
+      call compare_with_one_rank(dimension, 9, frictions(k), enriched//"1, contacts = 'active' /", 4, "direct, active")
+    end do
+    call test_solvers(dimension, 0.4_dp)
+    call compare_with_one_rank(dimension, 5, 0.4_dp, enriched//"1, interface = 'cg' /", 2, "conjugate gradient")
+    call test_fixed_point(dimension)
+  end do
+  call test_work()
+  call finish_checks()
+  call alone%free()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
+  !> follow from their identifiers press some together and part others.
+  subroutine make(over, dimension, n_subdomains, friction, keys, sim)
+    type(communicator_t), target, intent(in) :: over
+    integer, intent(in) :: dimension, n_subdomains
+    real(dp), intent(in) :: friction
+    !> of the groups &solver and &enriched
+    character(len=*), intent(in) :: keys
+    type(simulation_t), intent(inout) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    character(len=:), allocatable :: counts
+    integer :: s, b, d
+
+    counts = "9, 8"
+    if (dimension == 3) counts = "5, 4, 4"
+    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
+      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
+      & newline//"&time step = 1, steps = 1, theta = 1 /"//newline//keys//newline// &
+      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
+    call check(.not. allocated(error), "configuration")
+    call sim%init(over, config, error)
+    call sim%assemble(figures, error)
+    call check(.not. allocated(error), "assembly")
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do b = 1, sub%n_bodies
+          do d = 1, sim%problem%kernels%nv
+            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
+          end do
+        end do
+      end associate
+    end do
+  end subroutine make
+
+  !> Start a solve from the impulses of the problem and do `n` iterations.
+  subroutine iterate(sim, n)
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: n
+    type(error_t), allocatable :: error
+    real(dp) :: jump
+    integer :: k
+
+    call sim%scheme%start(sim%problem, error)
+    do k = 1, n
+      call sim%scheme%iterate(sim%problem, .false., jump, error)
+    end do
+    call check(.not. allocated(error), "iterations")
+  end subroutine iterate
+
+  pure logical function same_bits(a, b)
+    real(dp), intent(in) :: a(:, :), b(:, :)
+    integer :: i, j
+
+    same_bits = size(a) == size(b)
+    if (.not. same_bits) return
+    do j = 1, size(a, 2)
+      do i = 1, size(a, 1)
+        same_bits = same_bits .and. transfer(a(i, j), 0_i8) == transfer(b(i, j), 0_i8)
+      end do
+    end do
+  end function same_bits
+
+  !> Whether the subdomains of this rank have the bits that one rank alone gives them.
+  subroutine compare_with_one_rank(dimension, n_subdomains, friction, keys, n, name)
+    integer, intent(in) :: dimension, n_subdomains, n
+    real(dp), intent(in) :: friction
+    character(len=*), intent(in) :: keys, name
+    type(simulation_t) :: many, one
+    integer :: s, first
+    logical :: same
+
+    call make(comm, dimension, n_subdomains, friction, keys, many)
+    call make(alone, dimension, n_subdomains, friction, keys, one)
+    call iterate(many, n)
+    call iterate(one, n)
+    first = many%decomposition%first
+    same = .true.
+    do s = 1, size(many%problem%sub)
+      same = same .and. same_bits(many%problem%sub(s)%impulse, one%problem%sub(first + s - 1)%impulse)
+      same = same .and. same_bits(many%problem%sub(s)%velocity, one%problem%sub(first + s - 1)%velocity)
+    end do
+    call check(same, name//": the bits of one rank alone")
+    call many%free()
+    call one%free()
+  end subroutine compare_with_one_rank
+
+  !> Largest difference of the impulses of two runs. Collective.
+  real(dp) function distance(a, b)
+    type(contact_problem_t), intent(in) :: a, b
+    integer :: s
+
+    distance = 0.0_dp
+    do s = 1, size(a%sub)
+      if (a%sub(s)%n_contacts > 0) distance = max(distance, maxval(abs(a%sub(s)%impulse - b%sub(s)%impulse)))
+    end do
+    distance = a%comm%highest(distance)
+  end function distance
+
+  !> l = 0 is NSCDD, bit for bit; l > 0 is not.
+  subroutine test_zero(dimension, friction)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: friction
+    type(simulation_t) :: nscdd, zero, some
+    integer :: s
+    logical :: same
+
+    call make(comm, dimension, 9, friction, plain, nscdd)
+    call make(comm, dimension, 9, friction, enriched//"0 /", zero)
+    call make(comm, dimension, 9, friction, enriched//"1 /", some)
+    call iterate(nscdd, 10)
+    call iterate(zero, 10)
+    call iterate(some, 10)
+    same = .true.
+    do s = 1, size(nscdd%problem%sub)
+      same = same .and. same_bits(nscdd%problem%sub(s)%impulse, zero%problem%sub(s)%impulse)
+      same = same .and. same_bits(nscdd%problem%sub(s)%velocity, zero%problem%sub(s)%velocity)
+    end do
+    call check(same, "l = 0 is NSCDD, bit for bit")
+    call check(distance(nscdd%problem, some%problem) > 1.0e-3_dp, "l > 0 does something")
+    call nscdd%free()
+    call zero%free()
+    call some%free()
+  end subroutine test_zero
+
+  !> What an iteration must end with (paper, (24)-(29)): F such that the enriched velocities
+  !>   V~_E = M_eta,E^-1 [ R_E^d + H_E (r_E + l_E v_E) - A_E^T F ]
+  !> are the same in all copies, and M~_E V_E = R_E^d + H_E r_E - A_E^T F. F follows from V_E: it has no effect but on
+  !> shared bodies, and sums to zero over the copies.
+  subroutine test_condition(dimension, friction, direction)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: friction
+    character(len=*), intent(in) :: direction
+    type(simulation_t) :: sim
+    type(error_t), allocatable :: error
+    real(dp) :: jump
+    integer :: n
+
+    call make(comm, dimension, 9, friction, enriched//direction, sim)
+    ! the second round starts from impulses
+    do n = 1, 4
+      if (mod(n, 2) == 1) call sim%scheme%start(sim%problem, error)
+      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call check(.not. allocated(error), "iteration")
+      call check_condition(sim)
+    end do
+    call sim%free()
+  end subroutine test_condition
+
+  subroutine check_condition(sim)
+    type(simulation_t), intent(inout) :: sim
+    !> velocities and impulses of size 1 to 10, solved with M_eta whose condition is some hundred
+    real(dp), parameter :: rounding = 1.0e-11_dp
+    real(dp), allocatable :: force(:, :), total(:)
+    type(error_t), allocatable :: error
+    integer :: s, b, d, k, nd, nv
+    logical :: own, balanced
+
+    nd = sim%problem%kernels%nd
+    nv = sim%problem%kernels%nv
+    own = .true.
+    balanced = .true.
+    select type (scheme => sim%scheme)
+    type is (nscdd_ep_t)
+      do s = 1, size(sim%problem%sub)
+        call sim%problem%own_reactions(s)
+        associate (sub => sim%problem%sub(s), part => scheme%matrix%part(s))
+          ! A^T F = M~ (V_free - V) + H r, into `reaction`, and M~ V + H l v
+          do b = 1, sub%n_bodies
+            do d = 1, nv
+              associate (weight => sub%weight(merge(1, 2, d <= nd), b))
+                sub%reaction(d, b) = sub%reaction(d, b) + (sub%v_free(d, b) - sub%velocity(d, b))/weight
+              end associate
+            end do
+            if (sub%multiplicity(b) == 1) own = own .and. all(abs(sub%reaction(:, b)) <= rounding)
+          end do
+          allocate (force(nv, sub%n_columns), source=0.0_dp)
+          part%contact_work(:, :) = part%direction*part%law_velocity
+          call sim%problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, force)
+          do b = 1, sub%n_bodies
+            do d = 1, nv
+              force(d, b) = force(d, b) + sub%velocity(d, b)/sub%weight(merge(1, 2, d <= nd), b)
+            end do
+          end do
+          call scheme%matrix%solve(sim%problem, s, force, error)
+          part%body_work(:, :) = force
+          deallocate (force)
+        end associate
+        call sim%problem%shared%load(s, sim%problem%sub(s)%reaction)
+      end do
+      call check(.not. allocated(error), "enriched velocities")
+      call check(own, "multipliers act on shared bodies only")
+      call sim%problem%shared%pass()
+      allocate (total(nv))
+      do s = 1, size(sim%problem%sub)
+        do k = 1, sim%problem%shared%part(s)%n_shared
+          total(:) = sim%problem%sub(s)%reaction(:, sim%problem%shared%part(s)%body(k))
+          call sim%problem%shared%add_copies(s, k, total)
+          balanced = balanced .and. all(abs(total) <= rounding)
+        end do
+        call sim%problem%shared%load(s, scheme%matrix%part(s)%body_work)
+      end do
+      call check(balanced, "multipliers sum to zero over the copies")
+      call sim%problem%shared%pass()
+      own = .true.
+      do s = 1, size(sim%problem%sub)
+        associate (part => sim%problem%shared%part(s), work => scheme%matrix%part(s)%body_work)
+          do k = 1, part%n_slots
+            own = own .and. all(abs(part%recv(:, k) - work(:, part%body(part%slot_shared(k)))) <= 10*rounding)
+          end do
+        end associate
+      end do
+      call check(own, "enriched velocities are the same in all copies")
+    class default
+      call check(.false., "an NSCDD-EP scheme")
+    end select
+  end subroutine check_condition
+
+  !> The iterates of both interface solvers agree. F is good to 1e-12 times the condition of X at each iteration.
+  subroutine test_solvers(dimension, friction)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: friction
+    type(simulation_t) :: direct, cg
+
+    call make(comm, dimension, 5, friction, enriched//"2 /", direct)
+    call make(comm, dimension, 5, friction, enriched//"2, interface = 'cg' /", cg)
+    call iterate(direct, 3)
+    call iterate(cg, 3)
+    call check_close(distance(direct%problem, cg%problem), 0.0_dp, 1.0e-8_dp, "direct and iterative interface solves")
+    associate (work => cg%scheme%work_done())
+      call check(work%interface_iterations > work%interface_solves, "iterations of the conjugate gradient")
+    end associate
+    call direct%free()
+    call cg%free()
+  end subroutine test_solvers
+
+  !> The solution of the contact problem is a fixed point: from impulses of a residual 1e-10, iterations stay where NSCDD
+  !> ended. Impulses are of size 1, the error some ten times the residual.
+  subroutine test_fixed_point(dimension)
+    integer, intent(in) :: dimension
+    type(simulation_t) :: nscdd, ep
+    type(solve_report_t) :: report
+    type(error_t), allocatable :: error
+    real(dp) :: residual, defect
+    integer :: s
+
+    call make(comm, dimension, 9, 0.0_dp, plain, nscdd)
+    call make(comm, dimension, 9, 0.0_dp, enriched//"1 /", ep)
+    nscdd%control%tolerance = 1.0e-10_dp
+    call solve_contacts(nscdd%problem, nscdd%scheme, nscdd%control, report, error)
+    call check_equal(report%status, solve_converged, "NSCDD converges")
+    do s = 1, size(ep%problem%sub)
+      ep%problem%sub(s)%impulse(:, :) = nscdd%problem%sub(s)%impulse
+    end do
+    call iterate(ep, 10)
+    call check_close(distance(nscdd%problem, ep%problem), 0.0_dp, 1.0e-7_dp, "the solution is a fixed point")
+    call ep%problem%residual(residual, defect)
+    call check_close(residual, 0.0_dp, 1.0e-8_dp, "residual at a fixed point")
+    call nscdd%free()
+    call ep%free()
+  end subroutine test_fixed_point
+
+  !> One factorisation for each subdomain and one of X for a solve; none for another solve of the same problem.
+  subroutine test_work()
+    type(simulation_t) :: sim
+    integer :: s
+    integer(i8) :: mine
+
+    call make(comm, 2, 9, 0.4_dp, enriched//"1 /", sim)
+    mine = 0
+    do s = 1, size(sim%problem%sub)
+      if (sim%problem%sub(s)%n_bodies > 0) mine = mine + 1
+    end do
+    call iterate(sim, 4)
+    call expect(sim%scheme, 1, 4, mine)
+    call iterate(sim, 3)
+    call expect(sim%scheme, 2, 7, mine)
+    call sim%free()
+  end subroutine test_work
+
+  subroutine expect(scheme, solves, iterations, factorisations)
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: solves, iterations
+    integer(i8), intent(in) :: factorisations
+
+    associate (work => scheme%work_done())
+      call check_equal(work%solves, int(solves, i8), "solves")
+      call check_equal(work%iterations, int(iterations, i8), "iterations")
+      call check_equal(work%interface_solves, int(iterations, i8), "interface solves")
+      call check_equal(work%factorisations, factorisations, "factorisations of the subdomains of this rank")
+      call check_equal(work%analyses, factorisations, "analyses of the subdomains of this rank")
+    end associate
+  end subroutine expect
+
+end program test_nscdd_ep
