@@ -69,7 +69,7 @@ module gravier_config_keys
                             key_t("scene", "radius", kind_real, "1.0", "> 0", "radius of each body", unit="m", bodies="column"), &
                             key_t("scene", "mass", kind_real, "1.0", "> 0", "mass of each body", unit="kg", bodies="column"), &
                             key_t("scene", "density", kind_real, "2500", "> 0", &
-                                  "density of the bodies; with `bodies = 'file'`, of those whose mass the file does not give", &
+                                  "density of the bodies; with `bodies = 'file'`, where the file gives no masses", &
                                   unit="kg/m^3, kg/m^2 in 2D", bodies="lattice file"), &
                             key_t("scene", "lattice_count", kind_integer, "3*0", ">= 1", &
                   "number of bodies along each axis: two entries in 2D, three in 3D", count=3, note="required", bodies="lattice"), &
@@ -106,9 +106,9 @@ module gravier_config_keys
 
   type(key_t), parameter :: decomposition_keys(*) = [ &
                             key_t("decomposition", "partition", kind_choice, "'grid'", "grid metis", &
-                                  "cut space into equal boxes, or the graph of contacts with METIS"), &
+                                  "equal boxes, or cells with grains in them shared out by METIS"), &
                             key_t("decomposition", "kind", kind_choice, "'dual'", "dual primal", &
-                                  "share out the contacts (bodies may be shared), or the bodies (contacts may be shared)"), &
+                                  "a contact belongs to the subdomain of its midpoint, or of the centre of its candidate"), &
                             key_t("decomposition", "grid", kind_integer, "3*0", ">= 1", &
                                   "boxes along each axis, two entries in 2D, three in 3D; only with `partition = 'grid'`", &
                                   count=3, note="found from `subdomains`"), &

@@ -97,7 +97,7 @@ contains
     end do
   end subroutine start_neighbour_loads
 
-  !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* of B_E B_E*^T R_E*, and change the velocities by
+  !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* /= E of B_E B_E*^T R_E*, and change the velocities by
   !> what the loads have changed. With under-relaxation, only a share of the change is taken over. Collective.
   subroutine take_neighbour_loads(problem, relaxation, load)
     type(contact_problem_t), intent(inout) :: problem

@@ -21,7 +21,7 @@ module gravier_contact_problem
     integer, allocatable :: home(:)
     !> subdomains in which each grain carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
-    !> centres of grains at q_m (nd, n_bodies) [m]; velocity at the start of the step is v_start (nv, n_bodies)
+    !> centres of grains at q_m (nd, n_bodies) [m]
     real(dp), allocatable :: position(:, :)
     !> velocity without contacts, M^-1 R^d (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)

@@ -1,0 +1,268 @@
+"""The documentation says what is: keys, links, procedures and commands exist, examples run.
+
+Blocks of a page are run down the page in one directory that holds a link to data/, with the programs on PATH:
+- a block sh or python whose first line is `# tested` must end with status 0;
+- a block fortran that is a complete case (it has &scene and &time) must pass `gravier --check`; a first line
+  `! NAME.nml` leaves it under that name for the blocks after it.
+"""
+import functools
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import h5py
+
+SOURCE = Path(os.environ.get("GRAVIER_SOURCE_DIR", Path(__file__).resolve().parents[2])).resolve()
+PROGRAMS = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin")).resolve()
+MPIEXEC = shutil.which(os.environ.get("MPIEXEC", "mpiexec")) or "mpiexec"
+PAGES = [SOURCE / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted((SOURCE / "doc").glob("*.md"))
+BANNED = ["TODO", "FIXME", "XXX", "coming soon", "not yet implemented"]
+PATIENCE = 300  # seconds for one block
+
+ENVIRONMENT = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+}
+
+
+class Block:
+    """A fenced block of a page."""
+
+    def __init__(self, page, line, language):
+        self.page, self.line, self.language, self.lines = page, line, language, []
+
+    @property
+    def text(self):
+        return "\n".join(self.lines) + "\n"
+
+    @property
+    def place(self):
+        return f"{self.page.relative_to(SOURCE)}, line {self.line}"
+
+    def is_tested(self):
+        return self.language in ("sh", "python") and bool(self.lines) and self.lines[0].strip() == "# tested"
+
+    def is_case(self):
+        return self.language == "fortran" and all(re.search(rf"^\s*&{name}\b", self.text, re.I | re.M) for name in ("scene", "time"))
+
+    def case_name(self):
+        named = re.match(r"!\s*([\w.-]+\.nml)\b", self.text)
+        return named[1] if named else f"line{self.line}.nml"
+
+
+@functools.lru_cache(maxsize=None)
+def read(page):
+    """Blocks of a page, and its text without them (their lines left empty)."""
+    blocks, prose, block = [], [], None
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+        fence = re.match(r"\s*```(\w*)\s*$", line)
+        if fence and block is None:
+            block = Block(page, number, fence[1])
+        elif fence:
+            blocks.append(block)
+            block = None
+        elif block is not None:
+            block.lines.append(line)
+        prose.append("" if fence or block is not None else line)
+    if block is not None:
+        raise AssertionError(f"{block.place}: this block is not closed")
+    return blocks, "\n".join(prose)
+
+
+def anchors(page):
+    """What GitHub makes of the headings of a page."""
+    found = []
+    for heading in re.findall(r"^#+ +(.*?) *#*$", read(page)[1], re.M):
+        heading = re.sub(r"\[([^\]]*)\]\([^)]*\)|[`*$]", r"\1", heading)
+        slug = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        found.append(slug if slug not in found else f"{slug}-{found.count(slug)}")
+    return found
+
+
+def run(command, directory, path=None):
+    """Status and output of a command; a command that is not over in time is ended, with all that it started."""
+    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8"}
+    if path:
+        environment["PATH"] = f"{path}:{environment['PATH']}"
+    process = subprocess.Popen(command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, start_new_session=True)
+    try:
+        output = process.communicate(timeout=PATIENCE)[0]
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        return None, process.communicate()[0].decode(errors="replace")
+    return process.returncode, output.decode(errors="replace")
+
+
+@functools.lru_cache(maxsize=None)
+def key_reference():
+    status, text = run([str(PROGRAMS / "gravier"), "--keys"], ".")
+    if status != 0:
+        raise AssertionError(f"gravier --keys: status {status}\n{text}")
+    return text
+
+
+def rows_by_group(text):
+    """Rows of the tables of keys as {(group, key): row}."""
+    rows, group = {}, None
+    for line in text.splitlines():
+        if line.startswith("## &"):
+            group = line[4:]
+        row = re.match(r"\| `(\w+)` \|", line)
+        if row:
+            rows[group, row[1]] = line
+    return rows
+
+
+class Keys(unittest.TestCase):
+
+    def test_every_key_stands_in_keys_md_as_the_program_prints_it(self):
+        printed, written = rows_by_group(key_reference()), rows_by_group((SOURCE / "doc/keys.md").read_text(encoding="utf-8"))
+        self.assertGreater(len(printed), 30, "gravier --keys prints few keys")
+        for key, row in printed.items():
+            self.assertEqual(written.get(key), row, f"doc/keys.md, &{key[0]} {key[1]}: run gravier --keys > doc/keys.md")
+        self.assertEqual(sorted(written), sorted(printed), "doc/keys.md has keys that the program does not know")
+
+    def test_keys_and_words_in_the_prose_exist(self):
+        rows = rows_by_group(key_reference())
+        by_name = {}
+        for (_, key), row in rows.items():
+            by_name[key] = by_name.get(key, "") + row.split("|")[2]
+        count = 0
+        for page in PAGES:
+            for key, value in re.findall(r"`([a-z]\w*) = ([^`,/]+?)(?:[,/][^`]*)?`", read(page)[1]):
+                count += 1
+                self.assertIn(key, by_name, f"{page.name}: `{key} = {value}`: no such key")
+                word = re.fullmatch(r"'(\w+)'", value)
+                if word and "' or '" in by_name[key]:
+                    self.assertIn(value, by_name[key], f"{page.name}: `{key} = {value}`: no such word")
+        self.assertGreater(count, 20)
+
+
+class Links(unittest.TestCase):
+
+    def test_relative_links_lead_somewhere(self):
+        count = 0
+        for page in PAGES:
+            for target in re.findall(r"\]\(([^)\s]+)\)", read(page)[1]):
+                if re.match(r"[a-z]+:", target):
+                    continue
+                count += 1
+                path, _, anchor = target.partition("#")
+                place = (page.parent / path).resolve() if path else page
+                with self.subTest(page=page.name, target=target):
+                    self.assertTrue(place.exists(), f"{page.name}: {target}: no such file")
+                    self.assertTrue(place.is_relative_to(SOURCE), f"{page.name}: {target}: outside the project")
+                    if anchor:
+                        self.assertIn(anchor, anchors(place), f"{page.name}: {target}: no such heading")
+        self.assertGreater(count, 100)
+
+    def test_paths_in_the_prose_exist(self):
+        for page in PAGES:
+            for path in re.findall(r"`((?:modules|src|drivers|tests|data|doc|cmake)/[a-z0-9_./]*)`", read(page)[1]):
+                self.assertTrue((SOURCE / path).exists(), f"{page.name}: `{path}`: no such file")
+
+    def test_procedures_are_in_the_files_they_are_linked_to(self):
+        count = 0
+        for page in PAGES:
+            for name, path in re.findall(r"\[`(\w+)`\]\(([^)#\s]+\.(?:f90|F90|inc))\)", read(page)[1]):
+                count += 1
+                with self.subTest(page=page.name, procedure=name):
+                    text = (page.parent / path).read_text(encoding="utf-8")
+                    definition = rf"(?im)^ *[^!\n]*(?:\bsubroutine +|\bfunction +|\btype\b[^!\n]*:: *){name}\b"
+                    self.assertTrue(re.search(definition, text), f"{page.name}: {name} is not defined in {path}")
+        self.assertGreater(count, 50)
+
+
+class Words(unittest.TestCase):
+
+    def test_no_promises(self):
+        for page in PAGES:
+            text = page.read_text(encoding="utf-8")
+            for word in BANNED:
+                self.assertFalse(re.search(rf"(?i)\b{word}\b", text), f"{page.name} says {word}")
+
+    def test_commands_of_the_launcher_exist(self):
+        usage = run(["sh", str(SOURCE / "gravier"), "--help"], ".")[1]
+        known = set(re.findall(r"^ +\./gravier ([\w-]+)", usage, re.M))
+        self.assertIn("demo", known, usage)
+        for page in PAGES:
+            for word in re.findall(r"\./gravier ([a-z]+)", page.read_text(encoding="utf-8")):
+                self.assertIn(word, known, f"{page.name}: ./gravier {word}: no such command")
+
+    def test_options_of_the_programs_exist(self):
+        count = 0
+        for program in ("gravier", "gravier_columns"):
+            usage = run([str(PROGRAMS / program), "--help"], ".")[1]
+            for page in PAGES:
+                for option in re.findall(rf"(?<!/)\b{program} [^`\n]*?(--[a-z]+)", page.read_text(encoding="utf-8")):
+                    count += 1
+                    self.assertTrue(option in usage, f"{page.name}: {program} {option}: no such option")
+        self.assertGreater(count, 5)
+
+
+class Blocks(unittest.TestCase):
+
+    def setUp(self):
+        self.directory = Path(tempfile.mkdtemp(prefix="gravier-docs-"))
+        self.addCleanup(shutil.rmtree, self.directory, ignore_errors=True)
+        self.work, self.bin = self.directory / "work", self.directory / "bin"
+        self.work.mkdir()
+        self.bin.mkdir()
+        (self.work / "data").symlink_to(SOURCE / "data")
+        launcher = self.bin / "mpirun"
+        launcher.write_text(f'#!/bin/sh\nexec "{MPIEXEC}" "$@"\n', encoding="utf-8")
+        launcher.chmod(0o755)
+
+    def run_page(self, page):
+        """Run the blocks of a page; how many."""
+        count = 0
+        for block in read(page)[0]:
+            if block.is_case():
+                (self.work / block.case_name()).write_text(block.text, encoding="utf-8")
+                command = [str(PROGRAMS / "gravier"), "--check", block.case_name()]
+            elif block.is_tested():
+                script = self.directory / f"line{block.line}"
+                script.write_text(block.text, encoding="utf-8")
+                command = [sys.executable if block.language == "python" else "sh", *(["-eu"] if block.language == "sh" else []), script]
+            else:
+                continue
+            count += 1
+            status, output = run(command, self.work, path=f"{self.bin}:{PROGRAMS}")
+            if status != 0:
+                how = "did not end" if status is None else f"status {status}"
+                self.fail(f"{block.place}: {how}:\n{block.text}\n{output[-3000:]}")
+        return count
+
+    def test_readme(self):
+        self.assertGreaterEqual(self.run_page(SOURCE / "README.md"), 2)
+
+    def test_user_guide(self):
+        page = SOURCE / "doc/user_guide.md"
+        self.assertGreaterEqual(self.run_page(page), 10)
+        text = page.read_text(encoding="utf-8")
+        for column in (self.work / "heap/history.csv").read_text(encoding="ascii").splitlines()[0].split(","):
+            self.assertTrue(f"`{column}`" in text, f"column {column} of history.csv is not in the user guide")
+        names = set()
+        with h5py.File(self.work / "heap/results.h5", "r") as file:
+            file.visititems(lambda name, node: names.add(name.split("/")[-1]) if isinstance(node, h5py.Dataset) else None)
+            names.update(file["run"].attrs)
+        for name in names:
+            self.assertTrue(re.search(rf"`[\w/<>]*\b{name}`", text), f"{name} of results.h5 is not in the user guide")
+
+    def test_other_pages(self):
+        for page in PAGES:
+            if page.name not in ("README.md", "user_guide.md"):
+                self.run_page(page)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,368 @@
+"""Input that must be refused: exit status 2, one line on the standard error that says where, what and what was expected, and
+no file touched. A hang of the ranks that know of no error shows as a timeout."""
+import os
+import shutil
+import unittest
+
+import h5py
+import numpy as np
+
+from gravier_runs import RunTestCase, each, gravier, merged, namelist, run_case, write
+
+CASE = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [6, 5], "radius_min": 0.01, "radius_max": 0.01},
+    "time": {"step": 1e-3, "steps": 2},
+    "output": {"directory": "results"},
+}
+COLUMN = {"scene": {"bodies": "column", "column_count": 4, "lattice_count": None, "radius_min": None, "radius_max": None}}
+GOOD = namelist(CASE)
+
+
+def case(*parts):
+    return namelist(merged(CASE, *parts))
+
+
+def key(group, name, value, *words, also=None, kind=None):
+    """The good case with one bad key, given as the text that the file has; the message repeats group, key and value."""
+    base = merged(CASE, COLUMN) if kind == "column" else CASE
+    base = merged(base, also or {}, {group: {name: "@"}})
+    text = namelist(base).replace(f"{name} = '@'", f"{name} = {value}")
+    return f"{group} {name} = {value} {sorted((also or {}).items()) or ''}", text, ("&" + group, f"{name} = {value}", *words)
+
+
+# title, content of the input file, what the message must have besides the name of the file
+FILES = [
+    ("empty", "", ("empty file", "&scene")),
+    ("blank", "\n  \n\t\n", ("empty file",)),
+    ("comments only", "! nothing here\n", ("empty file",)),
+    ("prose", "Let 600 disks fall into a box.\n\nThen stir.\n", ("not a namelist", "line 1", "Let 600 disks fall into a box.")),
+    ("prose after a group", GOOD + "that is all\n", ("not a namelist", "that is all")),
+    ("binary", np.random.default_rng(1).bytes(5000), ("not a namelist",)),
+    ("zeros", bytes(4096), ("not a namelist",)),
+    ("an HDF5 file", b"\x89HDF\r\n\x1a\n" + bytes(512), ("not a namelist",)),
+    ("unknown group", GOOD + "&solvers /\n", ("unknown group &solvers", "did you mean &solver?")),
+    ("strange group", GOOD + "&weather rain = 1 /\n", ("unknown group &weather", "expected one of", "&decomposition")),
+    ("unknown key", GOOD + "&solver tolerence = 1e-4 /\n", ("unknown key 'tolerence' in &solver", "did you mean 'tolerance'?")),
+    ("strange key", GOOD + "&solver rain = 1 /\n", ("unknown key 'rain' in &solver", "expected one of", "max_iterations")),
+    ("key of another group", GOOD + "&solver friction = 0.3 /\n", ("unknown key 'friction' in &solver", "belongs to &scene")),
+    ("group twice", GOOD + "&time step = 1, steps = 1 /\n", ("group &time is given twice", "expected once")),
+    ("key twice", GOOD + "&solver sweeps = 2, sweeps = 3 /\n", ("&solver sweeps = 3", "given twice", "sweeps = 2")),
+    ("no &time", GOOD.replace("&time", "&solver").replace("step = 0.001", "").replace("steps = 2", ""), ("&time", "missing")),
+    ("no &scene", "&time step = 1e-3, steps = 2 /\n", ("&scene", "missing")),
+    ("no step", case({"time": {"step": None}}), ("&time step is missing", "expected a finite real number > 0")),
+    ("no steps", case({"time": {"steps": None}}), ("&time steps is missing", "expected an integer >= 0")),
+    ("no bodies", case({"scene": {"bodies": None}}), ("&scene bodies is missing", "'lattice'")),
+    ("no radius", case({"scene": {"radius_max": None}}), ("&scene radius_max is missing", "bodies = 'lattice'")),
+    ("no bodies file", "&scene bodies = 'file' /\n&time step = 1, steps = 1 /\n", ("&scene bodies_file is missing",)),
+    ("group not closed", GOOD + "&solver sweeps = 2\n", ("group &solver", "not closed", "expected /")),
+    ("quote not closed", GOOD.replace("'results'", "'results"), ("&output directory", "expected a quote that closes")),
+    ("no equal sign", GOOD + "&solver sweeps 2 /\n", ("&solver", "expected key = value", "sweeps 2")),
+    ("word without quotes", GOOD + "&solver method = nscdd /\n", ("&solver method = nscdd", "'nscdd_ep'")),
+    # the type
+    key("time", "step", "'fast'", "expected a finite real number > 0 (s)"),
+    key("time", "step", "1e-3 s", "expected a finite real number > 0 (s)"),
+    key("time", "steps", "1.5", "expected an integer >= 0"),
+    key("time", "steps", "99999999999", "expected an integer >= 0"),
+    key("solver", "warm_start", "maybe", "expected"),
+    key("solver", "sweeps", ".true.", "expected an integer >= 1"),
+    key("scene", "title", "5", "expected"),
+    key("scene", "gravity", "0, 0, 0, 0", "expected at most 3"),
+    key("scene", "friction", "0.3, 0.4", "expected a finite real number >= 0"),
+    # the range
+    key("time", "step", "-1e-3", "expected a finite real number > 0 (s)"),
+    key("time", "step", "0", "expected a finite real number > 0 (s)"),
+    key("time", "step", "NaN", "expected a finite real number > 0 (s)"),
+    key("time", "step", "Inf", "expected a finite real number > 0 (s)"),
+    key("time", "step", "1e999", "expected a finite real number > 0 (s)"),
+    key("time", "steps", "-1", "expected an integer >= 0"),
+    key("time", "theta", "0.4", "[0.5, 1]"),
+    key("time", "theta", "1.1", "[0.5, 1]"),
+    key("time", "theta", "NaN", "[0.5, 1]"),
+    key("scene", "dimension", "4", "2 or 3"),
+    key("scene", "gravity", "0, NaN, 0", "finite"),
+    key("scene", "gravity", "0, -Infinity, 0", "finite"),
+    key("scene", "gravity", "0, 0, -9.81", "third component of 0 where dimension = 2"),
+    key("scene", "radius_min", "0", "> 0"),
+    key("scene", "radius_min", "-0.01", "> 0"),
+    key("scene", "radius_min", "0.02", "at most radius_max", "0.01"),
+    key("scene", "radius_max", "NaN", "> 0"),
+    key("scene", "radius", "0", "> 0", kind="column"),
+    key("scene", "radius", "-1", "> 0", kind="column"),
+    key("scene", "radius", "Inf", "> 0", kind="column"),
+    key("scene", "mass", "0", "> 0", kind="column"),
+    key("scene", "column_count", "0", ">= 1", kind="column"),
+    key("scene", "lattice_count", "0, 5", "2 integers >= 1"),
+    key("scene", "lattice_count", "100000, 100000", "at most 2147483647 bodies"),
+    key("scene", "density", "0", "> 0"),
+    key("scene", "friction", "-0.1", ">= 0"),
+    key("scene", "wall_friction", "NaN", ">= 0"),
+    key("scene", "alert_distance", "-1e-3", ">= 0"),
+    key("solver", "tolerance", "0", "> 0"),
+    key("solver", "tolerance", "-1e-3", "> 0"),
+    key("solver", "tolerance", "NaN", "> 0"),
+    key("solver", "max_iterations", "0", ">= 1"),
+    key("solver", "sweeps", "0", ">= 1"),
+    key("solver", "check_every", "0", ">= 1"),
+    key("enriched", "direction", "-1", ">= 0"),
+    key("enriched", "cg_tolerance", "1", "(0, 1)"),
+    key("output", "every", "-1", ">= 0"),
+    key("output", "directory", "''", "not empty"),
+    # the choice
+    key("scene", "bodies", "'cubes'", "'column', 'lattice' or 'file'"),
+    key("solver", "method", "'jacobi'", "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd' or 'nscdd_ep'"),
+    key("solver", "criterion", "'energy'", "'residual' or 'error'"),
+    key("solver", "on_failure", "'panic'", "'continue', 'stop' or 'discard'"),
+    key("decomposition", "partition", "'scotch'", "'grid' or 'metis'"),
+    key("decomposition", "kind", "'mixed'", "'dual' or 'primal'"),
+    key("enriched", "interface", "'gmres'", "'mumps' or 'cg'"),
+    key("enriched", "contacts", "'some'", "'all' or 'active'"),
+    key("enriched", "direction_unit", "'miles'", "'relative' or 'absolute'"),
+    # what does not go together
+    key("decomposition", "subdomains", "0", ">= 1", also={"solver": {"method": "nscdd"}}),
+    key("decomposition", "subdomains", "2", "one subdomain where &solver method = 'nlgs'"),
+    key("decomposition", "grid", "2, 1", "one subdomain where &solver method = 'nlgs'"),
+    key("decomposition", "subdomains", "31", "more subdomains than detection cells", "expected at most 30",
+        also={"solver": {"method": "nscdd"}}),
+    key("decomposition", "subdomains", "31", "more subdomains than detection cells", "expected at most 30",
+        also={"solver": {"method": "nscdd"}, "decomposition": {"partition": "metis"}}),
+    *(key("decomposition", "subdomains", "2000000000", "more subdomains than detection cells", "expected at most 30",
+          also={"solver": {"method": "nscdd"}, "decomposition": {"partition": partition}}) for partition in ("grid", "metis")),
+    key("decomposition", "subdomains", "4", "expected 6, the product of grid = 2, 3",
+        also={"solver": {"method": "nscdd"}, "decomposition": {"grid": [2, 3]}}),
+    key("decomposition", "grid", "2, 2", "no grid where partition = 'metis'",
+        also={"solver": {"method": "nscdd"}, "decomposition": {"partition": "metis"}}),
+    key("solver", "criterion", "'error'", "bodies = 'column' only"),
+    key("scene", "column_count", "5", "belongs to bodies = 'column'"),
+]
+
+BODIES = """id,x,y,radius,vx,mass,shape,nx,ny
+1,0.0,0.1,0.1,0.0,1.0,grain,,
+2,0.3,0.1,0.1,0.0,1.0,grain,,
+3,0.6,0.1,0.1,0.0,1.0,grain,,
+4,0.9,0.1,0.1,0.0,1.0,grain,,
+9,0.0,0.0,,,,plane,0.0,1.0
+"""
+
+
+def changed(old, new):
+    assert old in BODIES
+    return BODIES.replace(old, new)
+
+
+# title, content of bodies.csv (None: no file), what the message must have
+CSV_FILES = [
+    ("missing", None, ("No such file",)),
+    ("empty", "", ("empty", "names of the columns")),
+    ("no column radius", "id,x,y\n1,0,0\n", ("id, x, y, radius", "required", "id,x,y")),
+    ("no column y", "id,x,radius\n1,0,1\n", ("id, x, y, radius", "required")),
+    ("unknown column", "id,x,y,radius,colour\n1,0,0,1,red\n", ("column colour is unknown in 2D", "known are")),
+    ("column of 3D", "id,x,y,z,radius\n1,0,0,0,1\n", ("column z is unknown in 2D",)),
+    ("column twice", "id,x,y,x,radius\n1,0,0,0,1\n", ("column x appears twice",)),
+    ("id twice", changed("3,0.6", "2,0.6"), ("id 2 appears twice", "unique")),
+    ("id of a body and a plane", changed("9,0.0", "4,0.0"), ("id 4 appears twice",)),
+    ("id 0", changed("4,0.9", "0,0.9"), ("line 5", "column id", '"0"', "id >= 1")),
+    ("id negative", changed("1,0.0,0.1", "-1,0.0,0.1"), ("line 2", "column id", '"-1"', "id >= 1")),
+    ("id not whole", changed("4,0.9", "4.5,0.9"), ("line 5", "column id", '"4.5"', "whole number")),
+    ("NaN", changed("4,0.9", "4,NaN"), ("line 5", "column x", '"NaN"', "finite number")),
+    ("infinity", changed("1,0.0,0.1,0.1,0.0", "1,0.0,0.1,0.1,inf"), ("line 2", "column vx", '"inf"', "finite number")),
+    ("too large", changed("4,0.9", "4,1e400"), ("line 5", "column x", '"1e400"', "1e308")),
+    ("text in a number", changed("4,0.9", "4,there"), ("line 5", "column x", '"there"', "finite number")),
+    ("a number and more", changed("4,0.9", "4,0.9m"), ("line 5", "column x", '"0.9m"', "finite number")),
+    ("no position", changed("4,0.9", "4,"), ("line 5", "column x", "empty")),
+    ("radius 0", changed("4,0.9,0.1,0.1", "4,0.9,0.1,0"), ("line 5", "column radius", '"0"', "radius > 0")),
+    ("radius negative", changed("1,0.0,0.1,0.1", "1,0.0,0.1,-2"), ("line 2", "column radius", '"-2"', "radius > 0")),
+    ("mass 0", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,0"), ("line 5", "column mass", '"0"', "mass > 0")),
+    ("mass of some", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,"), ("id 4", "column mass", "for all or for none")),
+    ("unknown shape", changed("1.0,grain,,\n9", "1.0,cube,,\n9"), ("line 5", "column shape", '"cube"', "grain or plane")),
+    ("plane without normal", changed("plane,0.0,1.0", "plane,,"), ("line 6", "column nx", "empty")),
+    ("plane with a zero normal", changed("plane,0.0,1.0", "plane,0.0,0.0"), ("line 6", "column nx", "not zero")),
+    ("short row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9"), ("line 5", "2 cells", "header has 9")),
+    ("long row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9,0.1,0.1,0.0,1.0,grain,,,"), ("line 5", "10 cells", "9")),
+    ("binary", np.random.default_rng(2).bytes(3000), ()),
+]
+
+ROWS = {"id": np.arange(1, 6), "position": np.array([[0.3 * k, 0.1] for k in range(5)]), "radius": np.full(5, 0.1),
+        "velocity": np.zeros((5, 3)), "mass": np.ones(5)}
+WALLS = {"id": np.array([9]), "point": np.zeros((1, 2)), "normal": np.array([[0.0, 1.0]])}
+
+
+def put(array, place, value):
+    array = np.array(array)
+    array[place] = value
+    return array
+
+
+# title, changes of /bodies, changes of /walls (a value None takes the dataset out), what the message must have
+HDF5_FILES = [
+    ("no radius", {"radius": None}, {}, ("/bodies/radius",)),
+    ("no id", {"id": None}, {}, ("/bodies/id",)),
+    ("unknown dataset", {"colour": np.ones(5)}, {}, ("/bodies/colour", "unknown", "known are")),
+    ("id twice", {"id": np.array([1, 2, 3, 4, 2])}, {}, ("id 2 appears twice",)),
+    ("id of a body and a plane", {}, {"id": np.array([5])}, ("id 5 appears twice",)),
+    ("id 0", {"id": np.array([1, 2, 3, 4, 0])}, {}, ("/bodies/id", "row 4", "0", "id >= 1")),
+    ("NaN", {"position": put(ROWS["position"], (4, 0), np.nan)}, {}, ("/bodies/position", "id 5", "NaN", "finite")),
+    ("infinity", {"velocity": put(ROWS["velocity"], (0, 2), np.inf)}, {}, ("/bodies/velocity", "id 1", "infinity", "finite")),
+    ("radius 0", {"radius": put(ROWS["radius"], 4, 0)}, {}, ("/bodies/radius", "id 5", "> 0")),
+    ("mass negative", {"mass": put(ROWS["mass"], 1, -1)}, {}, ("/bodies/mass", "id 2", "> 0")),
+    ("zero normal", {}, {"normal": np.zeros((1, 2))}, ("/walls/normal", "id 9", "not zero")),
+    ("three dimensions", {"position": np.zeros((5, 3)), "velocity": np.zeros((5, 6))}, {}, ("/bodies/position",)),
+    ("rows missing", {"radius": np.full(4, 0.1)}, {}, ("/bodies/radius", "4 rows", "5")),
+    ("text for numbers", {"radius": np.array([b"a"] * 5)}, {}, ("/bodies/radius",)),
+    ("reals for ids", {"id": np.arange(1, 6) + 0.5}, {}, ("/bodies/id",)),
+]
+
+
+def write_bodies(path, bodies, walls):
+    with h5py.File(path, "w") as file:
+        for group, rows in (("bodies", {**ROWS, **bodies}), ("walls", {**WALLS, **walls})):
+            for name, value in rows.items():
+                if value is not None:
+                    file[f"{group}/{name}"] = value
+    return path
+
+
+def bodies_case(path, **scene):
+    return namelist({"scene": {"bodies": "file", "bodies_file": path, **scene}, "time": CASE["time"], "output": CASE["output"]})
+
+
+class BadInput(RunTestCase):
+    """Every bad input runs twice: once where nothing was run before, once where an earlier run has left its results, and of
+    these once on one rank and once on two."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        run = run_case(CASE, directory=os.path.join(cls.scratch, "earlier"))
+        assert run.status == 0, str(run)
+
+    def refuse_all(self, cases, prepare):
+        """Run all cases; `prepare(directory, content)` writes the files of one and gives the name that its message has."""
+        jobs = [(k, ranks) for k in range(len(cases)) for ranks in (1, 2)]
+        # a refusal is a second of waiting for the launcher and little work: many side by side
+        outcomes = each(lambda k, ranks: self.refuse(k, ranks, cases[k], prepare), jobs, workers=10)
+        for (k, ranks), (run, file, problems) in zip(jobs, outcomes):
+            title, words = cases[k][0], cases[k][-1]
+            with self.subTest(title, ranks=ranks):
+                self.assert_refused(run, (file, *words))
+                self.assertEqual(problems, [])
+
+    def refuse(self, k, ranks, case, prepare):
+        directory = self.here(f"{prepare.__name__}-{k}-{ranks}")
+        os.makedirs(directory)
+        file = prepare(directory, *case[1:-1])
+        results = os.path.join(directory, "results")
+        earlier = (k + ranks) % 2 == 0
+        if earlier:
+            shutil.copytree(self.here("earlier", "results"), results)
+        before = snapshot(directory)
+        run = gravier("case.nml", ranks=ranks, directory=directory, timeout=60)
+        after = snapshot(directory)
+        return run, file, sorted(set(before.items()) ^ set(after.items()))
+
+    def assert_refused(self, run, words):
+        self.assert_status(run, 2)
+        # not splitlines, which takes a few other characters for ends of lines
+        self.assertEqual(run.stderr.count("\n"), 1, f"one line expected: {run.stderr!r}")
+        self.assertTrue(run.stderr.startswith("gravier: error: "), run.stderr)
+        for word in words:
+            self.assertIn(word, run.stderr)
+
+    def test_input_files(self):
+        def prepare_input(directory, text):
+            write(os.path.join(directory, "case.nml"), text)
+            return "case.nml"
+        self.refuse_all(FILES, prepare_input)
+
+    def test_csv_bodies(self):
+        def prepare_csv(directory, text):
+            if text is not None:
+                write(os.path.join(directory, "bodies.csv"), text)
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv"))
+            return "bodies.csv"
+        self.refuse_all(CSV_FILES, prepare_csv)
+
+    def test_hdf5_bodies(self):
+        def prepare_hdf5(directory, bodies, walls):
+            write_bodies(os.path.join(directory, "bodies.h5"), bodies, walls)
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.h5"))
+            return "bodies.h5"
+        self.refuse_all(HDF5_FILES, prepare_hdf5)
+
+    def test_broken_hdf5(self):
+        whole = write_bodies(self.here("whole.h5"), {}, {})
+        with open(whole, "rb") as file:
+            whole = file.read()
+
+        def prepare_broken(directory, name, content, scene):
+            if content is not None:
+                write(os.path.join(directory, name), content)
+            write(os.path.join(directory, "case.nml"), bodies_case(name, **scene))
+            return name
+        self.refuse_all([
+            ("missing", "bodies.h5", None, {}, ("No such file",)),
+            ("empty", "bodies.h5", b"", {}, ()),
+            ("text", "bodies.h5", BODIES, {}, ()),
+            ("cut in half", "bodies.h5", whole[:len(whole) // 2], {}, ()),
+            ("cut at the end", "bodies.h5", whole[:-100], {}, ()),
+            ("overwritten", "bodies.h5", whole[:100] + bytes(600) + whole[700:], {}, ()),
+            ("of two dimensions", "bodies.h5", whole, {"dimension": 3}, ("/bodies/position",)),
+            ("HDF5 named CSV", "bodies.csv", whole, {}, ()),
+            ("unknown ending", "bodies.txt", BODIES, {}, (".h5, .hdf5 or .csv",)),
+        ], prepare_broken)
+
+    def test_paths(self):
+        def prepare_directory_as_input(directory):
+            os.mkdir(os.path.join(directory, "case.nml"))
+            return "case.nml"
+
+        def prepare_nothing(directory):
+            return "case.nml"
+        self.refuse_all([("no file", ("No such file",))], prepare_nothing)
+        self.refuse_all([("a directory", ("cannot read",))], prepare_directory_as_input)
+
+    def test_bodies_path_is_a_directory(self):
+        def prepare_directory_as_bodies(directory, name):
+            os.mkdir(os.path.join(directory, name))
+            write(os.path.join(directory, "case.nml"), bodies_case(name))
+            return name
+        self.refuse_all([(name, name, ()) for name in ("bodies.csv", "bodies.h5")], prepare_directory_as_bodies)
+
+    def test_output_directory(self):
+        """Root may write where permissions forbid it, but not below a file or in /proc."""
+        def prepare_output(directory, path):
+            write(os.path.join(directory, "file"), "a file\n")
+            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"output": {"directory": path}})))
+            return "case.nml"
+        self.refuse_all([(path, path, ("&output directory", f"'{path}'", "expected a directory that can be written to"))
+                         for path in ("file", "file/below", "/proc/nowhere", "/proc/self")], prepare_output)
+
+    def test_command_line(self):
+        write(self.here("case.nml"), GOOD)
+        cases = [((), ("no input file", "--help")),
+                 (("--check",), ("no input file",)),
+                 (("case.nml", "other.nml"), ("more than one input file", "case.nml and other.nml", "expected one")),
+                 (("--frobnicate", "case.nml"), ("unknown option --frobnicate", "--help")),
+                 (("case.nml", "-n", "2"), ("unknown option -n",)),
+                 (("--check", "absent.nml"), ("absent.nml", "No such file"))]
+        before = snapshot(self.scratch)
+        for ranks in (1, 2):
+            for arguments, words in cases:
+                with self.subTest(arguments, ranks=ranks):
+                    self.assert_refused(gravier(*arguments, ranks=ranks, directory=self.scratch, timeout=60), words)
+        self.assertEqual(snapshot(self.scratch), before)
+
+
+def snapshot(directory):
+    """What is below a directory: content and time of change of files."""
+    found = {}
+    for folder, folders, files in os.walk(directory):
+        found.update({os.path.join(folder, name): "directory" for name in folders})
+        for name in files:
+            path = os.path.join(folder, name)
+            with open(path, "rb") as file:
+                found[path] = (file.read(), os.stat(path).st_mtime_ns)
+    return found
+
+
+if __name__ == "__main__":
+    unittest.main()

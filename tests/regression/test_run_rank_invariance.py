@@ -1,0 +1,119 @@
+"""The results do not depend on the number of ranks: not in one bit, for every method, partition and rule."""
+import unittest
+
+from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks, steps_of
+
+METHODS = {
+    # one sweep an iteration: with several, Schwarz need not converge on a dense packing
+    "schwarz": {"solver": {"method": "schwarz"}},
+    "schwarz_ec": {"solver": {"method": "schwarz_ec"}, "enriched": {"direction": 1.0}},
+    "nscdd": {"solver": {"method": "nscdd", "sweeps": 2}},
+    # a direction on active contacts only: the matrices change from one iteration to the next
+    "nscdd_ep, mumps": {"solver": {"method": "nscdd_ep", "sweeps": 10}, "enriched": {"direction": 10.0, "contacts": "active"}},
+    "nscdd_ep, cg": {"solver": {"method": "nscdd_ep", "sweeps": 30}, "time": {"steps": 2},
+                     "enriched": {"direction": 30.0, "contacts": "active", "interface": "cg"}},
+}
+
+
+class RankInvariance(RunTestCase):
+
+    def assert_same_runs(self, first, second, what):
+        self.assert_status(first, 0)
+        self.assert_status(second, 0)
+        self.assertEqual(differences(first.results(), second.results()), [], what)
+        tables = [run.history() for run in (first, second)]
+        for table in tables:
+            # the only figure that is not of the computation
+            del table["wall_seconds"]
+        self.assertEqual(differences(*tables), [], what)
+        self.assertEqual(differences(first.trace(), second.trace()), [], what)
+
+    def compare_ranks(self, cases, ranks):
+        """Run each of {title: groups} on each number of ranks; all must give what the first number gives."""
+        jobs = [(title, n) for title in cases for n in ranks]
+        runs = dict(zip(jobs, each(lambda title, n: run_case(cases[title], n, self.here(f"{title} on {n}")), jobs)))
+        for title in cases:
+            for n in ranks[1:]:
+                with self.subTest(title, ranks=n):
+                    self.assert_same_runs(runs[title, ranks[0]], runs[title, n], f"on {ranks[0]} and {n} ranks")
+        return runs
+
+
+class Disks(RankInvariance):
+    """600 settled disks with friction in 6 subdomains."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.packing = settled_disks(cls.scratch)
+        cls.case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": cls.packing, "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 3},
+            "solver": {"tolerance": 1e-3, "max_iterations": 5000, "check_every": 2},
+            "decomposition": {"subdomains": 6},
+            "output": {"directory": "results", "trace": True},
+        }
+
+    def check_variants(self, partition, kind, methods=tuple(METHODS)):
+        cases = {f"{name}, {partition}, {kind}": merged(self.case, METHODS[name],
+                                                        {"decomposition": {"partition": partition, "kind": kind}})
+                 for name in methods}
+        runs = self.compare_ranks(cases, (1, 2, 4))
+        for (title, ranks), run in runs.items():
+            # a comparison of runs that do nothing would prove nothing
+            self.assertEqual(steps_of(run.results()), list(range(cases[title]["time"]["steps"] + 1)))
+            history = run.history()
+            self.assertGreater(history["contacts"].min(), 1100, title)
+            self.assertGreater(history["iterations"].min(), 0, title)
+            self.assertGreater(history["iterations"].max() * cases[title]["solver"].get("sweeps", 1), 100, title)
+            self.assertGreater(history["interface_bodies"].min(), 30, title)
+
+    def test_grid_dual(self):
+        self.check_variants("grid", "dual")
+
+    def test_grid_primal(self):
+        self.check_variants("grid", "primal", ("schwarz", "schwarz_ec", "nscdd", "nscdd_ep, mumps"))
+
+    def test_metis_dual(self):
+        self.check_variants("metis", "dual", ("schwarz", "schwarz_ec", "nscdd", "nscdd_ep, mumps"))
+
+    def test_metis_primal(self):
+        self.check_variants("metis", "primal")
+
+    def test_the_same_run_twice(self):
+        case = merged(self.case, METHODS["nscdd_ep, mumps"])
+        first, second = (run_case(case, 2, self.here(f"take {k}")) for k in (1, 2))
+        self.assert_same_runs(first, second, "twice on 2 ranks")
+
+    def test_more_ranks_than_subdomains(self):
+        case = merged(self.case, METHODS["nscdd"], {"decomposition": {"subdomains": 2}})
+        runs = self.compare_ranks({"nscdd in two": case}, (1, 4))
+        self.assertIn("2 ranks own no subdomain", runs["nscdd in two", 4].stdout)
+
+    def test_repartition(self):
+        case = merged(self.case, METHODS["nscdd"], {"decomposition": {"partition": "metis", "repartition_every": 2}})
+        self.compare_ranks({"nscdd, new partition": case}, (1, 3))
+
+
+class Spheres(RankInvariance):
+    """288 spheres fall into a box, touch the ground, and start to settle: bodies change their subdomain, impulses of the
+    step before are carried over."""
+
+    def test_spheres(self):
+        case = {
+            "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [6, 6, 8], "radius_min": 0.008, "radius_max": 0.012,
+                      "friction": 0.3},
+            "time": {"step": 2e-3, "steps": 60},
+            "solver": {"method": "nscdd", "tolerance": 1e-3, "max_iterations": 5000, "warm_start": True},
+            "decomposition": {"subdomains": 4, "grid": [2, 1, 2], "repartition_every": 25},
+            "output": {"directory": "results", "every": 10, "trace": True},
+        }
+        runs = self.compare_ranks({"spheres": case}, (1, 2, 4))
+        history = runs["spheres", 1].history()
+        self.assertGreater(history["contacts"].max(), 500)
+        # falling, then stopped by the ground and by each other
+        self.assertLess(history["kinetic_energy"][-1], 0.5 * history["kinetic_energy"].max())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,202 @@
+"""Runs of the program: write an input file, run gravier under MPI in a directory of its own, read what it wrote.
+
+The environment names the program (GRAVIER_BIN_DIR) and the launcher (MPIEXEC); by hand, from the source tree:
+    GRAVIER_BIN_DIR=build/release/bin PYTHONPATH=tests/support /usr/bin/python3 -m unittest discover -s tests/regression
+"""
+import concurrent.futures
+import glob
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
+GRAVIER = os.path.join(os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin"))), "gravier")
+MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
+ENVIRONMENT = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "OMPI_MCA_hwloc_base_binding_policy": "none", "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1",
+    # after a rank that failed the launcher would wait seconds for ranks that have left
+    "OMPI_MCA_odls_base_sigkill_timeout": "0",
+}
+
+
+class Run:
+    """What a run left: status of the launcher, text of the ranks, files in `directory`."""
+
+    def __init__(self, directory, status, stdout, stderr):
+        self.directory, self.status, self.stdout, self.stderr = directory, status, stdout, stderr
+
+    def path(self, *names):
+        return os.path.join(self.directory, *names)
+
+    def results(self, directory="results"):
+        return contents(self.path(directory, "results.h5"))
+
+    def history(self, directory="results"):
+        return read_csv(self.path(directory, "history.csv"))
+
+    def trace(self, directory="results"):
+        return read_csv(self.path(directory, "trace.csv"))
+
+    def __str__(self):
+        return f"in {self.directory}: status {self.status}\n{self.stdout[-3000:]}\n{self.stderr[-3000:]}"
+
+
+def gravier(*arguments, ranks=1, directory=".", timeout=120):
+    """Run `gravier ARGUMENTS` on so many ranks. A run that is not over after `timeout` seconds is ended and is an error:
+    one rank waits for another that has left, or a loop does not end."""
+    # the ranks write their standard error to files, so that what the launcher adds to a failure stays apart
+    before = set(glob.glob(os.path.join(directory, "stderr.*")))
+    command = [MPIEXEC, "-n", str(ranks), "sh", "-c", 'exec "$0" "$@" 2>stderr.$$', GRAVIER, *arguments]
+    process = subprocess.Popen(command, cwd=directory, env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        stdout, launcher = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        # the launcher ends its ranks when it is told to stop
+        process.terminate()
+        try:
+            process.communicate(timeout=10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+        raise AssertionError(f"gravier {' '.join(arguments)} on {ranks} ranks did not end in {timeout} s") from None
+    stderr = b""
+    for name in sorted(set(glob.glob(os.path.join(directory, "stderr.*"))) - before):
+        with open(name, "rb") as file:
+            stderr += file.read()
+        os.remove(name)
+    if process.returncode < 0 or process.returncode > 4:
+        stderr += launcher
+    return Run(directory, process.returncode, stdout.decode(errors="replace"), stderr.decode(errors="replace"))
+
+
+def value_text(value):
+    """A value as a namelist has it."""
+    if isinstance(value, bool):
+        return ".true." if value else ".false."
+    if isinstance(value, str):
+        return "'" + value.replace("'", "''") + "'"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(value_text(one) for one in value)
+    return repr(value)
+
+
+def namelist(groups):
+    """Text of an input file from {group: {key: value}}."""
+    text = ""
+    for group, keys in groups.items():
+        text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
+    return text
+
+
+def merged(*parts):
+    """Input groups, later ones changing keys of earlier ones; a key of value None is left out."""
+    groups = {}
+    for part in parts:
+        for group, keys in part.items():
+            groups.setdefault(group, {}).update(keys)
+    return {group: {key: value for key, value in keys.items() if value is not None} for group, keys in groups.items()}
+
+
+def run_case(groups, ranks=1, directory=".", timeout=120):
+    """Write `groups` to case.nml in `directory` (made if need be) and run it there."""
+    os.makedirs(directory, exist_ok=True)
+    write(os.path.join(directory, "case.nml"), namelist(groups))
+    return gravier("case.nml", ranks=ranks, directory=directory, timeout=timeout)
+
+
+def write(path, text):
+    with open(path, "wb") as file:
+        file.write(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def contents(path):
+    """Everything in an HDF5 file: {path: array} and {path@attribute: value}."""
+    found = {}
+
+    def note(name, node):
+        found.update({f"/{name}@{key}": np.asarray(value) for key, value in node.attrs.items()})
+        found["/" + name] = node[()] if isinstance(node, h5py.Dataset) else "group"
+
+    with h5py.File(path, "r") as file:
+        file.visititems(note)
+    return found
+
+
+def steps_of(results):
+    """Numbers of the steps of a results file, in ascending order."""
+    return sorted(int(name.split("/")[2]) for name in results if name.startswith("/steps/") and name.count("/") == 2
+                  and "@" not in name)
+
+
+def read_csv(path):
+    """A table as {column: array}; every line must be whole."""
+    with open(path, encoding="ascii") as file:
+        text = file.read()
+    if not text.endswith("\n"):
+        raise AssertionError(f"{path}: the last line is not whole")
+    header, *rows = text.splitlines()
+    names = header.split(",")
+    cells = [row.split(",") for row in rows]
+    if any(len(row) != len(names) for row in cells):
+        raise AssertionError(f"{path}: a row has not as many cells as the header")
+    return {name: np.array([float(row[k]) for row in cells]) for k, name in enumerate(names)}
+
+
+def differences(first, second):
+    """Names of what differs between two dictionaries of arrays, in presence, type, shape or any bit."""
+    def key(value):
+        value = np.asarray(value)
+        return value.dtype.str, value.shape, value.tobytes() if value.dtype.kind != "O" else value.tolist()
+    return sorted(name for name in set(first) | set(second)
+                  if name not in first or name not in second or key(first[name]) != key(second[name]))
+
+
+def each(function, arguments, workers=2):
+    """Results of function(*a) for each a of a list, some side by side."""
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(lambda a: function(*a), arguments))
+
+
+class RunTestCase(unittest.TestCase):
+    """A test class with one scratch directory, and checks of how a run ended."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.mkdtemp(prefix="gravier-")
+        cls.addClassCleanup(shutil.rmtree, cls.scratch, ignore_errors=True)
+
+    def here(self, *names):
+        return os.path.join(self.scratch, *names)
+
+    def assert_status(self, run, status):
+        self.assertEqual(run.status, status, str(run))
+
+    def assert_finite(self, arrays):
+        for name, value in arrays.items():
+            if np.asarray(value).dtype.kind == "f":
+                self.assertTrue(np.all(np.isfinite(value)), f"{name} has NaN or infinity")
+
+
+def settled_disks(directory, steps=400):
+    """Fill a box with 600 disks: path of the bodies file of the packing. After 250 steps of 1 ms the disks lie on each other
+    and still move (kinetic energy 1 % of its peak), after 400 steps they are at rest (0.01 %)."""
+    run = run_case({
+        "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [24, 25], "radius_min": 0.008, "radius_max": 0.012,
+                  "friction": 0.3},
+        "time": {"step": 1e-3, "steps": steps},
+        "solver": {"tolerance": 1e-3, "max_iterations": 2000},
+        "output": {"directory": ".", "every": 0, "final_bodies": True},
+    }, directory=directory)
+    if run.status != 0:
+        raise AssertionError(f"the packing was not made: {run}")
+    return run.path("final_bodies.h5")
