@@ -89,11 +89,15 @@ contains
   subroutine test_extreme_keys()
     integer(i8), parameter :: most = huge(1_i8)
     integer(i8) :: keys(7)
-    integer :: order(7)
+    integer :: order(7), pair(2)
 
     keys(:) = [most, 0_i8, -most - 1_i8, most - 1_i8, -most, -1_i8, most]
     call argsort(keys, order)
     call check(all(order == [3, 5, 6, 2, 4, 1, 7]), "largest and smallest integers")
+    keys(1) = most
+    keys(2) = -most - 1_i8
+    call argsort(keys(1:2), pair)
+    call check(all(pair == [2, 1]), "largest before smallest integer")
   end subroutine test_extreme_keys
 
   !> Columns with many ties in every row, against the comparison of whole columns.

@@ -69,7 +69,7 @@ contains
   subroutine test_logicals_and_case()
     call check_text(to_text(.true.), "T", "true")
     call check_text(to_text(.false.), "F", "false")
-    call check_text(lower("NSCDD_EP 'Az' [@`{] 09 "), "nscdd_ep 'az' [@`{] 09 ", "lower case")
+    call check_text(lower("NSCDD_EP 'AZaz' [@`{] 09 "), "nscdd_ep 'azaz' [@`{] 09 ", "lower case")
     call check_text(lower(""), "", "lower case of nothing")
     call check_text(lower("É"), "É", "bytes beyond ASCII stay")
   end subroutine test_logicals_and_case

@@ -1,0 +1,152 @@
+"""Solves that diverge or give up: noticed, said aloud, exit status 3, and nothing in the results that is not a result."""
+import os
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks, steps_of
+
+# the packing 0.25 s after its start, dense and still moving: a step of it takes work
+DIVERGING = {
+    "nscdd_ep, huge direction": {"solver": {"method": "nscdd_ep", "sweeps": 10}, "enriched": {"direction": 1e4},
+                                 "decomposition": {"subdomains": 8}},
+    "nscdd_ep, huge direction, cg": {"solver": {"method": "nscdd_ep", "sweeps": 10},
+                                     "enriched": {"direction": 1e4, "interface": "cg"}, "decomposition": {"subdomains": 8}},
+    "nscdd_ep, absolute": {"solver": {"method": "nscdd_ep"}, "enriched": {"direction": 1e8, "direction_unit": "absolute"},
+                           "decomposition": {"subdomains": 4, "partition": "metis", "kind": "primal"}},
+    "schwarz": {"solver": {"method": "schwarz", "sweeps": 10}, "decomposition": {"subdomains": 16}},
+    "schwarz_ec": {"solver": {"method": "schwarz_ec", "sweeps": 50}, "decomposition": {"subdomains": 16},
+                   "enriched": {"direction": 1.0, "contacts": "active"}},
+}
+
+
+class FailedSolves(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        packing = settled_disks(cls.scratch, steps=250)
+        cls.case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": packing, "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 3},
+            "solver": {"tolerance": 1e-8, "max_iterations": 5000, "warm_start": False},
+            "output": {"directory": "results", "trace": True},
+        }
+
+    def assert_clean(self, run):
+        """No NaN, no infinity, no unbelievable speed in any file."""
+        results = run.results()
+        self.assert_finite(results)
+        for step in steps_of(results):
+            self.assertLess(np.abs(results[f"/steps/{step}/bodies/velocity"][:, :2]).max(), 10.0)
+        self.assert_finite(run.history())
+        with open(run.path("results", "history.csv"), encoding="ascii") as file:
+            text = file.read().lower()
+        self.assertNotIn("nan", text)
+        self.assertNotIn("inf", text)
+        return results
+
+    def assert_loud(self, run, words):
+        self.assert_status(run, 3)
+        with open(run.path("results", "run.log"), encoding="utf-8") as file:
+            log = file.read()
+        for text in (run.stdout, log):
+            self.assertRegex(text, r"\*\*\* " + words)
+            self.assertRegex(text, r"finished +\*\*\* \d+ of the steps did NOT reach the tolerance")
+
+    def test_divergence_is_noticed(self):
+        """A step that diverged is never kept, whatever on_failure says, and ends the run."""
+        jobs = [(title, choice, ranks) for k, title in enumerate(DIVERGING)
+                for choice, ranks in (("continue", 1), ("stop", 2), ("discard", 2))[k % 2:k % 2 + 2]]
+        jobs.append(("schwarz", "continue", 2))
+        runs = each(lambda title, choice, ranks: run_case(
+            merged(self.case, DIVERGING[title], {"solver": {"on_failure": choice}}), ranks,
+            self.here(f"{title} {choice} {ranks}")), jobs)
+        for (title, choice, ranks), run in zip(jobs, runs):
+            with self.subTest(title, on_failure=choice, ranks=ranks):
+                self.assert_loud(run, r"DIVERGED after \d+ iterations of " + title.split(",")[0])
+                self.assertIn("the last one is not in the results", run.stdout)
+                # the start, and nothing of the step that diverged
+                self.assertEqual(steps_of(self.assert_clean(run)), [0])
+                self.assertEqual(len(run.history()["step"]), 0)
+
+    def test_divergence_after_good_steps(self):
+        """Grains that fall one by one on the packing make its state worse with time: what was good stays."""
+        case = merged(self.case, {"solver": {"method": "nscdd_ep", "sweeps": 10, "tolerance": 1e-3},
+                                  "enriched": {"direction": 1e4}, "decomposition": {"subdomains": 8},
+                                  "scene": {"bodies": "lattice", "bodies_file": None, "lattice_count": [20, 10],
+                                            "radius_min": 0.008, "radius_max": 0.012},
+                                  "time": {"steps": 200}, "output": {"every": 3, "final_bodies": True}})
+        run = run_case(case, 2, self.here("late"))
+        self.assert_loud(run, "DIVERGED")
+        results = self.assert_clean(run)
+        history = run.history()
+        last = int(history["step"][-1])
+        self.assertGreater(last, 5)
+        self.assertLess(last, 200)
+        # states are due every third step; the last good one is gone when it was not due
+        self.assertEqual(steps_of(results), list(range(0, last + 1, 3)))
+        self.assertTrue(np.all(history["converged"] == 1))
+        self.assertFalse(os.path.exists(run.path("results", "final_bodies.h5")))
+        # as a run that ends before
+        short = run_case(merged(case, {"time": {"steps": last}, "output": {"final_bodies": False}}), 1, self.here("short"))
+        self.assert_status(short, 0)
+        written = [name for name in short.results() if not name.startswith("/run") and
+                   (not name.startswith("/steps/") or int(name.split("/")[2].split("@")[0]) % 3 == 0)]
+        self.assertEqual(differences({name: short.results()[name] for name in written},
+                                     {name: value for name, value in results.items() if not name.startswith("/run")}), [])
+
+    def test_giving_up(self):
+        """Three iterations do not do: the run goes on, stops with the step, or stops without it."""
+        case = merged(self.case, {"solver": {"method": "nscdd", "max_iterations": 3}, "decomposition": {"subdomains": 4},
+                                  "output": {"final_bodies": True}})
+        for choice, steps in (("continue", [0, 1, 2, 3]), ("stop", [0, 1]), ("discard", [0])):
+            for ranks in (1, 2):
+                with self.subTest(choice, ranks=ranks):
+                    run = run_case(merged(case, {"solver": {"on_failure": choice}}), ranks, self.here(f"{choice} {ranks}"))
+                    self.assert_loud(run, r"NOT CONVERGED: residual \S+ above the tolerance 1.00E-0?08 after 3 iterations of nscdd")
+                    self.assertEqual(run.stdout.count("NOT CONVERGED"), max(len(steps) - 1, 1))
+                    self.assertEqual(steps_of(self.assert_clean(run)), steps)
+                    history = run.history()
+                    self.assertEqual(list(history["step"]), steps[1:])
+                    self.assertTrue(np.all(history["converged"] == 0))
+                    self.assertTrue(np.all(history["iterations"] == 3))
+                    self.assertTrue(np.all(history["residual"] > 1e-8))
+                    self.assertEqual("the last one is not in the results" in run.stdout, choice == "discard")
+                    self.assertEqual(os.path.exists(run.path("results", "final_bodies.h5")), choice != "discard")
+
+    def test_giving_up_and_converging(self):
+        """Some steps give up, others do not: history tells which, and the exit status is 3."""
+        case = merged(self.case, {"solver": {"method": "nlgs", "tolerance": 1e-3, "max_iterations": 60, "warm_start": True},
+                                  "time": {"steps": 12}, "output": {"every": 0}})
+        run = run_case(case, 1, self.here("some"))
+        self.assert_loud(run, "NOT CONVERGED")
+        history = run.history()
+        self.assertEqual(set(history["converged"]), {0.0, 1.0})
+        self.assertTrue(np.array_equal(history["converged"] == 1, history["residual"] <= 1e-3))
+        self.assertIn(f"{int((history['converged'] == 0).sum())} of the steps did NOT", run.stdout)
+        self.assertEqual(steps_of(self.assert_clean(run)), [12])
+
+    def test_oscillation_is_not_convergence(self):
+        """Plain Schwarz with several sweeps oscillates on some partitions, neither growing nor settling."""
+        case = merged(self.case, {"solver": {"method": "schwarz", "sweeps": 3, "max_iterations": 1000, "on_failure": "discard"},
+                                  "scene": {"friction": 0.1}, "decomposition": {"subdomains": 16, "kind": "primal"}})
+        run = run_case(case, 2, self.here("oscillation"))
+        self.assert_loud(run, "(NOT CONVERGED|DIVERGED)")
+        self.assertEqual(steps_of(self.assert_clean(run)), [0])
+
+    def test_forces_beyond_numbers(self):
+        """Overflow in the first step, in velocities that are still finite numbers when read: an error or a divergence, and no
+        result that is not a number."""
+        for gravity, ranks in ((1e200, 1), (1e307, 1), (1e307, 2)):
+            with self.subTest(gravity, ranks=ranks):
+                case = merged(self.case, {"scene": {"gravity": [0.0, -gravity, 0.0]}, "solver": {"method": "nscdd"},
+                                          "time": {"step": 1e3}, "decomposition": {"subdomains": 4}})
+                run = run_case(case, ranks, self.here(f"overflow {gravity} {ranks}"))
+                self.assertIn(run.status, (3, 4), str(run))
+                self.assert_finite(run.results())
+                self.assert_finite(run.history())
+
+
+if __name__ == "__main__":
+    unittest.main()
