@@ -66,8 +66,7 @@ contains
     if (.not. allocated(error)) call simulation%init(comm, config, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
-    call simulation%assemble(figures, error)
-    if (allocated(error)) return
+    call simulation%assemble(figures)
     call log%write_interface(figures, error)
     call log%write_memory(simulation, figures, error)
     call log%line("checked     no error found; nothing was run", error)
@@ -213,7 +212,10 @@ contains
   subroutine report_error(comm, error)
     type(communicator_t), intent(in) :: comm
     type(error_t), intent(in) :: error
-    if (comm%rank == 0) write (error_unit, "(a)") "gravier: error: "//error%message
+    if (comm%rank /= 0) return
+    write (error_unit, "(a)") "gravier: error: "//error%message
+    ! another rank that leaves with an error status makes the launcher end this one: nothing may wait in a buffer
+    flush (error_unit)
   end subroutine report_error
 
 end module gravier_run

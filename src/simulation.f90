@@ -9,7 +9,7 @@ module gravier_simulation
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_diverged
-  use gravier_partition, only: choose_boxes
+  use gravier_partition, only: partition_t, choose_boxes, check_subdomains
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
@@ -77,11 +77,13 @@ contains
     call set_physics(self, scene)
     call set_control(self)
     call choose_scheme(config, self%scheme)
-    call self%decomposition%init(comm, config%decomposition%subdomains, scene%grains%nd, scene%grains%nv)
+    ! one subdomain until it is known that the scene has room for so many
+    call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv)
     self%decomposition%walls = scene%walls
     newcomers(1) = scene%grains
     call divide(self, newcomers, error)
     if (allocated(error)) return
+    call self%decomposition%init(comm, config%decomposition%subdomains, scene%grains%nd, scene%grains%nv)
     call self%decomposition%settle(scene%grains)
   end subroutine simulation_init
 
@@ -120,31 +122,56 @@ contains
     type(body_set_t), intent(in) :: bodies(:)
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: lower(self%decomposition%nd), upper(self%decomposition%nd), edge
-    integer :: boxes(3)
 
     associate (config => self%config%decomposition, rule => self%decomposition%rule)
       call self%decomposition%bounding_box(bodies, lower, upper)
       edge = 2.0_dp*rule%largest_radius + rule%alert_distance
       ! without grains any edge serves
       if (.not. edge > 0.0_dp) edge = 1.0_dp
-      if (config%partition == "metis") then
-        call self%decomposition%partition%init_graph(self%comm, lower, upper, edge, bodies, config%subdomains, error)
-      else
-        boxes(:) = config%grid
-        if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, config%subdomains)
-        call self%decomposition%partition%init_grid(lower, upper, boxes, edge, error)
-      end if
+      call check_subdomains(lower, upper, edge, config%subdomains, error)
+      if (.not. allocated(error)) call cut(self, bodies, lower, upper, edge, error)
     end associate
     if (allocated(error)) error%message = self%config%file//": "//error%message
     call self%comm%agree(error)
   end subroutine divide
 
+  !> Divide space anew; where the scene has come to fill fewer cells than there are subdomains, the old partition
+  !> stays. Collective.
+  subroutine divide_again(self)
+    class(simulation_t), intent(inout) :: self
+    type(partition_t) :: old
+    type(error_t), allocatable :: refused
+
+    old = self%decomposition%partition
+    call divide(self, self%decomposition%home, refused)
+    if (allocated(refused)) self%decomposition%partition = old
+  end subroutine divide_again
+
+  !> Cut the box [lower, upper] as &decomposition says. Collective.
+  subroutine cut(self, bodies, lower, upper, edge, error)
+    class(simulation_t), intent(inout) :: self
+    type(body_set_t), intent(in) :: bodies(:)
+    !> (nd) [m]; edge of a detection cell [m]
+    real(dp), intent(in) :: lower(:), upper(:), edge
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: boxes(3)
+
+    associate (config => self%config%decomposition, partition => self%decomposition%partition)
+      if (config%partition == "metis") then
+        call partition%init_graph(self%comm, lower, upper, edge, bodies, config%subdomains, error)
+      else
+        boxes(:) = config%grid
+        if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, config%subdomains)
+        call partition%init_grid(lower, upper, boxes, edge, error)
+      end if
+    end associate
+  end subroutine cut
+
   !> Move grains to q_m, bring each to its subdomain, detect the contacts and start them from the impulses of the
   !> last step. Collective.
-  subroutine simulation_assemble(self, figures, error)
+  subroutine simulation_assemble(self, figures)
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
-    type(error_t), allocatable, intent(inout) :: error
     integer :: s, nd
 
     nd = self%decomposition%nd
@@ -154,8 +181,7 @@ contains
         home%position(:, :) = predict_position(home%position, home%velocity(1:nd, :), self%physics%h, self%config%time%theta)
       end associate
     end do
-    if (is_due(self)) call divide(self, self%decomposition%home, error)
-    if (allocated(error)) return
+    if (is_due(self)) call divide_again(self)
     call self%decomposition%settle()
     call stop_timer(phase_bodies)
     call build_problem(self%decomposition, self%problem%kernels, self%physics, self%problem, figures%sharing)
@@ -185,8 +211,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     integer :: s, nd
 
-    call self%assemble(figures, error)
     if (allocated(error)) return
+    call self%assemble(figures)
     if (self%config%solver%criterion == "error") then
       call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column)
     else

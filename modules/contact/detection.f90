@@ -117,7 +117,8 @@ contains
         do w = 1, walls%n
           height = dot_product(bodies%position(:, b) - walls%point(:, w), walls%normal(:, w))
           if (height - bodies%radius(b) > rule%alert_distance) cycle
-          foot(:) = bodies%position(:, b) - height*walls%normal(:, w)
+          ! a centre that has got behind the wall decides itself, so that the owner never lies far from the grain
+          foot(:) = bodies%position(:, b) - max(height, 0.0_dp)*walls%normal(:, w)
           point(:) = owner_point(rule%kind, bodies%position(:, b), foot, .true.)
           if (region%owner(point) /= subdomain) cycle
           call add(b, -w, height - bodies%radius(b), walls%normal(:, w), point)

@@ -74,7 +74,7 @@ contains
     call next_place(sub, sub%pair(1, c), h, theta, candidate)
     w = sub%pair(2, c) - sub%n_bodies
     if (w > 0) then
-      antagonist(:) = candidate - dot_product(candidate - walls%point(:, w), walls%normal(:, w))*walls%normal(:, w)
+      antagonist(:) = candidate - max(dot_product(candidate - walls%point(:, w), walls%normal(:, w)), 0.0_dp)*walls%normal(:, w)
     else
       call next_place(sub, sub%pair(2, c), h, theta, antagonist)
     end if

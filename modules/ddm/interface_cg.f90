@@ -70,7 +70,7 @@ contains
       call combine(p, z, rz/rz_old, p)
       self%iterations = self%iterations + 1
     end do
-    if (rz > bound) call raise(error, status_failure, "conjugate gradient on the interface: "// &
+    if (.not. rz <= bound) call raise(error, status_failure, "conjugate gradient on the interface: "// &
       & to_text(self%max_iterations)//" iterations did not reach cg_tolerance = "//to_text(self%tolerance, 3))
   end subroutine interface_cg_solve
 

@@ -98,6 +98,7 @@ contains
     if (self%prepared .and. .not. self%matrix%direction%active_only) return
     call self%matrix%update(problem, changed, error)
     call problem%comm%agree(error)
+    if (allocated(error)) return
     if (self%prepared) changed = problem%comm%any_true(changed)
     call start_timer(phase_factorise)
     if (changed .or. .not. self%prepared) call self%interface_solver%prepare(problem, self%matrix, error)

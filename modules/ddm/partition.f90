@@ -10,7 +10,7 @@ module gravier_partition
   use gravier_graph_partition, only: partition_graph
   implicit none
   private
-  public :: partition_t, choose_boxes
+  public :: partition_t, choose_boxes, check_subdomains
 
   !> Points outside the box of the partition belong to the nearest subdomain of its border.
   type, extends(region_t) :: partition_t
@@ -46,15 +46,27 @@ contains
     !> edge of a detection cell [m]: no more boxes than cells
     real(dp), intent(in) :: edge
     type(error_t), allocatable, intent(inout) :: error
-    type(cell_grid_t) :: cells
 
     if (allocated(self%subdomain_of_cell)) deallocate (self%subdomain_of_cell)
     call set_box(self, lower, upper)
     self%boxes(:) = boxes
     self%n_subdomains = product(boxes)
-    call cells%init(lower, upper, edge, huge(0_i4) - 1_i8)
-    call refuse_too_many(self%n_subdomains, cells%cells(), error)
+    call check_subdomains(lower, upper, edge, self%n_subdomains, error)
   end subroutine partition_init_grid
+
+  !> Refuse more subdomains than detection cells; cheap, whatever their number.
+  subroutine check_subdomains(lower, upper, edge, n_subdomains, error)
+    !> (nd) [m]
+    real(dp), intent(in) :: lower(:), upper(:)
+    !> edge of a detection cell [m]
+    real(dp), intent(in) :: edge
+    integer, intent(in) :: n_subdomains
+    type(error_t), allocatable, intent(inout) :: error
+    type(cell_grid_t) :: cells
+
+    call cells%init(lower, upper, edge, huge(0_i4) - 1_i8)
+    call refuse_too_many(n_subdomains, cells%cells(), error)
+  end subroutine check_subdomains
 
   subroutine refuse_too_many(n_subdomains, n_cells, error)
     integer, intent(in) :: n_subdomains, n_cells

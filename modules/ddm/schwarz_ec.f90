@@ -53,7 +53,11 @@ contains
     if (allocated(error)) return
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
-    if (self%matrix%direction%active_only .or. .not. self%prepared) call self%matrix%update(problem, changed, error)
+    if (self%matrix%direction%active_only .or. .not. self%prepared) then
+      call self%matrix%update(problem, changed, error)
+      call problem%comm%agree(error)
+      if (allocated(error)) return
+    end if
     self%prepared = .true.
     call start_timer(phase_interface_solve)
     do s = 1, size(problem%sub)

@@ -13,9 +13,8 @@ module gravier_solve
 
   integer, parameter :: solve_converged = 0, solve_exhausted = 1, solve_diverged = 2
 
-  !> growth of the defect, relative to its largest value in the first `growth_window` checks, taken for divergence
-  real(dp), parameter :: growth_limit = 1.0e6_dp
-  integer, parameter :: growth_window = 3
+  !> growth of the defect, relative to that at the start or to the largest |R^d| of a body, taken for divergence
+  real(dp), parameter :: growth_limit = 1.0e4_dp
 
   type :: solve_control_t
     real(dp) :: tolerance = 1.0e-4_dp
@@ -68,11 +67,9 @@ contains
     class(exact_solution_t), intent(in), optional :: exact
     real(dp) :: reference
     logical :: measure, done
-    integer :: checks
 
     if (control%trace) allocate (report%trace(4, 64))
     reference = 0.0_dp
-    checks = 0
     call scheme%start(problem, error)
     if (allocated(error)) return
     call check(done)
@@ -107,12 +104,11 @@ contains
       logical, intent(out) :: finished
 
       finished = .true.
-      checks = checks + 1
       if (.not. (ieee_is_finite(figure) .and. ieee_is_finite(defect))) then
         report%status = solve_diverged
         return
       end if
-      if (checks <= growth_window) reference = max(reference, defect, problem%force_scale)
+      if (report%iterations == 0) reference = max(defect, problem%force_scale)
       if (figure <= control%tolerance) then
         report%status = solve_converged
       else if (defect > growth_limit*reference) then

@@ -26,6 +26,8 @@ module gravier_sparse_direct
     private
     type(dmumps_struc), pointer :: id => null()
     type(communicator_t), pointer :: comm => null()
+    !> MUMPS has set `id` up, so that its pointers are defined
+    logical :: started = .false.
     integer, public :: n = 0
     !> work done since `init`
     integer(i8), public :: analyses = 0, factorisations = 0, solves = 0
@@ -42,7 +44,7 @@ module gravier_sparse_direct
   !> MUMPS: stages of its work
   integer, parameter :: job_start = -1, job_end = -2, job_analyse = 1, job_factorise = 2, job_solve = 3
   !> MUMPS: errors that more work space mends
-  integer, parameter :: short_integers = -8, short_reals = -9
+  integer, parameter :: mended_by_space(4) = [-8, -9, -17, -20]
 
 contains
 
@@ -81,6 +83,8 @@ contains
     self%id%sym = 1
     self%id%par = 1
     call run(self, job_start, "start", error)
+    if (allocated(error)) return
+    self%started = .true.
     self%id%icntl(1:3) = -1
     self%id%icntl(4) = 0
     ! sequential analysis: the ordering sees the pattern, never the values, on the host
@@ -110,6 +114,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     logical :: same_pattern, same_values
 
+    if (allocated(error)) return
     call compare(self, n, row, column, value, same_pattern, same_values)
     if (same_values) return
     if (.not. same_pattern) then
@@ -285,7 +290,7 @@ contains
     do attempt = 1, 6
       self%id%job = job
       call dmumps(self%id)
-      if (self%id%infog(1) /= short_integers .and. self%id%infog(1) /= short_reals) exit
+      if (all(self%id%infog(1) /= mended_by_space)) exit
       self%id%icntl(14) = 2*max(self%id%icntl(14), 20)
     end do
     if (self%id%infog(1) < 0) call raise(error, status_failure, "sparse direct solver (MUMPS): "//what// &
@@ -297,9 +302,12 @@ contains
     class(sparse_factor_t), intent(inout) :: self
 
     if (.not. associated(self%id)) return
-    call drop_matrix(self)
-    self%id%job = job_end
-    call dmumps(self%id)
+    if (self%started) then
+      call drop_matrix(self)
+      self%id%job = job_end
+      call dmumps(self%id)
+    end if
+    self%started = .false.
     deallocate (self%id)
     nullify (self%comm)
   end subroutine sparse_factor_free

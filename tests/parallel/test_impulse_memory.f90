@@ -128,7 +128,7 @@ contains
     integer :: s
 
     call make(dimension, n_subdomains, friction, decomposition, sim)
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     allocate (owner(sim%n_grains, sim%n_grains + most_walls))
     call give_impulses(sim, owner)
     call check(count(owner > 0) > 50, "enough contacts to tell")
@@ -141,7 +141,7 @@ contains
       end associate
     end do
     sim%step = 1
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     call check(.not. allocated(error), "second step")
     call check_recalled(sim, owner)
     call sim%free()
@@ -192,12 +192,11 @@ contains
   subroutine test_nothing_kept()
     type(simulation_t) :: sim
     type(impulse_memory_t) :: memory
-    type(error_t), allocatable :: error
     type(step_figures_t) :: figures
     integer :: s
 
     call make(2, 3, 0.3_dp, "partition = 'grid'", sim)
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     call memory%recall(sim%decomposition, sim%problem)
     call check(.not. sim%problem%any_impulse(), "nothing kept, nothing recalled")
     call memory%keep(sim%problem, sim%decomposition%walls, sim%decomposition%rule%kind, 0.5_dp, 0.6_dp)

@@ -65,7 +65,7 @@ contains
       & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
     call check(.not. allocated(error), "configuration")
     call sim%init(over, config, error)
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     call check(.not. allocated(error), "assembly")
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
@@ -335,7 +335,12 @@ contains
     call check_close(distance(sim%problem, f, by_factors), 0.0_dp, 1.0e-12_dp, "direct solution")
     call check_sides(sim%problem, by_factors)
     call check_sides(sim%problem, by_cg)
-    call check(cg%iterations > 1 .or. l <= 0.0_dp, "iterations of the conjugate gradient")
+    if (l > 0.0_dp) then
+      call check(cg%iterations > 1, "iterations of the conjugate gradient")
+    else
+      ! relative to its diagonal, X has the eigenvalues of chains of m links, 1 - cos(k pi/m): some ten different ones
+      call check(cg%iterations <= 12, "iterations of the conjugate gradient at l = 0")
+    end if
     call check_equal(direct%factor%factorisations, 1_i8, "factorisations of X")
     ! the same matrix once more, and the solution as a guess
     call direct%prepare(sim%problem, matrix, error)

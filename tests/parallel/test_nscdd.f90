@@ -63,7 +63,7 @@ contains
       & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
     call check(.not. allocated(error), "configuration")
     call sim%init(over, config, error)
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     call check(.not. allocated(error), "assembly")
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))

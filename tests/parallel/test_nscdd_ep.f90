@@ -69,7 +69,7 @@ contains
       & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
     call check(.not. allocated(error), "configuration")
     call sim%init(over, config, error)
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     call check(.not. allocated(error), "assembly")
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
@@ -214,6 +214,8 @@ contains
       do s = 1, size(sim%problem%sub)
         call sim%problem%own_reactions(s)
         associate (sub => sim%problem%sub(s), part => scheme%matrix%part(s))
+          if (scheme%matrix%direction%active_only) call check(all((part%direction(1, :) > 0.0_dp) .eqv. &
+            & (sub%impulse(1, :) > 0.0_dp)), "l follows the active contacts")
           ! A^T F = M~ (V_free - V) + H r, into `reaction`, and M~ V + H l v
           do b = 1, sub%n_bodies
             do d = 1, nv

@@ -40,6 +40,7 @@ program test_schwarz
       call compare_with_one_rank(dimension, 9, frictions(k), enriched//"3, contacts = 'active' /", 6, "Schwarz-EC, active")
       call test_direction(dimension, frictions(k))
       call test_definition(dimension, frictions(k), "2 /")
+      call test_definition(dimension, frictions(k), "2, contacts = 'active' /")
       call test_definition(dimension, frictions(k), "0.7, direction_unit = 'absolute' /")
     end do
   end do
@@ -73,7 +74,7 @@ contains
       & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
     call check(.not. allocated(error), "configuration")
     call sim%init(over, config, error)
-    call sim%assemble(figures, error)
+    call sim%assemble(figures)
     call check(.not. allocated(error), "assembly")
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
@@ -325,6 +326,8 @@ contains
       old = method%load
       call method%iterate(sim%problem, .false., jump, error)
       do s = 1, size(sim%problem%sub)
+        if (method%matrix%direction%active_only) call check(all((method%matrix%part(s)%direction(1, :) > 0.0_dp) .eqv. &
+          & (sim%problem%sub(s)%impulse(1, :) > 0.0_dp)), "l follows the active contacts")
         call find_reactions(sim%problem, s, old(s), method%matrix)
         call sim%problem%shared%load(s, sim%problem%sub(s)%reaction)
       end do

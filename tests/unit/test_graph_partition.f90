@@ -14,6 +14,7 @@ program test_graph_partition
   call test_grid(7)
   call test_grid(16)
   call test_weights()
+  call test_edge_weights()
   call test_no_edges()
   call finish_checks()
   call MPI_Finalize()
@@ -97,6 +98,25 @@ contains
     call check(.not. allocated(error), "partition of a path")
     call check(all(part(2:) == part(2)) .and. part(1) /= part(2), "vertex weights decide the balance")
   end subroutine test_weights
+
+  !> A ring of four vertices, heavy edges between 1 and 2 and between 3 and 4, or the other two: the light ones are cut.
+  subroutine test_edge_weights()
+    integer(i4) :: first(5), neighbour(8), weight(4), edge_weight(8), part(4)
+    type(error_t), allocatable :: error
+    integer :: k
+
+    weight(:) = 1
+    do k = 0, 1
+      first(:) = [1, 3, 5, 7, 9]
+      neighbour(:) = [2, 4, 1, 3, 2, 4, 1, 3]
+      if (k == 0) edge_weight(:) = [9, 1, 9, 1, 1, 9, 1, 9]
+      if (k == 1) edge_weight(:) = [1, 9, 1, 9, 9, 1, 9, 1]
+      call partition_graph(first, neighbour, weight, edge_weight, 2, part, error)
+      call check(.not. allocated(error), "partition of a ring")
+      call check(part(1) == part(merge(2, 4, k == 0)) .and. part(3) == part(merge(4, 2, k == 0)) .and. part(1) /= part(3), &
+        & "heavy edges are not cut")
+    end do
+  end subroutine test_edge_weights
 
   !> Vertices without any edge are shared out all the same.
   subroutine test_no_edges()
