@@ -121,7 +121,8 @@ contains
       walls%normal(nd, 1) = 1.0_dp
       walls%normal(1, 2) = 0.6_dp
       walls%normal(nd, 2) = 0.8_dp
-      walls%point(1, 2) = 0.1_dp
+      ! some grains are far behind this one
+      walls%point(1, 2) = 0.4_dp
     end associate
   end subroutine make_walls
 
@@ -325,7 +326,8 @@ contains
         do w = 1, n_walls
           height = dot_product(a - walls%point(:, w), walls%normal(:, w))
           if (height - radius_of(i) > rule%alert_distance) cycle
-          b(:) = a - height*walls%normal(:, w)
+          ! a centre behind the wall decides itself
+          b(:) = a - max(height, 0.0_dp)*walls%normal(:, w)
           point(:) = owner_point(rule%kind, a, b, .true.)
           owner(id_of(i), n_grains + w) = decomposition%partition%owner(point)
         end do

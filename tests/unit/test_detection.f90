@@ -110,6 +110,8 @@ contains
     walls%normal(1, 2) = -1.0_dp
     walls%normal(1, 3) = 0.6_dp
     walls%normal(nd, 3) = 0.8_dp
+    ! some grains are behind this one
+    walls%point(1, 3) = 0.3_dp
   end subroutine make_scene
 
   subroutine test_random(nd, alert, trial)
@@ -261,8 +263,9 @@ contains
     j = contacts%antagonist(c)
     point(:) = bodies%position(:, i)
     if (rule%kind == rule_dual .and. j > 0) point(:) = (point + bodies%position(:, j))/2
+    ! the foot on the wall, or the centre itself where it has got behind the wall
     if (rule%kind == rule_dual .and. j < 0) point(:) = point - &
-      & dot_product(point - walls%point(:, -j), walls%normal(:, -j))*walls%normal(:, -j)
+      & max(0.0_dp, dot_product(point - walls%point(:, -j), walls%normal(:, -j)))*walls%normal(:, -j)
     subdomain = region%owner(point)
     ! the point given with the contact is that one: roundings of coordinates below 2
     if (any(abs(point - contacts%point(:, c)) > 16*epsilon(1.0_dp))) subdomain = 0
