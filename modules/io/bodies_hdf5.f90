@@ -251,7 +251,6 @@ contains
     call refuse_bad_numbers(comm, path, sorted, error)
     if (allocated(error)) return
     call file%create(comm, path//".part", error)
-    if (allocated(error)) return
     call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(3 + 4*sorted%dimension) + &
       & sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
     call write_groups(comm, file, sorted, error)
