@@ -28,10 +28,10 @@ ENVIRONMENT = {
 
 
 class Run:
-    """What a run left: status of the launcher, text of the ranks, files in `directory`."""
+    """What a run left: status of the launcher, text of the ranks and of the launcher, files in `directory`."""
 
-    def __init__(self, directory, status, stdout, stderr):
-        self.directory, self.status, self.stdout, self.stderr = directory, status, stdout, stderr
+    def __init__(self, directory, status, stdout, stderr, launcher):
+        self.directory, self.status, self.stdout, self.stderr, self.launcher = directory, status, stdout, stderr, launcher
 
     def path(self, *names):
         return os.path.join(self.directory, *names)
@@ -46,17 +46,19 @@ class Run:
         return read_csv(self.path(directory, "trace.csv"))
 
     def __str__(self):
-        return f"in {self.directory}: status {self.status}\n{self.stdout[-3000:]}\n{self.stderr[-3000:]}"
+        return "\n".join([f"in {self.directory}: status {self.status}", self.stdout[-3000:], self.stderr[-3000:],
+                          self.launcher[-3000:]])
 
 
 def gravier(*arguments, ranks=1, directory=".", timeout=120):
     """Run `gravier ARGUMENTS` on so many ranks. A run that is not over after `timeout` seconds is ended and is an error:
     one rank waits for another that has left, or a loop does not end."""
-    # the ranks write their standard error to files, so that what the launcher adds to a failure stays apart
-    before = set(glob.glob(os.path.join(directory, "stderr.*")))
-    command = [MPIEXEC, "-n", str(ranks), "sh", "-c", 'exec "$0" "$@" 2>stderr.$$', GRAVIER, *arguments]
-    process = subprocess.Popen(command, cwd=directory, env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL,
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure
+    before = set(glob.glob(os.path.join(directory, "rank.*")))
+    rank = '"$0" "$@" 2>rank.$$.stderr; status=$?; echo $status >rank.$$.status; exit $status'
+    process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", rank, GRAVIER, *arguments], cwd=directory,
+                               env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE)
     try:
         stdout, launcher = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
@@ -68,14 +70,16 @@ def gravier(*arguments, ranks=1, directory=".", timeout=120):
             process.kill()
             process.communicate()
         raise AssertionError(f"gravier {' '.join(arguments)} on {ranks} ranks did not end in {timeout} s") from None
-    stderr = b""
-    for name in sorted(set(glob.glob(os.path.join(directory, "stderr.*"))) - before):
+    said = {}
+    for name in sorted(set(glob.glob(os.path.join(directory, "rank.*"))) - before):
         with open(name, "rb") as file:
-            stderr += file.read()
+            said.setdefault(name.rsplit(".", 1)[1], []).append(file.read().decode(errors="replace"))
         os.remove(name)
-    if process.returncode < 0 or process.returncode > 4:
-        stderr += launcher
-    return Run(directory, process.returncode, stdout.decode(errors="replace"), stderr.decode(errors="replace"))
+    status, stderr = process.returncode, "".join(said.get("stderr", []))
+    if not 0 <= status <= 4:
+        # a rank that crashed, or the launcher itself: Open MPI 4.1 sometimes does when several ranks leave with an error
+        status = max((int(text) for text in said.get("status", []) if text), default=status)
+    return Run(directory, status, stdout.decode(errors="replace"), stderr, launcher.decode(errors="replace"))
 
 
 def value_text(value):
