@@ -1,9 +1,12 @@
-!> Bodies in packed arrays: grains (disks in 2D, spheres in 3D) that move, and walls that do not.
+!> Grains (disks in 2D, spheres in 3D) in packed arrays.
 module gravier_body_store
   use gravier_kinds, only: dp, i8
   implicit none
   private
-  public :: body_set_t, wall_set_t, append_bodies
+  public :: body_set_t, append_bodies, place_word
+
+  !> first of the words of a record that hold the grain's place
+  integer, parameter :: place_word = 6
 
   !> Grains of one subdomain, or of any batch. Velocities hold the translation first, then the spin where the
   !> scene has one: (vx, vy[, omega]) in 2D, (vx, vy, vz[, wx, wy, wz]) in 3D, all in global axes.
@@ -13,6 +16,8 @@ module gravier_body_store
     integer :: nd = 0
     !> degrees of freedom of a grain
     integer :: nv = 0
+    !> entries of an image: nd in a periodic scene, else 0
+    integer :: ni = 0
     !> global, stable identifiers (n)
     integer(i8), allocatable :: id(:)
     !> (nd, n) [m]
@@ -25,6 +30,10 @@ module gravier_body_store
     real(dp), allocatable :: mass(:)
     !> about any axis through the centre, (n) [kg m^2]
     real(dp), allocatable :: inertia(:)
+    !> number of the boundary that a grain is glued to, 0 for a free one (n)
+    integer, allocatable :: glued(:)
+    !> periods that lie between a grain's place and the place it would have without periods (ni, n)
+    integer, allocatable :: image(:, :)
   contains
     procedure :: init => body_set_init
     procedure :: record_words => body_set_record_words
@@ -34,35 +43,27 @@ module gravier_body_store
     procedure :: keep_only => body_set_keep_only
   end type body_set_t
 
-  !> Fixed half-spaces (half-planes in 2D): few, and the same on every rank.
-  type :: wall_set_t
-    integer :: n = 0
-    !> (n)
-    integer(i8), allocatable :: id(:)
-    !> a point of the surface, (nd, n) [m]
-    real(dp), allocatable :: point(:, :)
-    !> unit normal towards the free side, (nd, n)
-    real(dp), allocatable :: normal(:, :)
-  end type wall_set_t
-
 contains
 
-  !> Make room for `n` grains of `nv` degrees of freedom in `nd` dimensions.
-  subroutine body_set_init(self, nd, nv, n)
+  !> Make room for `n` grains of `nv` degrees of freedom in `nd` dimensions, with `ni` entries of an image.
+  subroutine body_set_init(self, nd, nv, ni, n)
     class(body_set_t), intent(inout) :: self
-    integer, intent(in) :: nd, nv, n
+    integer, intent(in) :: nd, nv, ni, n
 
     self%n = n
     self%nd = nd
     self%nv = nv
-    if (allocated(self%id)) deallocate (self%id, self%position, self%velocity, self%radius, self%mass, self%inertia)
-    allocate (self%id(n), self%position(nd, n), self%velocity(nv, n), self%radius(n), self%mass(n), self%inertia(n))
+    self%ni = ni
+    if (allocated(self%id)) deallocate (self%id, self%position, self%velocity, self%radius, self%mass, self%inertia, self%glued, &
+      & self%image)
+    allocate (self%id(n), self%position(nd, n), self%velocity(nv, n), self%radius(n), self%mass(n), self%inertia(n), &
+      & self%glued(n), self%image(ni, n))
   end subroutine body_set_init
 
   !> Words of one grain when it travels between subdomains.
   pure integer function body_set_record_words(self) result(words)
     class(body_set_t), intent(in) :: self
-    words = 4 + self%nd + self%nv
+    words = 5 + self%nd + self%nv + self%ni
   end function body_set_record_words
 
   !> Write grain `k` into `record` (record_words).
@@ -76,11 +77,15 @@ contains
     record(2) = transfer(self%radius(k), 0_i8)
     record(3) = transfer(self%mass(k), 0_i8)
     record(4) = transfer(self%inertia(k), 0_i8)
+    record(5) = self%glued(k)
     do d = 1, self%nd
-      record(4 + d) = transfer(self%position(d, k), 0_i8)
+      record(5 + d) = transfer(self%position(d, k), 0_i8)
     end do
     do d = 1, self%nv
-      record(4 + self%nd + d) = transfer(self%velocity(d, k), 0_i8)
+      record(5 + self%nd + d) = transfer(self%velocity(d, k), 0_i8)
+    end do
+    do d = 1, self%ni
+      record(5 + self%nd + self%nv + d) = self%image(d, k)
     end do
   end subroutine body_set_get_record
 
@@ -95,11 +100,15 @@ contains
     self%radius(k) = transfer(record(2), 0.0_dp)
     self%mass(k) = transfer(record(3), 0.0_dp)
     self%inertia(k) = transfer(record(4), 0.0_dp)
+    self%glued(k) = int(record(5))
     do d = 1, self%nd
-      self%position(d, k) = transfer(record(4 + d), 0.0_dp)
+      self%position(d, k) = transfer(record(5 + d), 0.0_dp)
     end do
     do d = 1, self%nv
-      self%velocity(d, k) = transfer(record(4 + self%nd + d), 0.0_dp)
+      self%velocity(d, k) = transfer(record(5 + self%nd + d), 0.0_dp)
+    end do
+    do d = 1, self%ni
+      self%image(d, k) = int(record(5 + self%nd + self%nv + d))
     end do
   end subroutine body_set_set_record
 
@@ -111,7 +120,7 @@ contains
     integer :: k
 
     old = self
-    call self%init(old%nd, old%nv, size(order))
+    call self%init(old%nd, old%nv, old%ni, size(order))
     do k = 1, size(order)
       self%id(k) = old%id(order(k))
       self%position(:, k) = old%position(:, order(k))
@@ -119,6 +128,8 @@ contains
       self%radius(k) = old%radius(order(k))
       self%mass(k) = old%mass(order(k))
       self%inertia(k) = old%inertia(order(k))
+      self%glued(k) = old%glued(order(k))
+      self%image(:, k) = old%image(:, order(k))
     end do
   end subroutine body_set_reorder
 
@@ -150,7 +161,7 @@ contains
     if (more%n == 0) return
     old = bodies
     n = old%n
-    call bodies%init(more%nd, more%nv, n + more%n)
+    call bodies%init(more%nd, more%nv, more%ni, n + more%n)
     if (n > 0) then
       bodies%id(1:n) = old%id
       bodies%position(:, 1:n) = old%position
@@ -158,6 +169,8 @@ contains
       bodies%radius(1:n) = old%radius
       bodies%mass(1:n) = old%mass
       bodies%inertia(1:n) = old%inertia
+      bodies%glued(1:n) = old%glued
+      bodies%image(:, 1:n) = old%image
     end if
     bodies%id(n + 1:) = more%id
     bodies%position(:, n + 1:) = more%position
@@ -165,6 +178,8 @@ contains
     bodies%radius(n + 1:) = more%radius
     bodies%mass(n + 1:) = more%mass
     bodies%inertia(n + 1:) = more%inertia
+    bodies%glued(n + 1:) = more%glued
+    bodies%image(:, n + 1:) = more%image
   end subroutine append_bodies
 
 end module gravier_body_store

@@ -1,65 +1,75 @@
-!> Who owns which grain, and which grains each subdomain sees.
+!> Who owns which grain.
 module gravier_decomposition
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort
+  use gravier_periodic, only: period_t
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
-  use gravier_body_store, only: body_set_t, wall_set_t, append_bodies
-  use gravier_detection, only: detection_rule_t, rule_primal
+  use gravier_body_store, only: body_set_t, append_bodies, place_word
+  use gravier_boundary, only: boundary_t
+  use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_partition, only: partition_t
   implicit none
   private
-  public :: decomposition_t, neighbourhood_t
+  public :: decomposition_t
 
-  !> Each rank owns a block of subdomains, each subdomain the grains whose centre it holds. Walls are everywhere.
+  !> Each rank owns a block of subdomains, each subdomain the grains whose centre it holds. Boundaries are everywhere.
   type :: decomposition_t
     type(communicator_t), pointer :: comm => null()
     type(partition_t) :: partition
-    type(detection_rule_t) :: rule
+    type(period_t) :: period
+    type(neighbour_rule_t) :: rule
     integer :: n_subdomains = 1
-    !> space dimension and degrees of freedom of a grain
-    integer :: nd = 2, nv = 3
+    !> space dimension, degrees of freedom of a grain, entries of an image
+    integer :: nd = 2, nv = 3, ni = 0
     !> first subdomain of this rank; home(s) belongs to subdomain first + s - 1
     integer :: first = 1
     type(body_set_t), allocatable :: home(:)
-    type(wall_set_t) :: walls
+    type(boundary_t), allocatable :: boundaries(:)
   contains
     procedure :: init => decomposition_init
     procedure :: settle => decomposition_settle
-    procedure :: look_around => decomposition_look_around
+    procedure :: deliver => decomposition_deliver
+    procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
+    procedure :: subdomain_of => decomposition_subdomain_of
   end type decomposition_t
-
-  !> The grains that a subdomain sees: its own and the ghosts near it.
-  type :: neighbourhood_t
-    type(body_set_t) :: bodies
-    !> subdomain that owns each, and for its own the place in home (n); 0 for ghosts
-    integer, allocatable :: home(:), origin(:)
-  end type neighbourhood_t
 
 contains
 
   !> Make room for `n_subdomains`, without grains.
-  subroutine decomposition_init(self, comm, n_subdomains, nd, nv)
+  subroutine decomposition_init(self, comm, n_subdomains, nd, nv, period)
     class(decomposition_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
     integer, intent(in) :: n_subdomains, nd, nv
+    type(period_t), intent(in) :: period
     integer :: s, last
 
     self%comm => comm
     self%n_subdomains = n_subdomains
     self%nd = nd
     self%nv = nv
+    self%ni = merge(nd, 0, period%on())
+    self%period = period
+    if (.not. allocated(self%boundaries)) allocate (self%boundaries(0))
     self%first = comm%first_subdomain(comm%rank, n_subdomains)
     last = comm%first_subdomain(comm%rank + 1, n_subdomains) - 1
     if (allocated(self%home)) deallocate (self%home)
     allocate (self%home(last - self%first + 1))
     do s = 1, size(self%home)
-      call self%home(s)%init(nd, nv, 0)
+      call self%home(s)%init(nd, nv, self%ni, 0)
     end do
   end subroutine decomposition_init
 
-  !> Corners of the box that holds all grains, radii included [m]; an empty scene has the unit box. Collective.
+  !> Global number of subdomain `s` of this rank.
+  pure integer function decomposition_subdomain_of(self, s) result(subdomain)
+    class(decomposition_t), intent(in) :: self
+    integer, intent(in) :: s
+    subdomain = self%first + s - 1
+  end function decomposition_subdomain_of
+
+  !> Corners of the box that holds all grains, radii included [m], and along periodic axes just the period; an empty
+  !> scene has the unit box. Collective.
   subroutine decomposition_bounding_box(self, bodies, lower, upper)
     class(decomposition_t), intent(in) :: self
     !> grains of this rank, however grouped
@@ -85,31 +95,130 @@ contains
       lower(:) = 0.0_dp
       upper(:) = 1.0_dp
     end if
+    do d = 1, nd
+      if (.not. self%period%length(d) > 0.0_dp) cycle
+      lower(d) = self%period%origin(d)
+      upper(d) = self%period%origin(d) + self%period%length(d)
+    end do
   end subroutine decomposition_bounding_box
 
-  !> Bring every grain to the subdomain that holds its centre; grains of a subdomain are kept by ascending
-  !> identifier. Collective.
+  !> Bring every grain to the subdomain that holds its centre, wrapped into the period; grains of a subdomain are kept by
+  !> ascending identifier. Collective.
   subroutine decomposition_settle(self, newcomers)
     class(decomposition_t), intent(inout) :: self
     !> grains of this rank without a home so far
     type(body_set_t), intent(in), optional :: newcomers
     type(body_set_t) :: leaving
     integer(i8), allocatable :: records(:, :), received(:, :)
-    integer, allocatable :: destination(:)
-    integer :: k, owner
+    integer :: k, s
 
+    if (self%ni > 0) then
+      do s = 1, size(self%home)
+        call wrap(self%period, self%home(s))
+      end do
+    end if
     call collect_leaving(self, leaving)
     if (present(newcomers)) call append_bodies(leaving, newcomers)
-    allocate (records(leaving%record_words() + 1, leaving%n), destination(leaving%n))
+    if (self%ni > 0) call wrap(self%period, leaving)
+    allocate (records(leaving%record_words() + 1, leaving%n))
     do k = 1, leaving%n
-      owner = self%partition%owner(leaving%position(:, k))
-      destination(k) = self%comm%rank_of(owner, self%n_subdomains)
-      records(1, k) = owner
       call leaving%get_record(k, records(2:, k))
     end do
-    call sparse_exchange(self%comm, records, destination, received)
+    call self%deliver(place_word + 1, records, received)
     call take_in(self, received)
   end subroutine decomposition_settle
+
+  !> Bring grains into the period, counting their images.
+  pure subroutine wrap(period, bodies)
+    type(period_t), intent(in) :: period
+    type(body_set_t), intent(inout) :: bodies
+    integer :: k, periods(bodies%nd)
+
+    do k = 1, bodies%n
+      call period%wrap(bodies%position(:, k), periods)
+      bodies%image(:, k) = bodies%image(:, k) - periods
+    end do
+  end subroutine wrap
+
+  !> Bring records to the ranks of the subdomains that hold a point. Collective.
+  subroutine decomposition_deliver(self, point_word, records, received)
+    class(decomposition_t), intent(in) :: self
+    !> first of the nd words that hold the point
+    integer, intent(in) :: point_word
+    !> (words, n), the first of them to be set here to the subdomain
+    integer(i8), intent(inout), contiguous :: records(:, :)
+    !> (words, n), by source subdomain as far as the records were so sorted
+    integer(i8), allocatable, intent(out) :: received(:, :)
+    integer(i8), allocatable :: arrived(:, :), onward(:, :), more(:, :)
+    integer, allocatable :: destination(:)
+
+    allocate (received(size(records, 1), 0))
+    onward = records
+    do
+      call address(self, point_word, onward, destination)
+      call sparse_exchange(self%comm, onward, destination, arrived)
+      ! a rank that does not know the place of a point writes to one that does
+      call address(self, point_word, arrived, destination)
+      call split(arrived, destination == self%comm%rank, more, onward)
+      call join(received, more)
+      if (.not. self%comm%any_true(size(onward, 2) > 0)) exit
+    end do
+  end subroutine decomposition_deliver
+
+  !> Subdomain and rank of each record, as far as known here.
+  subroutine address(self, point_word, records, destination)
+    class(decomposition_t), intent(in) :: self
+    integer, intent(in) :: point_word
+    integer(i8), intent(inout), contiguous :: records(:, :)
+    integer, allocatable, intent(out) :: destination(:)
+    real(dp) :: point(self%nd)
+    integer :: k, d, owner
+
+    allocate (destination(size(records, 2)))
+    do k = 1, size(records, 2)
+      do d = 1, self%nd
+        point(d) = transfer(records(point_word + d - 1, k), 0.0_dp)
+      end do
+      owner = self%partition%owner(point)
+      if (owner == 0) owner = self%partition%relay(point)
+      records(1, k) = owner
+      destination(k) = self%comm%rank_of(owner, self%n_subdomains)
+    end do
+  end subroutine address
+
+  !> Records whose mask is true, and the others.
+  pure subroutine split(records, mask, yes, no)
+    integer(i8), intent(in), contiguous :: records(:, :)
+    logical, intent(in), contiguous :: mask(:)
+    integer(i8), allocatable, intent(out) :: yes(:, :), no(:, :)
+    integer :: k, n_yes, n_no
+
+    allocate (yes(size(records, 1), count(mask)), no(size(records, 1), count(.not. mask)))
+    n_yes = 0
+    n_no = 0
+    do k = 1, size(records, 2)
+      if (mask(k)) then
+        n_yes = n_yes + 1
+        yes(:, n_yes) = records(:, k)
+      else
+        n_no = n_no + 1
+        no(:, n_no) = records(:, k)
+      end if
+    end do
+  end subroutine split
+
+  !> Add records behind others.
+  pure subroutine join(records, more)
+    integer(i8), allocatable, intent(inout) :: records(:, :)
+    integer(i8), intent(in), contiguous :: more(:, :)
+    integer(i8), allocatable :: all_of_them(:, :)
+
+    if (size(more, 2) == 0) return
+    allocate (all_of_them(size(records, 1), size(records, 2) + size(more, 2)))
+    all_of_them(:, 1:size(records, 2)) = records
+    all_of_them(:, size(records, 2) + 1:) = more
+    call move_alloc(all_of_them, records)
+  end subroutine join
 
   !> Take the grains whose centre has left their subdomain out of it.
   subroutine collect_leaving(self, leaving)
@@ -119,11 +228,11 @@ contains
     logical, allocatable :: stays(:)
     integer :: s, k
 
-    call leaving%init(self%nd, self%nv, 0)
+    call leaving%init(self%nd, self%nv, self%ni, 0)
     do s = 1, size(self%home)
       allocate (stays(self%home(s)%n))
       do k = 1, self%home(s)%n
-        stays(k) = self%partition%owner(self%home(s)%position(:, k)) == self%first + s - 1
+        stays(k) = self%partition%owner(self%home(s)%position(:, k)) == self%subdomain_of(s)
       end do
       if (.not. all(stays)) then
         gone = self%home(s)
@@ -145,7 +254,7 @@ contains
     integer, allocatable :: order(:)
     integer :: s
 
-    call unpack_by_subdomain(self, received, 1, arrived)
+    call self%unpack_by_subdomain(received, 1, arrived)
     do s = 1, size(self%home)
       if (arrived(s)%n == 0) cycle
       call append_bodies(self%home(s), arrived(s))
@@ -158,7 +267,7 @@ contains
 
   !> Sort received grains by subdomain of this rank; the first `lead` words of a record are not of the grain, and
   !> the first of them is the subdomain.
-  subroutine unpack_by_subdomain(self, received, lead, sets)
+  subroutine decomposition_unpack_by_subdomain(self, received, lead, sets)
     class(decomposition_t), intent(in) :: self
     integer(i8), intent(in), contiguous :: received(:, :)
     integer, intent(in) :: lead
@@ -173,7 +282,7 @@ contains
       counts(s) = counts(s) + 1
     end do
     do s = 1, size(sets)
-      call sets(s)%init(self%nd, self%nv, counts(s))
+      call sets(s)%init(self%nd, self%nv, self%ni, counts(s))
     end do
     counts(:) = 0
     do k = 1, size(received, 2)
@@ -181,92 +290,6 @@ contains
       counts(s) = counts(s) + 1
       call sets(s)%set_record(counts(s), received(lead + 1:, k))
     end do
-  end subroutine unpack_by_subdomain
-
-  !> What each subdomain of this rank sees: its grains and the ghosts that may touch a contact it owns. The order
-  !> is that of `home`, then ghosts by owner and identifier. Collective.
-  subroutine decomposition_look_around(self, seen)
-    class(decomposition_t), intent(in) :: self
-    type(neighbourhood_t), allocatable, intent(out) :: seen(:)
-    integer(i8), allocatable :: records(:, :), received(:, :)
-    integer, allocatable :: destination(:)
-    type(body_set_t), allocatable :: ghosts(:)
-    integer :: s, k, n
-
-    call list_ghosts(self, records, destination)
-    call sparse_exchange(self%comm, records, destination, received)
-    call unpack_by_subdomain(self, received, 2, ghosts)
-    allocate (seen(size(self%home)))
-    do s = 1, size(seen)
-      seen(s)%bodies = self%home(s)
-      call append_bodies(seen(s)%bodies, ghosts(s))
-      n = self%home(s)%n
-      allocate (seen(s)%home(seen(s)%bodies%n), seen(s)%origin(seen(s)%bodies%n))
-      seen(s)%home(1:n) = self%first + s - 1
-      do k = 1, n
-        seen(s)%origin(k) = k
-      end do
-      seen(s)%origin(n + 1:) = 0
-    end do
-    call note_owners(self, received, seen)
-  end subroutine decomposition_look_around
-
-  !> Records of the grains of this rank that other subdomains see: (seer, owner, grain).
-  subroutine list_ghosts(self, records, destination)
-    class(decomposition_t), intent(in) :: self
-    integer(i8), allocatable, intent(out) :: records(:, :)
-    integer, allocatable, intent(out) :: destination(:)
-    integer, allocatable :: near(:)
-    integer :: s, k, j, n_near, n, round
-
-    allocate (near(32))
-    do round = 1, 2
-      n = 0
-      do s = 1, size(self%home)
-        do k = 1, self%home(s)%n
-          call self%partition%near(self%home(s)%position(:, k), reach_of(self%rule, self%home(s)%radius(k)), near, n_near)
-          do j = 1, n_near
-            if (near(j) == self%first + s - 1) cycle
-            n = n + 1
-            if (round == 1) cycle
-            destination(n) = self%comm%rank_of(near(j), self%n_subdomains)
-            records(1, n) = near(j)
-            records(2, n) = self%first + s - 1
-            call self%home(s)%get_record(k, records(3:, n))
-          end do
-        end do
-      end do
-      if (round == 1) allocate (records(6 + self%nd + self%nv, n), destination(n))
-    end do
-  end subroutine list_ghosts
-
-  !> How far from its centre the contacts of a grain may have the point that decides their owner, or the candidate
-  !> whose owner needs it [m].
-  pure real(dp) function reach_of(rule, radius) result(reach)
-    type(detection_rule_t), intent(in) :: rule
-    real(dp), intent(in) :: radius
-    reach = radius + rule%largest_radius
-    if (rule%kind /= rule_primal) reach = 0.5_dp*reach
-    reach = reach + rule%alert_distance
-  end function reach_of
-
-  !> Owner of each ghost, in the order in which unpack_by_subdomain put them.
-  subroutine note_owners(self, received, seen)
-    class(decomposition_t), intent(in) :: self
-    integer(i8), intent(in), contiguous :: received(:, :)
-    type(neighbourhood_t), intent(inout) :: seen(:)
-    integer, allocatable :: next(:)
-    integer :: k, s
-
-    allocate (next(size(seen)))
-    do s = 1, size(seen)
-      next(s) = self%home(s)%n
-    end do
-    do k = 1, size(received, 2)
-      s = int(received(1, k)) - self%first + 1
-      next(s) = next(s) + 1
-      seen(s)%home(next(s)) = int(received(2, k))
-    end do
-  end subroutine note_owners
+  end subroutine decomposition_unpack_by_subdomain
 
 end module gravier_decomposition

@@ -1,219 +1,238 @@
-!> Impulses kept from one step to the next, so that a solve starts from those of contacts that persist.
+!> Impulses kept from one step to the next, so that a solve starts from those of contacts that persist. They stay with the
+!> pairs of the neighbour lists, and move with them when the lists are made anew.
 module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
-  use gravier_sparse_exchange, only: sparse_exchange
-  use gravier_contact_kernels, only: tangents
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_body_store, only: wall_set_t
-  use gravier_detection, only: owner_point
-  use gravier_motion, only: predict_position, advance_position
+  use gravier_periodic, only: shift_of_code
+  use gravier_contact_kernels, only: kernels_t, tangents
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
   implicit none
   private
-  public :: impulse_memory_t
-
-  !> Impulses of the contacts of this rank at the end of a step. A record is: identifiers of the candidate and the
-  !> antagonist, the point that will decide the owner of the contact in the next step (nd), the normal impulse and
-  !> the tangential one (a number in 2D, a vector in global axes in 3D).
-  type :: impulse_memory_t
-    integer :: nd = 2, nt = 0
-    integer(i8), allocatable :: records(:, :)
-  contains
-    procedure :: keep => impulse_memory_keep
-    procedure :: recall => impulse_memory_recall
-  end type impulse_memory_t
+  public :: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses, list_impulses, match_impulses
 
 contains
 
-  !> Keep the impulses of a solved problem (non-zero ones). v_global must be that of the impulses.
-  subroutine impulse_memory_keep(self, problem, walls, kind, h, theta)
-    class(impulse_memory_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
-    type(wall_set_t), intent(in) :: walls
-    !> rule that gives contacts to subdomains, see gravier_detection
-    integer, intent(in) :: kind
-    !> [s]
-    real(dp), intent(in) :: h, theta
-    real(dp) :: point(problem%kernels%nd)
-    integer :: s, c, n
+  !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector.
+  pure integer function impulse_entries(kernels) result(n)
+    type(kernels_t), intent(in) :: kernels
+    n = merge(4, kernels%nc, kernels%nc == 3)
+  end function impulse_entries
 
-    self%nd = problem%kernels%nd
-    self%nt = merge(0, 2*self%nd - 3, problem%kernels%nc == 1)
-    n = 0
+  !> Keep the impulses of a solved problem with the pairs of the lists.
+  subroutine keep_impulses(problem, neighbourhoods)
+    type(contact_problem_t), intent(in) :: problem
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    integer :: s, c
+    real(dp) :: t(3), u(3)
+
     do s = 1, size(problem%sub)
-      n = n + count(problem%sub(s)%impulse(1, :) > 0.0_dp)
-    end do
-    if (allocated(self%records)) deallocate (self%records)
-    allocate (self%records(3 + self%nd + self%nt, n))
-    n = 0
-    do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
+      associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
+        list%impulse(:, :) = 0.0_dp
         do c = 1, sub%n_contacts
-          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
-          n = n + 1
-          self%records(1, n) = sub%id(sub%pair(1, c))
-          self%records(2, n) = sub%id(sub%pair(2, c))
-          call next_point(sub, c, walls, kind, h, theta, point)
-          call write_impulse(self, sub, c, point, self%records(:, n))
+          if (problem%kernels%nc < 3) then
+            list%impulse(:, sub%source(c)) = sub%impulse(:, c)
+          else
+            call tangents(sub%hot(1:3, c), t, u)
+            list%impulse(1, sub%source(c)) = sub%impulse(1, c)
+            list%impulse(2:4, sub%source(c)) = sub%impulse(2, c)*t + sub%impulse(3, c)*u
+          end if
         end do
       end associate
     end do
-  end subroutine impulse_memory_keep
+  end subroutine keep_impulses
 
-  !> Where the point that decides the owner of contact `c` will be at the next detection.
-  subroutine next_point(sub, c, walls, kind, h, theta, point)
-    type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: c, kind
-    type(wall_set_t), intent(in) :: walls
-    real(dp), intent(in) :: h, theta
-    real(dp), intent(out), contiguous :: point(:)
-    real(dp) :: candidate(size(point)), antagonist(size(point))
-    integer :: w
-
-    call next_place(sub, sub%pair(1, c), h, theta, candidate)
-    w = sub%pair(2, c) - sub%n_bodies
-    if (w > 0) then
-      antagonist(:) = candidate - max(dot_product(candidate - walls%point(:, w), walls%normal(:, w)), 0.0_dp)*walls%normal(:, w)
-    else
-      call next_place(sub, sub%pair(2, c), h, theta, antagonist)
-    end if
-    point(:) = owner_point(kind, candidate, antagonist, w > 0)
-  end subroutine next_point
-
-  subroutine next_place(sub, b, h, theta, place)
-    type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: b
-    real(dp), intent(in) :: h, theta
-    real(dp), intent(out) :: place(:)
-    integer :: d
-    real(dp) :: q
-
-    do d = 1, size(place)
-      q = advance_position(sub%position(d, b), sub%v_global(d, b), h, theta)
-      place(d) = predict_position(q, sub%v_global(d, b), h, theta)
-    end do
-  end subroutine next_place
-
-  subroutine write_impulse(self, sub, c, point, record)
-    class(impulse_memory_t), intent(in) :: self
-    type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: c
-    real(dp), intent(in) :: point(:)
-    integer(i8), intent(inout) :: record(:)
-    real(dp) :: t(3), s(3), p(3)
-    integer :: d
-
-    do d = 1, self%nd
-      record(2 + d) = transfer(point(d), 0_i8)
-    end do
-    record(3 + self%nd) = transfer(sub%impulse(1, c), 0_i8)
-    if (self%nt == 1) then
-      record(4 + self%nd) = transfer(sub%impulse(2, c), 0_i8)
-    else if (self%nt == 3) then
-      call tangents(sub%hot(1:3, c), t, s)
-      p(:) = sub%impulse(2, c)*t + sub%impulse(3, c)*s
-      do d = 1, 3
-        record(3 + self%nd + d) = transfer(p(d), 0_i8)
-      end do
-    end if
-  end subroutine write_impulse
-
-  !> Bring each impulse to the subdomain that owns its contact now, and start the contacts from them. Collective.
-  subroutine impulse_memory_recall(self, decomposition, problem)
-    class(impulse_memory_t), intent(inout) :: self
-    type(decomposition_t), intent(in) :: decomposition
+  !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now.
+  subroutine recall_impulses(neighbourhoods, problem)
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
-    integer(i8), allocatable :: records(:, :), received(:, :), mine(:, :), keys(:, :)
-    integer, allocatable :: destination(:), order(:), first(:)
-    real(dp) :: point(self%nd)
-    integer :: k, d, s, n_words, owner
+    integer :: s, c
+    real(dp) :: t(3), u(3)
 
-    if (.not. allocated(self%records)) return
-    n_words = size(self%records, 1)
-    allocate (records(n_words + 1, size(self%records, 2)), destination(size(self%records, 2)))
-    do k = 1, size(self%records, 2)
-      do d = 1, self%nd
-        point(d) = transfer(self%records(2 + d, k), 0.0_dp)
-      end do
-      owner = decomposition%partition%owner(point)
-      destination(k) = decomposition%comm%rank_of(owner, decomposition%n_subdomains)
-      records(1, k) = owner
-      records(2:, k) = self%records(:, k)
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
+        do c = 1, sub%n_contacts
+          if (problem%kernels%nc < 3) then
+            sub%impulse(:, c) = list%impulse(:, sub%source(c))
+          else
+            call tangents(sub%hot(1:3, c), t, u)
+            sub%impulse(1, c) = list%impulse(1, sub%source(c))
+            sub%impulse(2, c) = sum(list%impulse(2:4, sub%source(c))*t)
+            sub%impulse(3, c) = sum(list%impulse(2:4, sub%source(c))*u)
+          end if
+        end do
+      end associate
     end do
-    call sparse_exchange(decomposition%comm, records, destination, received)
-    allocate (order(size(received, 2)), keys(3, size(received, 2)), mine(n_words + 1, size(received, 2)))
-    keys(:, :) = received(1:3, :)
+  end subroutine recall_impulses
+
+  !> Identifiers of candidate and antagonist and the impulse, for the pairs of a list that carry one; the antagonist of a
+  !> boundary is minus its number.
+  subroutine list_impulses(view, lead, records)
+    type(neighbourhood_t), intent(in) :: view
+    !> words left free before those of a record
+    integer, intent(in) :: lead
+    !> (lead + 2 + entries of an impulse, pairs with an impulse)
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    integer :: p, e, n
+
+    associate (list => view%list)
+      n = 0
+      do p = 1, list%n
+        if (list%impulse(1, p) > 0.0_dp) n = n + 1
+      end do
+      allocate (records(lead + 2 + size(list%impulse, 1), n), source=0_i8)
+      n = 0
+      do p = 1, list%n
+        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        n = n + 1
+        records(lead + 1, n) = view%bodies%id(list%candidate(p))
+        records(lead + 2, n) = antagonist_id(view, p)
+        do e = 1, size(list%impulse, 1)
+          records(lead + 2 + e, n) = transfer(list%impulse(e, p), 0_i8)
+        end do
+      end do
+    end associate
+  end subroutine list_impulses
+
+  pure integer(i8) function antagonist_id(view, p) result(id)
+    type(neighbourhood_t), intent(in) :: view
+    integer, intent(in) :: p
+
+    id = view%list%antagonist(p)
+    if (id > 0) id = view%bodies%id(view%list%antagonist(p))
+  end function antagonist_id
+
+  !> All impulses kept on this rank, each with the point that decides the owner of its pair, as records for
+  !> spread_impulses. The views must be up to date.
+  subroutine gather_impulses(decomposition, neighbourhoods, records)
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    !> (1 + nd + 2 + entries of an impulse, n): subdomain (to be set), point, candidate, antagonist, impulse
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    integer(i8), allocatable :: own(:, :)
+    integer :: s, n, words
+
+    words = 0
+    n = 0
+    do s = 1, size(neighbourhoods%view)
+      associate (list => neighbourhoods%view(s)%list)
+        words = 3 + decomposition%nd + size(list%impulse, 1)
+        n = n + count(list%impulse(1, :) > 0.0_dp)
+      end associate
+    end do
+    allocate (records(words, n))
+    n = 0
+    do s = 1, size(neighbourhoods%view)
+      call list_impulses(neighbourhoods%view(s), 1 + decomposition%nd, own)
+      call write_points(decomposition, neighbourhoods%view(s), own)
+      records(:, n + 1:n + size(own, 2)) = own
+      n = n + size(own, 2)
+    end do
+  end subroutine gather_impulses
+
+  !> The owner points of the pairs that carry an impulse.
+  subroutine write_points(decomposition, view, records)
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhood_t), intent(in) :: view
+    integer(i8), intent(inout), contiguous :: records(:, :)
+    real(dp) :: point(decomposition%nd), antagonist(decomposition%nd)
+    integer :: p, n, d, shift(3)
+
+    n = 0
+    associate (list => view%list, position => view%bodies%position)
+      do p = 1, list%n
+        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        n = n + 1
+        point(:) = position(:, list%candidate(p))
+        if (list%antagonist(p) > 0) then
+          antagonist(:) = position(:, list%antagonist(p))
+          if (size(list%shift) > 0) then
+            shift(:) = shift_of_code(list%shift(p))
+            antagonist(:) = antagonist + shift(1:decomposition%nd)*decomposition%period%length(1:decomposition%nd)
+          end if
+          point(:) = owner_point(decomposition%rule%kind, point, antagonist)
+        end if
+        do d = 1, decomposition%nd
+          records(1 + d, n) = transfer(point(d), 0_i8)
+        end do
+      end do
+    end associate
+  end subroutine write_points
+
+  !> Bring each impulse to the subdomain that owns its pair now. Collective.
+  subroutine spread_impulses(decomposition, records, neighbourhoods)
+    type(decomposition_t), intent(in) :: decomposition
+    !> of gather_impulses
+    integer(i8), intent(inout), contiguous :: records(:, :)
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    integer(i8), allocatable :: received(:, :), keys(:, :), mine(:, :)
+    integer, allocatable :: order(:)
+    integer :: s, k, first, lead
+
+    lead = 1 + decomposition%nd
+    call decomposition%deliver(2, records, received)
+    allocate (order(size(received, 2)), keys(1, size(received, 2)), mine(size(received, 1) - lead, size(received, 2)))
+    keys(1, :) = received(1, :)
     call argsort_rows(keys, order)
     do k = 1, size(order)
-      mine(:, k) = received(:, order(k))
+      mine(:, k) = received(lead + 1:, order(k))
     end do
-    allocate (first(size(problem%sub) + 1))
     k = 1
-    do s = 1, size(problem%sub)
-      first(s) = k
-      do while (k <= size(mine, 2))
-        if (mine(1, k) /= problem%sub(s)%subdomain) exit
+    do s = 1, size(neighbourhoods%view)
+      first = k
+      do while (k <= size(order))
+        if (received(1, order(k)) /= decomposition%subdomain_of(s)) exit
         k = k + 1
       end do
-      first(s + 1) = k
-      call match(self, mine(:, first(s):first(s + 1) - 1), problem%sub(s))
+      call match_impulses(mine(:, first:k - 1), neighbourhoods%view(s))
     end do
-  end subroutine impulse_memory_recall
+  end subroutine spread_impulses
 
-  !> Start the contacts of a subdomain from the impulses remembered for the same pairs.
-  subroutine match(self, mine, sub)
-    class(impulse_memory_t), intent(in) :: self
-    !> sorted by candidate and antagonist, the second and third words
-    integer(i8), intent(in), contiguous :: mine(:, :)
-    type(subproblem_t), intent(inout) :: sub
-    integer :: c, k
+  !> Give impulses to the pairs of a list that have the same bodies.
+  subroutine match_impulses(records, view)
+    !> (2 + entries of an impulse, n): candidate, antagonist, impulse
+    integer(i8), intent(in), contiguous :: records(:, :)
+    type(neighbourhood_t), intent(inout) :: view
+    integer(i8), allocatable :: keys(:, :)
+    integer, allocatable :: order(:)
+    integer :: p, k, e
 
-    do c = 1, sub%n_contacts
-      k = find_pair(mine, sub%id(sub%pair(1, c)), sub%id(sub%pair(2, c)))
-      if (k > 0) call read_impulse(self, mine(2:, k), sub%hot(:, c), sub%impulse(:, c))
-    end do
-  end subroutine match
+    allocate (keys(2, size(records, 2)), order(size(records, 2)))
+    keys(:, :) = records(1:2, :)
+    call argsort_rows(keys, order)
+    associate (list => view%list)
+      do p = 1, list%n
+        k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p))
+        if (k == 0) cycle
+        do e = 1, size(list%impulse, 1)
+          list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
+        end do
+      end do
+    end associate
+  end subroutine match_impulses
 
-  pure integer function find_pair(mine, candidate, antagonist) result(place)
-    integer(i8), intent(in), contiguous :: mine(:, :)
+  !> Place of a pair among keys that `order` sorts, or 0.
+  pure integer function find_pair(keys, order, candidate, antagonist) result(place)
+    integer(i8), intent(in), contiguous :: keys(:, :)
+    integer, intent(in), contiguous :: order(:)
     integer(i8), intent(in) :: candidate, antagonist
-    integer :: low, high
+    integer :: low, high, middle
 
     low = 1
-    high = size(mine, 2)
+    high = size(order)
     do while (low <= high)
-      place = (low + high)/2
-      if (mine(2, place) == candidate .and. mine(3, place) == antagonist) return
-      if (mine(2, place) < candidate .or. (mine(2, place) == candidate .and. mine(3, place) < antagonist)) then
-        low = place + 1
+      middle = (low + high)/2
+      place = order(middle)
+      if (keys(1, place) == candidate .and. keys(2, place) == antagonist) return
+      if (keys(1, place) < candidate .or. (keys(1, place) == candidate .and. keys(2, place) < antagonist)) then
+        low = middle + 1
       else
-        high = place - 1
+        high = middle - 1
       end if
     end do
     place = 0
   end function find_pair
-
-  !> The remembered impulse in the contact's present frame; a tangential vector is projected on the tangent plane.
-  pure subroutine read_impulse(self, record, hot, impulse)
-    class(impulse_memory_t), intent(in) :: self
-    integer(i8), intent(in) :: record(:)
-    real(dp), intent(in), contiguous :: hot(:)
-    real(dp), intent(inout) :: impulse(:)
-    real(dp) :: t(3), s(3), p(3)
-    integer :: d
-
-    impulse(1) = transfer(record(3 + self%nd), 0.0_dp)
-    if (self%nt == 1) then
-      impulse(2) = transfer(record(4 + self%nd), 0.0_dp)
-    else if (self%nt == 3) then
-      do d = 1, 3
-        p(d) = transfer(record(3 + self%nd + d), 0.0_dp)
-      end do
-      call tangents(hot(1:3), t, s)
-      impulse(2) = dot_product(p, t)
-      impulse(3) = dot_product(p, s)
-    end if
-  end subroutine read_impulse
 
 end module gravier_impulse_memory

@@ -1,0 +1,356 @@
+!> Boundaries: rigid bodies of simple shapes that bound the grains and are driven by what the user prescribes. There
+!> are few of them, and every rank knows them all.
+module gravier_boundary
+  use gravier_kinds, only: dp, i8
+  use gravier_time_table, only: time_table_t
+  implicit none
+  private
+  public :: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, shape_grains, shape_outlet
+  public :: shape_name, drive_names
+
+  !> half-plane or half-space; part of a line (2D); part of a plane (3D); inside of a circle (2D) or of an endless
+  !> cylinder (3D); grains glued to each other; plane behind which grains leave the scene
+  integer, parameter :: shape_plane = 1, shape_segment = 2, shape_rectangle = 3, shape_circle = 4, shape_cylinder = 5, &
+    & shape_grains = 6, shape_outlet = 7
+
+  character(len=*), parameter :: shape_names(7) = [character(len=9) :: "plane", "segment", "rectangle", "circle", &
+    & "cylinder", "grains", "outlet"]
+
+  !> columns of a table of drives, in 2D and 3D; each place stands for one quantity, see boundary_drive
+  character(len=*), parameter :: drives_2d(6) = [character(len=8) :: "vx", "vy", "omega", "fx", "fy", "pressure"]
+  character(len=*), parameter :: drives_3d(10) = [character(len=8) :: "vx", "vy", "vz", "wx", "wy", "wz", "fx", "fy", "fz", &
+    & "pressure"]
+
+  !> A boundary. In 2D vectors have a third component of 0, and spins only a third one.
+  type :: boundary_t
+    integer(i8) :: id = 0
+    character(len=:), allocatable :: name
+    integer :: shape = shape_plane
+    !> point of the plane, end of the segment, corner of the rectangle, centre of the circle, point of the axis [m]
+    real(dp) :: point(3) = 0.0_dp
+    !> plane, outlet: unit normal towards the free side; cylinder: unit vector along the axis
+    real(dp) :: axis(3) = 0.0_dp
+    !> segment: from end to end (first column); rectangle: its edges from the corner [m]
+    real(dp) :: edge(3, 2) = 0.0_dp
+    !> circle, cylinder [m]
+    real(dp) :: radius = 0.0_dp
+    !> the point it turns about [m]
+    real(dp) :: pivot(3) = 0.0_dp
+    !> at the present time [m/s], [rad/s]
+    real(dp) :: velocity(3) = 0.0_dp, spin(3) = 0.0_dp
+    !> as prescribed, where no table says otherwise [m/s], [rad/s]
+    real(dp) :: given_velocity(3) = 0.0_dp, given_spin(3) = 0.0_dp
+    !> components of translation that forces move
+    logical :: free(3) = .false.
+    !> on the free components [N]; [Pa], or [N/m] in 2D
+    real(dp) :: given_force(3) = 0.0_dp, given_pressure = 0.0_dp
+    !> inertia against forces [kg]
+    real(dp) :: mass = 0.0_dp
+    type(time_table_t) :: table
+    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+    !> [s]
+    real(dp) :: remove_at = huge(1.0_dp)
+    !> false once removed
+    logical :: present = .true.
+  contains
+    procedure :: touches => boundary_touches
+    procedure :: is_driven => boundary_is_driven
+    procedure :: turns => boundary_turns
+    procedure :: locate => boundary_locate
+    procedure :: velocity_at => boundary_velocity_at
+    procedure :: prescribe => boundary_prescribe
+    procedure :: applied_force => boundary_applied_force
+    procedure :: move => boundary_move
+    procedure :: carry => boundary_carry
+    procedure :: get_state => boundary_get_state
+    procedure :: set_state => boundary_set_state
+  end type boundary_t
+
+  !> words of the state of a boundary
+  integer, parameter, public :: boundary_words = 22
+
+contains
+
+  pure function shape_name(shape) result(name)
+    integer, intent(in) :: shape
+    character(len=:), allocatable :: name
+    name = trim(shape_names(shape))
+  end function shape_name
+
+  !> Names of the columns of a table of drives.
+  pure function drive_names(nd) result(names)
+    integer, intent(in) :: nd
+    character(len=8), allocatable :: names(:)
+    if (nd == 2) then
+      names = drives_2d
+    else
+      names = drives_3d
+    end if
+  end function drive_names
+
+  !> Whether grains can have a contact with its surface.
+  pure logical function boundary_touches(self)
+    class(boundary_t), intent(in) :: self
+    boundary_touches = self%present .and. self%shape /= shape_grains .and. self%shape /= shape_outlet
+  end function boundary_touches
+
+  !> Whether forces move it.
+  pure logical function boundary_is_driven(self)
+    class(boundary_t), intent(in) :: self
+    boundary_is_driven = any(self%free)
+  end function boundary_is_driven
+
+  !> Whether it turns, now or later.
+  pure logical function boundary_turns(self)
+    class(boundary_t), intent(in) :: self
+
+    boundary_turns = any(abs(self%given_spin) > 0.0_dp)
+    if (.not. allocated(self%table%has)) return
+    if (size(self%table%has) == size(drives_2d)) then
+      boundary_turns = boundary_turns .or. self%table%has(3)
+    else
+      boundary_turns = boundary_turns .or. any(self%table%has(4:6))
+    end if
+  end function boundary_turns
+
+  !> Nearest point of the surface: distance from it, negative behind a surface that has a behind, and unit normal
+  !> there towards `x`.
+  pure subroutine boundary_locate(self, x, distance, normal)
+    class(boundary_t), intent(in) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: x(:)
+    real(dp), intent(out) :: distance
+    !> (nd)
+    real(dp), intent(out) :: normal(:)
+    real(dp) :: from(3), away(3), length
+    integer :: nd
+
+    nd = size(x)
+    from(:) = 0.0_dp
+    from(1:nd) = x - self%point(1:nd)
+    select case (self%shape)
+    case (shape_circle, shape_cylinder)
+      from(:) = from - sum(from*self%axis)*self%axis
+      length = norm2(from)
+      distance = self%radius - length
+      away(:) = 0.0_dp
+      if (length > 0.0_dp) then
+        away(:) = -from/length
+      else
+        away(1) = 1.0_dp
+      end if
+    case (shape_segment, shape_rectangle)
+      away(:) = from - share_along(from, self%edge(:, 1))*self%edge(:, 1)
+      if (self%shape == shape_rectangle) away(:) = away - share_along(from, self%edge(:, 2))*self%edge(:, 2)
+      distance = norm2(away)
+      if (distance > 0.0_dp) then
+        away(:) = away/distance
+      else
+        away(:) = face_normal(self)
+      end if
+    case default
+      distance = sum(from*self%axis)
+      away(:) = self%axis
+    end select
+    normal(:) = away(1:nd)
+  end subroutine boundary_locate
+
+  !> Where the foot of `from` lies along an edge, in [0, 1].
+  pure real(dp) function share_along(from, edge) result(share)
+    real(dp), intent(in) :: from(3), edge(3)
+    share = min(max(sum(from*edge)/sum(edge*edge), 0.0_dp), 1.0_dp)
+  end function share_along
+
+  !> Unit normal of a segment or rectangle.
+  pure function face_normal(self) result(normal)
+    class(boundary_t), intent(in) :: self
+    real(dp) :: normal(3), other(3)
+
+    other(:) = self%edge(:, 2)
+    if (self%shape == shape_segment) then
+      other(:) = 0.0_dp
+      other(3) = 1.0_dp
+    end if
+    normal(:) = cross(self%edge(:, 1), other)
+    normal(:) = normal/norm2(normal)
+  end function face_normal
+
+  pure function cross(a, b) result(c)
+    real(dp), intent(in) :: a(3), b(3)
+    real(dp) :: c(3)
+
+    c(1) = a(2)*b(3) - a(3)*b(2)
+    c(2) = a(3)*b(1) - a(1)*b(3)
+    c(3) = a(1)*b(2) - a(2)*b(1)
+  end function cross
+
+  !> Velocity of the material point at `x` [m/s].
+  pure subroutine boundary_velocity_at(self, x, velocity)
+    class(boundary_t), intent(in) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: x(:)
+    !> (nd)
+    real(dp), intent(out) :: velocity(:)
+    real(dp) :: arm(3), turned(3)
+
+    arm(:) = 0.0_dp
+    arm(1:size(x)) = x - self%pivot(1:size(x))
+    turned(:) = cross(self%spin, arm)
+    velocity(:) = self%velocity(1:size(x)) + turned(1:size(x))
+  end subroutine boundary_velocity_at
+
+  !> Set the prescribed velocity and spin of a time; free components are left.
+  pure subroutine boundary_prescribe(self, nd, time)
+    class(boundary_t), intent(inout) :: self
+    integer, intent(in) :: nd
+    !> [s]
+    real(dp), intent(in) :: time
+    integer :: d
+
+    do d = 1, nd
+      if (.not. self%free(d)) self%velocity(d) = drive(self, d, time, self%given_velocity(d))
+    end do
+    if (nd == 2) then
+      self%spin(3) = drive(self, 3, time, self%given_spin(3))
+    else
+      do d = 1, 3
+        self%spin(d) = drive(self, 3 + d, time, self%given_spin(d))
+      end do
+    end if
+  end subroutine boundary_prescribe
+
+  !> A prescribed quantity: column `k` of the table where it has it, else the constant.
+  pure real(dp) function drive(self, k, time, constant) result(value)
+    class(boundary_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(dp), intent(in) :: time, constant
+
+    value = constant
+    if (.not. allocated(self%table%has)) return
+    if (self%table%has(k)) value = self%table%at(k, time)
+  end function drive
+
+  !> Force of the user on the free components at a time [N].
+  pure subroutine boundary_applied_force(self, nd, time, area, force)
+    class(boundary_t), intent(in) :: self
+    integer, intent(in) :: nd
+    !> [s]; the area that a pressure works on [m^2, m in 2D]
+    real(dp), intent(in) :: time, area
+    !> (nd); 0 on other components
+    real(dp), intent(out) :: force(:)
+    integer :: d
+
+    force(:) = 0.0_dp
+    do d = 1, nd
+      if (.not. self%free(d)) cycle
+      force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) - &
+        & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*self%axis(d)
+    end do
+  end subroutine boundary_applied_force
+
+  !> Move the boundary with its velocity and spin for a time.
+  pure subroutine boundary_move(self, duration)
+    class(boundary_t), intent(inout) :: self
+    !> [s]
+    real(dp), intent(in) :: duration
+    real(dp) :: turn(3, 3)
+
+    if (any(abs(self%spin) > 0.0_dp)) then
+      turn(:, :) = rotation(self%spin*duration)
+      self%point(:) = self%pivot + matmul(turn, self%point - self%pivot)
+      if (self%shape /= shape_circle) self%axis(:) = matmul(turn, self%axis)
+      self%edge(:, :) = matmul(turn, self%edge)
+    end if
+    self%point(:) = self%point + duration*self%velocity
+    self%pivot(:) = self%pivot + duration*self%velocity
+  end subroutine boundary_move
+
+  !> Move a point with the boundary for a time; the boundary itself has not moved yet.
+  pure subroutine boundary_carry(self, duration, x)
+    class(boundary_t), intent(in) :: self
+    real(dp), intent(in) :: duration
+    !> (nd) [m]
+    real(dp), intent(inout) :: x(:)
+    real(dp) :: arm(3), turn(3, 3)
+    integer :: nd
+
+    nd = size(x)
+    if (any(abs(self%spin) > 0.0_dp)) then
+      arm(:) = 0.0_dp
+      arm(1:nd) = x - self%pivot(1:nd)
+      turn(:, :) = rotation(self%spin*duration)
+      arm(:) = matmul(turn, arm)
+      x(:) = self%pivot(1:nd) + arm(1:nd)
+    end if
+    x(:) = x + duration*self%velocity(1:nd)
+  end subroutine boundary_carry
+
+  !> Matrix of the rotation by a vector (Rodrigues).
+  pure function rotation(vector) result(turn)
+    !> direction times angle [rad]
+    real(dp), intent(in) :: vector(3)
+    real(dp) :: turn(3, 3), u(3), angle
+    integer :: a, b
+
+    angle = norm2(vector)
+    turn(:, :) = 0.0_dp
+    do a = 1, 3
+      turn(a, a) = 1.0_dp
+    end do
+    if (.not. angle > 0.0_dp) return
+    u(:) = vector/angle
+    do b = 1, 3
+      do a = 1, 3
+        turn(a, b) = (1.0_dp - cos(angle))*u(a)*u(b)
+      end do
+      turn(b, b) = turn(b, b) + cos(angle)
+    end do
+    turn(1, 2) = turn(1, 2) - sin(angle)*u(3)
+    turn(2, 1) = turn(2, 1) + sin(angle)*u(3)
+    turn(1, 3) = turn(1, 3) + sin(angle)*u(2)
+    turn(3, 1) = turn(3, 1) - sin(angle)*u(2)
+    turn(2, 3) = turn(2, 3) - sin(angle)*u(1)
+    turn(3, 2) = turn(3, 2) + sin(angle)*u(1)
+  end function rotation
+
+  !> Everything of a boundary that time changes, bit for bit.
+  pure subroutine boundary_get_state(self, words)
+    class(boundary_t), intent(in) :: self
+    integer(i8), intent(out) :: words(boundary_words)
+    real(dp) :: state(boundary_words - 1)
+    integer :: k
+
+    state(:) = 0.0_dp
+    state(1:3) = self%point
+    state(4:6) = self%axis
+    state(7:9) = self%edge(:, 1)
+    state(10:12) = self%edge(:, 2)
+    state(13:15) = self%pivot
+    state(16:18) = self%velocity
+    state(19:21) = self%spin
+    words(1) = merge(1_i8, 0_i8, self%present)
+    do k = 1, size(state)
+      words(1 + k) = transfer(state(k), 0_i8)
+    end do
+  end subroutine boundary_get_state
+
+  pure subroutine boundary_set_state(self, words)
+    class(boundary_t), intent(inout) :: self
+    integer(i8), intent(in) :: words(boundary_words)
+    real(dp) :: state(boundary_words - 1)
+    integer :: k
+
+    do k = 1, size(state)
+      state(k) = transfer(words(1 + k), 0.0_dp)
+    end do
+    self%present = words(1) == 1
+    self%point(:) = state(1:3)
+    self%axis(:) = state(4:6)
+    self%edge(:, 1) = state(7:9)
+    self%edge(:, 2) = state(10:12)
+    self%pivot(:) = state(13:15)
+    self%velocity(:) = state(16:18)
+    self%spin(:) = state(19:21)
+  end subroutine boundary_set_state
+
+end module gravier_boundary

@@ -1,0 +1,143 @@
+!> Quantities given in a table against time: linear between the rows, constant before the first and after the last.
+module gravier_time_table
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_csv_table, only: csv_table_t
+  implicit none
+  private
+  public :: time_table_t
+
+  !> Columns of a CSV file with a header; `time` is one of them.
+  type :: time_table_t
+    !> (rows), ascending [s]
+    real(dp), allocatable :: time(:)
+    !> (columns asked for, rows)
+    real(dp), allocatable :: value(:, :)
+    !> whether the file has the column (columns asked for)
+    logical, allocatable :: has(:)
+  contains
+    procedure :: read => time_table_read
+    procedure :: at => time_table_at
+  end type time_table_t
+
+contains
+
+  !> Read the columns `names` of a file, as far as it has them. Failure: status_input, with file, line, column and what
+  !> was expected. Not collective.
+  subroutine time_table_read(self, path, names, error)
+    class(time_table_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    !> of the columns besides time
+    character(len=*), intent(in) :: names(:)
+    type(error_t), allocatable, intent(inout) :: error
+    type(csv_table_t) :: table
+    integer :: column(size(names)), time_column, k
+
+    if (allocated(error)) return
+    call table%open(path, error)
+    if (allocated(error)) return
+    time_column = table%column("time")
+    if (time_column == 0) call table%refuse_file("column time is missing; known are time"//listed(names), error)
+    do k = 1, size(names)
+      column(k) = table%column(trim(names(k)))
+    end do
+    do k = 1, table%column_count()
+      if (k == time_column .or. any(k == column)) cycle
+      call table%refuse_file("column "//table%column_name(k)//" is unknown here; known are time"//listed(names), error)
+    end do
+    self%has = column > 0
+    if (.not. any(self%has)) call table%refuse_file("no column besides time; known are"//listed(names), error)
+    allocate (self%time(0), self%value(size(names), 0))
+    call read_rows(self, table, time_column, column, error)
+    call table%close()
+  end subroutine time_table_read
+
+  pure function listed(names) result(text)
+    character(len=*), intent(in) :: names(:)
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(names)
+      text = text//", "//trim(names(k))
+    end do
+  end function listed
+
+  subroutine read_rows(self, table, time_column, column, error)
+    type(time_table_t), intent(inout) :: self
+    type(csv_table_t), intent(inout) :: table
+    integer, intent(in) :: time_column
+    integer, intent(in) :: column(:)
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: time, row(size(column))
+    integer :: n, k
+    logical :: found
+
+    n = 0
+    do
+      call table%next_row(found, error)
+      if (allocated(error) .or. .not. found) exit
+      call table%get_real(time_column, time, error)
+      row(:) = 0.0_dp
+      do k = 1, size(column)
+        if (column(k) > 0) call table%get_real(column(k), row(k), error)
+      end do
+      if (allocated(error)) exit
+      if (n > 0) then
+        if (time <= self%time(n)) call table%refuse(time_column, "a time later than that of the row above", error)
+      end if
+      call add_row(self, n, time, row)
+    end do
+    self%time = self%time(1:n)
+    self%value = self%value(:, 1:n)
+    if (n == 0 .and. .not. allocated(error)) call table%refuse_file("no rows; at least one was expected", error)
+  end subroutine read_rows
+
+  subroutine add_row(self, n, time, row)
+    type(time_table_t), intent(inout) :: self
+    integer, intent(inout) :: n
+    real(dp), intent(in) :: time, row(:)
+    real(dp), allocatable :: longer(:), wider(:, :)
+
+    if (n == size(self%time)) then
+      allocate (longer(2*n + 16), wider(size(row), 2*n + 16))
+      longer(1:n) = self%time(1:n)
+      wider(:, 1:n) = self%value(:, 1:n)
+      call move_alloc(longer, self%time)
+      call move_alloc(wider, self%value)
+    end if
+    n = n + 1
+    self%time(n) = time
+    self%value(:, n) = row
+  end subroutine add_row
+
+  !> Value of column `k` at a time.
+  pure real(dp) function time_table_at(self, k, time) result(value)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: time
+    integer :: low, high, middle
+    real(dp) :: share
+
+    low = 1
+    high = size(self%time)
+    if (time <= self%time(low)) then
+      value = self%value(k, low)
+    else if (time >= self%time(high)) then
+      value = self%value(k, high)
+    else
+      do while (high - low > 1)
+        middle = (low + high)/2
+        if (self%time(middle) <= time) then
+          low = middle
+        else
+          high = middle
+        end if
+      end do
+      share = (time - self%time(low))/(self%time(high) - self%time(low))
+      value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
+    end if
+  end function time_table_at
+
+end module gravier_time_table

@@ -1,0 +1,95 @@
+!> Near pairs of one subdomain: those that may come into contact before the list is made anew.
+module gravier_neighbour_list
+  use gravier_kinds, only: dp
+  implicit none
+  private
+  public :: neighbour_list_t
+
+  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. The impulses of
+  !> the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
+  !> global axes.
+  type :: neighbour_list_t
+    integer :: n = 0
+    !> place of the candidate among the bodies searched (n)
+    integer, allocatable :: candidate(:)
+    !> place of the antagonist among the bodies searched, or minus the number of a boundary (n)
+    integer, allocatable :: antagonist(:)
+    !> periods by which the antagonist's place is shifted to meet the candidate, see shift_code; without periods of no
+    !> size (n or 0)
+    integer, allocatable :: shift(:)
+    !> (entries of an impulse, n) [N s]
+    real(dp), allocatable :: impulse(:, :)
+  contains
+    procedure :: init => neighbour_list_init
+    procedure :: add => neighbour_list_add
+    procedure :: finish => neighbour_list_finish
+  end type neighbour_list_t
+
+contains
+
+  !> An empty list with room for `room` pairs.
+  subroutine neighbour_list_init(self, periodic, room)
+    class(neighbour_list_t), intent(inout) :: self
+    logical, intent(in) :: periodic
+    integer, intent(in) :: room
+
+    self%n = 0
+    if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
+    if (allocated(self%impulse)) deallocate (self%impulse)
+    allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
+  end subroutine neighbour_list_init
+
+  !> Add a pair; the room doubles where needed.
+  subroutine neighbour_list_add(self, candidate, antagonist, shift)
+    class(neighbour_list_t), intent(inout) :: self
+    integer, intent(in) :: candidate, antagonist, shift
+
+    if (self%n == size(self%candidate)) then
+      call lengthen(self%candidate, self%n)
+      call lengthen(self%antagonist, self%n)
+      if (size(self%shift) > 0) call lengthen(self%shift, self%n)
+    end if
+    self%n = self%n + 1
+    self%candidate(self%n) = candidate
+    self%antagonist(self%n) = antagonist
+    if (size(self%shift) > 0) self%shift(self%n) = shift
+  end subroutine neighbour_list_add
+
+  subroutine lengthen(list, n)
+    integer, allocatable, intent(inout) :: list(:)
+    integer, intent(in) :: n
+    integer, allocatable :: longer(:)
+
+    allocate (longer(2*n + 16))
+    longer(1:n) = list(1:n)
+    call move_alloc(longer, list)
+  end subroutine lengthen
+
+  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses to zero.
+  subroutine neighbour_list_finish(self, order, n_impulse)
+    class(neighbour_list_t), intent(inout) :: self
+    !> (n) a permutation
+    integer, intent(in), contiguous :: order(:)
+    !> entries of an impulse
+    integer, intent(in) :: n_impulse
+
+    call permute(self%candidate, order)
+    call permute(self%antagonist, order)
+    if (size(self%shift) > 0) call permute(self%shift, order)
+    allocate (self%impulse(n_impulse, self%n), source=0.0_dp)
+  end subroutine neighbour_list_finish
+
+  subroutine permute(list, order)
+    integer, allocatable, intent(inout) :: list(:)
+    integer, intent(in), contiguous :: order(:)
+    integer, allocatable :: permuted(:)
+    integer :: k
+
+    allocate (permuted(size(order)))
+    do k = 1, size(order)
+      permuted(k) = list(order(k))
+    end do
+    call move_alloc(permuted, list)
+  end subroutine permute
+
+end module gravier_neighbour_list

@@ -1,0 +1,403 @@
+!> Search for near pairs: grids of cells, one for each class of radii, find who is near whom; partitions of space decide
+!> which subdomain a pair belongs to.
+module gravier_neighbour_search
+  use gravier_kinds, only: dp, i8
+  use gravier_sorting, only: argsort_rows
+  use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
+  use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t
+  use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
+  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_region, only: region_t
+  implicit none
+  private
+  public :: neighbour_rule_t, find_neighbours, sweep_order, owner_point, rule_dual, rule_primal
+
+  !> a pair of grains belongs to the subdomain that holds the midpoint of the centres (paper, section 2.1)
+  integer, parameter :: rule_dual = 1
+  !> a pair belongs to the subdomain that holds the centre of its candidate; pairs of a grain and a boundary always do
+  integer, parameter :: rule_primal = 2
+
+  type :: neighbour_rule_t
+    !> pairs whose gap is at most this are contacts [m]
+    real(dp) :: alert_distance = 0.0_dp
+    !> pairs stay listed while no two bodies have come nearer than by this [m]
+    real(dp) :: skin = 0.0_dp
+    !> largest and mean radius of the scene [m]
+    real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
+    !> rule_dual or rule_primal
+    integer :: kind = rule_dual
+  contains
+    procedure :: range => rule_range
+    procedure :: reach => rule_reach
+    procedure :: sweep_edge => rule_sweep_edge
+  end type neighbour_rule_t
+
+  !> A grain, or a periodic image of one, where pairs are searched.
+  type :: entries_t
+    integer :: n = 0
+    !> place among the bodies (n)
+    integer, allocatable :: body(:)
+    !> periods by which it is shifted (3, n)
+    integer, allocatable :: shift(:, :)
+    !> with the shift (nd, n) [m]
+    real(dp), allocatable :: position(:, :)
+    !> (n)
+    integer, allocatable :: level(:)
+  end type entries_t
+
+  !> offsets of the cells searched from a cell besides itself: half of its neighbours, so that a pair is met once
+  integer, parameter :: half_stencil(3, 13) = reshape([ &
+    & 1, 0, 0, -1, 1, 0, 0, 1, 0, 1, 1, 0, &
+    & -1, -1, 1, 0, -1, 1, 1, -1, 1, -1, 0, 1, 0, 0, 1, 1, 0, 1, -1, 1, 1, 0, 1, 1, 1, 1, 1], [3, 13])
+
+contains
+
+  !> Gap up to which pairs are listed [m].
+  pure real(dp) function rule_range(self) result(range)
+    class(neighbour_rule_t), intent(in) :: self
+    range = self%alert_distance + self%skin
+  end function rule_range
+
+  !> How far from its centre a grain's pairs may have the point that decides their owner, or the candidate whose owner
+  !> needs it [m].
+  pure real(dp) function rule_reach(self, radius) result(reach)
+    class(neighbour_rule_t), intent(in) :: self
+    !> [m]
+    real(dp), intent(in) :: radius
+    reach = radius + self%largest_radius + self%range()
+    if (self%kind /= rule_primal) reach = 0.5_dp*reach
+  end function rule_reach
+
+  !> Edge of the cells in whose order contacts are swept [m].
+  pure real(dp) function rule_sweep_edge(self) result(edge)
+    class(neighbour_rule_t), intent(in) :: self
+    edge = 2.0_dp*self%mean_radius + self%alert_distance
+    if (.not. edge > 0.0_dp) edge = 1.0_dp
+  end function rule_sweep_edge
+
+  !> The point whose subdomain owns a pair of grains: the midpoint of the centres (dual), the candidate's centre (primal).
+  pure function owner_point(kind, candidate, antagonist) result(point)
+    integer, intent(in) :: kind
+    !> centres, the antagonist's shifted to where it meets the candidate (nd) [m]
+    real(dp), intent(in) :: candidate(:), antagonist(:)
+    real(dp) :: point(size(candidate))
+
+    if (kind == rule_primal) then
+      point(:) = candidate
+    else
+      point(:) = 0.5_dp*(candidate + antagonist)
+    end if
+  end function owner_point
+
+  !> Order of points along rows of cells, the last axis slowest, then by identifier: it depends on the set of points alone.
+  subroutine sweep_order(points, lower, edge, id, order)
+    !> (nd, n) [m]
+    real(dp), intent(in), contiguous :: points(:, :)
+    !> corner from which cells are counted (nd), and their edge [m]
+    real(dp), intent(in) :: lower(:), edge
+    !> (identifiers of a point, n)
+    integer(i8), intent(in), contiguous :: id(:, :)
+    !> (n) permutation to apply
+    integer, intent(out), contiguous :: order(:)
+    integer(i8), allocatable :: keys(:, :)
+    integer :: k
+
+    allocate (keys(1 + size(id, 1), size(points, 2)))
+    do k = 1, size(points, 2)
+      keys(1, k) = cell_key(0, place_of(points(:, k), lower, edge))
+      keys(2:, k) = id(:, k)
+    end do
+    call argsort_rows(keys, order)
+  end subroutine sweep_order
+
+  !> Cell of a point along each axis, from 0 at `lower`; what lies far out belongs to the last one.
+  pure function place_of(point, lower, edge) result(place)
+    real(dp), intent(in) :: point(:), lower(:), edge
+    integer :: place(3), d
+
+    place(:) = 0
+    do d = 1, size(point)
+      place(d) = int(min(max((point(d) - lower(d))/edge, 0.0_dp), real(last_cell, dp)))
+    end do
+  end function place_of
+
+  !> List the near pairs that belong to a subdomain, in sweep order, without impulses.
+  subroutine find_neighbours(bodies, home, boundaries, period, region, subdomain, rule, n_impulse, list)
+    !> the grains that the subdomain sees, wrapped into the period
+    type(body_set_t), intent(in) :: bodies
+    !> (n) subdomain that holds each grain's centre
+    integer, intent(in), contiguous :: home(:)
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(period_t), intent(in) :: period
+    class(region_t), intent(in) :: region
+    integer, intent(in) :: subdomain
+    type(neighbour_rule_t), intent(in) :: rule
+    !> entries of an impulse in the list
+    integer, intent(in) :: n_impulse
+    type(neighbour_list_t), intent(inout) :: list
+    type(entries_t) :: entries
+    type(cell_hash_t) :: hash
+    real(dp) :: lower(bodies%nd)
+    logical :: periodic
+
+    periodic = period%on()
+    call list%init(periodic, 4*bodies%n + 16)
+    if (bodies%n > 0) then
+      lower(:) = minval(bodies%position, dim=2)
+      call make_entries(bodies, period, rule, entries)
+      call hash_entries(entries, bodies%radius)
+      call search_boundaries()
+      call search_pairs()
+    end if
+    call sort_list()
+
+  contains
+
+    subroutine hash_entries(entries, radius)
+      type(entries_t), intent(inout) :: entries
+      real(dp), intent(in), contiguous :: radius(:)
+      integer(i8), allocatable :: keys(:)
+      integer :: e
+
+      if (periodic) lower(:) = minval(entries%position(:, 1:entries%n), dim=2)
+      allocate (keys(entries%n), entries%level(entries%n))
+      do e = 1, entries%n
+        entries%level(e) = level_of(radius(entries%body(e)), rule%largest_radius)
+        keys(e) = cell_key(entries%level(e), place_of(entries%position(:, e), lower, edge_of(entries%level(e))))
+      end do
+      call hash%init(keys)
+    end subroutine hash_entries
+
+    pure real(dp) function edge_of(level)
+      integer, intent(in) :: level
+      edge_of = 2.0_dp*rule%largest_radius*0.5_dp**level + rule%range()
+      if (.not. edge_of > 0.0_dp) edge_of = 1.0_dp
+    end function edge_of
+
+    subroutine search_boundaries()
+      integer :: k, b
+      real(dp) :: distance, normal(bodies%nd)
+
+      do k = 1, bodies%n
+        if (home(k) /= subdomain .or. bodies%glued(k) > 0) cycle
+        do b = 1, size(boundaries)
+          if (.not. boundaries(b)%touches()) cycle
+          call boundaries(b)%locate(bodies%position(:, k), distance, normal)
+          if (distance - bodies%radius(k) <= rule%range()) call list%add(k, -b, no_shift)
+        end do
+      end do
+    end subroutine search_boundaries
+
+    subroutine search_pairs()
+      integer :: cell, other, a, b, l, k, x, y, z, place(3), near(3)
+      logical :: used(0:n_levels - 1)
+
+      used(:) = .false.
+      do a = 1, entries%n
+        used(entries%level(a)) = .true.
+      end do
+      do cell = 1, hash%n_cells
+        a = hash%order(hash%first(cell))
+        l = entries%level(a)
+        place(:) = place_of(entries%position(:, a), lower, edge_of(l))
+        do a = hash%first(cell), hash%first(cell + 1) - 1
+          do b = a + 1, hash%first(cell + 1) - 1
+            call test_pair(hash%order(a), hash%order(b))
+          end do
+        end do
+        do k = 1, merge(4, 13, bodies%nd == 2)
+          near(:) = place + half_stencil(:, k)
+          if (any(near < 0) .or. any(near > last_cell)) cycle
+          other = hash%find(cell_key(l, near))
+          if (other == 0 .or. other == cell) cycle
+          do a = hash%first(cell), hash%first(cell + 1) - 1
+            do b = hash%first(other), hash%first(other + 1) - 1
+              call test_pair(hash%order(a), hash%order(b))
+            end do
+          end do
+        end do
+      end do
+      if (count(used) == 1) return
+      ! larger grains near each grain: one of a coarser level never lies farther off than one of its cells
+      do a = 1, entries%n
+        do l = 0, entries%level(a) - 1
+          if (.not. used(l)) cycle
+          place(:) = place_of(entries%position(:, a), lower, edge_of(l))
+          do z = merge(-1, 0, bodies%nd == 3), merge(1, 0, bodies%nd == 3)
+            do y = -1, 1
+              do x = -1, 1
+                near(1) = place(1) + x
+                near(2) = place(2) + y
+                near(3) = place(3) + z
+                if (any(near < 0) .or. any(near > last_cell)) cycle
+                other = hash%find(cell_key(l, near))
+                if (other == 0) cycle
+                do b = hash%first(other), hash%first(other + 1) - 1
+                  call test_pair(a, hash%order(b))
+                end do
+              end do
+            end do
+          end do
+        end do
+      end do
+    end subroutine search_pairs
+
+    subroutine test_pair(a, b)
+      integer, intent(in) :: a, b
+      integer :: i, j, shift(3), periods(3)
+      real(dp) :: branch(bodies%nd), antagonist(bodies%nd), point(bodies%nd)
+
+      i = entries%body(a)
+      j = entries%body(b)
+      branch(:) = entries%position(:, a) - entries%position(:, b)
+      if (dot_product(branch, branch) > (bodies%radius(i) + bodies%radius(j) + rule%range())**2) return
+      if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
+      shift(:) = 0
+      if (periodic) then
+        if (i == j) return
+        shift(:) = entries%shift(:, b) - entries%shift(:, a)
+        periods(:) = entries%shift(:, a)
+        if (bodies%id(j) < bodies%id(i)) then
+          shift(:) = -shift
+          periods(:) = entries%shift(:, b)
+        end if
+      end if
+      if (bodies%id(j) < bodies%id(i)) then
+        i = entries%body(b)
+        j = entries%body(a)
+      end if
+      antagonist(:) = bodies%position(:, j)
+      if (periodic) antagonist(:) = antagonist + shift(1:bodies%nd)*period%length(1:bodies%nd)
+      point(:) = owner_point(rule%kind, bodies%position(:, i), antagonist)
+      if (periodic) then
+        if (.not. is_where_owned(period, point, periods)) return
+      end if
+      if (region%owner(point) /= subdomain) return
+      call list%add(i, j, merge(shift_code(shift), no_shift, periodic))
+    end subroutine test_pair
+
+    subroutine sort_list()
+      integer(i8), allocatable :: id(:, :)
+      real(dp), allocatable :: point(:, :)
+      integer, allocatable :: order(:)
+      integer :: p, nd
+
+      nd = bodies%nd
+      allocate (id(2, list%n), point(nd, list%n), order(list%n))
+      do p = 1, list%n
+        id(1, p) = bodies%id(list%candidate(p))
+        if (list%antagonist(p) < 0) then
+          id(2, p) = list%antagonist(p)
+          point(:, p) = bodies%position(:, list%candidate(p))
+        else
+          id(2, p) = bodies%id(list%antagonist(p))
+          point(:, p) = bodies%position(:, list%antagonist(p))
+          if (periodic) point(:, p) = point(:, p) + shifted(period, list%shift(p), nd)
+          point(:, p) = owner_point(rule%kind, bodies%position(:, list%candidate(p)), point(:, p))
+        end if
+      end do
+      if (list%n > 0) lower(:) = minval(point, dim=2)
+      call sweep_order(point, lower, rule%sweep_edge(), id, order)
+      call list%finish(order, n_impulse)
+    end subroutine sort_list
+
+  end subroutine find_neighbours
+
+  !> Class of a radius: the grid whose cells are as large as its pairs need.
+  pure integer function level_of(radius, largest) result(level)
+    real(dp), intent(in) :: radius, largest
+    real(dp) :: half
+
+    level = 0
+    half = 0.5_dp*largest
+    do while (radius <= half .and. level < n_levels - 1)
+      level = level + 1
+      half = 0.5_dp*half
+    end do
+  end function level_of
+
+  !> Whether a pair is met where its owner point lies in the cell: of all its images one is. The point is wrapped.
+  pure logical function is_where_owned(period, point, periods)
+    type(period_t), intent(in) :: period
+    !> owner point of the image whose candidate is not shifted (nd) [m]
+    real(dp), intent(inout) :: point(:)
+    !> by which the candidate is shifted in the image met
+    integer, intent(in) :: periods(3)
+    integer :: wanted(3)
+
+    wanted(:) = 0
+    call period%wrap(point, wanted(1:size(point)))
+    is_where_owned = all(periods == wanted)
+  end function is_where_owned
+
+  !> Lengths of the shift of a code [m].
+  pure function shifted(period, code, nd) result(by)
+    type(period_t), intent(in) :: period
+    integer, intent(in) :: code, nd
+    real(dp) :: by(nd)
+    integer :: shift(3)
+
+    shift(:) = shift_of_code(code)
+    by(:) = shift(1:nd)*period%length(1:nd)
+  end function shifted
+
+  !> The grains and those of their periodic images that may meet another one.
+  subroutine make_entries(bodies, period, rule, entries)
+    type(body_set_t), intent(in) :: bodies
+    type(period_t), intent(in) :: period
+    type(neighbour_rule_t), intent(in) :: rule
+    type(entries_t), intent(out) :: entries
+    integer :: k, x, y, z, low(3), high(3), round, n
+
+    if (.not. period%on()) then
+      entries%n = bodies%n
+      entries%position = bodies%position
+      allocate (entries%body(bodies%n))
+      do k = 1, bodies%n
+        entries%body(k) = k
+      end do
+      return
+    end if
+    do round = 1, 2
+      n = 0
+      do k = 1, bodies%n
+        call image_range(bodies%position(:, k), bodies%radius(k) + rule%largest_radius + rule%range(), low, high)
+        do z = low(3), high(3)
+          do y = low(2), high(2)
+            do x = low(1), high(1)
+              n = n + 1
+              if (round == 1) cycle
+              entries%body(n) = k
+              entries%shift(1, n) = x
+              entries%shift(2, n) = y
+              entries%shift(3, n) = z
+              entries%position(:, n) = bodies%position(:, k) + entries%shift(1:bodies%nd, n)*period%length(1:bodies%nd)
+            end do
+          end do
+        end do
+      end do
+      entries%n = n
+      if (round == 1) allocate (entries%body(n), entries%shift(3, n), entries%position(bodies%nd, n))
+    end do
+
+  contains
+
+    !> Shifts that leave a grain within `margin` of the cell.
+    pure subroutine image_range(x, margin, low, high)
+      real(dp), intent(in) :: x(:), margin
+      integer, intent(out) :: low(3), high(3)
+      integer :: d
+
+      low(:) = 0
+      high(:) = 0
+      do d = 1, size(x)
+        if (.not. period%length(d) > 0.0_dp) cycle
+        if (x(d) - period%origin(d) <= margin) high(d) = 1
+        if (period%origin(d) + period%length(d) - x(d) <= margin) low(d) = -1
+      end do
+    end subroutine image_range
+
+  end subroutine make_entries
+
+end module gravier_neighbour_search

@@ -1,0 +1,288 @@
+!> What each subdomain sees: its grains, the ghosts near them, and the near pairs it owns; made anew only when grains
+!> have moved far enough.
+module gravier_neighbourhood
+  use gravier_kinds, only: dp, i8
+  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_body_store, only: body_set_t, append_bodies
+  use gravier_boundary, only: boundary_t, shape_plane, shape_grains, shape_outlet
+  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_search, only: find_neighbours, sweep_order
+  use gravier_decomposition, only: decomposition_t
+  implicit none
+  private
+  public :: neighbourhood_t, neighbourhoods_t
+
+  !> The grains that a subdomain sees, in an order that depends on them alone, and its near pairs.
+  type :: neighbourhood_t
+    type(body_set_t) :: bodies
+    !> subdomain that owns each, and for its own the place in home (n); 0 for ghosts
+    integer, allocatable :: home(:), origin(:)
+    type(neighbour_list_t) :: list
+  end type neighbourhood_t
+
+  !> Where the grains of a subdomain were when its list was made (nd, n) [m].
+  type :: places_t
+    real(dp), allocatable :: position(:, :)
+  end type places_t
+
+  !> The neighbourhoods of the subdomains of this rank, and who sends which grain to whom.
+  type :: neighbourhoods_t
+    type(neighbourhood_t), allocatable :: view(:)
+    !> as they were when the lists were made
+    type(places_t), allocatable :: reference(:)
+    type(boundary_t), allocatable :: reference_boundaries(:)
+    !> ghosts sent: subdomain of this rank and place in its home (2, n); subdomain that sees it, and its rank (n)
+    integer, allocatable :: sent(:, :), seer(:), destination(:)
+    !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
+    integer, allocatable :: arrival(:, :)
+    !> lists made so far
+    integer(i8) :: builds = 0
+  contains
+    procedure :: build => neighbourhoods_build
+    procedure :: refresh => neighbourhoods_refresh
+    procedure :: are_due => neighbourhoods_are_due
+  end type neighbourhoods_t
+
+contains
+
+  !> Make views and lists of the grains as they have settled. Collective.
+  subroutine neighbourhoods_build(self, decomposition, n_impulse)
+    class(neighbourhoods_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    !> entries of an impulse kept with a pair
+    integer, intent(in) :: n_impulse
+    type(body_set_t), allocatable :: ghosts(:)
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer :: s
+
+    call plan_ghosts(self, decomposition)
+    call write_ghosts(self, decomposition, records)
+    call sparse_exchange(decomposition%comm, records, self%destination, received)
+    call decomposition%unpack_by_subdomain(received, 2, ghosts)
+    if (allocated(self%view)) deallocate (self%view)
+    if (allocated(self%reference)) deallocate (self%reference)
+    allocate (self%view(size(decomposition%home)), self%reference(size(decomposition%home)))
+    call make_views(self, decomposition, ghosts, received)
+    do s = 1, size(self%view)
+      self%reference(s)%position = decomposition%home(s)%position
+      call find_neighbours(self%view(s)%bodies, self%view(s)%home, decomposition%boundaries, decomposition%period, &
+        & decomposition%partition, decomposition%subdomain_of(s), decomposition%rule, n_impulse, self%view(s)%list)
+    end do
+    self%reference_boundaries = decomposition%boundaries
+    self%builds = self%builds + 1
+  end subroutine neighbourhoods_build
+
+  !> Find the grains of this rank that other subdomains see.
+  subroutine plan_ghosts(self, decomposition)
+    class(neighbourhoods_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    integer, allocatable :: near(:)
+    integer :: s, k, j, n_near, n, round
+
+    if (allocated(self%sent)) deallocate (self%sent, self%seer, self%destination)
+    allocate (near(32))
+    do round = 1, 2
+      n = 0
+      do s = 1, size(decomposition%home)
+        associate (home => decomposition%home(s))
+          do k = 1, home%n
+            call decomposition%partition%near(home%position(:, k), decomposition%rule%reach(home%radius(k)), near, n_near)
+            do j = 1, n_near
+              if (near(j) == decomposition%subdomain_of(s)) cycle
+              n = n + 1
+              if (round == 1) cycle
+              self%sent(1, n) = s
+              self%sent(2, n) = k
+              self%seer(n) = near(j)
+              self%destination(n) = decomposition%comm%rank_of(near(j), decomposition%n_subdomains)
+            end do
+          end do
+        end associate
+      end do
+      if (round == 1) allocate (self%sent(2, n), self%seer(n), self%destination(n))
+    end do
+  end subroutine plan_ghosts
+
+  !> Records (seer, owner, grain).
+  subroutine write_ghosts(self, decomposition, records)
+    class(neighbourhoods_t), intent(in) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    type(body_set_t) :: empty
+    integer :: n
+
+    call empty%init(decomposition%nd, decomposition%nv, decomposition%ni, 0)
+    allocate (records(2 + empty%record_words(), size(self%seer)))
+    do n = 1, size(self%seer)
+      records(1, n) = self%seer(n)
+      records(2, n) = decomposition%subdomain_of(self%sent(1, n))
+      call decomposition%home(self%sent(1, n))%get_record(self%sent(2, n), records(3:, n))
+    end do
+  end subroutine write_ghosts
+
+  !> Put own grains and ghosts together, in sweep order, and note where each ghost went.
+  subroutine make_views(self, decomposition, ghosts, received)
+    class(neighbourhoods_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(body_set_t), intent(in) :: ghosts(:)
+    !> (seer, owner, grain)
+    integer(i8), intent(in), contiguous :: received(:, :)
+    integer, allocatable :: next(:)
+    integer :: s, k, n
+
+    if (allocated(self%arrival)) deallocate (self%arrival)
+    allocate (self%arrival(2, size(received, 2)), next(size(self%view)))
+    do s = 1, size(self%view)
+      associate (view => self%view(s))
+        view%bodies = decomposition%home(s)
+        call append_bodies(view%bodies, ghosts(s))
+        n = decomposition%home(s)%n
+        allocate (view%home(view%bodies%n), view%origin(view%bodies%n))
+        view%home(1:n) = decomposition%subdomain_of(s)
+        do k = 1, n
+          view%origin(k) = k
+        end do
+        view%origin(n + 1:) = 0
+        next(s) = n
+      end associate
+    end do
+    do k = 1, size(received, 2)
+      s = int(received(1, k)) - decomposition%first + 1
+      next(s) = next(s) + 1
+      self%view(s)%home(next(s)) = int(received(2, k))
+      self%arrival(1, k) = s
+      self%arrival(2, k) = next(s)
+    end do
+    call sort_views(self, decomposition)
+  end subroutine make_views
+
+  subroutine sort_views(self, decomposition)
+    class(neighbourhoods_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    integer(i8), allocatable :: id(:, :)
+    integer, allocatable :: order(:), home(:), origin(:), place(:), offset(:)
+    real(dp) :: lower(decomposition%nd)
+    integer :: s, k
+
+    allocate (offset(size(self%view) + 1))
+    offset(1) = 0
+    do s = 1, size(self%view)
+      offset(s + 1) = offset(s) + self%view(s)%bodies%n
+    end do
+    allocate (place(offset(size(offset))))
+    do s = 1, size(self%view)
+      associate (view => self%view(s))
+        allocate (order(view%bodies%n), id(1, view%bodies%n))
+        id(1, :) = view%bodies%id
+        lower(:) = 0.0_dp
+        if (view%bodies%n > 0) lower(:) = minval(view%bodies%position, dim=2)
+        call sweep_order(view%bodies%position, lower, decomposition%rule%sweep_edge(), id, order)
+        call view%bodies%reorder(order)
+        call move_alloc(view%home, home)
+        call move_alloc(view%origin, origin)
+        allocate (view%home(size(order)), view%origin(size(order)))
+        do k = 1, size(order)
+          view%home(k) = home(order(k))
+          view%origin(k) = origin(order(k))
+          place(offset(s) + order(k)) = k
+        end do
+        deallocate (order, id)
+      end associate
+    end do
+    do k = 1, size(self%arrival, 2)
+      self%arrival(2, k) = place(offset(self%arrival(1, k)) + self%arrival(2, k))
+    end do
+  end subroutine sort_views
+
+  !> Bring the places and velocities in the views up to date. Collective.
+  subroutine neighbourhoods_refresh(self, decomposition)
+    class(neighbourhoods_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer :: s, k, d, n, nd, nv
+
+    nd = decomposition%nd
+    nv = decomposition%nv
+    allocate (records(nd + nv, size(self%seer)))
+    do n = 1, size(self%seer)
+      associate (home => decomposition%home(self%sent(1, n)))
+        do d = 1, nd
+          records(d, n) = transfer(home%position(d, self%sent(2, n)), 0_i8)
+        end do
+        do d = 1, nv
+          records(nd + d, n) = transfer(home%velocity(d, self%sent(2, n)), 0_i8)
+        end do
+      end associate
+    end do
+    call sparse_exchange(decomposition%comm, records, self%destination, received)
+    do n = 1, size(received, 2)
+      associate (bodies => self%view(self%arrival(1, n))%bodies)
+        do d = 1, nd
+          bodies%position(d, self%arrival(2, n)) = transfer(received(d, n), 0.0_dp)
+        end do
+        do d = 1, nv
+          bodies%velocity(d, self%arrival(2, n)) = transfer(received(nd + d, n), 0.0_dp)
+        end do
+      end associate
+    end do
+    do s = 1, size(self%view)
+      associate (view => self%view(s), home => decomposition%home(s))
+        do k = 1, view%bodies%n
+          if (view%origin(k) == 0) cycle
+          view%bodies%position(:, k) = home%position(:, view%origin(k))
+          view%bodies%velocity(:, k) = home%velocity(:, view%origin(k))
+        end do
+      end associate
+    end do
+  end subroutine neighbourhoods_refresh
+
+  !> Whether some pair outside the lists may have come within the alert distance. Collective.
+  logical function neighbourhoods_are_due(self, decomposition) result(due)
+    class(neighbourhoods_t), intent(in) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    real(dp) :: farthest, boundary
+    integer :: s, k, b
+
+    due = .true.
+    if (.not. allocated(self%view)) return
+    farthest = 0.0_dp
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          farthest = max(farthest, sum((home%position(:, k) - self%reference(s)%position(:, k))**2))
+        end do
+      end associate
+    end do
+    farthest = sqrt(decomposition%comm%highest(farthest))
+    boundary = 0.0_dp
+    do b = 1, size(decomposition%boundaries)
+      boundary = max(boundary, way_of(decomposition%boundaries(b), self%reference_boundaries(b)))
+    end do
+    due = farthest + max(farthest, boundary) > decomposition%rule%skin
+  end function neighbourhoods_are_due
+
+  !> How far the surface of a boundary has moved at most [m].
+  pure real(dp) function way_of(now, before) result(way)
+    type(boundary_t), intent(in) :: now, before
+    integer :: k
+    real(dp) :: corner(3)
+
+    way = 0.0_dp
+    if (.not. now%present .or. now%shape == shape_grains .or. now%shape == shape_outlet) return
+    if (any(abs(now%axis - before%axis) > 0.0_dp)) then
+      ! a plane or a cylinder that tilts moves without bound
+      way = huge(1.0_dp)
+    else if (now%shape == shape_plane) then
+      way = abs(sum((now%point - before%point)*now%axis))
+    else
+      ! a rigid motion takes some corner farthest
+      do k = 0, 3
+        corner(:) = now%point - before%point
+        if (k == 1 .or. k == 3) corner(:) = corner + now%edge(:, 1) - before%edge(:, 1)
+        if (k >= 2) corner(:) = corner + now%edge(:, 2) - before%edge(:, 2)
+        way = max(way, norm2(corner))
+      end do
+    end if
+  end function way_of
+
+end module gravier_neighbourhood
