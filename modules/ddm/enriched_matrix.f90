@@ -1,4 +1,7 @@
 !> The enriched matrices M_E + H_E l_E H_E^T of the subdomains of a rank, and their factors.
+!>
+!> A component that cannot move (inverse mass 0) is eliminated: its row and column hold a one on the diagonal and nothing else,
+!> and its velocity is zero. Its place is kept, so that all bodies have as many unknowns.
 module gravier_enriched_matrix
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -124,7 +127,7 @@ contains
     end do
   end subroutine set_direction
 
-  !> Lower triangle of M + H l H^T with the masses in `weight`, as triplets.
+  !> Lower triangle of M + H l H^T with the masses in `weight`, as triplets; components that cannot move eliminated.
   subroutine assemble(kernels, sub, direction, row, column, value)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
@@ -141,7 +144,11 @@ contains
     n = 0
     do b = 1, sub%n_bodies
       do d = 1, nv
-        call add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp/sub%weight(merge(1, 2, d <= kernels%nd), b))
+        if (sub%moves(d, b)) then
+          call add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp/sub%weight(min(d, kernels%nw), b))
+        else
+          call add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp)
+        end if
       end do
     end do
     do c = 1, sub%n_contacts
@@ -167,7 +174,8 @@ contains
 
       do p = 1, nv
         do q = 1, merge(p, nv, i == j)
-          x = sum(jacobian(:, p, a)*direction(:, c)*jacobian(:, q, b))
+          x = 0.0_dp
+          if (sub%moves(p, i) .and. sub%moves(q, j)) x = sum(jacobian(:, p, a)*direction(:, c)*jacobian(:, q, b))
           call add((i - 1)*nv + p, (j - 1)*nv + q, x)
         end do
       end do
@@ -184,7 +192,7 @@ contains
 
   end subroutine assemble
 
-  !> Solve (M + H l H^T) y = b in subdomain `s`, in place; walls have no velocity.
+  !> Solve (M + H l H^T) y = b in subdomain `s`, in place; what cannot move has no velocity, walls among it.
   subroutine enriched_matrix_solve(self, problem, s, b, error)
     class(enriched_matrix_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
@@ -193,7 +201,7 @@ contains
     real(dp), intent(inout), contiguous :: b(:, :)
     type(error_t), allocatable, intent(inout) :: error
     real(dp), allocatable :: flat(:, :)
-    integer :: k, nv
+    integer :: k, d, nv
 
     nv = problem%kernels%nv
     allocate (flat(nv*problem%sub(s)%n_bodies, 1))
@@ -202,7 +210,9 @@ contains
     end do
     if (size(flat) > 0) call self%part(s)%factor%solve(flat, error)
     do k = 1, problem%sub(s)%n_bodies
-      b(:, k) = flat((k - 1)*nv + 1:k*nv, 1)
+      do d = 1, nv
+        b(d, k) = merge(flat((k - 1)*nv + d, 1), 0.0_dp, problem%sub(s)%moves(d, k))
+      end do
     end do
     b(:, problem%sub(s)%n_bodies + 1:) = 0.0_dp
   end subroutine enriched_matrix_solve

@@ -74,23 +74,22 @@ contains
       & to_text(self%max_iterations)//" iterations did not reach cg_tolerance = "//to_text(self%tolerance, 3))
   end subroutine interface_cg_solve
 
-  !> z := r divided by the diagonal of X for l = 0.
+  !> z := r divided by the diagonal of X for l = 0; zero, as r is, for a component that cannot move.
   subroutine precondition(problem, r, z)
     type(contact_problem_t), intent(in) :: problem
     type(interface_field_t), intent(in) :: r(:)
     type(interface_field_t), intent(inout) :: z(:)
-    real(dp) :: diagonal(2)
-    integer :: s, k, nd
+    integer :: s, k
 
-    nd = problem%kernels%nd
     do s = 1, size(r)
-      do k = 1, problem%shared%part(s)%n_shared
-        diagonal(:) = 2.0_dp*problem%sub(s)%weight(:, problem%shared%part(s)%body(k))
-        z(s)%upper(1:nd, k) = r(s)%upper(1:nd, k)/diagonal(1)
-        z(s)%upper(nd + 1:, k) = r(s)%upper(nd + 1:, k)/diagonal(2)
-        z(s)%lower(1:nd, k) = r(s)%lower(1:nd, k)/diagonal(1)
-        z(s)%lower(nd + 1:, k) = r(s)%lower(nd + 1:, k)/diagonal(2)
-      end do
+      associate (sub => problem%sub(s), part => problem%shared%part(s))
+        do k = 1, part%n_shared
+          z(s)%upper(:, k) = 0.5_dp*r(s)%upper(:, k)
+          z(s)%lower(:, k) = 0.5_dp*r(s)%lower(:, k)
+          call sub%multiply_mass(part%body(k), z(s)%upper(:, k))
+          call sub%multiply_mass(part%body(k), z(s)%lower(:, k))
+        end do
+      end associate
     end do
   end subroutine precondition
 

@@ -125,15 +125,16 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     real(dp) :: load(problem%kernels%nv)
-    integer :: k, b, nd
+    integer :: k, b, nd, nw
 
     nd = problem%kernels%nd
+    nw = problem%kernels%nw
     associate (part => problem%shared%part(s), sub => problem%sub(s), change => self%change(s))
       do k = 1, part%n_shared
         b = part%body(k)
         load(:) = change%upper(:, k) - change%lower(:, k)
-        sub%velocity(1:nd, b) = sub%velocity(1:nd, b) - sub%weight(1, b)*load(1:nd)
-        sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) - sub%weight(2, b)*load(nd + 1:)
+        sub%velocity(1:nd, b) = sub%velocity(1:nd, b) - sub%weight(1:nd, b)*load(1:nd)
+        sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) - sub%weight(nw, b)*load(nd + 1:)
       end do
     end associate
   end subroutine take_multipliers

@@ -143,7 +143,7 @@ contains
     allocate (sub%id(sub%n_columns), sub%home(sub%n_bodies), sub%position(kernels%nd, sub%n_bodies))
     allocate (sub%v_free(kernels%nv, sub%n_columns), sub%velocity(kernels%nv, sub%n_columns), &
       & sub%v_global(kernels%nv, sub%n_columns), sub%reaction(kernels%nv, sub%n_columns), &
-      & sub%inverse_mass(2, sub%n_columns), sub%weight(2, sub%n_columns), source=0.0_dp)
+      & sub%inverse_mass(kernels%nw, sub%n_columns), sub%weight(kernels%nw, sub%n_columns), source=0.0_dp)
     allocate (sub%multiplicity(sub%n_bodies), source=1)
     do k = 1, size(number_of)
       b = number_of(k)
@@ -153,8 +153,8 @@ contains
       sub%position(:, b) = seen%bodies%position(:, k)
       sub%v_free(:, b) = seen%bodies%velocity(:, k)
       call make_free_velocity(sub%v_free(:, b), physics%gravity(1:kernels%nd), physics%h)
-      sub%inverse_mass(1, b) = 1.0_dp/seen%bodies%mass(k)
-      sub%inverse_mass(2, b) = 1.0_dp/seen%bodies%inertia(k)
+      sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/seen%bodies%mass(k)
+      if (kernels%nw > kernels%nd) sub%inverse_mass(kernels%nw, b) = 1.0_dp/seen%bodies%inertia(k)
     end do
     sub%id(sub%n_bodies + 1:) = walls%id
   end subroutine pack_bodies
@@ -368,19 +368,26 @@ contains
     problem%n_contacts = counts(n_multiplicities + 2)
   end subroutine count_figures
 
-  !> Scales of the residual and of the jump: largest |R^d| and largest free speed of a grain in contact. Collective.
+  !> Scales of the residual and of the jump: largest |R^d|, over the components that can move, and largest free speed of a
+  !> body in contact. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(2), speed
-    integer :: s, b
+    real(dp) :: scales(2), moving(problem%kernels%nd)
+    integer :: s, b, d, nd
 
+    nd = problem%kernels%nd
     scales(:) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do b = 1, sub%n_bodies
-          speed = norm2(sub%v_free(1:problem%kernels%nd, b))
-          scales(1) = max(scales(1), speed/sub%inverse_mass(1, b))
-          scales(2) = max(scales(2), speed)
+          scales(2) = max(scales(2), norm2(sub%v_free(1:nd, b)))
+          moving(:) = sub%v_free(1:nd, b)
+          do d = 1, nd
+            if (.not. sub%moves(d, b)) moving(d) = 0.0_dp
+          end do
+          ! all components that move have the same mass
+          if (any(sub%inverse_mass(1:nd, b) > 0.0_dp)) scales(1) = max(scales(1), &
+            & norm2(moving)/maxval(sub%inverse_mass(1:nd, b)))
         end do
       end associate
     end do

@@ -59,29 +59,29 @@ contains
   end subroutine schwarz_iterate
 
   !> R_E = M (V_E - M^-1 R^d) - R_E^ddm on the shared bodies of subdomain `s`, into `reaction`: equal to H_E r_E, without
-  !> a pass over the contacts.
+  !> a pass over the contacts. Components that cannot move have none.
   subroutine shared_reactions(problem, s, load)
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     type(neighbour_load_t), intent(in) :: load
-    integer :: k, b, nd
+    integer :: k, b
 
-    nd = problem%kernels%nd
     associate (sub => problem%sub(s), part => problem%shared%part(s))
       do k = 1, part%n_shared
         b = part%body(k)
-        sub%reaction(1:nd, b) = (sub%velocity(1:nd, b) - sub%v_free(1:nd, b))/sub%weight(1, b) - load%value(1:nd, k)
-        sub%reaction(nd + 1:, b) = (sub%velocity(nd + 1:, b) - sub%v_free(nd + 1:, b))/sub%weight(2, b) &
-          & - load%value(nd + 1:, k)
+        sub%reaction(:, b) = sub%velocity(:, b) - sub%v_free(:, b)
+        call sub%multiply_mass(b, sub%reaction(:, b))
+        sub%reaction(:, b) = sub%reaction(:, b) - load%value(:, k)
       end do
     end associate
   end subroutine shared_reactions
 
-  !> Loads that agree with the impulses at the start of a solve, which `start_velocities` has put into the velocities.
+  !> Loads that agree with the impulses at the start of a solve, which `start_velocities` has put into the velocities; none
+  !> on components that cannot move.
   subroutine start_neighbour_loads(problem, load)
     type(contact_problem_t), intent(inout) :: problem
     type(neighbour_load_t), allocatable, intent(out) :: load(:)
-    integer :: s, k
+    integer :: s, k, d
 
     allocate (load(size(problem%sub)))
     do s = 1, size(problem%sub)
@@ -93,6 +93,9 @@ contains
     do s = 1, size(problem%sub)
       do k = 1, problem%shared%part(s)%n_shared
         call problem%shared%add_copies(s, k, load(s)%value(:, k))
+        do d = 1, problem%kernels%nv
+          if (.not. problem%sub(s)%moves(d, problem%shared%part(s)%body(k))) load(s)%value(d, k) = 0.0_dp
+        end do
       end do
     end do
   end subroutine start_neighbour_loads
@@ -105,9 +108,10 @@ contains
     real(dp), intent(in) :: relaxation
     type(neighbour_load_t), intent(inout) :: load(:)
     real(dp) :: change(problem%kernels%nv)
-    integer :: s, k, b, nd
+    integer :: s, k, b, nd, nw
 
     nd = problem%kernels%nd
+    nw = problem%kernels%nw
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), sub => problem%sub(s), old => load(s)%value)
@@ -117,8 +121,8 @@ contains
           call problem%shared%add_copies(s, k, change)
           change(:) = relaxation*(change - old(:, k))
           old(:, k) = old(:, k) + change
-          sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1, b)*change(1:nd)
-          sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(2, b)*change(nd + 1:)
+          sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1:nd, b)*change(1:nd)
+          sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(nw, b)*change(nd + 1:)
         end do
       end associate
     end do

@@ -81,16 +81,15 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     type(error_t), allocatable, intent(inout) :: error
-    integer :: k, b, nd
+    integer :: k, b
 
-    nd = problem%kernels%nd
     call shared_reactions(problem, s, self%load(s))
     call self%matrix%enrich(problem, s, error)
     associate (work => self%matrix%part(s)%body_work, sub => problem%sub(s), shared => problem%shared%part(s))
       do k = 1, shared%n_shared
         b = shared%body(k)
-        work(1:nd, b) = sub%reaction(1:nd, b) + work(1:nd, b)/sub%weight(1, b)
-        work(nd + 1:, b) = sub%reaction(nd + 1:, b) + work(nd + 1:, b)/sub%weight(2, b)
+        call sub%multiply_mass(b, work(:, b))
+        work(:, b) = sub%reaction(:, b) + work(:, b)
       end do
     end associate
   end subroutine enriched_reactions

@@ -6,13 +6,18 @@
 !>   impulse       (n[, t[, s]]) [N s], compression positive
 !> and a body a column of
 !>   velocity      (nv) translation, then spin
-!>   weight        inverse mass and inverse inertia, zero for what cannot move
+!>   weight        inverse mass of each component of the translation, then, where bodies turn, inverse inertia (nw); zero
+!>                 for what cannot move. Grains have the same mass along all axes, boundaries need not.
 !> The normal points from the antagonist to the candidate; v = H^T V and R = H r (paper, section 1).
+!>
+!> Local operators are taken diagonal, which they are between bodies of equal components. With a body whose components
+!> differ, W_nn is the exact one, and W_tt the largest eigenvalue of the tangential block: a relaxation with these two
+!> lowers the energy of the contact whatever the entries off the diagonal, and its fixed points are the same.
 module gravier_contact_kernels
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: kernels_t, contact_jacobian, tangents
+  public :: kernels_t, contact_jacobian, tangents, normal_operator, tangential_operator
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse.
@@ -58,8 +63,8 @@ module gravier_contact_kernels
   end interface
 
   type :: kernels_t
-    !> space dimension, degrees of freedom of a body, components of an impulse, rows of `hot`
-    integer :: nd = 2, nv = 2, nc = 1, nh = 4
+    !> space dimension, degrees of freedom of a body, rows of `weight`, components of an impulse, rows of `hot`
+    integer :: nd = 2, nv = 2, nw = 2, nc = 1, nh = 4
     procedure(sweep_kernel), pointer, nopass :: sweep => null()
     procedure(recording_kernel), pointer, nopass :: sweep_recording => null()
     procedure(reaction_kernel), pointer, nopass :: add_reaction => null()
@@ -84,6 +89,7 @@ contains
     self%nd = dimension
     self%nv = dimension
     if (rotation) self%nv = merge(3, 6, dimension == 2)
+    self%nw = dimension + merge(1, 0, rotation)
     self%nc = merge(dimension, 1, friction)
     self%nh = dimension + merge(6, 2, friction)
     if (friction .and. dimension == 2) then
@@ -138,6 +144,55 @@ contains
     s(2) = side + n(2)*n(2)*a
     s(3) = -n(2)
   end subroutine tangents
+
+  !> W_nn of two bodies [1/kg], sum over d of n_d^2 (w_d,i + w_d,j): exactly w_i + w_j where components are equal.
+  pure real(dp) function normal_operator(n, wi, wj) result(w)
+    !> (nd) unit normal
+    real(dp), intent(in), contiguous :: n(:)
+    !> (nw) columns of `weight`
+    real(dp), intent(in), contiguous :: wi(:), wj(:)
+    integer :: d
+
+    w = wi(1) + wj(1)
+    do d = 2, size(n)
+      w = w + n(d)**2*((wi(d) - wi(1)) + (wj(d) - wj(1)))
+    end do
+  end function normal_operator
+
+  !> Translational part of W_tt of two bodies [1/kg], the largest eigenvalue of the tangential block: exactly w_i + w_j
+  !> where components are equal.
+  pure real(dp) function tangential_operator(n, wi, wj) result(w)
+    !> (nd) unit normal
+    real(dp), intent(in), contiguous :: n(:)
+    !> (nw) columns of `weight`
+    real(dp), intent(in), contiguous :: wi(:), wj(:)
+
+    if (size(n) == 2) then
+      w = tangential_2d(n, wi, wj)
+    else
+      w = tangential_3d(n, wi, wj)
+    end if
+  end function tangential_operator
+
+  pure real(dp) function tangential_2d(n, wi, wj) result(w)
+    real(dp), intent(in), contiguous :: n(:), wi(:), wj(:)
+
+    w = wi(1) + wj(1) + n(1)**2*((wi(2) - wi(1)) + (wj(2) - wj(1)))
+  end function tangential_2d
+
+  pure real(dp) function tangential_3d(n, wi, wj) result(w)
+    real(dp), intent(in), contiguous :: n(:), wi(:), wj(:)
+    real(dp) :: t(3), s(3), y, z, tt, ss, ts
+
+    call tangents(n, t, s)
+    ! the block less (w_1,i + w_1,j) times the identity
+    y = (wi(2) - wi(1)) + (wj(2) - wj(1))
+    z = (wi(3) - wi(1)) + (wj(3) - wj(1))
+    tt = t(2)**2*y + t(3)**2*z
+    ss = s(2)**2*y + s(3)**2*z
+    ts = t(2)*s(2)*y + t(3)*s(3)*z
+    w = wi(1) + wj(1) + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
+  end function tangential_3d
 
   !> Rows of H^T of one contact: v = candidate . V_i + antagonist . V_j.
   pure subroutine contact_jacobian(nd, nc, hot, candidate, antagonist)
@@ -208,7 +263,7 @@ contains
       i = pair(1, c)
       j = pair(2, c)
       vn = sum((velocity(1:nd, i) - velocity(1:nd, j))*hot(1:nd, c))
-      rn = max(0.0_dp, impulse(1, c) - (vn + hot(nd + 1, c))/(weight(1, i) + weight(1, j)))
+      rn = max(0.0_dp, impulse(1, c) - (vn + hot(nd + 1, c))/normal_operator(hot(1:nd, c), weight(:, i), weight(:, j)))
       sums(1) = sums(1) + (rn - impulse(1, c))**2
       sums(2) = sums(2) + impulse(1, c)**2
     end do
@@ -270,8 +325,9 @@ contains
       i = pair(1, c)
       j = pair(2, c)
       call velocity_2d(hot(:, c), velocity(:, i), velocity(:, j), vn, vt)
-      wn = weight(1, i) + weight(1, j)
-      wt = wn + weight(2, i)*hot(6, c)**2 + weight(2, j)*hot(7, c)**2
+      wn = normal_operator(hot(1:2, c), weight(:, i), weight(:, j))
+      wt = tangential_2d(hot(1:2, c), weight(:, i), weight(:, j))
+      wt = wt + weight(3, i)*hot(6, c)**2 + weight(3, j)*hot(7, c)**2
       rn = max(0.0_dp, impulse(1, c) - (vn + hot(3, c))/wn)
       rt = max(-hot(8, c)*rn, min(hot(8, c)*rn, impulse(2, c) - vt/wt))
       sums(1) = sums(1) + (rn - impulse(1, c))**2 + (rt - impulse(2, c))**2
@@ -336,8 +392,9 @@ contains
       i = pair(1, c)
       j = pair(2, c)
       call velocity_3d(hot(:, c), velocity(:, i), velocity(:, j), v)
-      wn = weight(1, i) + weight(1, j)
-      wt = wn + weight(2, i)*hot(7, c)**2 + weight(2, j)*hot(8, c)**2
+      wn = normal_operator(hot(1:3, c), weight(:, i), weight(:, j))
+      wt = tangential_3d(hot(1:3, c), weight(:, i), weight(:, j))
+      wt = wt + weight(4, i)*hot(7, c)**2 + weight(4, j)*hot(8, c)**2
       rn = max(0.0_dp, impulse(1, c) - (v(1) + hot(4, c))/wn)
       rt(:) = impulse(2:3, c) - v(2:3)/wt
       bound = hot(9, c)*rn

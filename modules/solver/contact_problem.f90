@@ -4,7 +4,7 @@ module gravier_contact_problem
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_kernels, only: kernels_t, normal_operator, tangential_operator
   implicit none
   private
   public :: subproblem_t, contact_problem_t
@@ -34,9 +34,9 @@ module gravier_contact_problem
     real(dp), allocatable :: v_global(:, :)
     !> work space, H r (nv, n_columns) [N s, N m s]
     real(dp), allocatable :: reaction(:, :)
-    !> 1/m and 1/I of the undivided bodies, 0 for walls (2, n_columns)
+    !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (nw, n_columns)
     real(dp), allocatable :: inverse_mass(:, :)
-    !> the same as the scheme shares masses out (2, n_columns)
+    !> the same as the scheme shares masses out (nw, n_columns)
     real(dp), allocatable :: weight(:, :)
     !> (2, n_contacts), (nh, n_contacts), (nc, n_contacts): see gravier_contact_kernels
     integer, allocatable :: pair(:, :)
@@ -48,6 +48,8 @@ module gravier_contact_problem
     procedure :: share_masses => subproblem_share_masses
     procedure :: update_local_operator => subproblem_update_local_operator
     procedure :: local_operator => subproblem_local_operator
+    procedure :: moves => subproblem_moves
+    procedure :: multiply_mass => subproblem_multiply_mass
   end type subproblem_t
 
   type :: contact_problem_t
@@ -101,11 +103,11 @@ contains
     end do
   end subroutine subproblem_update_local_operator
 
-  !> W_nn and W_tt of contact `c` [1/kg]; W_tt = W_nn without friction.
+  !> W_nn and W_tt of contact `c` [1/kg], see gravier_contact_kernels; W_tt = W_nn without friction.
   pure subroutine subproblem_local_operator(self, c, weight, w)
     class(subproblem_t), intent(in) :: self
     integer, intent(in) :: c
-    !> (2, n_columns)
+    !> (nw, n_columns)
     real(dp), intent(in), contiguous :: weight(:, :)
     real(dp), intent(out) :: w(2)
     integer :: nd, i, j
@@ -113,11 +115,36 @@ contains
     nd = size(self%position, 1)
     i = self%pair(1, c)
     j = self%pair(2, c)
-    w(:) = weight(1, i) + weight(1, j)
+    w(:) = normal_operator(self%hot(1:nd, c), weight(:, i), weight(:, j))
     if (size(self%hot, 1) > nd + 2) then
-      w(2) = w(2) + self%hot(nd + 4, c)**2*weight(2, i) + self%hot(nd + 5, c)**2*weight(2, j)
+      w(2) = tangential_operator(self%hot(1:nd, c), weight(:, i), weight(:, j))
+      w(2) = w(2) + self%hot(nd + 4, c)**2*weight(nd + 1, i) + self%hot(nd + 5, c)**2*weight(nd + 1, j)
     end if
   end subroutine subproblem_local_operator
+
+  !> Whether degree of freedom `d` of body `b` can move.
+  pure logical function subproblem_moves(self, d, b) result(moves)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: d, b
+    moves = self%inverse_mass(min(d, size(self%inverse_mass, 1)), b) > 0.0_dp
+  end function subproblem_moves
+
+  !> v := M v of body `b` with the masses in `weight`; 0 for components that cannot move.
+  pure subroutine subproblem_multiply_mass(self, b, v)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: b
+    !> (nv) [m/s, rad/s] in, [N s, N m s] out
+    real(dp), intent(inout), contiguous :: v(:)
+    integer :: d
+
+    do d = 1, size(v)
+      if (self%moves(d, b)) then
+        v(d) = v(d)/self%weight(min(d, size(self%weight, 1)), b)
+      else
+        v(d) = 0.0_dp
+      end if
+    end do
+  end subroutine subproblem_multiply_mass
 
   !> R_E = H_E r_E of subdomain `s` of this rank, into `reaction`.
   subroutine contact_problem_own_reactions(self, s)
@@ -156,12 +183,13 @@ contains
 
     subroutine add_impulses(sub)
       type(subproblem_t), intent(inout) :: sub
-      integer :: b, nd
+      integer :: b, nd, nw
 
       nd = self%kernels%nd
+      nw = self%kernels%nw
       do b = 1, sub%n_columns
-        sub%v_global(1:nd, b) = sub%v_free(1:nd, b) + sub%inverse_mass(1, b)*sub%reaction(1:nd, b)
-        sub%v_global(nd + 1:nv, b) = sub%v_free(nd + 1:nv, b) + sub%inverse_mass(2, b)*sub%reaction(nd + 1:nv, b)
+        sub%v_global(1:nd, b) = sub%v_free(1:nd, b) + sub%inverse_mass(1:nd, b)*sub%reaction(1:nd, b)
+        sub%v_global(nd + 1:nv, b) = sub%v_free(nd + 1:nv, b) + sub%inverse_mass(nw, b)*sub%reaction(nd + 1:nv, b)
       end do
     end subroutine add_impulses
 

@@ -206,10 +206,10 @@ contains
         impulse(d, 1) = 1.0_dp
         sub%reaction(:, :) = 0.0_dp
         call problem%kernels%add_reaction(sub%pair(:, c:c), sub%hot(:, c:c), impulse, sub%reaction)
-        sub%reaction(1:nd, sub%pair(1, c)) = sub%weight(1, sub%pair(1, c))*sub%reaction(1:nd, sub%pair(1, c))
-        sub%reaction(nd + 1:, sub%pair(1, c)) = sub%weight(2, sub%pair(1, c))*sub%reaction(nd + 1:, sub%pair(1, c))
-        sub%reaction(1:nd, sub%pair(2, c)) = sub%weight(1, sub%pair(2, c))*sub%reaction(1:nd, sub%pair(2, c))
-        sub%reaction(nd + 1:, sub%pair(2, c)) = sub%weight(2, sub%pair(2, c))*sub%reaction(nd + 1:, sub%pair(2, c))
+        sub%reaction(1:nd, sub%pair(1, c)) = sub%weight(1:nd, sub%pair(1, c))*sub%reaction(1:nd, sub%pair(1, c))
+        sub%reaction(nd + 1:, sub%pair(1, c)) = sub%weight(problem%kernels%nw, sub%pair(1, c))*sub%reaction(nd + 1:, sub%pair(1, c))
+        sub%reaction(1:nd, sub%pair(2, c)) = sub%weight(1:nd, sub%pair(2, c))*sub%reaction(1:nd, sub%pair(2, c))
+        sub%reaction(nd + 1:, sub%pair(2, c)) = sub%weight(problem%kernels%nw, sub%pair(2, c))*sub%reaction(nd + 1:, sub%pair(2, c))
         call problem%kernels%contact_velocity(sub%pair(:, c:c), sub%hot(:, c:c), sub%reaction, v)
         ! some roundings, relative to the largest entry; the other components do not move
         v(d, 1) = v(d, 1) - w(min(d, 2))

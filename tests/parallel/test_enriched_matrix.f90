@@ -124,7 +124,7 @@ contains
         call sim%problem%kernels%add_reaction(sub%pair, sub%hot, v, b)
         do g = 1, sub%n_bodies
           do d = 1, nv
-            b(d, g) = b(d, g) + y(d, g)/sub%weight(merge(1, 2, d <= dimension), g)
+            b(d, g) = b(d, g) + y(d, g)/sub%weight(min(d, sim%problem%kernels%nw), g)
           end do
         end do
         scale = maxval(abs(b))
@@ -161,8 +161,8 @@ contains
         expected(:) = l
         if (relative) then
           w(:) = sub%inverse_mass(1, sub%pair(1, c)) + sub%inverse_mass(1, sub%pair(2, c))
-          if (kernels%nc > 1) w(2) = w(2) + sub%inverse_mass(2, sub%pair(1, c))*sub%hot(kernels%nd + 4, c)**2 + &
-            & sub%inverse_mass(2, sub%pair(2, c))*sub%hot(kernels%nd + 5, c)**2
+          if (kernels%nc > 1) w(2) = w(2) + sub%inverse_mass(kernels%nw, sub%pair(1, c))*sub%hot(kernels%nd + 4, c)**2 + &
+            & sub%inverse_mass(kernels%nw, sub%pair(2, c))*sub%hot(kernels%nd + 5, c)**2
           expected(:) = l/w
         end if
         if (active) then

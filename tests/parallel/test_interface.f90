@@ -431,7 +431,7 @@ contains
             end do
             mean = mean/part%multiplicity(k)
             velocity = copy_of(sub%id(part%body(k)), sub%subdomain, d, 5) - &
-              & sub%weight(merge(1, 2, d <= dimension), part%body(k))*(f(s)%upper(d, k) - f(s)%lower(d, k))
+              & sub%weight(min(d, sim%problem%kernels%nw), part%body(k))*(f(s)%upper(d, k) - f(s)%lower(d, k))
             right = right .and. abs(velocity - mean) <= 100*epsilon(1.0_dp)
           end do
         end do

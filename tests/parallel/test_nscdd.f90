@@ -205,7 +205,7 @@ contains
       associate (sub => problem%sub(s))
         do b = 1, sub%n_bodies
           do d = 1, problem%kernels%nv
-            parts(d, s) = parts(d, s) + sub%velocity(d, b)/sub%weight(merge(1, 2, d <= problem%kernels%nd), b)
+            parts(d, s) = parts(d, s) + sub%velocity(d, b)/sub%weight(min(d, problem%kernels%nw), b)
           end do
         end do
       end associate

@@ -219,7 +219,7 @@ contains
           ! A^T F = M~ (V_free - V) + H r, into `reaction`, and M~ V + H l v
           do b = 1, sub%n_bodies
             do d = 1, nv
-              associate (weight => sub%weight(merge(1, 2, d <= nd), b))
+              associate (weight => sub%weight(min(d, size(sub%weight, 1)), b))
                 sub%reaction(d, b) = sub%reaction(d, b) + (sub%v_free(d, b) - sub%velocity(d, b))/weight
               end associate
             end do
@@ -230,7 +230,7 @@ contains
           call sim%problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, force)
           do b = 1, sub%n_bodies
             do d = 1, nv
-              force(d, b) = force(d, b) + sub%velocity(d, b)/sub%weight(merge(1, 2, d <= nd), b)
+              force(d, b) = force(d, b) + sub%velocity(d, b)/sub%weight(min(d, size(sub%weight, 1)), b)
             end do
           end do
           call scheme%matrix%solve(sim%problem, s, force, error)

@@ -221,14 +221,16 @@ contains
         right = right .and. sub%multiplicity(b) == count(truth%touches(g, :))
         right = right .and. all(abs(sub%position(:, b) - truth%place(:, g)) <= 0.0_dp)
         ! one rounding of numbers of size 1
-        right = right .and. abs(sub%inverse_mass(1, b)*(1.0_dp + draw(g, 5)) - 1.0_dp) <= 2*epsilon(1.0_dp)
-        right = right .and. abs(sub%inverse_mass(2, b)*(0.1_dp + draw(g, 6)) - 1.0_dp) <= 2*epsilon(1.0_dp)
+        right = right .and. all(abs(sub%inverse_mass(1:kernels%nd, b)*(1.0_dp + draw(g, 5)) - 1.0_dp) <= 2*epsilon(1.0_dp))
+        if (kernels%nv > kernels%nd) right = right .and. &
+          & abs(sub%inverse_mass(kernels%nd + 1, b)*(0.1_dp + draw(g, 6)) - 1.0_dp) <= 2*epsilon(1.0_dp)
         do d = 1, kernels%nv
           right = right .and. abs(sub%v_free(d, b) - free_velocity(g, d, kernels%nd)) <= 4*epsilon(1.0_dp)
         end do
       end do
       right = right .and. maxval(abs(sub%v_free(:, sub%n_bodies + 1:))) <= 0.0_dp
       right = right .and. maxval(abs(sub%inverse_mass(:, sub%n_bodies + 1:))) <= 0.0_dp
+      right = right .and. size(sub%inverse_mass, 1) == kernels%nw .and. size(sub%weight, 1) == kernels%nw
       call check(right, "bodies of a subdomain")
     end associate
   end subroutine check_bodies

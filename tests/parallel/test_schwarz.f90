@@ -218,7 +218,7 @@ contains
         do b = 1, sub%n_bodies
           do d = 1, problem%kernels%nv
             right = right .and. abs(sub%velocity(d, b) - sub%v_free(d, b) - &
-              & sub%inverse_mass(merge(1, 2, d <= problem%kernels%nd), b)*sub%reaction(d, b)) <= rounding
+              & sub%inverse_mass(min(d, problem%kernels%nw), b)*sub%reaction(d, b)) <= rounding
           end do
         end do
       end associate
@@ -363,7 +363,7 @@ contains
       allocate (inverse_mass(n), force(n), right_side(n), system(n, n))
       do b = 1, sub%n_bodies
         do d = 1, nv
-          inverse_mass((b - 1)*nv + d) = sub%inverse_mass(merge(1, 2, d <= problem%kernels%nd), b)
+          inverse_mass((b - 1)*nv + d) = sub%inverse_mass(min(d, problem%kernels%nw), b)
           force((b - 1)*nv + d) = sub%v_free(d, b)/inverse_mass((b - 1)*nv + d)
         end do
       end do

@@ -55,12 +55,12 @@ contains
     call problem%kernels%choose(dimension, friction, rotation)
     associate (kernels => problem%kernels)
       allocate (problem%pair(2, n), problem%hot(kernels%nh, n), problem%impulse(kernels%nc, n))
-      allocate (problem%weight(2, n_columns), problem%velocity(kernels%nv, n_columns))
+      allocate (problem%weight(kernels%nw, n_columns), problem%velocity(kernels%nv, n_columns))
       problem%weight(:, :) = 0.0_dp
       problem%velocity(:, :) = 0.0_dp
       do b = 1, n_grains
-        problem%weight(1, b) = 1.5_dp + draw(trial, b, 1)
-        problem%weight(2, b) = 2.5_dp + draw(trial, b, 2)
+        problem%weight(1:dimension, b) = 1.5_dp + draw(trial, b, 1)
+        if (rotation) problem%weight(kernels%nw, b) = 2.5_dp + draw(trial, b, 2)
         do d = 1, kernels%nv
           problem%velocity(d, b) = draw(trial, b, 2 + d)
         end do
@@ -95,8 +95,8 @@ contains
     problem%hot(nd + 4, c) = 0.7_dp + 0.3_dp*draw(trial, c, 17)
     problem%hot(nd + 5, c) = 0.7_dp + 0.3_dp*draw(trial, c, 18)
     if (j > n_grains) problem%hot(nd + 5, c) = 0.0_dp
-    problem%hot(nd + 3, c) = 1.0_dp/(wn + problem%hot(nd + 4, c)**2*problem%weight(2, i) + &
-      & problem%hot(nd + 5, c)**2*problem%weight(2, j))
+    problem%hot(nd + 3, c) = 1.0_dp/(wn + problem%hot(nd + 4, c)**2*problem%weight(nd + 1, i) + &
+      & problem%hot(nd + 5, c)**2*problem%weight(nd + 1, j))
     problem%hot(nd + 6, c) = 0.5_dp + 0.5_dp*draw(trial, c, 19)
     do d = 2, nd
       problem%impulse(d, c) = draw(trial, c, 18 + d)
@@ -111,6 +111,7 @@ contains
     call kernels%choose(dimension, friction, rotation)
     call check_equal(kernels%nd, dimension, "space dimension")
     call check_equal(kernels%nv, merge(3*dimension - 3, dimension, rotation), "degrees of freedom")
+    call check_equal(kernels%nw, dimension + merge(1, 0, rotation), "rows of weight")
     call check_equal(kernels%nc, merge(dimension, 1, friction), "components of an impulse")
     call check_equal(kernels%nh, dimension + merge(6, 2, friction), "rows of hot")
   end subroutine test_choice
@@ -245,7 +246,7 @@ contains
         reaction(:, :) = 0.0_dp
         call kernels%add_reaction(problem%pair, problem%hot, change, reaction)
         do d = 1, kernels%nv
-          reaction(d, :) = reaction(d, :)*problem%weight(merge(1, 2, d <= kernels%nd), :)
+          reaction(d, :) = reaction(d, :)*problem%weight(min(d, kernels%nw), :)
         end do
         call check(all(abs(problem%velocity - before - reaction) <= rounding), "velocities change by the impulses")
         ! the residual vanishes there: nothing but the rounding of numbers of size 1, squared
@@ -272,7 +273,7 @@ contains
     problem%hot(nd + 2, 1) = 1.0_dp/wn
     if (problem%kernels%nc == 1) return
     problem%hot(nd + 5, 1) = 0.0_dp
-    problem%hot(nd + 3, 1) = 1.0_dp/(wn + problem%hot(nd + 4, 1)**2*problem%weight(2, i))
+    problem%hot(nd + 3, 1) = 1.0_dp/(wn + problem%hot(nd + 4, 1)**2*problem%weight(nd + 1, i))
   end subroutine put_on_wall
 
   !> Signorini and Coulomb at contact 1, of local velocity `v`. Regimes: 1 open, 2 sliding, 3 closed or sticking.
