@@ -5,7 +5,7 @@ module gravier_config_types
   implicit none
   private
   public :: scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t
-  public :: output_config_t, config_t
+  public :: output_config_t, boundary_config_t, sample_config_t, config_t
   public :: text_length, choice_length
 
   !> longest title or path
@@ -20,7 +20,7 @@ module gravier_config_types
     integer :: dimension
     !> m/s^2; the third component is 0 in 2D
     real(dp) :: gravity(3)
-    !> column, lattice or file
+    !> column, lattice, file or sample
     character(len=choice_length) :: bodies
     !> blank unless bodies is file
     character(len=text_length) :: bodies_file
@@ -35,10 +35,31 @@ module gravier_config_types
     real(dp) :: radius_min, radius_max
     integer :: seed
     real(dp) :: friction, wall_friction
+    !> in [0, 1]
+    real(dp) :: restitution, wall_restitution
+    !> false: no grain turns; true: grains turn where friction asks
+    logical :: rotation
+    !> m; 0 along an axis that is not periodic; the third is 0 in 2D
+    real(dp) :: period(3)
+    !> m: lower corner of the period, and of the box of a sample
+    real(dp) :: period_origin(3)
+    !> N/m^3 (N/m^2 in 2D); the third component is 0 in 2D
+    real(dp) :: body_force(3)
+    !> CSV table of the gravity in time; blank: none
+    character(len=text_length) :: gravity_table
     !> m; negative when not given, see alert_given
     real(dp) :: alert_distance
     !> false: the alert distance is 0.1 of the largest radius
     logical :: alert_given = .false.
+    !> m: distance within which neighbour lists stay valid; negative when not given
+    real(dp) :: skin
+    !> false: the skin is 0.2 of the mean radius
+    logical :: skin_given = .false.
+    !> m; negative when not given
+    real(dp) :: overlap_allowed
+    !> false: the allowed overlap is 0.01 of the mean radius
+    logical :: overlap_given = .false.
+    logical :: overlap_projection
   end type scene_config_t
 
   !> &time: the steps.
@@ -76,6 +97,8 @@ module gravier_config_types
     integer :: subdomains
     !> steps; 0 never
     integer :: repartition_every
+    !> largest over mean number of contacts of a subdomain that asks for a new partition; 0 never
+    real(dp) :: repartition_imbalance
   end type decomposition_config_t
 
   !> &enriched: the search direction of schwarz_ec and nscdd_ep.
@@ -84,32 +107,123 @@ module gravier_config_types
     real(dp) :: direction
     !> relative or absolute
     character(len=choice_length) :: direction_unit
-    !> all or active
-    character(len=choice_length) :: contacts
-    !> mumps or cg (nscdd_ep only)
-    character(len=choice_length) :: interface
-      real(dp) :: cg_tolerance
-      integer :: cg_max_iterations
-      end type enriched_config_t
+    !> interface solve: mumps or cg (nscdd_ep only); contacts that take part: all or active
+    character(len=choice_length) :: interface, contacts
+    real(dp) :: cg_tolerance
+    integer :: cg_max_iterations
+  end type enriched_config_t
 
-      !> &output: the results.
-      type :: output_config_t
-        character(len=text_length) :: directory
-        !> steps; 0 writes the last state only
-        integer :: every
-        logical :: contacts, trace, final_bodies
-      end type output_config_t
+  !> &output: the results.
+  type :: output_config_t
+    character(len=text_length) :: directory
+    !> steps; 0 writes the last state only
+    integer :: every
+    logical :: contacts, trace, final_bodies
+    !> steps; 0 never
+    integer :: checkpoint_every
+    !> s of wall time; 0 never
+    real(dp) :: checkpoint_seconds
+    !> s: the run writes a checkpoint and stops before it has run so long; 0: no limit
+    real(dp) :: walltime
+    !> groups of diagnostics
+    logical :: energy, stress, structure, boundary_forces
+  end type output_config_t
 
-      !> A whole input file.
-      type :: config_t
-        !> path and content of the file
-        character(len=:), allocatable :: file, text
-        type(scene_config_t) :: scene
-        type(time_config_t) :: time
-        type(solver_config_t) :: solver
-        type(decomposition_config_t) :: decomposition
-        type(enriched_config_t) :: enriched
-        type(output_config_t) :: output
-      end type config_t
+  !> &boundary: one boundary. What does not belong to its shape keeps the default.
+  type :: boundary_config_t
+    !> unique; 'boundary K', K its number, when not given
+    character(len=text_length) :: name
+    logical :: name_given = .false.
+    !> plane, segment, rectangle, circle, cylinder, grains or outlet
+    character(len=choice_length) :: shape
+    !> m: a point of a plane, outlet or axis of a cylinder, first end of a segment, corner of a rectangle, centre of a circle
+    real(dp) :: point(3)
+    !> plane, outlet: towards the free side; not 0, of any length
+    real(dp) :: normal(3)
+    !> m: second end of a segment
+    real(dp) :: end_point(3)
+    !> m: the edges of a rectangle from its corner, at right angles within 1e-6
+    real(dp) :: edge_a(3), edge_b(3)
+    !> cylinder: not 0, of any length
+    real(dp) :: axis(3)
+    !> m: circle, cylinder
+    real(dp) :: radius
+    !> grains: the group of the bodies file
+    integer :: group
+    !> m/s
+    real(dp) :: velocity(3)
+    !> rad/s; in 2D the first entry is the rate about z and the others are 0
+    real(dp) :: rotation(3)
+    !> m: the point it turns about; the value of point when not given (0 for grains)
+    real(dp) :: pivot(3)
+    logical :: pivot_given = .false.
+    !> components of the translation that forces move
+    logical :: free(3)
+    !> N; 0 along components that are not free
+    real(dp) :: force(3)
+    !> Pa (N/m in 2D); 0 unless it is a plane that is free
+    real(dp) :: pressure
+    !> kg; > 0 where a component is free, else 0
+    real(dp) :: mass
+    !> CSV table of the motion and the loads in time; blank: none
+    character(len=text_length) :: table
+    !> wall_friction of &scene when not given
+    real(dp) :: friction
+    logical :: friction_given = .false.
+    !> wall_restitution of &scene when not given
+    real(dp) :: restitution
+    logical :: restitution_given = .false.
+    !> s; the largest real number when not given
+    real(dp) :: remove_at
+    logical :: remove_given = .false.
+  end type boundary_config_t
 
-      end module gravier_config_types
+  !> &sample: the sample that is generated where bodies is sample. What does not belong to the choices keeps the default.
+  type :: sample_config_t
+    !> lattice or loose
+    character(len=choice_length) :: arrangement
+    !> none, settled or compacted
+    character(len=choice_length) :: preparation
+    !> grains
+    integer :: count
+    !> single, uniform, uniform_volume, log_normal or table
+    character(len=choice_length) :: radii
+    !> m: of single radii; bounds of the others
+    real(dp) :: radius, radius_min, radius_max
+    !> m; standard deviation of ln(radius/radius_mean): log_normal
+    real(dp) :: radius_mean, radius_deviation
+    !> CSV table of the radii and their shares
+    character(len=text_length) :: radius_table
+    !> m; the period along a periodic axis; the last may be 0: found from solid_fraction; the third is 0 in 2D
+    real(dp) :: box(3)
+    !> of a loose sample whose last size is 0
+    real(dp) :: solid_fraction
+    logical :: solid_fraction_given = .false.
+    integer :: seed
+    !> Pa (N/m in 2D): compacted
+    real(dp) :: pressure
+    !> kinetic energy of a grain at rest, in m g R (settled) or pressure R^dimension (compacted)
+    real(dp) :: rest_tolerance
+    !> settled, compacted
+    integer :: max_steps
+    !> the bodies file that gravier_sample writes
+    character(len=text_length) :: file
+  end type sample_config_t
+
+  !> A whole input file.
+  type :: config_t
+    !> path and content of the file
+    character(len=:), allocatable :: file, text
+    type(scene_config_t) :: scene
+    type(time_config_t) :: time
+    type(solver_config_t) :: solver
+    type(decomposition_config_t) :: decomposition
+    type(enriched_config_t) :: enriched
+    type(output_config_t) :: output
+    !> in the order of the file; shape (0) when it has none
+    type(boundary_config_t), allocatable :: boundaries(:)
+    !> defaults unless bodies is sample
+    type(sample_config_t) :: sample
+  end type config_t
+
+end module gravier_config_types
