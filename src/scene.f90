@@ -1,13 +1,17 @@
-!> From the &scene group to bodies, walls and the physics of their contacts.
+!> From the &scene group to grains, boundaries and the physics of their contacts.
 module gravier_scene
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t
   use gravier_bodies_file, only: bodies_data_t, read_bodies
-  use gravier_body_store, only: body_set_t, wall_set_t
+  use gravier_periodic, only: period_t
+  use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_config_types, only: config_t, scene_config_t
+  use gravier_scene_boundaries, only: make_boundaries
   implicit none
   private
   public :: scene_t, make_scene
@@ -15,14 +19,15 @@ module gravier_scene
   !> room around a grain of the largest radius in a lattice, relative to its diameter
   real(dp), parameter :: lattice_room = 1.05_dp
 
-  !> A scene as it starts. Grains are spread over the ranks in any way; walls are on all of them.
+  !> A scene as it starts. Grains are spread over the ranks in any way; boundaries are on all of them.
   type :: scene_t
     type(body_set_t) :: grains
-    type(wall_set_t) :: walls
-    !> grains of all ranks
-    integer(i8) :: n_grains = 0
+    type(boundary_t), allocatable :: boundaries(:)
+    type(period_t) :: period
+    !> grains of all ranks, and those of them that are glued to boundaries
+    integer(i8) :: n_grains = 0, n_glued = 0
     !> of all ranks [m]; 0 without grains
-    real(dp) :: largest_radius = 0.0_dp
+    real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
     !> some contact has friction; some grain turns
     logical :: friction = .false., rotation = .false.
   end type scene_t
@@ -37,7 +42,6 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
 
-    scene%friction = config%scene%friction > 0.0_dp .or. config%scene%wall_friction > 0.0_dp
     select case (config%scene%bodies)
     case ("column")
       call make_column(comm, config%scene, data)
@@ -48,8 +52,63 @@ contains
     end select
     call check_exact_solution(config, error)
     if (allocated(error)) return
+    call make_boundaries(comm, config, data, scene%boundaries, error)
+    if (allocated(error)) return
+    call set_period(config%scene, data, scene)
     call take_data(comm, config%scene, data, scene)
+    call glue(comm, config, data, scene, error)
+    call check_period(config, scene, error)
   end subroutine make_scene
+
+  !> The period of the input file, else that of the bodies file.
+  subroutine set_period(config, data, scene)
+    type(scene_config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(scene_t), intent(inout) :: scene
+
+    scene%period%length(:) = config%period
+    scene%period%origin(:) = config%period_origin
+    if (scene%period%on() .or. .not. data%has_box) return
+    scene%period%length(:) = data%period
+    scene%period%origin(:) = data%origin
+  end subroutine set_period
+
+  !> A pair of grains must not be able to meet across both sides of a period.
+  subroutine check_period(config, scene, error)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: least
+
+    least = 8.0_dp*scene%largest_radius
+    if (.not. any(scene%period%length > 0.0_dp .and. scene%period%length <= least)) return
+    call raise(error, status_input, config%file//": &scene period: expected more than four diameters of the largest grain, "// &
+      & to_text(least, 4)//" m, along each periodic axis")
+  end subroutine check_period
+
+  !> Glue the grains of a group to the boundary of that group. Errors are the same on all ranks. Collective.
+  subroutine glue(comm, config, data, scene, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(scene_t), intent(inout) :: scene
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k, b
+
+    scene%n_glued = comm%total(int(count(data%group > 0), i8))
+    do k = 1, data%n
+      if (data%group(k) == 0) cycle
+      do b = 1, size(config%boundaries)
+        if (config%boundaries(b)%shape == "grains" .and. config%boundaries(b)%group == data%group(k)) &
+          & scene%grains%glued(k) = data%n_walls + b
+      end do
+      if (scene%grains%glued(k) > 0) cycle
+      call raise(error, status_input, trim(config%scene%bodies_file)//": id "//to_text(data%id(k))//": group "// &
+        & to_text(data%group(k))//": expected 0, or the group of a &boundary with shape = 'grains' in "//config%file)
+      exit
+    end do
+    call comm%agree(error)
+  end subroutine glue
 
   !> The criterion 'error' knows the impulses of a column that gravity presses on the ground.
   subroutine check_exact_solution(config, error)
@@ -97,6 +156,7 @@ contains
     do w = 1, data%n
       data%id(w) = first + w - 1
     end do
+    allocate (data%group(data%n), source=0)
   end subroutine make_room
 
   !> Equal grains, one upon the other on a ground: the columns of the paper.
@@ -159,14 +219,21 @@ contains
     integer :: k, nd, nv
 
     nd = scene_config%dimension
-    turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp))
+    scene%friction = scene_config%friction > 0.0_dp
+    do k = 1, size(scene%boundaries)
+      scene%friction = scene%friction .or. scene%boundaries(k)%friction > 0.0_dp
+    end do
+    turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. scene_config%rotation
     scene%rotation = scene%friction .or. turning
     nv = merge(3*nd - 3, nd, scene%rotation)
-    call scene%grains%init(nd, nv, data%n)
+    call scene%grains%init(nd, nv, merge(nd, 0, scene%period%on()), data%n)
+    scene%grains%glued(:) = 0
+    scene%grains%image(:, :) = 0
     do k = 1, data%n
       scene%grains%id(k) = data%id(k)
       scene%grains%position(:, k) = data%position(:, k)
       scene%grains%velocity(:, k) = data%velocity(1:nv, k)
+      if (.not. scene_config%rotation) scene%grains%velocity(nd + 1:, k) = 0.0_dp
       scene%grains%radius(k) = data%radius(k)
       if (allocated(data%mass)) then
         scene%grains%mass(k) = data%mass(k)
@@ -178,10 +245,7 @@ contains
     scene%n_grains = data%total
     if (data%n > 0) scene%largest_radius = maxval(data%radius)
     scene%largest_radius = comm%highest(scene%largest_radius)
-    scene%walls%n = data%n_walls
-    scene%walls%id = data%wall_id
-    scene%walls%point = data%wall_point
-    scene%walls%normal = data%wall_normal
+    if (data%total > 0) scene%mean_radius = comm%sum_real(data%radius)/real(data%total, dp)
   end subroutine take_data
 
 end module gravier_scene

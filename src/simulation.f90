@@ -3,17 +3,21 @@ module gravier_simulation
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
-  use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_setup
+  use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
+  use gravier_time_table, only: time_table_t
   use gravier_motion, only: predict_position, advance_position
-  use gravier_detection, only: rule_dual, rule_primal
+  use gravier_boundary, only: shape_outlet, shape_plane
+  use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_diverged
   use gravier_partition, only: partition_t, choose_boxes, check_subdomains
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
-  use gravier_impulse_memory, only: impulse_memory_t
+  use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
+  use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
   use gravier_scheme_choice, only: choose_scheme
@@ -27,6 +31,10 @@ module gravier_simulation
     type(solve_report_t) :: solve
     type(interface_figures_t) :: sharing
     integer(i8) :: contacts = 0
+    !> grains that left by an outlet; grains that move by more than their radius in a step
+    integer(i8) :: left = 0, fast = 0
+    !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
+    logical :: listed = .false., divided = .false., refused = .false.
     !> [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
   end type step_figures_t
@@ -35,18 +43,24 @@ module gravier_simulation
     type(config_t) :: config
     type(communicator_t), pointer :: comm => null()
     type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
     type(physics_t) :: physics
+    type(time_table_t) :: gravity_table
     type(contact_problem_t) :: problem
     class(scheme_t), allocatable :: scheme
     type(solve_control_t) :: control
-    type(impulse_memory_t) :: memory
     type(column_solution_t) :: column
-    integer(i8) :: n_grains = 0
+    !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
+    real(dp), allocatable :: boundary_impulses(:, :)
+    !> grains of the scene now, and those of them that are glued to boundaries
+    integer(i8) :: n_grains = 0, n_glued = 0
     !> messages between ranks, and numbers in them, that iterations of this rank have sent
     integer(i8) :: messages = 0, values = 0
     integer :: step = 0
     !> [s]
     real(dp) :: time = 0.0_dp
+    !> largest over mean number of contacts of a subdomain in the last step
+    real(dp) :: imbalance = 1.0_dp
   contains
     procedure :: init => simulation_init
     procedure :: assemble => simulation_assemble
@@ -71,21 +85,38 @@ contains
     self%config = config
     self%step = 0
     self%time = 0.0_dp
+    if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
+      & gravity_names(config%scene%dimension), error)
+    call comm%agree(error)
+    if (allocated(error)) return
     call make_scene(comm, config, scene, error)
     if (allocated(error)) return
     self%n_grains = scene%n_grains
+    self%n_glued = scene%n_glued
     call set_physics(self, scene)
     call set_control(self)
     call choose_scheme(config, self%scheme)
     ! one subdomain until it is known that the scene has room for so many
-    call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv)
-    self%decomposition%walls = scene%walls
+    self%decomposition%boundaries = scene%boundaries
+    call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
     newcomers(1) = scene%grains
     call divide(self, newcomers, error)
     if (allocated(error)) return
-    call self%decomposition%init(comm, config%decomposition%subdomains, scene%grains%nd, scene%grains%nv)
+    call self%decomposition%init(comm, config%decomposition%subdomains, scene%grains%nd, scene%grains%nv, scene%period)
     call self%decomposition%settle(scene%grains)
+    if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
+    allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
   end subroutine simulation_init
+
+  pure function gravity_names(nd) result(names)
+    integer, intent(in) :: nd
+    character(len=2) :: names(nd)
+    integer :: d
+
+    do d = 1, nd
+      names(d) = "g"//achar(iachar("x") + d - 1)
+    end do
+  end function gravity_names
 
   subroutine set_physics(self, scene)
     class(simulation_t), intent(inout) :: self
@@ -93,12 +124,16 @@ contains
 
     associate (config => self%config%scene, rule => self%decomposition%rule)
       self%physics%gravity(:) = config%gravity
+      self%physics%body_force(:) = config%body_force
       self%physics%friction = config%friction
-      self%physics%wall_friction = config%wall_friction
+      self%physics%restitution = config%restitution
+      self%physics%rotation = config%rotation
       self%physics%h = self%config%time%step
       call self%problem%kernels%choose(config%dimension, scene%friction, scene%rotation)
       rule%largest_radius = scene%largest_radius
+      rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
+      rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
       rule%kind = merge(rule_primal, rule_dual, self%config%decomposition%kind == "primal")
     end associate
   end subroutine set_physics
@@ -116,7 +151,7 @@ contains
     end associate
   end subroutine set_control
 
-  !> Divide space for the bodies given. Collective.
+  !> Divide space for the grains given. Collective.
   subroutine divide(self, bodies, error)
     class(simulation_t), intent(inout) :: self
     type(body_set_t), intent(in) :: bodies(:)
@@ -125,7 +160,7 @@ contains
 
     associate (config => self%config%decomposition, rule => self%decomposition%rule)
       call self%decomposition%bounding_box(bodies, lower, upper)
-      edge = 2.0_dp*rule%largest_radius + rule%alert_distance
+      edge = 2.0_dp*rule%largest_radius + rule%range()
       ! without grains any edge serves
       if (.not. edge > 0.0_dp) edge = 1.0_dp
       call check_subdomains(lower, upper, edge, config%subdomains, error)
@@ -137,14 +172,16 @@ contains
 
   !> Divide space anew; where the scene has come to fill fewer cells than there are subdomains, the old partition
   !> stays. Collective.
-  subroutine divide_again(self)
+  subroutine divide_again(self, refused)
     class(simulation_t), intent(inout) :: self
+    logical, intent(out) :: refused
     type(partition_t) :: old
-    type(error_t), allocatable :: refused
+    type(error_t), allocatable :: error
 
     old = self%decomposition%partition
-    call divide(self, self%decomposition%home, refused)
-    if (allocated(refused)) self%decomposition%partition = old
+    call divide(self, self%decomposition%home, error)
+    refused = allocated(error)
+    if (refused) self%decomposition%partition = old
   end subroutine divide_again
 
   !> Cut the box [lower, upper] as &decomposition says. Collective.
@@ -154,54 +191,304 @@ contains
     !> (nd) [m]; edge of a detection cell [m]
     real(dp), intent(in) :: lower(:), upper(:), edge
     type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
     integer :: boxes(3)
 
     associate (config => self%config%decomposition, partition => self%decomposition%partition)
+      partition%period(:) = self%decomposition%period%length
       if (config%partition == "metis") then
-        call partition%init_graph(self%comm, lower, upper, edge, bodies, config%subdomains, error)
+        call collect_weights(self, bodies, points, weights)
+        call partition%init_graph(self%comm, lower, upper, edge, points, weights, config%subdomains, error)
       else
         boxes(:) = config%grid
-        if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, config%subdomains)
+        if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, config%subdomains, self%decomposition%period%length)
         call partition%init_grid(lower, upper, boxes, edge, error)
       end if
     end associate
   end subroutine cut
 
-  !> Move grains to q_m, bring each to its subdomain, detect the contacts and start them from the impulses of the
-  !> last step. Collective.
+  !> What a subdomain has to carry: grains, and as far as they are known contacts, at their candidates.
+  subroutine collect_weights(self, bodies, points, weights)
+    class(simulation_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies(:)
+    !> (nd, n) [m]; (n)
+    real(dp), allocatable, intent(out) :: points(:, :)
+    integer, allocatable, intent(out) :: weights(:)
+    integer :: s, c, k, n, n_points
+
+    n_points = sum(bodies%n)
+    if (allocated(self%problem%sub)) n_points = n_points + sum(self%problem%sub%n_grains)
+    allocate (points(self%decomposition%nd, n_points), weights(n_points), source=0)
+    points(:, :) = 0.0_dp
+    n = 0
+    do s = 1, size(bodies)
+      do k = 1, bodies(s)%n
+        n = n + 1
+        points(:, n) = bodies(s)%position(:, k)
+        weights(n) = 1
+      end do
+    end do
+    if (.not. allocated(self%problem%sub)) return
+    do s = 1, size(self%problem%sub)
+      associate (sub => self%problem%sub(s))
+        points(:, n + 1:n + sub%n_grains) = sub%position
+        do c = 1, sub%n_contacts
+          k = minval(sub%pair(:, c))
+          weights(n + k) = weights(n + k) + 1
+        end do
+        n = n + sub%n_grains
+      end associate
+    end do
+  end subroutine collect_weights
+
+  !> Move grains and boundaries to q_m, bring the neighbour lists up to date, find the contacts and start them from the
+  !> impulses of the last step. Collective.
   subroutine simulation_assemble(self, figures)
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
-    integer :: s, nd
+    logical :: listed
+    integer :: s
 
-    nd = self%decomposition%nd
     call start_timer(phase_bodies)
-    do s = 1, size(self%decomposition%home)
-      associate (home => self%decomposition%home(s))
-        home%position(:, :) = predict_position(home%position, home%velocity(1:nd, :), self%physics%h, self%config%time%theta)
-      end associate
-    end do
-    if (is_due(self)) call divide_again(self)
-    call self%decomposition%settle()
+    listed = .false.
+    call move_to_middle(self, listed)
+    call drive(self)
+    call count_fast(self, figures)
     call stop_timer(phase_bodies)
-    call build_problem(self%decomposition, self%problem%kernels, self%physics, self%problem, figures%sharing)
+    call start_timer(phase_neighbourhood)
+    if (.not. listed) listed = self%neighbourhoods%are_due(self%decomposition)
+    if (.not. listed) listed = some_leave(self)
+    call check_division(self, figures)
+    figures%listed = listed .or. figures%divided
+    call list_neighbours(self, figures)
+    call stop_timer(phase_neighbourhood)
+    call build_problem(self%decomposition, self%neighbourhoods, self%problem%kernels, self%physics, self%problem, figures%sharing)
     call start_timer(phase_setup)
-    if (self%config%solver%warm_start) call self%memory%recall(self%decomposition, self%problem)
+    if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
     figures%contacts = self%problem%n_contacts
     do s = 1, size(self%problem%sub)
       if (self%problem%sub(s)%n_contacts > 0) figures%max_overlap = max(figures%max_overlap, -minval(self%problem%sub(s)%gap))
     end do
     figures%max_overlap = self%comm%highest(figures%max_overlap)
+    if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
+      & real(figures%contacts, dp)
   end subroutine simulation_assemble
 
-  !> Whether this step starts from a new partition.
-  pure logical function is_due(self)
+  !> q_m of grains and boundaries; boundaries whose time has come are taken away.
+  subroutine move_to_middle(self, listed)
+    class(simulation_t), intent(inout) :: self
+    logical, intent(inout) :: listed
+    real(dp) :: part
+    integer :: s, b, k, nd
+
+    nd = self%decomposition%nd
+    part = (1.0_dp - self%config%time%theta)*self%physics%h
+    do s = 1, size(self%decomposition%home)
+      associate (home => self%decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) home%position(:, k) = predict_position(home%position(:, k), home%velocity(1:nd, k), &
+            & self%physics%h, self%config%time%theta)
+        end do
+      end associate
+    end do
+    if (self%n_glued > 0) call carry_glued(self%decomposition, part)
+    do b = 1, size(self%decomposition%boundaries)
+      associate (boundary => self%decomposition%boundaries(b))
+        call boundary%move(part)
+        if (.not. boundary%present .or. self%time < boundary%remove_at) cycle
+        boundary%present = .false.
+        listed = .true.
+      end associate
+    end do
+  end subroutine move_to_middle
+
+  !> Whether grain `k` of subdomain `s` of this rank stays in the scene: its centre lies behind no outlet, and the
+  !> boundary that it is glued to is there.
+  pure logical function stays(self, s, k)
     class(simulation_t), intent(in) :: self
-    is_due = .false.
-    if (self%config%decomposition%repartition_every > 0 .and. self%step > 0) &
-      & is_due = mod(self%step, self%config%decomposition%repartition_every) == 0
-  end function is_due
+    integer, intent(in) :: s, k
+    integer :: b
+    real(dp) :: distance, normal(self%decomposition%nd)
+
+    stays = .true.
+    associate (boundaries => self%decomposition%boundaries, home => self%decomposition%home(s))
+      if (home%glued(k) > 0) then
+        stays = boundaries(home%glued(k))%present
+        return
+      end if
+      do b = 1, size(boundaries)
+        if (boundaries(b)%shape /= shape_outlet .or. .not. boundaries(b)%present) cycle
+        call boundaries(b)%locate(home%position(:, k), distance, normal)
+        if (distance < 0.0_dp) stays = .false.
+      end do
+    end associate
+  end function stays
+
+  !> Whether some grain leaves the scene now. Collective.
+  logical function some_leave(self)
+    class(simulation_t), intent(in) :: self
+    integer :: s, k
+
+    some_leave = .false.
+    if (.not. any(self%decomposition%boundaries%shape == shape_outlet)) return
+    do s = 1, size(self%decomposition%home)
+      do k = 1, self%decomposition%home(s)%n
+        if (.not. stays(self, s, k)) some_leave = .true.
+      end do
+    end do
+    some_leave = self%comm%any_true(some_leave)
+  end function some_leave
+
+  !> Take the grains that leave out of the scene. Collective.
+  subroutine let_grains_out(self, figures)
+    class(simulation_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    logical, allocatable :: mask(:)
+    integer(i8) :: counts(2)
+    integer :: s, k
+
+    associate (boundaries => self%decomposition%boundaries)
+      if (.not. any(boundaries%shape == shape_outlet) .and. (self%n_glued == 0 .or. all(boundaries%present))) return
+    end associate
+    counts(:) = 0
+    do s = 1, size(self%decomposition%home)
+      associate (home => self%decomposition%home(s))
+        allocate (mask(home%n))
+        do k = 1, home%n
+          mask(k) = stays(self, s, k)
+        end do
+        counts(2) = counts(2) + count(.not. mask .and. home%glued > 0)
+        counts(1) = counts(1) + count(.not. mask .and. home%glued == 0)
+        if (.not. all(mask)) call home%keep_only(mask)
+        deallocate (mask)
+      end associate
+    end do
+    call self%comm%sum_counts(counts)
+    figures%left = counts(1)
+    self%n_grains = self%n_grains - sum(counts)
+    self%n_glued = self%n_glued - counts(2)
+  end subroutine let_grains_out
+
+  !> Gravity and the velocities of boundaries at the end of the step, without contacts.
+  subroutine drive(self)
+    class(simulation_t), intent(inout) :: self
+    real(dp) :: force(self%decomposition%nd), end_time
+    integer :: b, d, nd
+
+    nd = self%decomposition%nd
+    end_time = self%time + self%physics%h
+    if (allocated(self%gravity_table%has)) then
+      do d = 1, nd
+        if (self%gravity_table%has(d)) self%physics%gravity(d) = self%gravity_table%at(d, end_time)
+      end do
+    end if
+    do b = 1, size(self%decomposition%boundaries)
+      associate (boundary => self%decomposition%boundaries(b))
+        boundary%last_velocity(:) = boundary%velocity
+        call boundary%prescribe(nd, end_time)
+        if (.not. boundary%is_driven()) cycle
+        call boundary%applied_force(nd, end_time, facing_area(self, b), force)
+        do d = 1, nd
+          if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + self%physics%h*force(d)/boundary%mass
+        end do
+      end associate
+    end do
+  end subroutine drive
+
+  !> Area that a pressure on plane `b` works on: along every other axis, the way between the two planes that face each
+  !> other across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
+  pure real(dp) function facing_area(self, b) result(area)
+    class(simulation_t), intent(in) :: self
+    integer, intent(in) :: b
+    integer :: d, main
+
+    area = 1.0_dp
+    associate (boundaries => self%decomposition%boundaries)
+      main = maxloc(abs(boundaries(b)%axis), dim=1)
+      do d = 1, self%decomposition%nd
+        if (d == main) cycle
+        if (self%decomposition%period%length(d) > 0.0_dp) then
+          area = area*self%decomposition%period%length(d)
+        else
+          area = area*way_across(d)
+        end if
+      end do
+    end associate
+
+  contains
+
+    pure real(dp) function way_across(d) result(way)
+      integer, intent(in) :: d
+      real(dp) :: low, high
+      integer :: k
+
+      low = -huge(1.0_dp)
+      high = huge(1.0_dp)
+      do k = 1, size(self%decomposition%boundaries)
+        associate (plane => self%decomposition%boundaries(k))
+          if (plane%shape /= shape_plane .or. .not. plane%present) cycle
+          if (plane%axis(d) > 0.99_dp) low = max(low, plane%point(d))
+          if (plane%axis(d) < -0.99_dp) high = min(high, plane%point(d))
+        end associate
+      end do
+      way = 1.0_dp
+      if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) way = max(high - low, 0.0_dp)
+    end function way_across
+
+  end function facing_area
+
+  !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
+  subroutine count_fast(self, figures)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(inout) :: figures
+    integer(i8) :: counts(1)
+    integer :: s, k, nd
+
+    nd = self%decomposition%nd
+    counts(:) = 0
+    do s = 1, size(self%decomposition%home)
+      associate (home => self%decomposition%home(s))
+        do k = 1, home%n
+          if (self%physics%h**2*sum(home%velocity(1:nd, k)**2) > home%radius(k)**2) counts(1) = counts(1) + 1
+        end do
+      end associate
+    end do
+    call self%comm%sum_counts(counts)
+    figures%fast = counts(1)
+  end subroutine count_fast
+
+  !> Whether this step starts from a new partition: by schedule, or because contacts lie unevenly.
+  subroutine check_division(self, figures)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(inout) :: figures
+
+    associate (config => self%config%decomposition)
+      if (self%step == 0 .or. config%subdomains == 1) return
+      if (config%repartition_every > 0) figures%divided = mod(self%step, config%repartition_every) == 0
+      if (config%repartition_imbalance > 0.0_dp) figures%divided = figures%divided .or. &
+        & self%imbalance > config%repartition_imbalance
+    end associate
+  end subroutine check_division
+
+  !> Bring views and lists up to date, or make them anew with the impulses carried over. Collective.
+  subroutine list_neighbours(self, figures)
+    class(simulation_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    integer(i8), allocatable :: records(:, :)
+    logical :: remembered
+
+    if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
+    if (.not. figures%listed) return
+    remembered = self%config%solver%warm_start .and. self%neighbourhoods%builds > 0
+    if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
+    call let_grains_out(self, figures)
+    if (figures%divided) call divide_again(self, figures%refused)
+    call self%decomposition%settle()
+    call self%neighbourhoods%build(self%decomposition, impulse_entries(self%problem%kernels))
+    if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)
+  end subroutine list_neighbours
 
   !> One step. After a solve that diverged, velocities and places are not those of any step: the run must end.
   !> Collective.
@@ -209,7 +496,6 @@ contains
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
     type(error_t), allocatable, intent(inout) :: error
-    integer :: s, nd
 
     if (allocated(error)) return
     call self%assemble(figures)
@@ -222,20 +508,37 @@ contains
     self%values = self%values + self%problem%shared%values
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
-    nd = self%decomposition%nd
     call take_velocities(self%decomposition, self%physics, self%problem)
-    do s = 1, size(self%decomposition%home)
-      associate (home => self%decomposition%home(s))
-        home%position(:, :) = advance_position(home%position, home%velocity(1:nd, :), self%physics%h, self%config%time%theta)
-      end associate
-    end do
-    if (self%config%solver%warm_start) call self%memory%keep(self%problem, self%decomposition%walls, &
-      & self%decomposition%rule%kind, self%physics%h, self%config%time%theta)
+    call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
+    call take_boundary_velocities(self%decomposition, self%boundary_impulses)
+    call move_to_end(self)
+    if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     call stop_timer(phase_bodies)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%kinetic_energy()
   end subroutine simulation_advance
+
+  !> q_{i+1} of grains and boundaries.
+  subroutine move_to_end(self)
+    class(simulation_t), intent(inout) :: self
+    integer :: s, b, k, nd
+
+    nd = self%decomposition%nd
+    do s = 1, size(self%decomposition%home)
+      associate (home => self%decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) home%position(:, k) = advance_position(home%position(:, k), home%velocity(1:nd, k), &
+            & self%physics%h, self%config%time%theta)
+        end do
+      end associate
+    end do
+    if (self%n_glued > 0) call carry_glued(self%decomposition, self%config%time%theta*self%physics%h)
+    do b = 1, size(self%decomposition%boundaries)
+      call self%decomposition%boundaries(b)%move(self%config%time%theta*self%physics%h)
+    end do
+    if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
+  end subroutine move_to_end
 
   !> Kinetic energy of all grains [J]. Collective.
   real(dp) function simulation_kinetic_energy(self) result(energy)
@@ -248,6 +551,7 @@ contains
     do s = 1, size(part)
       associate (home => self%decomposition%home(s))
         do k = 1, home%n
+          if (home%glued(k) > 0) cycle
           part(s) = part(s) + 0.5_dp*home%mass(k)*sum(home%velocity(1:nd, k)**2) + &
             & 0.5_dp*home%inertia(k)*sum(home%velocity(nd + 1:, k)**2)
         end do
@@ -264,7 +568,9 @@ contains
       call self%scheme%free()
       deallocate (self%scheme)
     end if
-    if (allocated(self%memory%records)) deallocate (self%memory%records)
+    if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
+    if (allocated(self%neighbourhoods%view)) deallocate (self%neighbourhoods%view)
+    self%neighbourhoods%builds = 0
   end subroutine simulation_free
 
 end module gravier_simulation

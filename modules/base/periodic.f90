@@ -3,7 +3,7 @@ module gravier_periodic
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: period_t, no_shift, shift_code, shift_of_code
+  public :: period_t, wrap, no_shift, shift_code, shift_of_code
 
   !> The cell that repeats: [origin, origin + length) along each axis whose length is not 0.
   type :: period_t
@@ -25,31 +25,55 @@ contains
     period_on = any(self%length > 0.0_dp)
   end function period_on
 
-  !> Bring a point into the cell by whole periods.
-  pure subroutine period_wrap(self, x, periods)
+  !> Bring a point into the cell.
+  pure subroutine period_wrap(self, x, turns)
     class(period_t), intent(in) :: self
     !> (nd) [m]
     real(dp), intent(inout) :: x(:)
-    !> (nd): periods added along each axis
-    integer, intent(out) :: periods(:)
+    !> (nd): periods taken away along each axis
+    integer, intent(out) :: turns(:)
+    real(dp) :: inside
     integer :: d
 
-    periods(:) = 0
     do d = 1, size(x)
-      if (.not. self%length(d) > 0.0_dp) cycle
-      associate (length => self%length(d), origin => self%origin(d))
-        if (x(d) >= origin .and. x(d) < origin + length) cycle
-        periods(d) = -floor((x(d) - origin)/length)
-        x(d) = x(d) + periods(d)*length
-        ! rounding may leave it on or beyond an end of the cell
-        if (x(d) < origin) x(d) = origin
-        if (x(d) >= origin + length) then
-          x(d) = origin
-          periods(d) = periods(d) - 1
-        end if
-      end associate
+      call wrap(x(d), self%origin(d), self%length(d), inside, turns(d))
+      x(d) = inside
     end do
   end subroutine period_wrap
+
+  !> The image of `x` in [origin, origin + period), also after rounding, and the whole periods between: `x` is about
+  !> inside + turns*period. A coordinate more than 2^30 periods away has turns +-huge(1); one that is not a number goes to
+  !> `origin`.
+  elemental subroutine wrap(x, origin, period, inside, turns)
+    !> [m]; period 0: the axis is not periodic, inside is x
+    real(dp), intent(in) :: x, origin, period
+    real(dp), intent(out) :: inside
+    integer, intent(out) :: turns
+    real(dp), parameter :: far = 2.0_dp**30
+    real(dp) :: apart
+
+    inside = x
+    turns = 0
+    if (.not. period > 0.0_dp) return
+    apart = x - origin
+    if (abs(apart)*(1.0_dp/far) < period) then
+      turns = floor(apart/period)
+      if (turns /= 0) inside = x - turns*period
+    else
+      turns = merge(huge(1), -huge(1), apart > 0.0_dp)
+      inside = origin + modulo(apart, period)
+    end if
+    ! rounding may have put it one period off
+    if (inside < origin) then
+      inside = inside + period
+      if (abs(turns) < huge(1)) turns = turns - 1
+    end if
+    if (inside >= origin + period) then
+      inside = inside - period
+      if (abs(turns) < huge(1)) turns = turns + 1
+    end if
+    if (.not. (inside >= origin .and. inside < origin + period)) inside = origin
+  end subroutine wrap
 
   !> One number for a shift of -1, 0 or 1 periods along each axis.
   pure integer function shift_code(shift) result(code)

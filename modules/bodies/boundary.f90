@@ -38,6 +38,8 @@ module gravier_boundary
     real(dp) :: pivot(3) = 0.0_dp
     !> at the present time [m/s], [rad/s]
     real(dp) :: velocity(3) = 0.0_dp, spin(3) = 0.0_dp
+    !> at the start of the step [m/s]
+    real(dp) :: last_velocity(3) = 0.0_dp
     !> as prescribed, where no table says otherwise [m/s], [rad/s]
     real(dp) :: given_velocity(3) = 0.0_dp, given_spin(3) = 0.0_dp
     !> components of translation that forces move
@@ -67,7 +69,7 @@ module gravier_boundary
   end type boundary_t
 
   !> words of the state of a boundary
-  integer, parameter, public :: boundary_words = 22
+  integer, parameter, public :: boundary_words = 25
 
 contains
 
@@ -328,6 +330,7 @@ contains
     state(13:15) = self%pivot
     state(16:18) = self%velocity
     state(19:21) = self%spin
+    state(22:24) = self%last_velocity
     words(1) = merge(1_i8, 0_i8, self%present)
     do k = 1, size(state)
       words(1 + k) = transfer(state(k), 0_i8)
@@ -351,6 +354,7 @@ contains
     self%pivot(:) = state(13:15)
     self%velocity(:) = state(16:18)
     self%spin(:) = state(19:21)
+    self%last_velocity(:) = state(22:24)
   end subroutine boundary_set_state
 
 end module gravier_boundary

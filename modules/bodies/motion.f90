@@ -3,8 +3,8 @@ module gravier_motion
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: predict_position, advance_position, make_free_velocity
-  public :: grain_mass, grain_inertia
+  public :: predict_position, advance_position
+  public :: grain_volume, grain_mass, grain_inertia
 
   real(dp), parameter :: pi = acos(-1.0_dp)
 
@@ -22,31 +22,22 @@ contains
     q = q_m + theta*h*v
   end function advance_position
 
-  !> Turn the velocity at the start of a step into that without contacts, M^-1 R^d = V_i + h M^-1 F (paper, (1));
-  !> no force here turns a grain.
-  pure subroutine make_free_velocity(v, gravity, h)
-    !> (nv) translation first
-    real(dp), intent(inout) :: v(:)
-    !> (at least nd) [m/s^2]
-    real(dp), intent(in) :: gravity(:)
-    !> [s]
-    real(dp), intent(in) :: h
-    integer :: d
-
-    do d = 1, size(gravity)
-      v(d) = v(d) + h*gravity(d)
-    end do
-  end subroutine make_free_velocity
+  !> Area of a disk [m^2] or volume of a sphere [m^3].
+  pure real(dp) function grain_volume(dimension, radius) result(volume)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: radius
+    if (dimension == 2) then
+      volume = pi*radius**2
+    else
+      volume = 4.0_dp/3.0_dp*pi*radius**3
+    end if
+  end function grain_volume
 
   !> Mass of a homogeneous disk (density in kg/m^2) or sphere (kg/m^3) [kg].
   pure real(dp) function grain_mass(dimension, radius, density) result(mass)
     integer, intent(in) :: dimension
     real(dp), intent(in) :: radius, density
-    if (dimension == 2) then
-      mass = density*pi*radius**2
-    else
-      mass = density*4.0_dp/3.0_dp*pi*radius**3
-    end if
+    mass = density*grain_volume(dimension, radius)
   end function grain_mass
 
   !> Moment of inertia of a homogeneous disk, m R^2/2, or sphere, 2 m R^2/5 [kg m^2].

@@ -318,17 +318,17 @@ contains
   end function level_of
 
   !> Whether a pair is met where its owner point lies in the cell: of all its images one is. The point is wrapped.
-  pure logical function is_where_owned(period, point, periods)
+  logical function is_where_owned(period, point, periods)
     type(period_t), intent(in) :: period
     !> owner point of the image whose candidate is not shifted (nd) [m]
     real(dp), intent(inout) :: point(:)
     !> by which the candidate is shifted in the image met
     integer, intent(in) :: periods(3)
-    integer :: wanted(3)
+    integer :: turns(3)
 
-    wanted(:) = 0
-    call period%wrap(point, wanted(1:size(point)))
-    is_where_owned = all(periods == wanted)
+    turns(:) = 0
+    call period%wrap(point, turns(1:size(point)))
+    is_where_owned = all(periods == -turns)
   end function is_where_owned
 
   !> Lengths of the shift of a code [m].

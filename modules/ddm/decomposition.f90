@@ -114,12 +114,12 @@ contains
 
     if (self%ni > 0) then
       do s = 1, size(self%home)
-        call wrap(self%period, self%home(s))
+        call wrap_grains(self%period, self%home(s))
       end do
     end if
     call collect_leaving(self, leaving)
     if (present(newcomers)) call append_bodies(leaving, newcomers)
-    if (self%ni > 0) call wrap(self%period, leaving)
+    if (self%ni > 0) call wrap_grains(self%period, leaving)
     allocate (records(leaving%record_words() + 1, leaving%n))
     do k = 1, leaving%n
       call leaving%get_record(k, records(2:, k))
@@ -129,16 +129,16 @@ contains
   end subroutine decomposition_settle
 
   !> Bring grains into the period, counting their images.
-  pure subroutine wrap(period, bodies)
+  pure subroutine wrap_grains(period, bodies)
     type(period_t), intent(in) :: period
     type(body_set_t), intent(inout) :: bodies
-    integer :: k, periods(bodies%nd)
+    integer :: k, turns(bodies%nd)
 
     do k = 1, bodies%n
-      call period%wrap(bodies%position(:, k), periods)
-      bodies%image(:, k) = bodies%image(:, k) - periods
+      call period%wrap(bodies%position(:, k), turns)
+      bodies%image(:, k) = bodies%image(:, k) + turns
     end do
-  end subroutine wrap
+  end subroutine wrap_grains
 
   !> Bring records to the ranks of the subdomains that hold a point. Collective.
   subroutine decomposition_deliver(self, point_word, records, received)

@@ -4,27 +4,34 @@ module gravier_problem_builder
   use gravier_sorting, only: argsort, argsort_rows, find_sorted
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_shared_exchange, only: shared_part_t
-  use gravier_timers, only: start_timer, stop_timer, phase_neighbourhood, phase_detection, phase_interface, phase_setup
-  use gravier_body_store, only: wall_set_t
-  use gravier_motion, only: make_free_velocity
-  use gravier_cell_grid, only: cell_grid_t
-  use gravier_contact_list, only: contact_list_t
-  use gravier_detection, only: detect_contacts, sort_bodies
+  use gravier_timers, only: start_timer, stop_timer, phase_detection, phase_interface, phase_setup
+  use gravier_periodic, only: period_t, shift_of_code
+  use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t
+  use gravier_motion, only: grain_volume
+  use gravier_neighbour_list, only: neighbour_list_t
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_decomposition, only: decomposition_t, neighbourhood_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
   implicit none
   private
   public :: physics_t, interface_figures_t, build_problem, take_velocities, n_multiplicities
 
-  !> What the contacts of a scene need to know.
+  !> What acts on the grains of a scene.
   type :: physics_t
-    !> [m/s^2], the first nd are used
+    !> at the present time [m/s^2], the first nd are used
     real(dp) :: gravity(3) = 0.0_dp
-    !> friction coefficients between grains, and of grains on walls
-    real(dp) :: friction = 0.0_dp, wall_friction = 0.0_dp
+    !> on the volume of grains [N/m^3, N/m^2 in 2D]
+    real(dp) :: body_force(3) = 0.0_dp
+    !> friction and normal restitution between grains; boundaries have their own
+    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+    !> grains turn
+    logical :: rotation = .true.
     !> step [s]
     real(dp) :: h = 1.0_dp
+  contains
+    procedure :: accelerate => physics_accelerate
   end type physics_t
 
   !> multiplicities counted apart; the last counts that many and more
@@ -32,53 +39,74 @@ module gravier_problem_builder
 
   !> The interface that a partition makes, over all subdomains.
   type :: interface_figures_t
-    !> grains that carry contacts in several subdomains
+    !> bodies that carry contacts in several subdomains
     integer(i8) :: bodies = 0
     !> contacts between grains whose centres lie in different subdomains
     integer(i8) :: interactions = 0
-    !> grains in contact by multiplicity
+    !> bodies in contact by multiplicity
     integer(i8) :: multiplicity(n_multiplicities) = 0
     !> contacts in the fullest and the emptiest subdomain
     integer(i8) :: most_contacts = 0, least_contacts = 0
   end type interface_figures_t
 
+  !> Gaps and normals of the pairs of a list that are contacts.
+  type :: found_t
+    integer :: n = 0
+    !> place in the list (n)
+    integer, allocatable :: source(:)
+    !> (n) [m], (nd, n)
+    real(dp), allocatable :: gap(:), normal(:, :)
+  end type found_t
+
 contains
 
-  !> Detect the contacts at the present places (q_m) and pack them, subdomain by subdomain. Impulses start from
-  !> zero. Collective.
-  subroutine build_problem(decomposition, kernels, physics, problem, figures)
+  !> Turn the velocity of grain `k` at the start of a step into that without contacts, M^-1 R^d = V_i + h M^-1 F
+  !> (paper, (1)); no force here turns a grain.
+  pure subroutine physics_accelerate(self, bodies, k, v)
+    class(physics_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (nv)
+    real(dp), intent(inout) :: v(:)
+    integer :: d
+
+    do d = 1, bodies%nd
+      v(d) = v(d) + self%h*self%gravity(d)
+    end do
+    if (.not. any(abs(self%body_force) > 0.0_dp)) return
+    do d = 1, bodies%nd
+      v(d) = v(d) + self%h*self%body_force(d)*grain_volume(bodies%nd, bodies%radius(k))/bodies%mass(k)
+    end do
+  end subroutine physics_accelerate
+
+  !> Find the contacts among the near pairs at the present places (q_m) and pack them, subdomain by subdomain. Impulses
+  !> start from zero. Boundaries hold the velocities that they have at the end of the step as far as no contact acts on
+  !> them. Collective.
+  subroutine build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(inout) :: problem
     type(interface_figures_t), intent(out) :: figures
-    type(neighbourhood_t), allocatable :: seen(:)
-    type(contact_list_t) :: contacts
-    type(cell_grid_t) :: grid
-    integer, allocatable :: order(:), first(:)
-    real(dp) :: edge
+    type(found_t) :: found
     integer :: s
 
-    call start_timer(phase_neighbourhood)
-    call decomposition%look_around(seen)
-    call stop_timer(phase_neighbourhood)
     problem%comm => decomposition%comm
     problem%kernels = kernels
     problem%n_subdomains = decomposition%n_subdomains
     if (allocated(problem%sub)) deallocate (problem%sub)
-    allocate (problem%sub(size(seen)))
-    edge = 2.0_dp*decomposition%rule%largest_radius + decomposition%rule%alert_distance
-    do s = 1, size(seen)
-      call start_timer(phase_detection)
-      call sort_bodies(seen(s)%bodies, edge, grid, order, first)
-      call reorder(seen(s), order)
-      call detect_contacts(seen(s)%bodies, grid, first, decomposition%walls, decomposition%partition, &
-        & decomposition%first + s - 1, decomposition%rule, contacts)
-      call stop_timer(phase_detection)
-      call start_timer(phase_setup)
-      problem%sub(s)%subdomain = decomposition%first + s - 1
-      call pack_subproblem(seen(s), contacts, decomposition%walls, kernels, physics, problem%sub(s))
-      call stop_timer(phase_setup)
+    allocate (problem%sub(size(neighbourhoods%view)))
+    do s = 1, size(problem%sub)
+      associate (view => neighbourhoods%view(s))
+        call start_timer(phase_detection)
+        call find_contacts(view, decomposition, physics, found)
+        call stop_timer(phase_detection)
+        call start_timer(phase_setup)
+        problem%sub(s)%subdomain = decomposition%subdomain_of(s)
+        call pack_subproblem(view, found, decomposition, kernels, physics, problem%sub(s))
+        call stop_timer(phase_setup)
+      end associate
     end do
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
@@ -87,112 +115,281 @@ contains
     call stop_timer(phase_interface)
   end subroutine build_problem
 
-  subroutine reorder(seen, order)
-    type(neighbourhood_t), intent(inout) :: seen
-    integer, intent(in), contiguous :: order(:)
-    integer, allocatable :: home(:), origin(:)
-    integer :: k
+  !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
+  !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
+  subroutine find_contacts(view, decomposition, physics, found)
+    type(neighbourhood_t), intent(in) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(found_t), intent(inout) :: found
+    integer :: p, i, j, nd
+    real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
 
-    call seen%bodies%reorder(order)
-    call move_alloc(seen%home, home)
-    call move_alloc(seen%origin, origin)
-    allocate (seen%home(size(order)), seen%origin(size(order)))
-    do k = 1, size(order)
-      seen%home(k) = home(order(k))
-      seen%origin(k) = origin(order(k))
+    nd = decomposition%nd
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal)
+    allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
+    found%n = 0
+    alert = decomposition%rule%alert_distance
+    do p = 1, view%list%n
+      i = view%list%candidate(p)
+      j = view%list%antagonist(p)
+      if (j > 0) then
+        branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
+        if (size(view%list%shift) > 0) branch(:) = branch - way_of_shift(decomposition%period, view%list%shift(p), nd)
+        distance = norm2(branch)
+        gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
+        if (gap > alert) cycle
+        if (distance > 0.0_dp) then
+          normal(:) = branch/distance
+        else
+          ! coincident centres have no normal: take the vertical, so that the law can part them
+          normal(:) = 0.0_dp
+          normal(nd) = 1.0_dp
+        end if
+      else
+        if (.not. decomposition%boundaries(-j)%present) cycle
+        call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
+        gap = distance - view%bodies%radius(i)
+        if (gap > alert) cycle
+      end if
+      if (gap > 0.0_dp) then
+        if (restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
+      end if
+      found%n = found%n + 1
+      found%source(found%n) = p
+      found%gap(found%n) = gap
+      found%normal(:, found%n) = normal
     end do
-  end subroutine reorder
+  end subroutine find_contacts
 
-  !> Number the bodies that contacts touch, in their order, and pack bodies and contacts.
-  subroutine pack_subproblem(seen, contacts, walls, kernels, physics, sub)
-    type(neighbourhood_t), intent(in) :: seen
-    type(contact_list_t), intent(in) :: contacts
-    type(wall_set_t), intent(in) :: walls
+  pure function way_of_shift(period, code, nd) result(way)
+    type(period_t), intent(in) :: period
+    integer, intent(in) :: code, nd
+    real(dp) :: way(nd)
+    integer :: shift(3)
+
+    shift(:) = shift_of_code(code)
+    way(:) = shift(1:nd)*period%length(1:nd)
+  end function way_of_shift
+
+  !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
+  pure integer function boundary_of(view, p) result(b)
+    type(neighbourhood_t), intent(in) :: view
+    integer, intent(in) :: p
+
+    if (view%list%antagonist(p) < 0) then
+      b = -view%list%antagonist(p)
+    else
+      b = max(view%bodies%glued(view%list%candidate(p)), view%bodies%glued(view%list%antagonist(p)))
+    end if
+  end function boundary_of
+
+  pure real(dp) function restitution_of(view, boundaries, physics, p) result(e)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    integer :: b
+
+    b = boundary_of(view, p)
+    e = physics%restitution
+    if (b > 0) e = boundaries(b)%restitution
+  end function restitution_of
+
+  !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order of the view,
+  !> then boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, or one a contact
+  !> where the boundary turns.
+  subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(decomposition_t), intent(in) :: decomposition
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    integer, allocatable :: number_of(:)
-    integer :: c, k
+    integer, allocatable :: number_of(:), column_of(:)
+    integer :: c, k, p, b, n
 
-    allocate (number_of(seen%bodies%n), source=0)
-    do c = 1, contacts%n
-      number_of(contacts%candidate(c)) = 1
-      if (contacts%antagonist(c) > 0) number_of(contacts%antagonist(c)) = 1
-    end do
-    sub%n_bodies = 0
-    do k = 1, seen%bodies%n
-      if (number_of(k) == 0) cycle
-      sub%n_bodies = sub%n_bodies + 1
-      number_of(k) = sub%n_bodies
-    end do
-    sub%n_columns = sub%n_bodies + walls%n
-    sub%n_contacts = contacts%n
-    call pack_bodies(seen, number_of, walls, kernels, physics, sub)
-    call pack_contacts(seen, contacts, number_of, kernels, physics, sub)
+    associate (list => view%list, boundaries => decomposition%boundaries)
+      allocate (number_of(view%bodies%n), column_of(size(boundaries)), source=0)
+      n = 0
+      do c = 1, found%n
+        p = found%source(c)
+        if (view%bodies%glued(list%candidate(p)) == 0) number_of(list%candidate(p)) = 1
+        if (list%antagonist(p) > 0) then
+          if (view%bodies%glued(list%antagonist(p)) == 0) number_of(list%antagonist(p)) = 1
+        end if
+        b = boundary_of(view, p)
+        if (b == 0) cycle
+        column_of(b) = 1
+        if (boundaries(b)%turns()) n = n + 1
+      end do
+      sub%n_contacts = found%n
+      sub%n_grains = 0
+      do k = 1, view%bodies%n
+        if (number_of(k) == 0) cycle
+        sub%n_grains = sub%n_grains + 1
+        number_of(k) = sub%n_grains
+      end do
+      sub%n_bodies = sub%n_grains
+      do b = 1, size(boundaries)
+        if (column_of(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle
+        sub%n_bodies = sub%n_bodies + 1
+        column_of(b) = sub%n_bodies
+      end do
+      sub%n_columns = sub%n_bodies
+      do b = 1, size(boundaries)
+        if (column_of(b) == 0 .or. boundaries(b)%is_driven() .or. boundaries(b)%turns()) cycle
+        sub%n_columns = sub%n_columns + 1
+        column_of(b) = sub%n_columns
+      end do
+      call allocate_bodies(kernels, sub%n_columns + n, sub)
+      call pack_grains(view, number_of, kernels, physics, sub)
+      do b = 1, size(boundaries)
+        if (column_of(b) == 0 .or. boundaries(b)%turns()) cycle
+        call pack_boundary(boundaries(b), b, column_of(b), decomposition%n_subdomains, kernels, sub)
+      end do
+    end associate
+    call pack_contacts(view, found, decomposition%boundaries, number_of, column_of, kernels, physics, sub)
   end subroutine pack_subproblem
 
-  subroutine pack_bodies(seen, number_of, walls, kernels, physics, sub)
-    type(neighbourhood_t), intent(in) :: seen
+  subroutine allocate_bodies(kernels, n_columns, sub)
+    type(kernels_t), intent(in) :: kernels
+    integer, intent(in) :: n_columns
+    type(subproblem_t), intent(inout) :: sub
+
+    allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%position(kernels%nd, sub%n_grains), sub%radius(sub%n_grains))
+    allocate (sub%v_free(kernels%nv, n_columns), sub%velocity(kernels%nv, n_columns), sub%v_global(kernels%nv, n_columns), &
+      & sub%reaction(kernels%nv, n_columns), sub%inverse_mass(kernels%nw, n_columns), sub%weight(kernels%nw, n_columns), &
+      & source=0.0_dp)
+    allocate (sub%multiplicity(sub%n_bodies), source=1)
+    allocate (sub%boundary(sub%n_grains + 1:n_columns), source=0)
+  end subroutine allocate_bodies
+
+  subroutine pack_grains(view, number_of, kernels, physics, sub)
+    type(neighbourhood_t), intent(in) :: view
     integer, intent(in), contiguous :: number_of(:)
-    type(wall_set_t), intent(in) :: walls
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     integer :: k, b
 
-    allocate (sub%id(sub%n_columns), sub%home(sub%n_bodies), sub%position(kernels%nd, sub%n_bodies))
-    allocate (sub%v_free(kernels%nv, sub%n_columns), sub%velocity(kernels%nv, sub%n_columns), &
-      & sub%v_global(kernels%nv, sub%n_columns), sub%reaction(kernels%nv, sub%n_columns), &
-      & sub%inverse_mass(kernels%nw, sub%n_columns), sub%weight(kernels%nw, sub%n_columns), source=0.0_dp)
-    allocate (sub%multiplicity(sub%n_bodies), source=1)
     do k = 1, size(number_of)
       b = number_of(k)
       if (b == 0) cycle
-      sub%id(b) = seen%bodies%id(k)
-      sub%home(b) = seen%home(k)
-      sub%position(:, b) = seen%bodies%position(:, k)
-      sub%v_free(:, b) = seen%bodies%velocity(:, k)
-      call make_free_velocity(sub%v_free(:, b), physics%gravity(1:kernels%nd), physics%h)
-      sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/seen%bodies%mass(k)
-      if (kernels%nw > kernels%nd) sub%inverse_mass(kernels%nw, b) = 1.0_dp/seen%bodies%inertia(k)
+      sub%id(b) = view%bodies%id(k)
+      sub%home(b) = view%home(k)
+      sub%position(:, b) = view%bodies%position(:, k)
+      sub%radius(b) = view%bodies%radius(k)
+      sub%v_free(:, b) = view%bodies%velocity(:, k)
+      call physics%accelerate(view%bodies, k, sub%v_free(:, b))
+      sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/view%bodies%mass(k)
+      if (kernels%nw > kernels%nd .and. physics%rotation) sub%inverse_mass(kernels%nw, b) = 1.0_dp/view%bodies%inertia(k)
     end do
-    sub%id(sub%n_bodies + 1:) = walls%id
-  end subroutine pack_bodies
+  end subroutine pack_grains
 
-  subroutine pack_contacts(seen, contacts, number_of, kernels, physics, sub)
-    type(neighbourhood_t), intent(in) :: seen
-    type(contact_list_t), intent(in) :: contacts
-    integer, intent(in), contiguous :: number_of(:)
+  !> A boundary as a column. One that forces move is a body shared by the subdomains that touch it, with one of all
+  !> subdomains to keep account of them.
+  subroutine pack_boundary(boundary, b, column, n_subdomains, kernels, sub)
+    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: b, column, n_subdomains
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(inout) :: sub
+    integer :: d
+
+    sub%id(column) = boundary%id
+    sub%boundary(column) = b
+    sub%v_free(1:kernels%nd, column) = boundary%velocity(1:kernels%nd)
+    if (column > sub%n_bodies) return
+    sub%home(column) = mod(b - 1, n_subdomains) + 1
+    do d = 1, kernels%nd
+      if (boundary%free(d)) sub%inverse_mass(d, column) = 1.0_dp/boundary%mass
+    end do
+  end subroutine pack_boundary
+
+  subroutine pack_contacts(view, found, boundaries, number_of, column_of, kernels, physics, sub)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> of the grains of the view, 0 for those without a column of their own; of the boundaries
+    integer, intent(in), contiguous :: number_of(:), column_of(:)
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    integer :: c, nd
-    logical :: on_wall
+    integer :: c, p, b, i, j, nd
+    real(dp) :: e
 
     nd = kernels%nd
-    allocate (sub%pair(2, contacts%n))
-    allocate (sub%hot(kernels%nh, contacts%n), sub%impulse(kernels%nc, contacts%n), source=0.0_dp)
-    allocate (sub%gap(contacts%n))
-    do c = 1, contacts%n
-      on_wall = contacts%antagonist(c) < 0
-      sub%pair(1, c) = number_of(contacts%candidate(c))
-      sub%gap(c) = contacts%gap(c)
-      sub%hot(1:nd, c) = contacts%normal(:, c)
-      sub%hot(nd + 1, c) = max(contacts%gap(c), 0.0_dp)/physics%h
-      if (on_wall) then
-        sub%pair(2, c) = sub%n_bodies - contacts%antagonist(c)
+    allocate (sub%pair(2, found%n), sub%source(found%n), sub%gap(found%n))
+    allocate (sub%hot(kernels%nh, found%n), sub%impulse(kernels%nc, found%n), source=0.0_dp)
+    sub%source(:) = found%source(1:found%n)
+    sub%gap(:) = found%gap(1:found%n)
+    do c = 1, found%n
+      p = found%source(c)
+      i = view%list%candidate(p)
+      j = view%list%antagonist(p)
+      b = boundary_of(view, p)
+      if (b > 0) then
+        if (boundaries(b)%turns()) call add_column()
+        sub%pair(1, c) = merge(column(b), number_of(i), view%bodies%glued(i) > 0)
+        sub%pair(2, c) = column(b)
+        if (view%bodies%glued(i) > 0) sub%pair(2, c) = number_of(j)
       else
-        sub%pair(2, c) = number_of(contacts%antagonist(c))
+        sub%pair(1, c) = number_of(i)
+        sub%pair(2, c) = number_of(j)
+      end if
+      sub%hot(1:nd, c) = found%normal(:, c)
+      e = restitution_of(view, boundaries, physics, p)
+      if (e > 0.0_dp) then
+        sub%hot(nd + 1, c) = e*min(approach(), 0.0_dp)
+      else
+        sub%hot(nd + 1, c) = max(found%gap(c), 0.0_dp)/physics%h
       end if
       if (kernels%nc == 1) cycle
-      sub%hot(nd + 4, c) = seen%bodies%radius(contacts%candidate(c))
-      if (on_wall) then
-        sub%hot(nd + 6, c) = physics%wall_friction
-      else
-        sub%hot(nd + 5, c) = seen%bodies%radius(contacts%antagonist(c))
-        sub%hot(nd + 6, c) = physics%friction
+      if (view%bodies%glued(i) == 0) sub%hot(nd + 4, c) = view%bodies%radius(i)
+      if (j > 0) then
+        if (view%bodies%glued(j) == 0) sub%hot(nd + 5, c) = view%bodies%radius(j)
       end if
+      sub%hot(nd + 6, c) = physics%friction
+      if (b > 0) sub%hot(nd + 6, c) = boundaries(b)%friction
     end do
+
+  contains
+
+    pure integer function column(b)
+      integer, intent(in) :: b
+      column = merge(sub%n_columns, column_of(b), boundaries(b)%turns())
+    end function column
+
+    !> The point of a turning boundary that this contact touches, as a body of its own.
+    subroutine add_column()
+      real(dp) :: point(nd)
+
+      sub%n_columns = sub%n_columns + 1
+      sub%id(sub%n_columns) = boundaries(b)%id
+      sub%boundary(sub%n_columns) = b
+      if (j < 0) then
+        point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(c))*found%normal(:, c)
+      else if (view%bodies%glued(i) > 0) then
+        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*found%normal(:, c)
+      else
+        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*found%normal(:, c)
+      end if
+      call boundaries(b)%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
+    end subroutine add_column
+
+    !> Normal velocity at the start of the step.
+    real(dp) function approach()
+      real(dp) :: v(nd)
+
+      v(:) = view%bodies%velocity(1:nd, i)
+      if (j > 0) then
+        v(:) = v - view%bodies%velocity(1:nd, j)
+      else
+        v(:) = v - boundaries(b)%last_velocity(1:nd)
+      end if
+      approach = sum(v*found%normal(:, c))
+    end function approach
+
   end subroutine pack_contacts
 
   !> Find out which subdomains hold a copy of each grain: every subdomain tells the owner of a grain that it
@@ -349,7 +546,7 @@ contains
           counts(m) = counts(m) + 1
         end do
         do c = 1, sub%n_contacts
-          if (sub%pair(2, c) > sub%n_bodies) cycle
+          if (any(sub%pair(:, c) > sub%n_grains)) cycle
           if (sub%home(sub%pair(1, c)) /= sub%home(sub%pair(2, c))) counts(n_multiplicities + 1) = counts(n_multiplicities + 1) + 1
         end do
         counts(n_multiplicities + 2) = counts(n_multiplicities + 2) + sub%n_contacts
@@ -369,16 +566,17 @@ contains
   end subroutine count_figures
 
   !> Scales of the residual and of the jump: largest |R^d|, over the components that can move, and largest free speed of a
-  !> body in contact. Collective.
+  !> body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may strike. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(2), moving(problem%kernels%nd)
+    real(dp) :: scales(2), moving(problem%kernels%nd), speed, lightest
     integer :: s, b, d, nd
 
     nd = problem%kernels%nd
     scales(:) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
+        lightest = huge(1.0_dp)
         do b = 1, sub%n_bodies
           scales(2) = max(scales(2), norm2(sub%v_free(1:nd, b)))
           moving(:) = sub%v_free(1:nd, b)
@@ -386,8 +584,14 @@ contains
             if (.not. sub%moves(d, b)) moving(d) = 0.0_dp
           end do
           ! all components that move have the same mass
-          if (any(sub%inverse_mass(1:nd, b) > 0.0_dp)) scales(1) = max(scales(1), &
-            & norm2(moving)/maxval(sub%inverse_mass(1:nd, b)))
+          if (.not. any(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
+          scales(1) = max(scales(1), norm2(moving)/maxval(sub%inverse_mass(1:nd, b)))
+          lightest = min(lightest, maxval(sub%inverse_mass(1:nd, b)))
+        end do
+        do b = sub%n_bodies + 1, sub%n_columns
+          speed = norm2(sub%v_free(1:nd, b))
+          scales(1) = max(scales(1), speed/lightest)
+          scales(2) = max(scales(2), speed)
         end do
       end associate
     end do
@@ -397,7 +601,8 @@ contains
   end subroutine find_scales
 
   !> Velocities at the end of the step: those of the solved problem (v_global) for grains in contact, free ones for
-  !> the others. A shared grain whose owner has no contact on it gets its velocity from its first sharer. Collective.
+  !> the others. A shared grain whose owner has no contact on it gets its velocity from its first sharer. Grains glued to
+  !> a boundary are left. Collective.
   subroutine take_velocities(decomposition, physics, problem)
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
@@ -409,7 +614,7 @@ contains
     do s = 1, size(decomposition%home)
       associate (home => decomposition%home(s))
         do k = 1, home%n
-          call make_free_velocity(home%velocity(:, k), physics%gravity(1:home%nd), physics%h)
+          if (home%glued(k) == 0) call physics%accelerate(home, k, home%velocity(:, k))
         end do
       end associate
     end do
@@ -441,13 +646,15 @@ contains
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s), part => problem%shared%part(s))
           allocate (sends(sub%n_bodies), source=.true.)
+          sends(sub%n_grains + 1:) = .false.
           do k = 1, part%n_shared
             b = part%body(k)
+            if (b > sub%n_grains) cycle
             sends(b) = sub%home(b) == sub%subdomain
             if (part%rung(k) == 1) sends(b) = sends(b) .or. &
               & .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%home(b))
           end do
-          do b = 1, sub%n_bodies
+          do b = 1, sub%n_grains
             if (.not. sends(b)) cycle
             n = n + 1
             if (round == 1) cycle

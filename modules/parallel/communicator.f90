@@ -29,6 +29,7 @@ module gravier_communicator
     procedure :: highest => communicator_highest
     procedure :: lowest => communicator_lowest
     procedure :: highest_of => communicator_highest_of
+    procedure :: largest => communicator_largest
     procedure :: any_true => communicator_any_true
     procedure :: sum_parts => communicator_sum_parts
     procedure :: sum_real => communicator_sum_real
@@ -131,6 +132,13 @@ contains
     call MPI_Allreduce(x, highest, size(x), MPI_DOUBLE_PRECISION, MPI_MAX, self%mpi)
     x(:) = highest
   end subroutine communicator_highest_of
+
+  !> Largest of integers, one a rank. Collective.
+  integer(i8) function communicator_largest(self, n) result(largest)
+    class(communicator_t), intent(in) :: self
+    integer(i8), intent(in) :: n
+    call MPI_Allreduce(n, largest, 1, MPI_INTEGER8, MPI_MAX, self%mpi)
+  end function communicator_largest
 
   logical function communicator_any_true(self, flag) result(any_true)
     class(communicator_t), intent(in) :: self

@@ -17,7 +17,7 @@ module gravier_contact_kernels
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: kernels_t, contact_jacobian, tangents, normal_operator, tangential_operator
+  public :: kernels_t, contact_jacobian, global_impulse, tangents, normal_operator, tangential_operator
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse.
@@ -193,6 +193,25 @@ contains
     ts = t(2)*s(2)*y + t(3)*s(3)*z
     w = wi(1) + wj(1) + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
   end function tangential_3d
+
+  !> The impulse of one contact on its candidate in global axes [N s].
+  pure subroutine global_impulse(kernels, hot, impulse, p)
+    type(kernels_t), intent(in) :: kernels
+    !> columns of `hot` and `impulse`
+    real(dp), intent(in), contiguous :: hot(:), impulse(:)
+    !> (nd)
+    real(dp), intent(out) :: p(:)
+    real(dp) :: t(3), s(3)
+
+    p(:) = impulse(1)*hot(1:kernels%nd)
+    if (kernels%nc == 2) then
+      p(1) = p(1) - impulse(2)*hot(2)
+      p(2) = p(2) + impulse(2)*hot(1)
+    else if (kernels%nc == 3) then
+      call tangents(hot(1:3), t, s)
+      p(:) = p + impulse(2)*t + impulse(3)*s
+    end if
+  end subroutine global_impulse
 
   !> Rows of H^T of one contact: v = candidate . V_i + antagonist . V_j.
   pure subroutine contact_jacobian(nd, nc, hot, candidate, antagonist)

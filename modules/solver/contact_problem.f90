@@ -12,20 +12,22 @@ module gravier_contact_problem
   !> a defect of so many roundings of the largest momentum, a contact, is none
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
 
-  !> The contacts of one subdomain and the bodies they touch, packed in sweep order.
-  !> Bodies 1 to n_bodies are grains, n_bodies + 1 to n_columns are walls, which do not move.
+  !> The contacts of one subdomain and the bodies they touch, packed in sweep order. Bodies 1 to n_grains are free
+  !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed.
   type :: subproblem_t
     !> global number of the subdomain, from 1
     integer :: subdomain = 0
-    integer :: n_bodies = 0, n_columns = 0, n_contacts = 0
-    !> identifiers of grains, then walls (n_columns)
+    integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
+    !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
-    !> subdomain that holds the centre of each grain (n_bodies)
+    !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
     integer, allocatable :: home(:)
-    !> subdomains in which each grain carries contacts (n_bodies)
+    !> subdomains in which each body carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
-    !> centres of grains at q_m (nd, n_bodies) [m]
-    real(dp), allocatable :: position(:, :)
+    !> number of the boundary behind a column (n_grains + 1 to n_columns)
+    integer, allocatable :: boundary(:)
+    !> centres of grains at q_m (nd, n_grains), radii (n_grains) [m]
+    real(dp), allocatable :: position(:, :), radius(:)
     !> velocity without contacts, M^-1 R^d (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
     !> velocity under the scheme's present loads (nv, n_columns)
@@ -44,6 +46,8 @@ module gravier_contact_problem
     real(dp), allocatable :: impulse(:, :)
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
+    !> place of each contact in the neighbour list (n_contacts)
+    integer, allocatable :: source(:)
   contains
     procedure :: share_masses => subproblem_share_masses
     procedure :: update_local_operator => subproblem_update_local_operator

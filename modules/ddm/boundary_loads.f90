@@ -1,0 +1,98 @@
+!> What grains do to boundaries: impulses of a step, and the velocities of boundaries that forces move.
+module gravier_boundary_loads
+  use gravier_kinds, only: dp
+  use gravier_contact_kernels, only: global_impulse
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_decomposition, only: decomposition_t
+  implicit none
+  private
+  public :: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
+
+contains
+
+  !> Impulse of all contacts on each boundary [N s], exactly the same whatever the number of ranks. Collective.
+  subroutine sum_boundary_impulses(decomposition, problem, impulses)
+    type(decomposition_t), intent(in) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    !> (nd, boundaries)
+    real(dp), allocatable, intent(out) :: impulses(:, :)
+    real(dp), allocatable :: parts(:, :), sums(:)
+    real(dp) :: p(decomposition%nd)
+    integer :: s, c, b, nd, first
+
+    nd = decomposition%nd
+    allocate (impulses(nd, size(decomposition%boundaries)), source=0.0_dp)
+    allocate (parts(size(impulses), size(problem%sub)), sums(size(impulses)), source=0.0_dp)
+    if (size(sums) == 0) return
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          if (all(sub%pair(:, c) <= sub%n_grains)) cycle
+          call global_impulse(problem%kernels, sub%hot(:, c), sub%impulse(:, c), p)
+          if (sub%pair(2, c) > sub%n_grains) then
+            b = sub%boundary(sub%pair(2, c))
+            p(:) = -p
+          else
+            b = sub%boundary(sub%pair(1, c))
+          end if
+          first = (b - 1)*nd
+          parts(first + 1:first + nd, s) = parts(first + 1:first + nd, s) + p
+        end do
+      end associate
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    do b = 1, size(impulses, 2)
+      impulses(:, b) = sums((b - 1)*nd + 1:b*nd)
+    end do
+  end subroutine sum_boundary_impulses
+
+  !> Velocities at the end of the step of the boundaries that forces move.
+  subroutine take_boundary_velocities(decomposition, impulses)
+    type(decomposition_t), intent(inout) :: decomposition
+    !> (nd, boundaries) of the contacts [N s]
+    real(dp), intent(in), contiguous :: impulses(:, :)
+    integer :: b, d
+
+    do b = 1, size(decomposition%boundaries)
+      associate (boundary => decomposition%boundaries(b))
+        do d = 1, decomposition%nd
+          if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + impulses(d, b)/boundary%mass
+        end do
+      end associate
+    end do
+  end subroutine take_boundary_velocities
+
+  !> Move glued grains with their boundaries, which have not moved yet, for a time.
+  subroutine carry_glued(decomposition, duration)
+    type(decomposition_t), intent(inout) :: decomposition
+    !> [s]
+    real(dp), intent(in) :: duration
+    integer :: s, k
+
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) > 0) call decomposition%boundaries(home%glued(k))%carry(duration, home%position(:, k))
+        end do
+      end associate
+    end do
+  end subroutine carry_glued
+
+  !> Give glued grains the velocity of their boundary where they are.
+  subroutine set_glued_velocities(decomposition)
+    type(decomposition_t), intent(inout) :: decomposition
+    integer :: s, k, nd
+
+    nd = decomposition%nd
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) cycle
+          home%velocity(:, k) = 0.0_dp
+          call decomposition%boundaries(home%glued(k))%velocity_at(home%position(:, k), home%velocity(1:nd, k))
+        end do
+      end associate
+    end do
+  end subroutine set_glued_velocities
+
+end module gravier_boundary_loads

@@ -1,0 +1,104 @@
+!> From &boundary groups and the walls of a bodies file to boundaries.
+module gravier_scene_boundaries
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t
+  use gravier_bodies_file, only: bodies_data_t
+  use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, &
+    & shape_grains, shape_outlet, drive_names
+  use gravier_config_types, only: config_t, boundary_config_t
+  implicit none
+  private
+  public :: make_boundaries
+
+contains
+
+  !> Walls first, then the groups of the input file, with the identifiers that follow on the largest of `data`. Errors
+  !> are the same on all ranks. Collective.
+  subroutine make_boundaries(comm, config, data, boundaries, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(boundary_t), allocatable, intent(out) :: boundaries(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: last_id
+    integer :: w, b, nd
+
+    nd = config%scene%dimension
+    allocate (boundaries(data%n_walls + size(config%boundaries)))
+    do w = 1, data%n_walls
+      associate (wall => boundaries(w))
+        wall%id = data%wall_id(w)
+        wall%name = "wall "//to_text(data%wall_id(w))
+        wall%point(1:nd) = data%wall_point(:, w)
+        wall%pivot(:) = wall%point
+        wall%axis(1:nd) = data%wall_normal(:, w)
+        wall%friction = config%scene%wall_friction
+        wall%restitution = config%scene%wall_restitution
+      end associate
+    end do
+    last_id = 0
+    if (data%n > 0) last_id = maxval(data%id)
+    if (data%n_walls > 0) last_id = max(last_id, maxval(data%wall_id))
+    last_id = comm%largest(last_id)
+    do b = 1, size(config%boundaries)
+      associate (boundary => boundaries(data%n_walls + b))
+        boundary%id = last_id + b
+        call set_boundary(config%boundaries(b), nd, boundary)
+        if (config%boundaries(b)%table /= "") call boundary%table%read(trim(config%boundaries(b)%table), drive_names(nd), error)
+      end associate
+    end do
+    call comm%agree(error)
+    do b = 1, size(boundaries)
+      if (.not. allocated(error)) call boundaries(b)%prescribe(nd, 0.0_dp)
+    end do
+  end subroutine make_boundaries
+
+  subroutine set_boundary(config, nd, boundary)
+    type(boundary_config_t), intent(in) :: config
+    integer, intent(in) :: nd
+    type(boundary_t), intent(inout) :: boundary
+
+    boundary%name = trim(config%name)
+    boundary%point(:) = config%point
+    boundary%pivot(:) = config%pivot
+    boundary%radius = config%radius
+    select case (config%shape)
+    case ("plane")
+      boundary%shape = shape_plane
+      boundary%axis(:) = config%normal/norm2(config%normal)
+    case ("outlet")
+      boundary%shape = shape_outlet
+      boundary%axis(:) = config%normal/norm2(config%normal)
+    case ("segment")
+      boundary%shape = shape_segment
+      boundary%edge(:, 1) = config%end_point - config%point
+    case ("rectangle")
+      boundary%shape = shape_rectangle
+      boundary%edge(:, 1) = config%edge_a
+      boundary%edge(:, 2) = config%edge_b
+    case ("circle")
+      boundary%shape = shape_circle
+    case ("cylinder")
+      boundary%shape = shape_cylinder
+      boundary%axis(:) = config%axis/norm2(config%axis)
+    case ("grains")
+      boundary%shape = shape_grains
+    end select
+    boundary%given_velocity(:) = config%velocity
+    boundary%given_spin(:) = config%rotation
+    if (nd == 2) then
+      boundary%given_spin(3) = config%rotation(1)
+      boundary%given_spin(1) = 0.0_dp
+    end if
+    boundary%free(:) = config%free
+    boundary%given_force(:) = config%force
+    boundary%given_pressure = config%pressure
+    boundary%mass = config%mass
+    boundary%friction = config%friction
+    boundary%restitution = config%restitution
+    boundary%remove_at = config%remove_at
+  end subroutine set_boundary
+
+end module gravier_scene_boundaries
