@@ -12,7 +12,7 @@ module gravier_bodies_csv
 
   !> Places of the columns in the table, 0 for a column that the file does not have.
   type :: layout_t
-    integer :: id = 0, radius = 0, mass = 0, shape = 0
+    integer :: id = 0, radius = 0, mass = 0, shape = 0, group = 0
     !> (dimension)
     integer, allocatable :: position(:), normal(:)
     !> (3 or 6)
@@ -71,6 +71,7 @@ contains
     layout%radius = table%column("radius")
     layout%mass = table%column("mass")
     layout%shape = table%column("shape")
+    layout%group = table%column("group")
     call find_columns(table, position_names(dimension), layout%position)
     call find_columns(table, normal_names(dimension), layout%normal)
     call find_columns(table, velocity_names(dimension), layout%velocity)
@@ -128,13 +129,14 @@ contains
     integer :: k
 
     required = "id, "//position_names(dimension)//", radius"
-    known = required//", "//velocity_names(dimension)//", mass, shape, "//normal_names(dimension)
+    known = required//", "//velocity_names(dimension)//", mass, shape, "//normal_names(dimension)//", group"
     if (layout%id == 0 .or. layout%radius == 0 .or. any(layout%position == 0)) then
       call table%refuse_file("in "//to_text(dimension)//"D the columns "//required//" are required, but the first line is: "// &
         & header_text(table), error)
     end if
     do k = 1, table%column_count()
-      if (k == layout%id .or. k == layout%radius .or. k == layout%mass .or. k == layout%shape) cycle
+      if (k == layout%id .or. k == layout%radius .or. k == layout%mass .or. k == layout%shape .or. &
+        & k == layout%group) cycle
       if (any(k == layout%position) .or. any(k == layout%normal) .or. any(k == layout%velocity)) cycle
       call table%refuse_file("column "//table%column_name(k)//" is unknown in "//to_text(dimension)//"D; known are "//known, error)
       return
@@ -235,6 +237,7 @@ contains
     call read_numbers(table, layout%normal, .false., ignored, error)
     call read_positive(table, layout%radius, "a radius > 0", bodies%radius(i), error)
     if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
+    call read_group(table, layout%group, bodies%group(i), error)
   end subroutine read_grain
 
   subroutine read_plane(table, layout, i, bodies, error)
@@ -244,6 +247,7 @@ contains
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: ignored(6)
+    integer :: group
     logical :: possible
 
     call read_id(table, layout%id, bodies%wall_id(i), error)
@@ -251,6 +255,7 @@ contains
     call read_numbers(table, layout%velocity, .false., ignored, error)
     if (.not. table%is_empty(layout%radius)) call table%get_real(layout%radius, ignored(1), error)
     if (.not. table%is_empty(layout%mass)) call table%get_real(layout%mass, ignored(1), error)
+    call read_group(table, layout%group, group, error)
     if (any(layout%normal == 0)) then
       call table%refuse(layout%shape, "a grain (a plane needs the columns "//normal_names(bodies%dimension)//")", error)
       return
@@ -271,6 +276,25 @@ contains
     if (allocated(error)) return
     if (id < 1) call table%refuse(column, "an id >= 1", error)
   end subroutine read_id
+
+  !> Read the group that a grain is glued to; a cell that is empty or missing is 0.
+  subroutine read_group(table, column, group, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: column
+    integer, intent(out) :: group
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: value
+
+    group = 0
+    if (table%is_empty(column)) return
+    call table%get_integer(column, value, error)
+    if (allocated(error)) return
+    if (value < 0 .or. value > huge(group)) then
+      call table%refuse(column, "a group from 0 to "//to_text(huge(group)), error)
+    else
+      group = int(value)
+    end if
+  end subroutine read_group
 
   subroutine read_positive(table, column, expected, value, error)
     type(csv_table_t), intent(in) :: table

@@ -27,17 +27,22 @@ module gravier_bodies_data
     real(dp), allocatable :: radius(:)
     !> (n): > 0; not allocated when the file has no masses
     real(dp), allocatable :: mass(:)
+    !> (n): 0 a free grain, k >= 1 a grain glued to the boundary of group k; zero where the file has none
+    integer, allocatable :: group(:)
     !> the same on all ranks
     integer :: n_walls = 0
     !> (n_walls)
     integer(i8), allocatable :: wall_id(:)
     !> (dimension, n_walls): a point of each plane, and its unit normal towards the free side
     real(dp), allocatable :: wall_point(:, :), wall_normal(:, :)
+    !> whether the file has a periodic box, its lower corner and its lengths; an axis of length 0 is not periodic
+    logical :: has_box = .false.
+    real(dp) :: origin(3) = 0, period(3) = 0
   end type bodies_data_t
 
 contains
 
-  !> Room for n bodies at rest, without masses.
+  !> Room for n bodies at rest, free, without masses.
   subroutine allocate_bodies(bodies, dimension, n)
     type(bodies_data_t), intent(inout) :: bodies
     integer, intent(in) :: dimension, n
@@ -45,6 +50,7 @@ contains
     bodies%dimension = dimension
     bodies%n = n
     allocate (bodies%id(n), bodies%position(dimension, n), bodies%radius(n))
+    allocate (bodies%group(n), source=0)
     allocate (bodies%velocity(3*(dimension - 1), n), source=0.0_dp)
   end subroutine allocate_bodies
 

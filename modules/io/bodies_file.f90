@@ -39,7 +39,8 @@ contains
 
   !> Write a bodies file in HDF5, in the order of the ids whatever rank holds which body. It appears under its name only
   !> when complete. Failure: status_failure, the same on all ranks; an older file of that name stays. Collective.
-  subroutine write_bodies(comm, path, dimension, id, position, velocity, radius, mass, wall_id, wall_point, wall_normal, error)
+  subroutine write_bodies(comm, path, dimension, id, position, velocity, radius, mass, wall_id, wall_point, wall_normal, error, &
+    & group, origin, period)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> 2 or 3
@@ -57,6 +58,10 @@ contains
     !> (dimension, walls): a point of each plane, and unit vectors towards the free side
     real(dp), intent(in), contiguous :: wall_point(:, :), wall_normal(:, :)
     type(error_t), allocatable, intent(inout) :: error
+    !> (n): >= 0, the group that a grain is glued to; free grains when absent, on all ranks or on none
+    integer, intent(in), contiguous, optional :: group(:)
+    !> (dimension), m: lower corner and lengths of the periodic box, 0 along an axis that is not periodic; both or none
+    real(dp), intent(in), contiguous, optional :: origin(:), period(:)
     type(bodies_data_t) :: bodies
 
     if (allocated(error)) return
@@ -67,6 +72,16 @@ contains
     bodies%velocity = velocity
     bodies%radius = radius
     if (present(mass)) bodies%mass = mass
+    if (present(group)) then
+      bodies%group = group
+    else
+      allocate (bodies%group(bodies%n), source=0)
+    end if
+    bodies%has_box = present(origin) .and. present(period)
+    if (bodies%has_box) then
+      bodies%origin(1:dimension) = origin
+      bodies%period(1:dimension) = period
+    end if
     bodies%n_walls = size(wall_id)
     bodies%wall_id = wall_id
     bodies%wall_point = wall_point

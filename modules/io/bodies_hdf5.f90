@@ -1,4 +1,5 @@
-!> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass} and /walls/{id, point, normal}.
+!> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group}, /walls/{id, point,
+!> normal} and /box/{origin, period}.
 module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
@@ -13,8 +14,9 @@ module gravier_bodies_hdf5
   private
   public :: read_bodies_hdf5, write_bodies_hdf5
 
-  character(len=*), parameter :: body_sets(5) = [character(len=8) :: "id", "position", "velocity", "radius", "mass"]
+  character(len=*), parameter :: body_sets(6) = [character(len=8) :: "id", "position", "velocity", "radius", "mass", "group"]
   character(len=*), parameter :: wall_sets(3) = [character(len=8) :: "id", "point", "normal"]
+  character(len=*), parameter :: box_sets(2) = [character(len=8) :: "origin", "period"]
   !> room for the headers of the file
   integer(i8), parameter :: bytes_of_headers = 65536
   integer, parameter :: bytes_of_word = 8
@@ -36,9 +38,11 @@ contains
     if (allocated(error)) return
     call check_members(file, path, "/bodies", body_sets, error)
     if (file%exists("/walls")) call check_members(file, path, "/walls", wall_sets, error)
+    if (file%exists("/box")) call check_members(file, path, "/box", box_sets, error)
     call read_grains(comm, file, path, dimension, bodies, error)
     call comm%agree(error)
     call read_walls(file, path, dimension, bodies, error)
+    call read_box(file, path, dimension, bodies, error)
     call comm%agree(error)
     call file%close(error)
   end subroutine read_bodies_hdf5
@@ -86,7 +90,8 @@ contains
     integer(i8) :: first
     integer :: n
 
-    call check_lengths(file, path, "/bodies", body_sets, [.true., .true., .false., .true., .false.], bodies%total, error)
+    call check_lengths(file, path, "/bodies", body_sets, [.true., .true., .false., .true., .false., .false.], &
+      & bodies%total, error)
     if (allocated(error)) return
     call find_own_rows(comm, bodies%total, first, n)
     call allocate_bodies(bodies, dimension, n)
@@ -105,7 +110,50 @@ contains
       call file%read_rows("/bodies/mass", first, bodies%mass, error)
       call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, .true., error)
     end if
+    if (file%exists("/bodies/group")) call read_groups(comm, file, path, first, bodies, error)
   end subroutine read_grains
+
+  !> Read the groups that grains are glued to.
+  subroutine read_groups(comm, file, path, first, bodies, error)
+    type(communicator_t), intent(in) :: comm
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: group(:)
+
+    if (allocated(error)) return
+    allocate (group(bodies%n), source=0_i8)
+    call file%read_rows("/bodies/group", first, group, error)
+    call check_groups(comm, path//": /bodies/group", bodies%id, group, error)
+    if (allocated(error)) return
+    bodies%group = int(group)
+  end subroutine read_groups
+
+  !> Read the periodic box, if the file has one; the same on all ranks.
+  subroutine read_box(file, path, dimension, bodies, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: dimension
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: n
+
+    if (allocated(error)) return
+    bodies%has_box = file%exists("/box")
+    if (.not. bodies%has_box) return
+    call check_lengths(file, path, "/box", box_sets, [.true., .true.], n, error)
+    if (allocated(error)) return
+    if (n /= dimension) then
+      call raise(error, status_input, path//": /box/origin: "//to_text(n)//" numbers, but "//to_text(dimension)// &
+        & " were expected")
+      return
+    end if
+    call file%read_rows("/box/origin", 0_i8, bodies%origin(1:dimension), error)
+    call file%read_rows("/box/period", 0_i8, bodies%period(1:dimension), error)
+    call check_box(path, bodies, error)
+  end subroutine read_box
 
   !> Every rank reads all walls.
   subroutine read_walls(file, path, dimension, bodies, error)
@@ -236,7 +284,41 @@ contains
     end do
   end subroutine check_own_numbers
 
-  !> Write the bodies of all ranks in the order of the ids, and the walls. The file appears under its name only when it
+  subroutine check_groups(comm, place, id, group, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: place
+    integer(i8), intent(in), contiguous :: id(:), group(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i
+
+    if (allocated(error)) return
+    do i = 1, size(id)
+      if (group(i) >= 0 .and. group(i) <= huge(i)) cycle
+      call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(group(i))//", but a group from 0 to "// &
+        & to_text(huge(i))//" was expected")
+      exit
+    end do
+    call comm%agree(error)
+  end subroutine check_groups
+
+  !> Refuse a box that is not finite or has a negative length.
+  subroutine check_box(path, bodies, error)
+    character(len=*), intent(in) :: path
+    type(bodies_data_t), intent(in) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    if (.not. all(is_finite(bodies%origin))) then
+      call raise(error, status_input, path//": /box/origin: NaN or infinity, but finite numbers were expected")
+    else if (.not. all(is_finite(bodies%period))) then
+      call raise(error, status_input, path//": /box/period: NaN or infinity, but finite numbers were expected")
+    else if (any(bodies%period < 0)) then
+      call raise(error, status_input, path//": /box/period: "//to_text(minval(bodies%period))// &
+        & ", but a number >= 0 was expected")
+    end if
+  end subroutine check_box
+
+  !> Write the bodies of all ranks in the order of the ids, the walls, groups where a grain has one, and the box. The file appears under its name only when it
   !> is complete. Failure: status_failure; what had that name before is left as it was. Collective.
   subroutine write_bodies_hdf5(comm, path, bodies, error)
     type(communicator_t), intent(in) :: comm
@@ -251,7 +333,7 @@ contains
     call refuse_bad_numbers(comm, path, sorted, error)
     if (allocated(error)) return
     call file%create(comm, path//".part", error)
-    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(3 + 4*sorted%dimension) + &
+    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(4 + 4*sorted%dimension) + &
       & sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
     call write_groups(comm, file, sorted, error)
     call file%flush(error)
@@ -268,6 +350,7 @@ contains
     type(h5_file_t), intent(inout) :: file
     type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: group(:)
     integer :: n
 
     call file%make_group("/bodies", error)
@@ -282,6 +365,9 @@ contains
       call file%write_rows("/bodies/mass", bodies%mass, error)
       call file%write_attribute("/bodies/mass", "unit", "kg", error)
     end if
+    group = bodies%group
+    if (comm%any_true(any(group > 0))) call file%write_rows("/bodies/group", group, error)
+    if (bodies%has_box) call write_box(comm, file, bodies, error)
     if (bodies%n_walls == 0) return
     n = merge(bodies%n_walls, 0, comm%rank == 0)
     call file%make_group("/walls", error)
@@ -290,6 +376,21 @@ contains
     call file%write_attribute("/walls/point", "unit", "m", error)
     call file%write_rows("/walls/normal", bodies%wall_normal(:, 1:n), error)
   end subroutine write_groups
+
+  subroutine write_box(comm, file, bodies, error)
+    type(communicator_t), intent(in) :: comm
+    type(h5_file_t), intent(inout) :: file
+    type(bodies_data_t), intent(in) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    n = merge(bodies%dimension, 0, comm%rank == 0)
+    call file%make_group("/box", error)
+    call file%write_rows("/box/origin", bodies%origin(1:n), error)
+    call file%write_attribute("/box/origin", "unit", "m", error)
+    call file%write_rows("/box/period", bodies%period(1:n), error)
+    call file%write_attribute("/box/period", "unit", "m", error)
+  end subroutine write_box
 
   !> The bodies of all ranks in the order of the ids, cut into equal blocks.
   subroutine sort_by_id(comm, bodies, sorted)
@@ -302,12 +403,13 @@ contains
 
     nd = bodies%dimension
     nv = size(bodies%velocity, 1)
-    allocate (records(3 + nd + nv, bodies%n), source=0_i8)
+    allocate (records(4 + nd + nv, bodies%n), source=0_i8)
     records(1, :) = bodies%id
     call pack_reals(1, bodies%radius, 2, records)
     if (allocated(bodies%mass)) call pack_reals(1, bodies%mass, 3, records)
     call pack_reals(nd, bodies%position, 4, records)
     call pack_reals(nv, bodies%velocity, 4 + nd, records)
+    records(4 + nd + nv, :) = bodies%group
     call order_rows(comm, 1, records, ordered)
     sorted%dimension = nd
     sorted%n = size(ordered, 2)
@@ -321,10 +423,14 @@ contains
     end if
     call unpack_reals(ordered, 4, nd, sorted%position)
     call unpack_reals(ordered, 4 + nd, nv, sorted%velocity)
+    sorted%group = int(ordered(4 + nd + nv, :))
     sorted%n_walls = bodies%n_walls
     sorted%wall_id = bodies%wall_id
     sorted%wall_point = bodies%wall_point
     sorted%wall_normal = bodies%wall_normal
+    sorted%has_box = bodies%has_box
+    sorted%origin = bodies%origin
+    sorted%period = bodies%period
   end subroutine sort_by_id
 
   !> What read_bodies would refuse is not written.
@@ -333,12 +439,16 @@ contains
     character(len=*), intent(in) :: path
     type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: group(:)
 
     call check_ids(comm, path//": /bodies/id", comm%offset(int(bodies%n, i8)), bodies%id, error)
     call check_numbers(comm, path//": /bodies/position", bodies%dimension, bodies%id, bodies%position, .false., error)
     call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, .false., error)
     call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, .true., error)
     if (allocated(bodies%mass)) call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, .true., error)
+    group = bodies%group
+    call check_groups(comm, path//": /bodies/group", bodies%id, group, error)
+    call check_box(path, bodies, error)
     call check_ids(comm, path//": /walls/id", 0_i8, bodies%wall_id, error)
     call check_numbers(comm, path//": /walls/point", bodies%dimension, bodies%wall_id, bodies%wall_point, .false., error)
     call check_numbers(comm, path//": /walls/normal", bodies%dimension, bodies%wall_id, bodies%wall_normal, .false., error)

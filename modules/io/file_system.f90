@@ -8,6 +8,7 @@ module gravier_file_system
   implicit none
   private
   public :: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
+  public :: extend_file, sync_to_disk
   public :: text_file_t, text_at
 
   !> A text file written piece by piece; after a failed write it ends with the last complete piece.
@@ -20,6 +21,7 @@ module gravier_file_system
   contains
     procedure :: create => text_file_create
     procedure :: append => text_file_append
+    procedure :: replace => text_file_replace
     procedure :: close => text_file_close
     procedure :: is_open => text_file_is_open
   end type text_file_t
@@ -89,6 +91,12 @@ module gravier_file_system
       integer(c_int64_t), value :: offset
       integer(c_int), value :: whence
     end function c_lseek
+
+    integer(c_int) function c_fsync(descriptor) bind(C, name="fsync")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: descriptor
+    end function c_fsync
 
     integer(c_int) function c_ftruncate(descriptor, length) bind(C, name="ftruncate")
       import :: c_int, c_int64_t
@@ -271,6 +279,46 @@ contains
     ignored = c_close(descriptor)
   end function file_length
 
+  !> Give a file at least `length` bytes, zeros behind its end. Failure: status_failure, with the system's reason.
+  subroutine extend_file(path, length, error)
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: length
+    type(error_t), allocatable, intent(inout) :: error
+    integer(c_int) :: descriptor, number, ignored
+
+    if (allocated(error)) return
+    number = 0
+    descriptor = c_open(c_text(path), o_wronly)
+    if (descriptor < 0) then
+      number = last_error()
+    else
+      if (c_lseek(descriptor, 0_c_int64_t, seek_end) < length) then
+        if (c_ftruncate(descriptor, int(length, c_int64_t)) /= 0) number = last_error()
+      end if
+      ignored = c_close(descriptor)
+    end if
+    if (number /= 0) call raise(error, status_failure, path//": cannot write to this file: "//reason(number))
+  end subroutine extend_file
+
+  !> Bring a file, or the names in a directory, to the disk: they outlive a loss of power. Failure: status_failure, with
+  !> the system's reason.
+  subroutine sync_to_disk(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(c_int) :: descriptor, number, ignored
+
+    if (allocated(error)) return
+    number = 0
+    descriptor = c_open(c_text(path), o_rdonly)
+    if (descriptor < 0) then
+      number = last_error()
+    else
+      if (c_fsync(descriptor) /= 0) number = last_error()
+      ignored = c_close(descriptor)
+    end if
+    if (number /= 0) call raise(error, status_failure, path//": cannot bring this to the disk: "//reason(number))
+  end subroutine sync_to_disk
+
   !> Reserve bytes [first, last) of an open file; the result is the system's error number, 0 for success.
   integer(c_int) function allocate_range(descriptor, first, last) result(number)
     integer(c_int), intent(in) :: descriptor
@@ -337,6 +385,19 @@ contains
     end do
     self%length = self%length + done
   end subroutine text_file_append
+
+  !> Give the file the name `path`, in place of what had it, in one indivisible operation once its content is on the
+  !> disk. Failure: status_failure, with the system's reason; what had that name stays.
+  subroutine text_file_replace(self, path, error)
+    class(text_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    call sync_to_disk(self%path, error)
+    call rename_file(self%path, path, error)
+    if (.not. allocated(error)) self%path = path
+  end subroutine text_file_replace
 
   !> Close; a failure that the system had kept to itself shows here. Without effect on a file not open.
   subroutine text_file_close(self, error)

@@ -7,14 +7,14 @@ module gravier_hdf5_file
   use mpi_f08, only: MPI_INFO_NULL
   use hdf5, only: h5aclose_f, h5acreate_f, h5aget_space_f, h5aget_type_f, h5aopen_by_name_f, h5aread_f, h5awrite_f, h5dclose_f, &
     & h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5dwrite_f, h5eset_auto_f, &
-    & h5fclose_f, h5fcreate_f, h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, &
-    & h5gn_members_f, h5kind_to_type, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5olink_f, h5oopen_f, h5open_f, &
+    & h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, &
+    & h5gn_members_f, h5kind_to_type, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5olink_f, h5oopen_f, h5open_f, &
     & h5pclose_f, h5pcreate_f, h5pset_create_inter_group_f, h5pset_dxpl_mpio_f, h5pset_fapl_mpio_f, &
     & h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_f, &
     & h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, &
     & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tcopy_f, h5tget_class_f, h5tget_size_f, &
     & h5tis_variable_str_f, h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, hsize_t, size_t, &
-    & H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, H5F_ACC_RDONLY_F, H5F_ACC_TRUNC_F, &
+    & H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, &
     & H5F_CLOSE_STRONG_F, H5F_SCOPE_GLOBAL_F, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F, &
     & H5P_FILE_ACCESS_F, H5P_LINK_CREATE_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_CSET_UTF8_F, H5T_C_S1, H5T_FLOAT_F, &
     & H5T_IEEE_F64LE, H5T_INTEGER_F, H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING, H5T_STRING_F, H5T_STR_NULLPAD_F, &
@@ -23,7 +23,7 @@ module gravier_hdf5_file
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, text_at
+  use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, extend_file, text_at
   implicit none
   private
   public :: h5_file_t
@@ -43,6 +43,7 @@ module gravier_hdf5_file
   contains
     procedure :: create => h5_create
     procedure :: open => h5_open
+    procedure :: reopen => h5_reopen
     procedure :: close => h5_close
     procedure :: flush => h5_flush
     procedure :: reserve => h5_reserve
@@ -52,6 +53,7 @@ module gravier_hdf5_file
     procedure :: begin_group => h5_begin_group
     procedure :: commit_group => h5_commit_group
     procedure :: abandon_group => h5_abandon_group
+    procedure :: remove_group => h5_remove_group
 
     procedure :: exists => h5_exists
     procedure :: columns => h5_columns
@@ -60,15 +62,18 @@ module gravier_hdf5_file
     procedure :: member => h5_member
 
     !> write_rows(path, values, error): make a dataset of the rows of all ranks, in the order of the ranks
-    generic :: write_rows => write_integers, write_reals, write_real_columns
+    generic :: write_rows => write_integers, write_integer_columns, write_reals, write_real_columns, write_texts
     procedure, private :: write_integers => h5_write_integers
+    procedure, private :: write_integer_columns => h5_write_integer_columns
+    procedure, private :: write_texts => h5_write_texts
     procedure, private :: write_reals => h5_write_reals
     procedure, private :: write_real_columns => h5_write_real_columns
 
     !> read_rows(path, first_row, values, error): fill `values` with rows first_row (from 0) and following; each rank
     !> asks for its own block, empty if it likes
-    generic :: read_rows => read_integers, read_reals, read_real_columns
+    generic :: read_rows => read_integers, read_integer_columns, read_reals, read_real_columns
     procedure, private :: read_integers => h5_read_integers
+    procedure, private :: read_integer_columns => h5_read_integer_columns
     procedure, private :: read_reals => h5_read_reals
     procedure, private :: read_real_columns => h5_read_real_columns
 
@@ -139,22 +144,43 @@ contains
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
+    call open_existing(self, comm, path, .false., error)
+  end subroutine h5_open
+
+  !> Open an existing file for reading and for writing more into it.
+  subroutine h5_reopen(self, comm, path, error)
+    class(h5_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    call open_existing(self, comm, path, .true., error)
+  end subroutine h5_reopen
+
+  subroutine open_existing(self, comm, path, writable, error)
+    type(h5_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: writable
+    type(error_t), allocatable, intent(inout) :: error
     integer(hid_t) :: access
     integer :: stat, ignored
 
     if (allocated(error)) return
     call prepare(self, comm, path, error)
     ! one rank alone looks first: a file that HDF5 cannot make sense of is never opened by all together
-    if (comm%rank == 0) call check_format(path, error)
+    if (comm%rank == 0) then
+      call check_format(path, error)
+      if (writable) call reserve_space(path, bytes_of_file, error)
+    end if
     call comm%agree(error)
     if (allocated(error)) return
     access = parallel_access(comm)
-    call h5fopen_f(path, H5F_ACC_RDONLY_F, self%id, stat, access_prp=access)
+    call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable), self%id, stat, access_prp=access)
     call h5pclose_f(access, ignored)
     if (stat < 0) call raise(error, status_input, path//": truncated or damaged HDF5 file")
-    self%writable = .false.
+    self%writable = writable
     call comm%agree(error)
-  end subroutine h5_open
+  end subroutine open_existing
 
   !> Check that `path` can be read and begins like an HDF5 file.
   subroutine check_format(path, error)
@@ -219,9 +245,15 @@ contains
   subroutine h5_flush(self, error)
     class(h5_file_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
+    integer(hsize_t) :: length
     integer :: stat
 
     if (allocated(error)) return
+    ! a file that the program dies over must not be shorter than its headers say
+    if (self%comm%rank == 0) then
+      call h5fget_filesize_f(self%id, length, stat)
+      if (stat == 0) call extend_file(self%path, int(length, i8), error)
+    end if
     ! HDF5 waits for ever when one rank cannot write its share of the headers: give them their place first
     if (self%comm%rank == 0) call reserve_space(self%path, bytes_of_link, error, start=self%flushed)
     call self%comm%agree(error)
@@ -338,6 +370,22 @@ contains
     self%hidden = -1
     deallocate (self%hidden_path)
   end subroutine h5_abandon_group
+
+  !> Remove a group and all that is in it; the file can use its room again.
+  subroutine h5_remove_group(self, path, error)
+    class(h5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place
+    character(len=:), allocatable :: name
+    integer :: stat
+
+    if (allocated(error)) return
+    call self%locate(path, place, name)
+    call h5ldelete_f(place, name, stat)
+    if (stat < 0) call self%fail(path, "cannot remove this group", error)
+    call self%comm%agree(error)
+  end subroutine h5_remove_group
 
   !> Property of links: missing groups on the way are made.
   integer(hid_t) function with_groups_above() result(links)
@@ -498,6 +546,46 @@ contains
     call self%write_block(path, 0, size(values), H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), buffer, error)
   end subroutine h5_write_integers
 
+  subroutine h5_write_integer_columns(self, path, values, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (columns, rows of this rank); the number of columns is the same on all ranks
+    integer(i8), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    type(c_ptr) :: buffer
+
+    buffer = c_null_ptr
+    if (size(values) > 0) buffer = c_loc(values(1, 1))
+    call self%write_block(path, size(values, 1), size(values, 2), H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), buffer, error)
+  end subroutine h5_write_integer_columns
+
+  !> Texts without their trailing blanks, as strings of one fixed length.
+  subroutine h5_write_texts(self, path, values, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (rows of this rank)
+    character(len=*), intent(in), contiguous :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    character(kind=c_char, len=:), allocatable, target :: letters
+    integer(hid_t) :: type
+    integer :: i, length, stat
+
+    if (allocated(error)) return
+    length = 1
+    if (size(values) > 0) length = max(1, maxval(len_trim(values)))
+    length = nint(self%comm%highest(real(length, dp)))
+    letters = repeat(c_null_char, length*max(1, size(values)))
+    do i = 1, size(values)
+      letters(length*(i - 1) + 1:length*(i - 1) + len_trim(values(i))) = trim(values(i))
+    end do
+    call h5tcopy_f(H5T_C_S1, type, stat)
+    call h5tset_size_f(type, int(length, size_t), stat)
+    call h5tset_strpad_f(type, H5T_STR_NULLPAD_F, stat)
+    if (self%comm%any_true(.not. is_ascii(letters))) call h5tset_cset_f(type, H5T_CSET_UTF8_F, stat)
+    call self%write_block(path, 0, size(values), type, type, c_loc(letters), error)
+    call h5tclose_f(type, stat)
+  end subroutine h5_write_texts
+
   subroutine h5_write_reals(self, path, values, error)
     class(h5_file_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -652,6 +740,21 @@ contains
     call self%read_block(path, .true., 0, first_row, size(values), h5kind_to_type(i8, H5_INTEGER_KIND), buffer, error)
   end subroutine h5_read_integers
 
+  subroutine h5_read_integer_columns(self, path, first_row, values, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, rows this rank wants)
+    integer(i8), intent(inout), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    type(c_ptr) :: buffer
+
+    buffer = c_null_ptr
+    if (size(values) > 0) buffer = c_loc(values(1, 1))
+    call self%read_block(path, .true., size(values, 1), first_row, size(values, 2), h5kind_to_type(i8, H5_INTEGER_KIND), &
+      & buffer, error)
+  end subroutine h5_read_integer_columns
+
   subroutine h5_read_reals(self, path, first_row, values, error)
     class(h5_file_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -801,15 +904,19 @@ contains
   subroutine set_character_set(type, text)
     integer(hid_t), intent(in) :: type
     character(len=*), intent(in) :: text
-    integer :: i, stat
-
-    do i = 1, len(text)
-      if (iachar(text(i:i)) > 127) then
-        call h5tset_cset_f(type, H5T_CSET_UTF8_F, stat)
-        return
-      end if
-    end do
+    integer :: stat
+    if (.not. is_ascii(text)) call h5tset_cset_f(type, H5T_CSET_UTF8_F, stat)
   end subroutine set_character_set
+
+  pure logical function is_ascii(text)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    is_ascii = .true.
+    do i = 1, len(text)
+      is_ascii = is_ascii .and. iachar(text(i:i)) <= 127
+    end do
+  end function is_ascii
 
   subroutine h5_write_i4(self, path, name, value, error)
     class(h5_file_t), intent(in) :: self

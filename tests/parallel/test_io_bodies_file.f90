@@ -21,10 +21,13 @@ program test_io_bodies_file
   call test_hdf5(3, 2)
   call test_hdf5(2, 0)
   call test_same_file()
+  call test_groups()
+  call test_box()
   call test_csv_2d()
   call test_csv_3d()
   call test_csv_large()
   call test_csv_empty()
+  call test_csv_groups()
   call test_csv_refused()
   call test_csv_planes_refused()
   call test_hdf5_refused()
@@ -226,6 +229,144 @@ contains
     call expect_none(error, "writing twice")
   end subroutine test_same_file
 
+  !> Glued grains keep their groups; a file without any is the one of no argument, and is read with zeros.
+  subroutine test_groups()
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: plain, free
+
+    call make_bodies(2, 30, bodies)
+    call write_made(base//".h5", 2, bodies, error)
+    plain = content(base//".h5")
+    allocate (bodies%group(bodies%n), source=0)
+    call write_with(bodies, error)
+    free = content(base//".h5")
+    call check(plain == free .and. len(plain) == len(free), "no grain glued: the file of no groups")
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call expect_none(error, "reading no groups")
+    call check_equal(size(bodies%group), bodies%n, "size of no groups")
+    call check(all(bodies%group == 0), "free grains")
+
+    ! one glued grain, on one rank, and many
+    call make_bodies(2, 30, bodies)
+    bodies%group = merge(7, 0, bodies%id == 24)
+    call write_with(bodies, error)
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call expect_none(error, "reading one group")
+    call check(all(bodies%group == merge(7, 0, bodies%id == 24)), "one glued grain")
+    call make_bodies(2, 30, bodies)
+    bodies%group = int(mod(bodies%id, 9_i8))
+    where (bodies%id == 12) bodies%group = huge(1)
+    call write_with(bodies, error)
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call expect_none(error, "reading many groups")
+    call check(all(bodies%group == merge(huge(1), int(mod(bodies%id, 9_i8)), bodies%id == 12)), "many glued grains")
+    call check_bodies(bodies, 2, 30, 1.0_dp)
+
+    call make_bodies(2, 30, bodies)
+    bodies%group = merge(-1, 0, bodies%id == 40)
+    call write_with(bodies, error)
+    call expect(error, status_failure, "/bodies/group: id 40: -1, but a group from 0 to 2147483647 was expected", &
+      & "writing a negative group")
+    call refuse_groups(-1_i8)
+    call refuse_groups(2147483648_i8)
+  end subroutine test_groups
+
+  subroutine write_with(bodies, error)
+    type(bodies_data_t), intent(in) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+
+    call write_bodies(comm, base//".h5", 2, bodies%id, bodies%position, bodies%velocity, bodies%radius, bodies%mass, &
+      & bodies%wall_id, bodies%wall_point, bodies%wall_normal, error, group=bodies%group)
+  end subroutine write_with
+
+  !> A file with this group of the last body.
+  subroutine refuse_groups(group)
+    integer(i8), intent(in) :: group
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+    type(h5_file_t) :: file
+    integer(i8), allocatable :: groups(:)
+
+    call make_bodies(2, 8, bodies)
+    allocate (groups(bodies%n), source=0_i8)
+    where (bodies%id == 26) groups = group
+    call file%create(comm, base//".h5", error)
+    call file%write_rows("/bodies/id", bodies%id, error)
+    call file%write_rows("/bodies/position", bodies%position, error)
+    call file%write_rows("/bodies/radius", bodies%radius, error)
+    call file%write_rows("/bodies/group", groups, error)
+    call file%close(error)
+    call expect_none(error, "writing a group to be refused")
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call expect(error, status_input, "/bodies/group: id 26: "//to_text(group)//", but a group from 0 to", "a group out of range")
+  end subroutine refuse_groups
+
+  !> A periodic box is read as written, and absent where there is none.
+  subroutine test_box()
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+
+    call make_bodies(3, 9, bodies)
+    call write_made(base//".h5", 3, bodies, error)
+    call read_bodies(comm, base//".h5", 3, bodies, error)
+    call check(.not. bodies%has_box, "no box")
+    call check_write_box([0.1_dp, -0.2_dp, 0.3_dp], [1.5_dp, 0.0_dp, 1.0_dp/3], error)
+    call read_bodies(comm, base//".h5", 3, bodies, error)
+    call expect_none(error, "reading a box")
+    call check(bodies%has_box, "a box")
+    call check(all(abs(bodies%origin - [0.1_dp, -0.2_dp, 0.3_dp]) <= 0), "its origin")
+    call check(all(abs(bodies%period - [1.5_dp, 0.0_dp, 1.0_dp/3]) <= 0), "its period")
+    call check_write_box([0.1_dp, -0.2_dp], [0.0_dp, 2.0_dp], error)
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call expect_none(error, "reading a box in 2D")
+    call check(all(abs(bodies%origin - [0.1_dp, -0.2_dp, 0.0_dp]) <= 0), "its origin in 2D")
+    call check(all(abs(bodies%period - [0.0_dp, 2.0_dp, 0.0_dp]) <= 0), "its period in 2D")
+
+    call check_write_box([0.0_dp, 0.0_dp], [1.0_dp, -2.0_dp], error)
+    call expect(error, status_failure, "/box/period: -2.00000000E+000, but a number >= 0 was expected", "writing a negative period")
+    call refuse_layout("+/box/period", "/box/origin: missing")
+    call refuse_layout("+/box/size", "/box/size: unknown; known are origin, period")
+    call refuse_box(1, 1.0_dp, "/box/origin: 1 numbers, but 2 were expected")
+    call refuse_box(2, -1.0_dp, "/box/period: -1.00000000E+000, but a number >= 0 was expected")
+    call refuse_box(2, ieee_value(1.0_dp, ieee_quiet_nan), "/box/period: NaN or infinity")
+  end subroutine test_box
+
+  subroutine check_write_box(origin, period, error)
+    real(dp), intent(in), contiguous :: origin(:), period(:)
+    type(error_t), allocatable, intent(inout) :: error
+    type(bodies_data_t) :: bodies
+
+    call make_bodies(size(origin), 9, bodies)
+    call write_bodies(comm, base//".h5", size(origin), bodies%id, bodies%position, bodies%velocity, bodies%radius, bodies%mass, &
+      & bodies%wall_id, bodies%wall_point, bodies%wall_normal, error, origin=origin, period=period)
+  end subroutine check_write_box
+
+  !> A box of n numbers, all of one value.
+  subroutine refuse_box(n, value, part)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: value
+    character(len=*), intent(in) :: part
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+    type(h5_file_t) :: file
+    real(dp), allocatable :: origin(:), period(:)
+
+    allocate (origin(merge(n, 0, comm%rank == 0)), source=0.0_dp)
+    allocate (period(size(origin)), source=value)
+    call make_bodies(2, 8, bodies)
+    call file%create(comm, base//".h5", error)
+    call file%write_rows("/bodies/id", bodies%id, error)
+    call file%write_rows("/bodies/position", bodies%position, error)
+    call file%write_rows("/bodies/radius", bodies%radius, error)
+    call file%write_rows("/box/origin", origin, error)
+    call file%write_rows("/box/period", period, error)
+    call file%close(error)
+    call expect_none(error, "writing a box to be refused")
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call expect(error, status_input, part, "a box with "//part)
+  end subroutine refuse_box
+
   ! ------------------------------------------------------------------------------------------------ CSV
 
   subroutine test_csv_2d()
@@ -322,6 +463,33 @@ contains
     call check_equal(bodies%total, 0_i8, "number of no bodies beside a wall")
     call check_equal(bodies%n_walls, 1, "number of walls without bodies")
   end subroutine test_csv_empty
+
+  !> An empty cell is a free grain; the cell of a plane must be empty or a group, and counts for nothing.
+  subroutine test_csv_groups()
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+
+    call put(base//".csv", "id,x,y,radius,group,shape,nx,ny"//lf//"1,0,0,1,3,,,"//lf//"2,0,0,1,,,,"//lf// &
+      & "3,0,0,,4,plane,0,1"//lf//"4,0,0,1,0,,,"//lf//"5,0,0,1,2147483647,,,"//lf)
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect_none(error, "groups in CSV")
+    call check(all(bodies%group == merge(3, 0, bodies%id == 1) + merge(huge(1), 0, bodies%id == 5)), "groups")
+    call check(.not. bodies%has_box, "no box in CSV")
+    call put(base//".csv", "id,x,y,radius"//lf//"1,0,0,1"//lf//"2,0,0,1"//lf)
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect_none(error, "no groups in CSV")
+    call check_equal(size(bodies%group), bodies%n, "size of no groups in CSV")
+    call check(all(bodies%group == 0), "free grains in CSV")
+    call put(base//".csv", "id,x,y,radius,group"//lf//"1,0,0,1,-1"//lf)
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect(error, status_input, 'line 2: column group: "-1", but a group from 0 to 2147483647 was expected', "a group below 0")
+    call put(base//".csv", "id,x,y,radius,group"//lf//"1,0,0,1,2147483648"//lf)
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect(error, status_input, 'line 2: column group: "2147483648", but a group from 0', "a group too large")
+    call put(base//".csv", "id,x,y,radius,group"//lf//"1,0,0,1,base"//lf)
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect(error, status_input, 'line 2: column group: "base", but a whole number', "a group that is a name")
+  end subroutine test_csv_groups
 
   subroutine refuse_csv(header, row, part)
     character(len=*), intent(in) :: header, row, part
@@ -455,8 +623,8 @@ contains
     call refuse_layout("/bodies/id", "/bodies/id: missing")
     call refuse_layout("/bodies/position", "/bodies/position: missing")
     call refuse_layout("/bodies/radius", "/bodies/radius: missing")
-    call refuse_layout("/bodies", "/bodies: missing; a group with id, position, velocity, radius, mass was expected")
-    call refuse_layout("+/bodies/masses", "/bodies/masses: unknown; known are id, position, velocity, radius, mass")
+    call refuse_layout("/bodies", "/bodies: missing; a group with id, position, velocity, radius, mass, group was expected")
+    call refuse_layout("+/bodies/masses", "/bodies/masses: unknown; known are id, position, velocity, radius, mass, group")
     call refuse_layout("+/walls/point", "/walls/id: missing")
     call refuse_layout("+/bodies/mass", "/bodies/mass: "//to_text(comm%size)//" rows, but /bodies/id has 8")
     call refuse_walls()
