@@ -14,8 +14,8 @@ module gravier_timers
   integer, parameter :: n_phases = 11
   !> what the log calls the phases
   character(len=28), parameter :: phase_names(n_phases) = [character(len=28) :: "bodies: move, migrate", &
-    & "neighbour lists and ghosts", "detection of contacts", "interface: who shares whom", "set-up of the solve", "sweeps", "exchange", &
-    & "factorisation", "interface solve", "residual checks", "output"]
+    & "neighbour lists and ghosts", "detection of contacts", "interface: who shares whom", &
+    & "set-up of the solve", "sweeps", "exchange", "factorisation", "interface solve", "residual checks", "output"]
 
   real(dp) :: elapsed(n_phases) = 0.0_dp
   real(dp) :: started(n_phases) = 0.0_dp

@@ -17,7 +17,7 @@ module gravier_contact_kernels
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: kernels_t, contact_jacobian, global_impulse, tangents, normal_operator, tangential_operator
+  public :: kernels_t, contact_jacobian, global_impulse, tangents, local_operator
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse.
@@ -145,53 +145,56 @@ contains
     s(3) = -n(2)
   end subroutine tangents
 
-  !> W_nn of two bodies [1/kg], sum over d of n_d^2 (w_d,i + w_d,j): exactly w_i + w_j where components are equal.
-  pure real(dp) function normal_operator(n, wi, wj) result(w)
+  !> W_nn and the translational part of W_tt of two bodies [1/kg].
+  pure subroutine local_operator(n, wi, wj, wn, wt)
     !> (nd) unit normal
     real(dp), intent(in), contiguous :: n(:)
     !> (nw) columns of `weight`
     real(dp), intent(in), contiguous :: wi(:), wj(:)
-    integer :: d
-
-    w = wi(1) + wj(1)
-    do d = 2, size(n)
-      w = w + n(d)**2*((wi(d) - wi(1)) + (wj(d) - wj(1)))
-    end do
-  end function normal_operator
-
-  !> Translational part of W_tt of two bodies [1/kg], the largest eigenvalue of the tangential block: exactly w_i + w_j
-  !> where components are equal.
-  pure real(dp) function tangential_operator(n, wi, wj) result(w)
-    !> (nd) unit normal
-    real(dp), intent(in), contiguous :: n(:)
-    !> (nw) columns of `weight`
-    real(dp), intent(in), contiguous :: wi(:), wj(:)
+    real(dp), intent(out) :: wn, wt
+    real(dp) :: t(3), s(3)
 
     if (size(n) == 2) then
-      w = tangential_2d(n, wi, wj)
+      wn = normal_2d(n, wi, wj)
+      wt = tangential_2d(n, wi, wj)
     else
-      w = tangential_3d(n, wi, wj)
+      call tangents(n, t, s)
+      wn = normal_3d(n, wi, wj)
+      wt = tangential_3d(t, s, wi, wj)
     end if
-  end function tangential_operator
+  end subroutine local_operator
+
+  !> W_nn of disks, the sum over d of n_d^2 (w_d,i + w_d,j), written so that it is exactly w_i + w_j where components are
+  !> equal; and so the next ones.
+  pure real(dp) function normal_2d(n, wi, wj) result(w)
+    real(dp), intent(in) :: n(2), wi(2), wj(2)
+    w = wi(1) + wj(1) + n(2)**2*((wi(2) - wi(1)) + (wj(2) - wj(1)))
+  end function normal_2d
+
+  pure real(dp) function normal_3d(n, wi, wj) result(w)
+    real(dp), intent(in) :: n(3), wi(3), wj(3)
+    w = wi(1) + wj(1) + (n(2)**2*((wi(2) - wi(1)) + (wj(2) - wj(1))) + n(3)**2*((wi(3) - wi(1)) + (wj(3) - wj(1))))
+  end function normal_3d
 
   pure real(dp) function tangential_2d(n, wi, wj) result(w)
-    real(dp), intent(in), contiguous :: n(:), wi(:), wj(:)
-
+    real(dp), intent(in) :: n(2), wi(2), wj(2)
     w = wi(1) + wj(1) + n(1)**2*((wi(2) - wi(1)) + (wj(2) - wj(1)))
   end function tangential_2d
 
-  pure real(dp) function tangential_3d(n, wi, wj) result(w)
-    real(dp), intent(in), contiguous :: n(:), wi(:), wj(:)
-    real(dp) :: t(3), s(3), y, z, tt, ss, ts
+  !> The largest eigenvalue of the tangential block.
+  pure real(dp) function tangential_3d(t, s, wi, wj) result(w)
+    real(dp), intent(in) :: t(3), s(3), wi(3), wj(3)
+    real(dp) :: y, z, tt, ss, ts
 
-    call tangents(n, t, s)
+    w = wi(1) + wj(1)
     ! the block less (w_1,i + w_1,j) times the identity
     y = (wi(2) - wi(1)) + (wj(2) - wj(1))
     z = (wi(3) - wi(1)) + (wj(3) - wj(1))
+    if (.not. max(abs(y), abs(z)) > 0.0_dp) return
     tt = t(2)**2*y + t(3)**2*z
     ss = s(2)**2*y + s(3)**2*z
     ts = t(2)*s(2)*y + t(3)*s(3)*z
-    w = wi(1) + wj(1) + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
+    w = w + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
   end function tangential_3d
 
   !> The impulse of one contact on its candidate in global axes [N s].
@@ -274,7 +277,7 @@ contains
     real(dp), intent(in), contiguous :: hot(:, :), weight(:, :), velocity(:, :), impulse(:, :)
     real(dp), intent(out) :: sums(2)
     integer :: c, i, j, nd
-    real(dp) :: vn, rn
+    real(dp) :: vn, wn, rn
 
     nd = size(hot, 1) - 2
     sums(:) = 0.0_dp
@@ -282,7 +285,12 @@ contains
       i = pair(1, c)
       j = pair(2, c)
       vn = sum((velocity(1:nd, i) - velocity(1:nd, j))*hot(1:nd, c))
-      rn = max(0.0_dp, impulse(1, c) - (vn + hot(nd + 1, c))/normal_operator(hot(1:nd, c), weight(:, i), weight(:, j)))
+      if (nd == 2) then
+        wn = normal_2d(hot(1:2, c), weight(1:2, i), weight(1:2, j))
+      else
+        wn = normal_3d(hot(1:3, c), weight(1:3, i), weight(1:3, j))
+      end if
+      rn = max(0.0_dp, impulse(1, c) - (vn + hot(nd + 1, c))/wn)
       sums(1) = sums(1) + (rn - impulse(1, c))**2
       sums(2) = sums(2) + impulse(1, c)**2
     end do
@@ -344,8 +352,8 @@ contains
       i = pair(1, c)
       j = pair(2, c)
       call velocity_2d(hot(:, c), velocity(:, i), velocity(:, j), vn, vt)
-      wn = normal_operator(hot(1:2, c), weight(:, i), weight(:, j))
-      wt = tangential_2d(hot(1:2, c), weight(:, i), weight(:, j))
+      wn = normal_2d(hot(1:2, c), weight(1:2, i), weight(1:2, j))
+      wt = tangential_2d(hot(1:2, c), weight(1:2, i), weight(1:2, j))
       wt = wt + weight(3, i)*hot(6, c)**2 + weight(3, j)*hot(7, c)**2
       rn = max(0.0_dp, impulse(1, c) - (vn + hot(3, c))/wn)
       rt = max(-hot(8, c)*rn, min(hot(8, c)*rn, impulse(2, c) - vt/wt))
@@ -378,20 +386,22 @@ contains
     integer, intent(in), contiguous :: pair(:, :)
     real(dp), intent(in), contiguous :: hot(:, :), velocity(:, :)
     real(dp), intent(inout), contiguous :: contact_velocity(:, :)
+    real(dp) :: t(3), s(3)
     integer :: c
 
     do c = 1, size(pair, 2)
-      call velocity_3d(hot(:, c), velocity(:, pair(1, c)), velocity(:, pair(2, c)), contact_velocity(:, c))
+      call tangents(hot(1:3, c), t, s)
+      call velocity_3d(hot(:, c), t, s, velocity(:, pair(1, c)), velocity(:, pair(2, c)), contact_velocity(:, c))
     end do
   end subroutine contact_velocity_3d_friction
 
   !> Velocity (n, t, s) at a contact of spheres.
-  pure subroutine velocity_3d(hot, vi, vj, v)
+  pure subroutine velocity_3d(hot, t, s, vi, vj, v)
     real(dp), intent(in), contiguous :: hot(:), vi(:), vj(:)
+    real(dp), intent(in) :: t(3), s(3)
     real(dp), intent(out) :: v(3)
-    real(dp) :: t(3), s(3), dv(3), spin(3)
+    real(dp) :: dv(3), spin(3)
 
-    call tangents(hot(1:3), t, s)
     dv(:) = vi(1:3) - vj(1:3)
     spin(:) = hot(7)*vi(4:6) + hot(8)*vj(4:6)
     v(1) = sum(dv*hot(1:3))
@@ -404,15 +414,16 @@ contains
     real(dp), intent(in), contiguous :: hot(:, :), weight(:, :), velocity(:, :), impulse(:, :)
     real(dp), intent(out) :: sums(2)
     integer :: c, i, j
-    real(dp) :: v(3), wn, wt, rn, rt(2), length, bound
+    real(dp) :: t(3), s(3), v(3), wn, wt, rn, rt(2), length, bound
 
     sums(:) = 0.0_dp
     do c = 1, size(pair, 2)
       i = pair(1, c)
       j = pair(2, c)
-      call velocity_3d(hot(:, c), velocity(:, i), velocity(:, j), v)
-      wn = normal_operator(hot(1:3, c), weight(:, i), weight(:, j))
-      wt = tangential_3d(hot(1:3, c), weight(:, i), weight(:, j))
+      call tangents(hot(1:3, c), t, s)
+      call velocity_3d(hot(:, c), t, s, velocity(:, i), velocity(:, j), v)
+      wn = normal_3d(hot(1:3, c), weight(1:3, i), weight(1:3, j))
+      wt = tangential_3d(t, s, weight(1:3, i), weight(1:3, j))
       wt = wt + weight(4, i)*hot(7, c)**2 + weight(4, j)*hot(8, c)**2
       rn = max(0.0_dp, impulse(1, c) - (v(1) + hot(4, c))/wn)
       rt(:) = impulse(2:3, c) - v(2:3)/wt

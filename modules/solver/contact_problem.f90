@@ -4,7 +4,7 @@ module gravier_contact_problem
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_contact_kernels, only: kernels_t, normal_operator, tangential_operator
+  use gravier_contact_kernels, only: kernels_t, local_operator
   implicit none
   private
   public :: subproblem_t, contact_problem_t
@@ -119,10 +119,11 @@ contains
     nd = size(self%position, 1)
     i = self%pair(1, c)
     j = self%pair(2, c)
-    w(:) = normal_operator(self%hot(1:nd, c), weight(:, i), weight(:, j))
+    call local_operator(self%hot(1:nd, c), weight(:, i), weight(:, j), w(1), w(2))
     if (size(self%hot, 1) > nd + 2) then
-      w(2) = tangential_operator(self%hot(1:nd, c), weight(:, i), weight(:, j))
       w(2) = w(2) + self%hot(nd + 4, c)**2*weight(nd + 1, i) + self%hot(nd + 5, c)**2*weight(nd + 1, j)
+    else
+      w(2) = w(1)
     end if
   end subroutine subproblem_local_operator
 

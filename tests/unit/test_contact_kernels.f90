@@ -32,6 +32,13 @@ program test_contact_kernels
       call test_record(dimension, friction, rotation)
     end do
   end do
+  call test_local_operator(2)
+  call test_local_operator(3)
+  do k = 2, 3
+    call test_components(k, .false., .false.)
+    call test_components(k, .false., .true.)
+    call test_components(k, .true., .true.)
+  end do
   call test_no_contacts()
   call test_tangents()
   call finish_checks()
@@ -348,6 +355,74 @@ contains
       end do
     end do
   end function same_bits
+
+  !> Local operators of bodies whose components differ, against H^T W H: W_nn is its entry, W_tt the least value that makes
+  !> |v|^2 no larger along any tangential direction; in 2D its entry. With equal components, w_i + w_j bit for bit.
+  subroutine test_local_operator(dimension)
+    integer, intent(in) :: dimension
+    real(dp) :: n(dimension), wi(dimension), wj(dimension), sum_of(dimension), wn, wt, frame(3, 3), u(3), angle, largest
+    integer :: trial, d, k
+
+    do trial = 1, 200
+      do d = 1, dimension
+        n(d) = draw(61, trial, d)
+        ! every other component of the antagonist does not move
+        wi(d) = 1.5_dp + draw(62, trial, d)
+        wj(d) = merge(1.5_dp + draw(63, trial, d), 0.0_dp, draw(64, trial, d) > 0.0_dp)
+      end do
+      n(:) = n/norm2(n)
+      sum_of(:) = wi + wj
+      call local_operator(n, wi, wj, wn, wt)
+      call check_close(wn, sum(sum_of*n**2), rounding, "W_nn")
+      if (dimension == 2) then
+        largest = sum_of(1)*n(2)**2 + sum_of(2)*n(1)**2
+      else
+        frame(:, 1) = n
+        call tangents(frame(:, 1), frame(:, 2), frame(:, 3))
+        largest = 0.0_dp
+        do k = 1, 2000
+          angle = k*acos(-1.0_dp)/2000
+          u(:) = cos(angle)*frame(:, 2) + sin(angle)*frame(:, 3)
+          largest = max(largest, sum(sum_of*u**2))
+        end do
+      end if
+      ! off the maximum by half a step of the angle, squared
+      call check_close(wt, largest, 1.0e-5_dp, "W_tt")
+      wi(:) = wi(1)
+      wj(:) = wj(1)
+      call local_operator(n, wi, wj, wn, wt)
+      call check_close(wn, wi(1) + wj(1), 0.0_dp, "W_nn of equal components")
+      call check_close(wt, wi(1) + wj(1), 0.0_dp, "W_tt of equal components")
+    end do
+  end subroutine test_local_operator
+
+  !> A relaxation changes velocities by W H (r - r_old) component by component: what has weight 0 stays as it is.
+  subroutine test_components(dimension, friction, rotation)
+    integer, intent(in) :: dimension
+    logical, intent(in) :: friction, rotation
+    type(case_t) :: problem
+    real(dp), allocatable :: before(:, :), start(:, :), reaction(:, :)
+    integer :: b, d
+
+    call make_case(dimension, friction, rotation, 30, 71, problem)
+    associate (kernels => problem%kernels)
+      do b = 1, n_columns
+        do d = 1, dimension
+          problem%weight(d, b) = max(0.0_dp, draw(72, b, d))
+        end do
+      end do
+      allocate (before(kernels%nv, n_columns), source=problem%velocity)
+      allocate (start(kernels%nc, 30), source=problem%impulse)
+      allocate (reaction(kernels%nv, n_columns), source=0.0_dp)
+      call kernels%sweep(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse)
+      start(:, :) = problem%impulse - start
+      call kernels%add_reaction(problem%pair, problem%hot, start, reaction)
+      do d = 1, kernels%nv
+        reaction(d, :) = reaction(d, :)*problem%weight(min(d, kernels%nw), :)
+      end do
+      call check(all(abs(problem%velocity - before - reaction) <= 100*rounding), "velocities change by components")
+    end associate
+  end subroutine test_components
 
   subroutine test_no_contacts()
     type(case_t) :: problem
