@@ -114,7 +114,7 @@ contains
       if (self%comm%size > simulation%decomposition%n_subdomains) call self%line("warning     "// &
         & to_text(self%comm%size - simulation%decomposition%n_subdomains)//" ranks own no subdomain and stay idle", error)
       call self%line("bodies      "//to_text(simulation%n_grains)//" grains, "// &
-        & to_text(simulation%decomposition%walls%n)//" walls", error)
+        & to_text(size(simulation%decomposition%boundaries))//" boundaries", error)
       call self%line("effects     "//effects_text(simulation)//": "//to_text(kernels%nv)//" degrees of freedom a grain, "// &
         & to_text(kernels%nc)//" unknowns a contact", error)
       call self%line("options in force", error)
@@ -136,8 +136,8 @@ contains
     character(len=:), allocatable :: text
     integer :: d
 
-    if (allocated(simulation%decomposition%partition%subdomain_of_cell)) then
-      text = "METIS on "//to_text(size(simulation%decomposition%partition%subdomain_of_cell))//" cells"
+    if (simulation%config%decomposition%partition == "metis") then
+      text = "METIS"
       return
     end if
     text = "grid "//to_text(simulation%decomposition%partition%boxes(1))

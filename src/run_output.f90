@@ -6,9 +6,9 @@ module gravier_run_output
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t
   use gravier_csv_writer, only: csv_writer_t
-  use gravier_bodies_file, only: write_bodies
   use gravier_build_info, only: version
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_final_bodies, only: write_final_bodies
   implicit none
   private
   public :: run_output_t
@@ -41,9 +41,6 @@ contains
     self%directory = trim(simulation%config%output%directory)//"/"
     call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
       & simulation%config%scene%dimension, error)
-    associate (walls => simulation%decomposition%walls)
-      call self%results%write_walls(walls%id, walls%point, walls%normal, error)
-    end associate
     if (self%comm%rank == 0) then
       call self%history%open(self%directory//"history.csv", "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,"// &
         & "kinetic_energy,wall_seconds,interface_bodies,converged", error)
@@ -153,7 +150,7 @@ contains
   subroutine collect_contacts(simulation, rows)
     type(simulation_t), intent(in) :: simulation
     type(contact_rows_t), intent(out) :: rows
-    integer :: s, c, n, nd, nc
+    integer :: s, c, p, n, nd, nc
 
     nd = simulation%problem%kernels%nd
     nc = simulation%problem%kernels%nc
@@ -165,11 +162,16 @@ contains
     allocate (rows%impulse(nd, n), source=0.0_dp)
     n = 0
     do s = 1, size(simulation%problem%sub)
-      associate (sub => simulation%problem%sub(s))
+      associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
         do c = 1, sub%n_contacts
           n = n + 1
-          rows%candidate(n) = sub%id(sub%pair(1, c))
-          rows%antagonist(n) = sub%id(sub%pair(2, c))
+          p = sub%source(c)
+          rows%candidate(n) = view%bodies%id(view%list%candidate(p))
+          if (view%list%antagonist(p) > 0) then
+            rows%antagonist(n) = view%bodies%id(view%list%antagonist(p))
+          else
+            rows%antagonist(n) = simulation%decomposition%boundaries(-view%list%antagonist(p))%id
+          end if
           rows%normal(:, n) = sub%hot(1:nd, c)
           rows%gap(n) = sub%gap(c)
           rows%impulse(1:nc, n) = sub%impulse(:, c)
@@ -188,35 +190,12 @@ contains
 
     if (keep_last) then
       call self%write_state(simulation, error)
-      if (simulation%config%output%final_bodies) call write_final_bodies(self, simulation, error)
+      if (simulation%config%output%final_bodies) call write_final_bodies(simulation, self%directory//"final_bodies.h5", error)
     end if
     call self%results%close(error)
     call self%history%close(error)
     if (self%trace%is_open()) call self%trace%close(error)
     call self%comm%agree(error)
   end subroutine run_output_finish
-
-  !> A bodies file from which another scene can start.
-  subroutine write_final_bodies(self, simulation, error)
-    class(run_output_t), intent(in) :: self
-    type(simulation_t), intent(in) :: simulation
-    type(error_t), allocatable, intent(inout) :: error
-    type(body_rows_t) :: rows
-    real(dp), allocatable :: mass(:)
-    integer :: s, next, n
-
-    call collect_bodies(simulation, rows)
-    allocate (mass(size(rows%id)))
-    next = 0
-    do s = 1, size(simulation%decomposition%home)
-      n = simulation%decomposition%home(s)%n
-      mass(next + 1:next + n) = simulation%decomposition%home(s)%mass
-      next = next + n
-    end do
-    associate (walls => simulation%decomposition%walls)
-      call write_bodies(self%comm, self%directory//"final_bodies.h5", simulation%config%scene%dimension, rows%id, rows%position, &
-        & rows%velocity, rows%radius, mass, walls%id, walls%point, walls%normal, error)
-    end associate
-  end subroutine write_final_bodies
 
 end module gravier_run_output

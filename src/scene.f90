@@ -22,7 +22,9 @@ module gravier_scene
   !> A scene as it starts. Grains are spread over the ranks in any way; boundaries are on all of them.
   type :: scene_t
     type(body_set_t) :: grains
+    !> those that came with the grains, then those of the input file
     type(boundary_t), allocatable :: boundaries(:)
+    integer :: n_walls = 0
     type(period_t) :: period
     !> grains of all ranks, and those of them that are glued to boundaries
     integer(i8) :: n_grains = 0, n_glued = 0
@@ -54,6 +56,7 @@ contains
     if (allocated(error)) return
     call make_boundaries(comm, config, data, scene%boundaries, error)
     if (allocated(error)) return
+    scene%n_walls = data%n_walls
     call set_period(config%scene, data, scene)
     call take_data(comm, config%scene, data, scene)
     call glue(comm, config, data, scene, error)

@@ -64,6 +64,7 @@ contains
     boundary%point(:) = config%point
     boundary%pivot(:) = config%pivot
     boundary%radius = config%radius
+    boundary%group = config%group
     select case (config%shape)
     case ("plane")
       boundary%shape = shape_plane

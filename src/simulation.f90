@@ -54,6 +54,8 @@ module gravier_simulation
     real(dp), allocatable :: boundary_impulses(:, :)
     !> grains of the scene now, and those of them that are glued to boundaries
     integer(i8) :: n_grains = 0, n_glued = 0
+    !> boundaries that came with the grains: the first ones
+    integer :: n_walls = 0
     !> messages between ranks, and numbers in them, that iterations of this rank have sent
     integer(i8) :: messages = 0, values = 0
     integer :: step = 0
@@ -86,13 +88,14 @@ contains
     self%step = 0
     self%time = 0.0_dp
     if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
-      & gravity_names(config%scene%dimension), error)
+      & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), error)
     call comm%agree(error)
     if (allocated(error)) return
     call make_scene(comm, config, scene, error)
     if (allocated(error)) return
     self%n_grains = scene%n_grains
     self%n_glued = scene%n_glued
+    self%n_walls = scene%n_walls
     call set_physics(self, scene)
     call set_control(self)
     call choose_scheme(config, self%scheme)
@@ -107,16 +110,6 @@ contains
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
   end subroutine simulation_init
-
-  pure function gravity_names(nd) result(names)
-    integer, intent(in) :: nd
-    character(len=2) :: names(nd)
-    integer :: d
-
-    do d = 1, nd
-      names(d) = "g"//achar(iachar("x") + d - 1)
-    end do
-  end function gravity_names
 
   subroutine set_physics(self, scene)
     class(simulation_t), intent(inout) :: self
@@ -219,8 +212,8 @@ contains
 
     n_points = sum(bodies%n)
     if (allocated(self%problem%sub)) n_points = n_points + sum(self%problem%sub%n_grains)
-    allocate (points(self%decomposition%nd, n_points), weights(n_points), source=0)
-    points(:, :) = 0.0_dp
+    allocate (points(self%decomposition%nd, n_points))
+    allocate (weights(n_points), source=0)
     n = 0
     do s = 1, size(bodies)
       do k = 1, bodies(s)%n

@@ -16,10 +16,9 @@ module gravier_boundary
   character(len=*), parameter :: shape_names(7) = [character(len=9) :: "plane", "segment", "rectangle", "circle", &
     & "cylinder", "grains", "outlet"]
 
-  !> columns of a table of drives, in 2D and 3D; each place stands for one quantity, see boundary_drive
-  character(len=*), parameter :: drives_2d(6) = [character(len=8) :: "vx", "vy", "omega", "fx", "fy", "pressure"]
-  character(len=*), parameter :: drives_3d(10) = [character(len=8) :: "vx", "vy", "vz", "wx", "wy", "wz", "fx", "fy", "fz", &
-    & "pressure"]
+  !> columns of a table of drives, in 2D and 3D; `drive` knows them by their places
+  character(len=*), parameter :: drives_2d = "vx vy omega fx fy pressure"
+  character(len=*), parameter :: drives_3d = "vx vy vz wx wy wz fx fy fz pressure"
 
   !> A boundary. In 2D vectors have a third component of 0, and spins only a third one.
   type :: boundary_t
@@ -34,6 +33,8 @@ module gravier_boundary
     real(dp) :: edge(3, 2) = 0.0_dp
     !> circle, cylinder [m]
     real(dp) :: radius = 0.0_dp
+    !> grains: their group in the bodies file
+    integer :: group = 0
     !> the point it turns about [m]
     real(dp) :: pivot(3) = 0.0_dp
     !> at the present time [m/s], [rad/s]
@@ -79,15 +80,12 @@ contains
     name = trim(shape_names(shape))
   end function shape_name
 
-  !> Names of the columns of a table of drives.
+  !> Names of the columns of a table of drives, with a blank between two.
   pure function drive_names(nd) result(names)
     integer, intent(in) :: nd
-    character(len=8), allocatable :: names(:)
-    if (nd == 2) then
-      names = drives_2d
-    else
-      names = drives_3d
-    end if
+    character(len=:), allocatable :: names
+    names = drives_3d
+    if (nd == 2) names = drives_2d
   end function drive_names
 
   !> Whether grains can have a contact with its surface.
@@ -108,7 +106,7 @@ contains
 
     boundary_turns = any(abs(self%given_spin) > 0.0_dp)
     if (.not. allocated(self%table%has)) return
-    if (size(self%table%has) == size(drives_2d)) then
+    if (size(self%table%has) == 6) then
       boundary_turns = boundary_turns .or. self%table%has(3)
     else
       boundary_turns = boundary_turns .or. any(self%table%has(4:6))
@@ -255,13 +253,17 @@ contains
     class(boundary_t), intent(inout) :: self
     !> [s]
     real(dp), intent(in) :: duration
-    real(dp) :: turn(3, 3)
+    real(dp) :: turn(3, 3), angle(3)
 
     if (any(abs(self%spin) > 0.0_dp)) then
-      turn(:, :) = rotation(self%spin*duration)
-      self%point(:) = self%pivot + matmul(turn, self%point - self%pivot)
-      if (self%shape /= shape_circle) self%axis(:) = matmul(turn, self%axis)
-      self%edge(:, :) = matmul(turn, self%edge)
+      angle(:) = self%spin*duration
+      call make_rotation(angle, turn)
+      self%point(:) = self%point - self%pivot
+      call rotate(turn, self%point)
+      self%point(:) = self%point + self%pivot
+      call rotate(turn, self%axis)
+      call rotate(turn, self%edge(:, 1))
+      call rotate(turn, self%edge(:, 2))
     end if
     self%point(:) = self%point + duration*self%velocity
     self%pivot(:) = self%pivot + duration*self%velocity
@@ -273,25 +275,40 @@ contains
     real(dp), intent(in) :: duration
     !> (nd) [m]
     real(dp), intent(inout) :: x(:)
-    real(dp) :: arm(3), turn(3, 3)
+    real(dp) :: arm(3), turn(3, 3), angle(3)
     integer :: nd
 
     nd = size(x)
     if (any(abs(self%spin) > 0.0_dp)) then
       arm(:) = 0.0_dp
       arm(1:nd) = x - self%pivot(1:nd)
-      turn(:, :) = rotation(self%spin*duration)
-      arm(:) = matmul(turn, arm)
+      angle(:) = self%spin*duration
+      call make_rotation(angle, turn)
+      call rotate(turn, arm)
       x(:) = self%pivot(1:nd) + arm(1:nd)
     end if
     x(:) = x + duration*self%velocity(1:nd)
   end subroutine boundary_carry
 
+  !> v := turn v.
+  pure subroutine rotate(turn, v)
+    real(dp), intent(in) :: turn(3, 3)
+    real(dp), intent(inout) :: v(3)
+    real(dp) :: u(3)
+    integer :: a
+
+    u(:) = v
+    do a = 1, 3
+      v(a) = turn(a, 1)*u(1) + turn(a, 2)*u(2) + turn(a, 3)*u(3)
+    end do
+  end subroutine rotate
+
   !> Matrix of the rotation by a vector (Rodrigues).
-  pure function rotation(vector) result(turn)
+  pure subroutine make_rotation(vector, turn)
     !> direction times angle [rad]
     real(dp), intent(in) :: vector(3)
-    real(dp) :: turn(3, 3), u(3), angle
+    real(dp), intent(out) :: turn(3, 3)
+    real(dp) :: u(3), angle
     integer :: a, b
 
     angle = norm2(vector)
@@ -313,7 +330,7 @@ contains
     turn(3, 1) = turn(3, 1) - sin(angle)*u(2)
     turn(2, 3) = turn(2, 3) - sin(angle)*u(1)
     turn(3, 2) = turn(3, 2) + sin(angle)*u(1)
-  end function rotation
+  end subroutine make_rotation
 
   !> Everything of a boundary that time changes, bit for bit.
   pure subroutine boundary_get_state(self, words)

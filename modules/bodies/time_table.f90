@@ -27,41 +27,49 @@ contains
   subroutine time_table_read(self, path, names, error)
     class(time_table_t), intent(inout) :: self
     character(len=*), intent(in) :: path
-    !> of the columns besides time
-    character(len=*), intent(in) :: names(:)
+    !> of the columns besides time, with a blank between two
+    character(len=*), intent(in) :: names
     type(error_t), allocatable, intent(inout) :: error
     type(csv_table_t) :: table
-    integer :: column(size(names)), time_column, k
+    integer, allocatable :: column(:)
+    integer :: time_column, k
 
     if (allocated(error)) return
     call table%open(path, error)
     if (allocated(error)) return
     time_column = table%column("time")
-    if (time_column == 0) call table%refuse_file("column time is missing; known are time"//listed(names), error)
-    do k = 1, size(names)
-      column(k) = table%column(trim(names(k)))
-    end do
+    if (time_column == 0) call table%refuse_file("column time is missing; known are time "//names, error)
+    call find_columns(table, names, column)
     do k = 1, table%column_count()
       if (k == time_column .or. any(k == column)) cycle
-      call table%refuse_file("column "//table%column_name(k)//" is unknown here; known are time"//listed(names), error)
+      call table%refuse_file("column "//table%column_name(k)//" is unknown here; known are time "//names, error)
     end do
     self%has = column > 0
-    if (.not. any(self%has)) call table%refuse_file("no column besides time; known are"//listed(names), error)
-    allocate (self%time(0), self%value(size(names), 0))
+    if (.not. any(self%has)) call table%refuse_file("no column besides time; known are "//names, error)
+    allocate (self%time(0), self%value(size(column), 0))
     call read_rows(self, table, time_column, column, error)
     call table%close()
   end subroutine time_table_read
 
-  pure function listed(names) result(text)
-    character(len=*), intent(in) :: names(:)
-    character(len=:), allocatable :: text
-    integer :: k
+  !> Places of columns in the table, 0 for those that it does not have.
+  subroutine find_columns(table, names, column)
+    type(csv_table_t), intent(in) :: table
+    character(len=*), intent(in) :: names
+    integer, allocatable, intent(out) :: column(:)
+    integer :: k, n, first, last
 
-    text = ""
-    do k = 1, size(names)
-      text = text//", "//trim(names(k))
+    n = 1
+    do k = 1, len(names)
+      if (names(k:k) == " ") n = n + 1
     end do
-  end function listed
+    allocate (column(n))
+    first = 1
+    do k = 1, n
+      last = first + index(names(first:)//" ", " ") - 2
+      column(k) = table%column(names(first:last))
+      first = last + 2
+    end do
+  end subroutine find_columns
 
   subroutine read_rows(self, table, time_column, column, error)
     type(time_table_t), intent(inout) :: self
@@ -88,8 +96,7 @@ contains
       end if
       call add_row(self, n, time, row)
     end do
-    self%time = self%time(1:n)
-    self%value = self%value(:, 1:n)
+    call set_room(self, n, n)
     if (n == 0 .and. .not. allocated(error)) call table%refuse_file("no rows; at least one was expected", error)
   end subroutine read_rows
 
@@ -97,19 +104,25 @@ contains
     type(time_table_t), intent(inout) :: self
     integer, intent(inout) :: n
     real(dp), intent(in) :: time, row(:)
-    real(dp), allocatable :: longer(:), wider(:, :)
 
-    if (n == size(self%time)) then
-      allocate (longer(2*n + 16), wider(size(row), 2*n + 16))
-      longer(1:n) = self%time(1:n)
-      wider(:, 1:n) = self%value(:, 1:n)
-      call move_alloc(longer, self%time)
-      call move_alloc(wider, self%value)
-    end if
+    if (n == size(self%time)) call set_room(self, n, 2*n + 16)
     n = n + 1
     self%time(n) = time
     self%value(:, n) = row
   end subroutine add_row
+
+  !> Keep the first `n` rows, with room for `room`.
+  subroutine set_room(self, n, room)
+    type(time_table_t), intent(inout) :: self
+    integer, intent(in) :: n, room
+    real(dp), allocatable :: time(:), value(:, :)
+
+    allocate (time(room), value(size(self%value, 1), room))
+    time(1:n) = self%time(1:n)
+    value(:, 1:n) = self%value(:, 1:n)
+    call move_alloc(time, self%time)
+    call move_alloc(value, self%value)
+  end subroutine set_room
 
   !> Value of column `k` at a time.
   pure real(dp) function time_table_at(self, k, time) result(value)

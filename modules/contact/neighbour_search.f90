@@ -101,11 +101,12 @@ contains
     !> (n) permutation to apply
     integer, intent(out), contiguous :: order(:)
     integer(i8), allocatable :: keys(:, :)
-    integer :: k
+    integer :: k, place(3)
 
     allocate (keys(1 + size(id, 1), size(points, 2)))
     do k = 1, size(points, 2)
-      keys(1, k) = cell_key(0, place_of(points(:, k), lower, edge))
+      place(:) = place_of(points(:, k), lower, edge)
+      keys(1, k) = cell_key(0, place)
       keys(2:, k) = id(:, k)
     end do
     call argsort_rows(keys, order)
@@ -158,13 +159,14 @@ contains
       type(entries_t), intent(inout) :: entries
       real(dp), intent(in), contiguous :: radius(:)
       integer(i8), allocatable :: keys(:)
-      integer :: e
+      integer :: e, place(3)
 
       if (periodic) lower(:) = minval(entries%position(:, 1:entries%n), dim=2)
       allocate (keys(entries%n), entries%level(entries%n))
       do e = 1, entries%n
         entries%level(e) = level_of(radius(entries%body(e)), rule%largest_radius)
-        keys(e) = cell_key(entries%level(e), place_of(entries%position(:, e), lower, edge_of(entries%level(e))))
+        place(:) = place_of(entries%position(:, e), lower, edge_of(entries%level(e)))
+        keys(e) = cell_key(entries%level(e), place)
       end do
       call hash%init(keys)
     end subroutine hash_entries
@@ -281,7 +283,8 @@ contains
       integer(i8), allocatable :: id(:, :)
       real(dp), allocatable :: point(:, :)
       integer, allocatable :: order(:)
-      integer :: p, nd
+      real(dp) :: antagonist(bodies%nd)
+      integer :: p, nd, shift(3)
 
       nd = bodies%nd
       allocate (id(2, list%n), point(nd, list%n), order(list%n))
@@ -292,9 +295,12 @@ contains
           point(:, p) = bodies%position(:, list%candidate(p))
         else
           id(2, p) = bodies%id(list%antagonist(p))
-          point(:, p) = bodies%position(:, list%antagonist(p))
-          if (periodic) point(:, p) = point(:, p) + shifted(period, list%shift(p), nd)
-          point(:, p) = owner_point(rule%kind, bodies%position(:, list%candidate(p)), point(:, p))
+          antagonist(:) = bodies%position(:, list%antagonist(p))
+          if (periodic) then
+            shift(:) = shift_of_code(list%shift(p))
+            antagonist(:) = antagonist + shift(1:nd)*period%length(1:nd)
+          end if
+          point(:, p) = owner_point(rule%kind, bodies%position(:, list%candidate(p)), antagonist)
         end if
       end do
       if (list%n > 0) lower(:) = minval(point, dim=2)
@@ -330,17 +336,6 @@ contains
     call period%wrap(point, turns(1:size(point)))
     is_where_owned = all(periods == -turns)
   end function is_where_owned
-
-  !> Lengths of the shift of a code [m].
-  pure function shifted(period, code, nd) result(by)
-    type(period_t), intent(in) :: period
-    integer, intent(in) :: code, nd
-    real(dp) :: by(nd)
-    integer :: shift(3)
-
-    shift(:) = shift_of_code(code)
-    by(:) = shift(1:nd)*period%length(1:nd)
-  end function shifted
 
   !> The grains and those of their periodic images that may meet another one.
   subroutine make_entries(bodies, period, rule, entries)

@@ -159,7 +159,7 @@ contains
       call sparse_exchange(self%comm, onward, destination, arrived)
       ! a rank that does not know the place of a point writes to one that does
       call address(self, point_word, arrived, destination)
-      call split(arrived, destination == self%comm%rank, more, onward)
+      call split(arrived, destination, self%comm%rank, more, onward)
       call join(received, more)
       if (.not. self%comm%any_true(size(onward, 2) > 0)) exit
     end do
@@ -186,23 +186,25 @@ contains
     end do
   end subroutine address
 
-  !> Records whose mask is true, and the others.
-  pure subroutine split(records, mask, yes, no)
+  !> Records for a rank, and the others.
+  pure subroutine split(records, destination, rank, own, others)
     integer(i8), intent(in), contiguous :: records(:, :)
-    logical, intent(in), contiguous :: mask(:)
-    integer(i8), allocatable, intent(out) :: yes(:, :), no(:, :)
-    integer :: k, n_yes, n_no
+    integer, intent(in), contiguous :: destination(:)
+    integer, intent(in) :: rank
+    integer(i8), allocatable, intent(out) :: own(:, :), others(:, :)
+    integer :: k, n_own, n_others
 
-    allocate (yes(size(records, 1), count(mask)), no(size(records, 1), count(.not. mask)))
-    n_yes = 0
-    n_no = 0
+    n_own = count(destination == rank)
+    allocate (own(size(records, 1), n_own), others(size(records, 1), size(records, 2) - n_own))
+    n_own = 0
+    n_others = 0
     do k = 1, size(records, 2)
-      if (mask(k)) then
-        n_yes = n_yes + 1
-        yes(:, n_yes) = records(:, k)
+      if (destination(k) == rank) then
+        n_own = n_own + 1
+        own(:, n_own) = records(:, k)
       else
-        n_no = n_no + 1
-        no(:, n_no) = records(:, k)
+        n_others = n_others + 1
+        others(:, n_others) = records(:, k)
       end if
     end do
   end subroutine split

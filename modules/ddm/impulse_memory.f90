@@ -137,7 +137,7 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     type(neighbourhood_t), intent(in) :: view
     integer(i8), intent(inout), contiguous :: records(:, :)
-    real(dp) :: point(decomposition%nd), antagonist(decomposition%nd)
+    real(dp) :: point(decomposition%nd), candidate(decomposition%nd), antagonist(decomposition%nd)
     integer :: p, n, d, shift(3)
 
     n = 0
@@ -150,9 +150,12 @@ contains
           antagonist(:) = position(:, list%antagonist(p))
           if (size(list%shift) > 0) then
             shift(:) = shift_of_code(list%shift(p))
-            antagonist(:) = antagonist + shift(1:decomposition%nd)*decomposition%period%length(1:decomposition%nd)
+            do d = 1, decomposition%nd
+              antagonist(d) = antagonist(d) + shift(d)*decomposition%period%length(d)
+            end do
           end if
-          point(:) = owner_point(decomposition%rule%kind, point, antagonist)
+          candidate(:) = point
+          point(:) = owner_point(decomposition%rule%kind, candidate, antagonist)
         end if
         do d = 1, decomposition%nd
           records(1 + d, n) = transfer(point(d), 0_i8)

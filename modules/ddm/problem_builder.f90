@@ -135,7 +135,7 @@ contains
       j = view%list%antagonist(p)
       if (j > 0) then
         branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
-        if (size(view%list%shift) > 0) branch(:) = branch - way_of_shift(decomposition%period, view%list%shift(p), nd)
+        if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
         if (gap > alert) cycle
@@ -162,15 +162,19 @@ contains
     end do
   end subroutine find_contacts
 
-  pure function way_of_shift(period, code, nd) result(way)
+  !> Take the shift of the antagonist into account in the way from it to the candidate.
+  pure subroutine shift_back(period, code, branch)
     type(period_t), intent(in) :: period
-    integer, intent(in) :: code, nd
-    real(dp) :: way(nd)
-    integer :: shift(3)
+    integer, intent(in) :: code
+    !> (nd) [m]
+    real(dp), intent(inout) :: branch(:)
+    integer :: shift(3), d
 
     shift(:) = shift_of_code(code)
-    way(:) = shift(1:nd)*period%length(1:nd)
-  end function way_of_shift
+    do d = 1, size(branch)
+      branch(d) = branch(d) - shift(d)*period%length(d)
+    end do
+  end subroutine shift_back
 
   !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
   pure integer function boundary_of(view, p) result(b)

@@ -1,0 +1,57 @@
+!> The bodies of a simulation as a bodies file from which another scene starts.
+module gravier_final_bodies
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls
+  use gravier_bodies_hdf5, only: write_bodies_hdf5
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: write_final_bodies
+
+contains
+
+  !> Write grains, the walls that came with them and the period. Boundaries of the input file are not written: the next
+  !> input file has its own. Collective; errors are the same on all ranks.
+  subroutine write_final_bodies(simulation, path, error)
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    type(bodies_data_t) :: data
+    integer :: s, k, n, nd, nv, w
+
+    if (allocated(error)) return
+    associate (decomposition => simulation%decomposition)
+      nd = decomposition%nd
+      nv = decomposition%nv
+      call allocate_bodies(data, nd, sum(decomposition%home%n))
+      allocate (data%mass(data%n))
+      data%total = simulation%n_grains
+      n = 0
+      do s = 1, size(decomposition%home)
+        associate (home => decomposition%home(s))
+          do k = 1, home%n
+            n = n + 1
+            data%id(n) = home%id(k)
+            data%position(:, n) = home%position(:, k)
+            data%velocity(1:nv, n) = home%velocity(:, k)
+            data%radius(n) = home%radius(k)
+            data%mass(n) = home%mass(k)
+            if (home%glued(k) > 0) data%group(n) = decomposition%boundaries(home%glued(k))%group
+          end do
+        end associate
+      end do
+      call allocate_walls(data, nd, simulation%n_walls)
+      do w = 1, simulation%n_walls
+        data%wall_id(w) = decomposition%boundaries(w)%id
+        data%wall_point(:, w) = decomposition%boundaries(w)%point(1:nd)
+        data%wall_normal(:, w) = decomposition%boundaries(w)%axis(1:nd)
+      end do
+      data%has_box = decomposition%period%on()
+      data%origin(:) = decomposition%period%origin
+      data%period(:) = decomposition%period%length
+    end associate
+    call write_bodies_hdf5(simulation%comm, path, data, error)
+  end subroutine write_final_bodies
+
+end module gravier_final_bodies
