@@ -118,9 +118,9 @@ contains
     if (key%kind == kind_logical) what = "a third component of .false."
     what = what//" where dimension = 2"
     if (key%kind == kind_real) &
-      call expect(report, .not. any(abs(slot%reals(key%planar + 1:)) > 0.0_dp), key%group, trim(key%name), error, what)
+      call expect(report, all(abs(slot%reals(key%planar + 1:)) <= 0.0_dp), key%group, trim(key%name), error, what)
     if (key%kind == kind_logical) &
-      call expect(report, .not. any(slot%logicals(key%planar + 1:)), key%group, trim(key%name), error, what)
+      call expect(report, all(.not. slot%logicals(key%planar + 1:)), key%group, trim(key%name), error, what)
   end subroutine check_planar
 
   subroutine check_scene(report, config, error)

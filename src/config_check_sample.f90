@@ -61,7 +61,7 @@ contains
         call miss(report, "sample", "box", error, "each axis that is not periodic but the last")
       call expect(report, all(sample%box(:nd - 1) > 0.0_dp), "sample", "box", error, &
                   "sizes > 0, of which the last may be 0")
-      call expect(report, .not. any(period > 0.0_dp .and. abs(sample%box - period) > 0.0_dp), "sample", "box", error, &
+      call expect(report, all(period <= 0.0_dp .or. abs(sample%box - period) <= 0.0_dp), "sample", "box", error, &
                   "the same sizes as &scene "//shown_text(report, "scene", "period")//" along each axis that is periodic")
       call expect(report, sample%box(nd) <= 0.0_dp .or. .not. is_given(report, "sample", "solid_fraction"), &
                   "sample", "solid_fraction", error, "a sample without it where the last size of the box is given")

@@ -2,7 +2,7 @@
 module gravier_config_value
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, ieee_set_halting_mode, &
-                                           ieee_support_halting, ieee_overflow
+                                                                              ieee_support_halting, ieee_overflow
   use gravier_kinds, only: dp
   use gravier_text, only: lower
   use gravier_config_types, only: text_length, choice_length
