@@ -238,20 +238,18 @@ contains
     type(config_t), intent(in) :: config
     type(scan_t), intent(in) :: found
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: name
     logical :: is_there
     integer :: g
 
     do g = 1, size(groups)
       if (groups(g)%bodies == "" .or. config%scene%bodies == "") cycle
-      name = trim(groups(g)%name)
-      is_there = number_of_groups(found, name) > 0
-      if (is_there .and. group_count(config, name) == 0) then
-        call raise(error, status_input, config%file//": group &"//name//" belongs to bodies = '"//trim(groups(g)%bodies) &
-                   //"', expected without it where bodies = '"//trim(config%scene%bodies)//"'")
-      else if (group_count(config, name) > 0 .and. .not. is_there) then
-        call raise(error, status_input, config%file//": group &"//name//" is missing: expected &"//name &
-                   //" ... /, required by bodies = '"//trim(groups(g)%bodies)//"'")
+      is_there = number_of_groups(found, groups(g)%name) > 0
+      if (is_there .and. group_count(config, groups(g)%name) == 0) then
+        call raise(error, status_input, config%file//": group &"//trim(groups(g)%name)//" belongs to bodies = '" &
+                   //trim(groups(g)%bodies)//"', expected without it where bodies = '"//trim(config%scene%bodies)//"'")
+      else if (group_count(config, groups(g)%name) > 0 .and. .not. is_there) then
+        call raise(error, status_input, config%file//": group &"//trim(groups(g)%name)//" is missing: expected &" &
+                   //trim(groups(g)%name)//" ... /, required by bodies = '"//trim(groups(g)%bodies)//"'")
       end if
     end do
   end subroutine check_owned_groups
