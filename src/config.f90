@@ -2,18 +2,22 @@
 module gravier_config
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
-                                  enriched_config_t, output_config_t
-  use gravier_config_keys, only: groups, keys, find_group, find_key, nearest_group, nearest_key, expected_text
+                                  enriched_config_t, output_config_t, boundary_config_t, sample_config_t
+  use gravier_config_table, only: groups, keys
+  use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
-  use gravier_config_slots, only: slot_t, slot_of
+  use gravier_config_slots, only: slot_t, slot_of, group_count
   use gravier_config_value, only: read_value, most_entries
-  use gravier_config_check, only: given_t, check_dimension, check_config, grid_product
+  use gravier_config_report, only: report_t, is_given, label
+  use gravier_config_check, only: check_dimension, check_config, grid_product
   use gravier_config_write, only: write_active, write_key_reference
   implicit none
   private
   public :: parse_config, write_active, write_key_reference
   public :: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t, output_config_t
+  public :: boundary_config_t, sample_config_t
 
 contains
 
@@ -28,55 +32,81 @@ contains
     type(config_t), target, intent(out) :: config
     type(error_t), allocatable, intent(out) :: error
     type(scan_t) :: found
-    type(given_t) :: given(size(keys))
+    type(report_t) :: report
 
     config%file = file
     config%text = text
-    call set_defaults(config, error)
+    report%file = file
     call scan_groups(file, text, found, error)
     if (.not. allocated(error)) call check_names(file, found, error)
-    if (.not. allocated(error)) call read_dimension(config, found, given, error)
-    if (.not. allocated(error)) call read_others(config, found, given, error)
     if (allocated(error)) return
-    call settle(config, given)
-    call check_config(config, given, error)
+    allocate (config%boundaries(number_of_groups(found, "boundary")))
+    allocate (report%given(size(keys), max(1, size(config%boundaries))))
+    call set_defaults(config, error)
+    call read_first(config, found, report, error)
+    if (.not. allocated(error)) call read_others(config, found, report, error)
+    if (.not. allocated(error)) call check_owned_groups(config, found, error)
+    if (allocated(error)) return
+    call settle(config, report)
+    call check_config(config, report, error)
   end subroutine parse_config
 
-  !> Gives every key the default of the table.
+  pure integer function number_of_groups(found, name) result(n)
+    type(scan_t), intent(in) :: found
+    character(len=*), intent(in) :: name
+    integer :: i
+    n = 0
+    do i = 1, found%n_groups
+      if (found%groups(i)%name == name) n = n + 1
+    end do
+  end function number_of_groups
+
+  !> Gives every key of every group the default of the table.
   subroutine set_defaults(config, error)
+    !> its boundaries are allocated
     type(config_t), target, intent(inout) :: config
     type(error_t), allocatable, intent(inout) :: error
     type(slot_t) :: slot
     logical :: touched(most_entries), failed
-    integer :: k
+    integer :: k, instance, n
 
     do k = 1, size(keys)
-      slot = slot_of(config, keys(k))
-      if (keys(k)%default == "''") then
-        ! no word: a required choice, or an empty text
-        if (associated(slot%choice)) slot%choice = ""
-        if (associated(slot%text)) slot%text = ""
-        cycle
-      end if
-      call read_value(keys(k), "", trim(keys(k)%default), slot, touched, failed)
-      if (failed) call raise(error, status_input, "table of keys: default of &"//trim(keys(k)%group)//" " &
-                             //trim(keys(k)%name)//" = "//trim(keys(k)%default)//": expected "//expected_text(keys(k)))
+      n = 1
+      if (keys(k)%group == "boundary") n = size(config%boundaries)
+      do instance = 1, n
+        slot = slot_of(config, keys(k), instance)
+        if (keys(k)%default == "''") then
+          ! no word: a required choice, or an empty text
+          if (associated(slot%choice)) slot%choice = ""
+          if (associated(slot%text)) slot%text = ""
+          cycle
+        end if
+        call read_value(keys(k), "", trim(keys(k)%default), slot, touched, failed)
+        if (failed) call raise(error, status_input, "table of keys: default of &"//trim(keys(k)%group)//" " &
+                               //trim(keys(k)%name)//" = "//trim(keys(k)%default)//": expected "//expected_text(keys(k)))
+      end do
     end do
   end subroutine set_defaults
 
-  !> Fails on a group or key that is not in the table, and on a missing group.
+  !> Fails on a group or key that is not in the table, on a group given twice that may stand once, and on a missing group.
   subroutine check_names(file, found, error)
     character(len=*), intent(in) :: file
     type(scan_t), intent(in) :: found
     type(error_t), allocatable, intent(inout) :: error
-    logical :: present_group(size(groups))
-    integer :: g, i
+    integer :: first(size(groups)), g, i
 
-    present_group = .false.
+    ! where each group of the table stands first
+    first = 0
     do i = 1, found%n_groups
       g = find_group(found%groups(i)%name)
-      if (g > 0) present_group(g) = .true.
-      if (g == 0) call raise(error, status_input, file//": "//unknown_group(found%groups(i)%name))
+      if (g == 0) then
+        call raise(error, status_input, file//": "//unknown_group(found%groups(i)%name))
+      else if (first(g) == 0) then
+        first(g) = i
+      else if (.not. groups(g)%repeated) then
+        call raise(error, status_input, file//": group &"//trim(groups(g)%name)//" is given twice (lines " &
+                   //to_text(found%groups(first(g))%line)//" and "//to_text(found%groups(i)%line)//"): expected once")
+      end if
     end do
     do i = 1, found%n_assignments
       associate (item => found%assignments(i))
@@ -84,7 +114,7 @@ contains
       end associate
     end do
     do g = 1, size(groups)
-      if (groups(g)%required .and. .not. present_group(g)) &
+      if (groups(g)%required .and. first(g) == 0) &
         call raise(error, status_input, file//": group &"//trim(groups(g)%name)//" is missing: expected &" &
                    //trim(groups(g)%name)//" ... /")
     end do
@@ -129,50 +159,51 @@ contains
     end do
   end function unknown_key
 
-  !> Reads the dimension, first because the default of gravity hangs on it, and sets that default.
-  subroutine read_dimension(config, found, given, error)
+  !> Reads what others hang on: the dimension, and sets the defaults that depend on it; the names of the boundaries, which
+  !> messages quote.
+  subroutine read_first(config, found, report, error)
     type(config_t), target, intent(inout) :: config
     type(scan_t), intent(in) :: found
-    !> shape (number of keys)
-    type(given_t), intent(inout) :: given(:)
+    type(report_t), intent(inout) :: report
     type(error_t), allocatable, intent(inout) :: error
     integer :: i
 
     do i = 1, found%n_assignments
-      if (is_dimension(found%assignments(i))) call read_assignment(config, found%assignments(i), given, error)
+      if (.not. allocated(error) .and. comes_first(found%assignments(i))) &
+        call read_assignment(config, found%assignments(i), report, error)
     end do
     if (allocated(error)) return
-    call check_dimension(config, given, error)
+    call check_dimension(config, report, error)
     if (config%scene%dimension == 2) return
     config%scene%gravity(3) = config%scene%gravity(2)
     config%scene%gravity(2) = 0.0_dp
-  end subroutine read_dimension
+    config%sample%solid_fraction = 0.2_dp
+  end subroutine read_first
 
-  subroutine read_others(config, found, given, error)
+  subroutine read_others(config, found, report, error)
     type(config_t), target, intent(inout) :: config
     type(scan_t), intent(in) :: found
-    !> shape (number of keys)
-    type(given_t), intent(inout) :: given(:)
+    type(report_t), intent(inout) :: report
     type(error_t), allocatable, intent(inout) :: error
     integer :: i
 
     do i = 1, found%n_assignments
-      if (.not. is_dimension(found%assignments(i))) call read_assignment(config, found%assignments(i), given, error)
+      if (.not. comes_first(found%assignments(i))) call read_assignment(config, found%assignments(i), report, error)
       if (allocated(error)) return
     end do
   end subroutine read_others
 
-  pure logical function is_dimension(item)
+  pure logical function comes_first(item)
     type(assignment_t), intent(in) :: item
-    is_dimension = item%group == "scene" .and. item%key == "dimension"
-  end function is_dimension
+    comes_first = (item%group == "scene" .and. item%key == "dimension") .or. (item%group == "boundary" .and. item%key == "name")
+  end function comes_first
 
   !> Reads one assignment and notes it; fails on a bad value and on an entry that is already given.
-  subroutine read_assignment(config, item, given, error)
+  subroutine read_assignment(config, item, report, error)
     type(config_t), target, intent(inout) :: config
     type(assignment_t), intent(in) :: item
-    !> shape (number of keys)
-    type(given_t), intent(inout) :: given(:)
+    !> its instance is that of the assignment afterwards
+    type(report_t), intent(inout) :: report
     type(error_t), allocatable, intent(inout) :: error
     type(slot_t) :: slot
     character(len=:), allocatable :: shown, place
@@ -180,38 +211,84 @@ contains
     integer :: k
 
     k = find_key(item%group, item%key)
-    slot = slot_of(config, keys(k))
+    report%instance = item%instance
+    slot = slot_of(config, keys(k), item%instance)
     shown = item%key//excerpt(item%index)//" = "//excerpt(item%value)
     if (item%value == "") shown = shown//"(nothing)"
-    place = config%file//": &"//item%group//" "//shown//": "
+    place = config%file//": "//label(report, item%group)//" "//shown//": "
     call read_value(keys(k), item%index, item%value, slot, touched, failed)
-    if (failed .and. keys(k)%count == 1 .and. item%index /= "") then
-      call raise(error, status_input, place//"expected "//item%key//" without an index")
-    else if (failed) then
-      call raise(error, status_input, place//"expected "//expected_text(keys(k)))
-    else if (any(given(k)%entries .and. touched)) then
-      call raise(error, status_input, place//"expected once, but it is given twice, first as "//given(k)%shown)
-    end if
-    given(k)%entries = given(k)%entries .or. touched
-    if (allocated(given(k)%shown)) shown = given(k)%shown//", "//shown
-    given(k)%shown = shown
+    associate (given => report%given(k, item%instance))
+      if (failed .and. keys(k)%count == 1 .and. item%index /= "") then
+        call raise(error, status_input, place//"expected "//item%key//" without an index")
+      else if (failed) then
+        call raise(error, status_input, place//"expected "//expected_text(keys(k)))
+      else if (any(given%entries .and. touched)) then
+        call raise(error, status_input, place//"expected once, but it is given twice, first as "//given%shown)
+      end if
+      given%entries = given%entries .or. touched
+      if (allocated(given%shown)) shown = given%shown//", "//shown
+      given%shown = shown
+      given%value = excerpt(item%value)
+    end associate
+    if (associated(slot%given)) slot%given = .true.
   end subroutine read_assignment
 
-  !> Sets the values that hang on others.
-  subroutine settle(config, given)
-    type(config_t), intent(inout) :: config
-    !> shape (number of keys)
-    type(given_t), intent(in) :: given(:)
+  !> Fails on a group that belongs to other bodies, and on a missing group that the bodies ask for.
+  subroutine check_owned_groups(config, found, error)
+    type(config_t), intent(in) :: config
+    type(scan_t), intent(in) :: found
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: is_there
+    integer :: g
 
-    associate (scene => config%scene, parts => config%decomposition)
-      if (.not. any(given(find_key("scene", "wall_friction"))%entries)) scene%wall_friction = scene%friction
-      scene%alert_given = any(given(find_key("scene", "alert_distance"))%entries)
+    do g = 1, size(groups)
+      if (groups(g)%bodies == "" .or. config%scene%bodies == "") cycle
+      is_there = number_of_groups(found, groups(g)%name) > 0
+      if (is_there .and. group_count(config, groups(g)%name) == 0) then
+        call raise(error, status_input, config%file//": group &"//trim(groups(g)%name)//" belongs to bodies = '" &
+                   //trim(groups(g)%bodies)//"', expected without it where bodies = '"//trim(config%scene%bodies)//"'")
+      else if (group_count(config, groups(g)%name) > 0 .and. .not. is_there) then
+        call raise(error, status_input, config%file//": group &"//trim(groups(g)%name)//" is missing: expected &" &
+                   //trim(groups(g)%name)//" ... /, required by bodies = '"//trim(groups(g)%bodies)//"'")
+      end if
+    end do
+  end subroutine check_owned_groups
+
+  !> Sets the values that hang on others.
+  subroutine settle(config, report)
+    type(config_t), intent(inout) :: config
+    type(report_t), intent(inout) :: report
+    integer :: i
+
+    report%instance = 1
+    associate (scene => config%scene, parts => config%decomposition, sample => config%sample)
+      if (.not. is_given(report, "scene", "wall_friction")) scene%wall_friction = scene%friction
+      if (.not. is_given(report, "scene", "wall_restitution")) scene%wall_restitution = scene%restitution
       call fill_third(scene%dimension, scene%lattice_count)
       call fill_third(scene%dimension, parts%grid)
-      if (any(given(find_key("decomposition", "subdomains"))%entries)) return
-      if (grid_product(parts%grid) > 0) parts%subdomains = grid_product(parts%grid)
+      where (.not. abs(sample%box) > 0.0_dp) sample%box = scene%period
+      if (grid_product(parts%grid) > 0 .and. .not. is_given(report, "decomposition", "subdomains")) &
+        parts%subdomains = grid_product(parts%grid)
     end associate
+    do i = 1, size(config%boundaries)
+      report%instance = i
+      call settle_boundary(config%scene, report, config%boundaries(i))
+    end do
+    report%instance = 1
   end subroutine settle
+
+  subroutine settle_boundary(scene, report, boundary)
+    type(scene_config_t), intent(in) :: scene
+    !> of the instance of the boundary
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(inout) :: boundary
+
+    if (.not. is_given(report, "boundary", "name")) boundary%name = "boundary "//to_text(report%instance)
+    where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = boundary%point
+    if (.not. boundary%friction_given) boundary%friction = scene%wall_friction
+    if (.not. boundary%restitution_given) boundary%restitution = scene%wall_restitution
+    if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)
+  end subroutine settle_boundary
 
   !> One layer along the third axis in 2D, when counts are given and this one is not.
   pure subroutine fill_third(dimension, counts)

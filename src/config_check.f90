@@ -4,57 +4,41 @@ module gravier_config_check
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_config_types, only: config_t
-  use gravier_config_keys, only: key_t, keys, find_key, expected_text, choices_text
+  use gravier_config_table, only: key_t, keys, kind_real, kind_logical
+  use gravier_config_keys, only: choices_text
+  use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
+  use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
+  use gravier_config_check_boundary, only: check_boundaries
+  use gravier_config_check_sample, only: check_sample
   implicit none
   private
-  public :: given_t, check_dimension, check_config, grid_product
-
-  !> Whether a key of the table is in the file, and how.
-  type :: given_t
-    !> the entries that are set
-    logical :: entries(3) = .false.
-    !> `key = value` as the file has it; several, separated by commas, when the entries were set one by one
-    character(len=:), allocatable :: shown
-  end type given_t
-
-  !> What every check needs to make its message.
-  type :: report_t
-    character(len=:), allocatable :: file
-    !> as the table of keys
-    type(given_t), allocatable :: given(:)
-  end type report_t
+  public :: check_dimension, check_config, grid_product
 
 contains
 
   !> Fails unless dimension is 2 or 3, which other defaults and rules depend on.
-  subroutine check_dimension(config, given, error)
+  subroutine check_dimension(config, report, error)
     type(config_t), intent(in) :: config
-    !> shape (number of keys)
-    type(given_t), intent(in) :: given(:)
+    type(report_t), intent(in) :: report
     type(error_t), allocatable, intent(inout) :: error
-    type(report_t) :: report
-
-    report%file = config%file
-    report%given = given
-    call expect(report, any(config%scene%dimension == [2, 3]), "scene", "dimension", error)
+    call expect(report, config%scene%dimension == 2 .or. config%scene%dimension == 3, "scene", "dimension", error)
   end subroutine check_dimension
 
   !> Fails (status_input) with the first rule that the input breaks.
-  subroutine check_config(config, given, error)
+  subroutine check_config(config, report, error)
     !> with defaults settled
     type(config_t), intent(in) :: config
-    !> shape (number of keys)
-    type(given_t), intent(in) :: given(:)
+    !> what the file gives; its instance comes back as it was
+    type(report_t), intent(inout) :: report
     type(error_t), allocatable, intent(inout) :: error
-    type(report_t) :: report
 
-    report%file = config%file
-    report%given = given
-    call check_required(report, config, error)
-    call check_bodies_keys(report, config, error)
+    call check_keys(report, config, error)
+    if (allocated(error)) return
     call check_scene(report, config, error)
     if (config%scene%bodies == "column") call check_column(report, config, error)
     if (config%scene%bodies == "lattice") call check_lattice(report, config, error)
+    call check_boundaries(report, config, error)
+    if (config%scene%bodies == "sample") call check_sample(report, config, error)
     call check_time(report, config, error)
     call check_solver(report, config, error)
     call check_decomposition(report, config, error)
@@ -63,44 +47,81 @@ contains
     call check_output(report, config, error)
   end subroutine check_config
 
-  !> Keys that have no default.
-  subroutine check_required(report, config, error)
-    type(report_t), intent(in) :: report
+  !> The rules of the table of keys, for every key of every group.
+  subroutine check_keys(report, config, error)
+    type(report_t), intent(inout) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
-    logical :: needed
-    integer :: k
+    !> a copy to point into
+    type(config_t), target :: copy
+    integer :: rule, k, instance
 
-    do k = 1, size(keys)
-      needed = keys(k)%required .or. (keys(k)%note == "required" .and. keys(k)%bodies == config%scene%bodies)
-      if (.not. needed .or. any(report%given(k)%entries)) cycle
-      call raise(error, status_input, report%file//": &"//trim(keys(k)%group)//" "//trim(keys(k)%name) &
-                 //" is missing: expected "//expected_text(keys(k))//needed_by(keys(k)))
+    copy = config
+    do rule = 1, 3
+      do k = 1, size(keys)
+        do instance = 1, group_count(config, keys(k)%group)
+          report%instance = instance
+          if (rule == 1) call check_required(report, copy, keys(k), error)
+          if (rule == 2) call check_owner(report, copy, keys(k), error)
+          if (rule == 3) call check_planar(report, copy, keys(k), error)
+          if (allocated(error)) return
+        end do
+      end do
     end do
+    report%instance = 1
+  end subroutine check_keys
+
+  !> A key that has no default.
+  subroutine check_required(report, config, key, error)
+    type(report_t), intent(in) :: report
+    type(config_t), target, intent(inout) :: config
+    type(key_t), intent(in) :: key
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (key%note /= "required") return
+    if (key%required) then
+      call miss(report, key%group, trim(key%name), error, "")
+    else if (belongs(config, key, report%instance)) then
+      call miss(report, key%group, trim(key%name), error, &
+                trim(key%chooser)//" = '"//chosen_word(config, key, report%instance)//"'")
+    end if
   end subroutine check_required
 
-  pure function needed_by(key) result(text)
-    type(key_t), intent(in) :: key
-    character(len=:), allocatable :: text
-    text = ""
-    if (key%bodies /= "") text = ", required by bodies = "//choices_text(key%bodies)
-  end function needed_by
-
-  !> Keys that belong to another kind of bodies.
-  subroutine check_bodies_keys(report, config, error)
+  !> A key that belongs to another choice: to other bodies, to another shape.
+  subroutine check_owner(report, config, key, error)
     type(report_t), intent(in) :: report
-    type(config_t), intent(in) :: config
+    type(config_t), target, intent(inout) :: config
+    type(key_t), intent(in) :: key
     type(error_t), allocatable, intent(inout) :: error
-    integer :: k
 
-    do k = 1, size(keys)
-      if (keys(k)%bodies == "" .or. .not. any(report%given(k)%entries)) cycle
-      if (index(keys(k)%bodies, trim(config%scene%bodies)) > 0) cycle
-      call raise(error, status_input, report%file//": &scene "//report%given(k)%shown//": "//trim(keys(k)%name) &
-                 //" belongs to bodies = "//choices_text(keys(k)%bodies)//", expected without it where bodies = '" &
-                 //trim(config%scene%bodies)//"'")
-    end do
-  end subroutine check_bodies_keys
+    if (.not. is_given(report, key%group, key%name)) return
+    if (belongs(config, key, report%instance)) return
+    call raise(error, status_input, report%file//": "//label(report, key%group)//" " &
+               //shown_text(report, key%group, key%name)//": "//trim(key%name)//" belongs to "//trim(key%chooser)//" = " &
+               //choices_text(key%chosen)//", expected without it where "//trim(key%chooser)//" = '" &
+               //chosen_word(config, key, report%instance)//"'")
+  end subroutine check_owner
+
+  !> Entries that a vector does not have in 2D.
+  subroutine check_planar(report, config, key, error)
+    type(report_t), intent(in) :: report
+    type(config_t), target, intent(inout) :: config
+    type(key_t), intent(in) :: key
+    type(error_t), allocatable, intent(inout) :: error
+    type(slot_t) :: slot
+    character(len=:), allocatable :: what
+
+    if (config%scene%dimension == 3 .or. key%count == 1) return
+    slot = slot_of(config, key, report%instance)
+    what = "a third component of 0"
+    if (key%planar == 1) what = "one entry"
+    if (key%kind == kind_logical) what = "a third component of .false."
+    what = what//" where dimension = 2"
+    if (key%kind == kind_real) &
+      call expect(report, all(abs(slot%reals(key%planar + 1:)) <= 0.0_dp), key%group, trim(key%name), error, what)
+    if (key%kind == kind_logical) &
+      call expect(report, all(.not. slot%logicals(key%planar + 1:)), key%group, trim(key%name), error, what)
+  end subroutine check_planar
 
   subroutine check_scene(report, config, error)
     type(report_t), intent(in) :: report
@@ -108,13 +129,17 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     associate (scene => config%scene)
-      call expect(report, scene%dimension == 3 .or. .not. abs(scene%gravity(3)) > 0.0_dp, "scene", "gravity", error, &
-                  "a third component of 0 where dimension = 2")
       call expect(report, scene%bodies /= "file" .or. scene%bodies_file /= "", "scene", "bodies_file", error)
       call expect(report, scene%density > 0.0_dp, "scene", "density", error)
       call expect(report, scene%friction >= 0.0_dp, "scene", "friction", error)
       call expect(report, scene%wall_friction >= 0.0_dp, "scene", "wall_friction", error)
+      call expect(report, scene%restitution >= 0.0_dp .and. scene%restitution <= 1.0_dp, "scene", "restitution", error)
+      call expect(report, scene%wall_restitution >= 0.0_dp .and. scene%wall_restitution <= 1.0_dp, &
+                  "scene", "wall_restitution", error)
+      call expect(report, all(scene%period >= 0.0_dp), "scene", "period", error)
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
+      call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
+      call expect(report, scene%overlap_allowed > 0.0_dp .or. .not. scene%overlap_given, "scene", "overlap_allowed", error)
     end associate
   end subroutine check_scene
 
@@ -143,7 +168,7 @@ contains
       call expect(report, scene%radius_min > 0.0_dp, "scene", "radius_min", error)
       call expect(report, scene%radius_max > 0.0_dp, "scene", "radius_max", error)
       call expect(report, scene%radius_min <= scene%radius_max, "scene", "radius_min", error, &
-                  "at most radius_max, here "//report%given(find_key("scene", "radius_max"))%shown)
+                  "at most radius_max, here "//shown_text(report, "scene", "radius_max"))
     end associate
   end subroutine check_lattice
 
@@ -181,6 +206,8 @@ contains
     associate (parts => config%decomposition)
       call expect(report, parts%subdomains >= 1, "decomposition", "subdomains", error)
       call expect(report, parts%repartition_every >= 0, "decomposition", "repartition_every", error)
+      call expect(report, parts%repartition_imbalance > 1.0_dp .or. .not. abs(parts%repartition_imbalance) > 0.0_dp, &
+                  "decomposition", "repartition_imbalance", error)
       if (all(parts%grid == 0)) return
       call expect(report, parts%partition == "grid", "decomposition", "grid", error, &
                   "no grid where partition = '"//trim(parts%partition)//"': give subdomains, or partition = 'grid'")
@@ -189,7 +216,7 @@ contains
       call expect(report, grid_product(parts%grid) > 0, "decomposition", "grid", error, &
                   "at most "//to_text(huge(1))//" subdomains")
       call expect(report, parts%subdomains == grid_product(parts%grid), "decomposition", "subdomains", error, &
-                  to_text(grid_product(parts%grid))//", the product of "//report%given(find_key("decomposition", "grid"))%shown)
+                  to_text(grid_product(parts%grid))//", the product of "//shown_text(report, "decomposition", "grid"))
     end associate
   end subroutine check_decomposition
 
@@ -227,33 +254,10 @@ contains
 
     call expect(report, config%output%directory /= "", "output", "directory", error)
     call expect(report, config%output%every >= 0, "output", "every", error)
+    call expect(report, config%output%checkpoint_every >= 0, "output", "checkpoint_every", error)
+    call expect(report, config%output%checkpoint_seconds >= 0.0_dp, "output", "checkpoint_seconds", error)
+    call expect(report, config%output%walltime >= 0.0_dp, "output", "walltime", error)
   end subroutine check_output
-
-  !> Fails with `FILE: &group key = VALUE: expected ...` unless the rule holds.
-  subroutine expect(report, holds, group, key, error, what)
-    type(report_t), intent(in) :: report
-    logical, intent(in) :: holds
-    character(len=*), intent(in) :: group, key
-    type(error_t), allocatable, intent(inout) :: error
-    !> what is expected; the words of the table of keys by default
-    character(len=*), intent(in), optional :: what
-    character(len=:), allocatable :: shown, expected
-    integer :: k
-
-    if (holds) return
-    k = find_key(group, key)
-    shown = key
-    if (allocated(report%given(k)%shown)) shown = report%given(k)%shown
-    expected = expected_text(keys(k))
-    if (present(what)) expected = what
-    call raise(error, status_input, report%file//": &"//group//" "//shown//": expected "//expected)
-  end subroutine expect
-
-  pure logical function is_given(report, group, key)
-    type(report_t), intent(in) :: report
-    character(len=*), intent(in) :: group, key
-    is_given = any(report%given(find_key(group, key))%entries)
-  end function is_given
 
   !> Are the counts along each axis positive, the third one 1 in 2D?
   pure logical function positive(counts, dimension)

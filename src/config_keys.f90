@@ -1,143 +1,11 @@
-!> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table.
+!> Looks up groups and keys of an input file in their table, and says what their values must be.
 module gravier_config_keys
   use gravier_text, only: to_text
   use gravier_config_types, only: text_length
+  use gravier_config_table, only: key_t, groups, keys, kind_integer, kind_real, kind_logical, kind_choice
   implicit none
   private
-  public :: group_t, key_t, groups, keys
-  public :: kind_integer, kind_real, kind_logical, kind_choice, kind_text
-  public :: find_group, find_key, nearest_group, nearest_key, choices_text, expected_text
-
-  !> what a value is
-  integer, parameter :: kind_integer = 1
-  integer, parameter :: kind_real = 2
-  integer, parameter :: kind_logical = 3
-  !> one of a few words, in quotes
-  integer, parameter :: kind_choice = 4
-  !> any text, in quotes
-  integer, parameter :: kind_text = 5
-
-  !> A namelist group.
-  type :: group_t
-    character(len=16) :: name
-    !> must the file have it?
-    logical :: required
-    character(len=120) :: meaning
-  end type group_t
-
-  !> A key of a group.
-  type :: key_t
-    character(len=16) :: group
-    character(len=20) :: name
-    !> one of the kind_ constants
-    integer :: kind
-    !> the default, as it would be typed after the equal sign
-    character(len=16) :: default
-    !> a choice: the words, separated by blanks; otherwise a rule that follows "a finite real number", "an integer"
-    character(len=48) :: allowed
-    character(len=200) :: meaning
-    !> number of entries
-    integer :: count = 1
-    character(len=24) :: unit = ""
-    !> replaces the default in the reference where no constant can say it
-    character(len=56) :: note = ""
-    !> the kinds of bodies (&scene bodies) to which the key belongs; blank: all
-    character(len=16) :: bodies = ""
-    !> must the group give it?
-    logical :: required = .false.
-  end type key_t
-
-  type(group_t), parameter :: groups(*) = [ &
-                              group_t("scene", .true., "The bodies, their loads and their contact laws."), &
-                              group_t("time", .true., "The time steps."), &
-                              group_t("solver", .false., "The method that solves the contacts of every step, and when it stops."), &
-                              group_t("decomposition", .false., "The subdomains of the domain decomposition methods."), &
-           group_t("enriched", .false., "The enriched methods `schwarz_ec` and `nscdd_ep`; the other methods ignore this group."), &
-                              group_t("output", .false., "The results.")]
-
-  type(key_t), parameter :: scene_keys(*) = [ &
-                            key_t("scene", "title", kind_text, "''", "", "a title for the log and the results"), &
-                       key_t("scene", "dimension", kind_integer, "2", "2 or 3", "disks in the plane (2) or spheres in space (3)"), &
-                key_t("scene", "gravity", kind_real, "0, -9.81, 0", "", "acceleration of gravity; its third component is 0 in 2D", &
-                                  count=3, unit="m/s^2", note="`0, -9.81, 0` in 2D, `0, 0, -9.81` in 3D"), &
-                            key_t("scene", "bodies", kind_choice, "''", "column lattice file", &
-                        "where the bodies come from: a column of equal bodies, a loose lattice of random radii, or a bodies file", &
-                                  note="required", required=.true.), &
-           key_t("scene", "bodies_file", kind_text, "''", "not empty", "path of the bodies file", note="required", bodies="file"), &
-                     key_t("scene", "column_count", kind_integer, "3", ">= 1", "number of bodies in the column", bodies="column"), &
-                            key_t("scene", "radius", kind_real, "1.0", "> 0", "radius of each body", unit="m", bodies="column"), &
-                            key_t("scene", "mass", kind_real, "1.0", "> 0", "mass of each body", unit="kg", bodies="column"), &
-                            key_t("scene", "density", kind_real, "2500", "> 0", &
-                                  "density of the bodies; with `bodies = 'file'`, where the file gives no masses", &
-                                  unit="kg/m^3, kg/m^2 in 2D", bodies="lattice file"), &
-                            key_t("scene", "lattice_count", kind_integer, "3*0", ">= 1", &
-                  "number of bodies along each axis: two entries in 2D, three in 3D", count=3, note="required", bodies="lattice"), &
-              key_t("scene", "radius_min", kind_real, "0", "> 0", "smallest radius", unit="m", note="required", bodies="lattice"), &
-                            key_t("scene", "radius_max", kind_real, "0", "> 0", "largest radius, at least `radius_min`", &
-                                  unit="m", note="required", bodies="lattice"), &
-                            key_t("scene", "seed", kind_integer, "1", "", "seed of the random radii", bodies="lattice"), &
-                            key_t("scene", "friction", kind_real, "0.0", ">= 0", "friction coefficient between bodies"), &
-                         key_t("scene", "wall_friction", kind_real, "-1", ">= 0", "friction coefficient between bodies and walls", &
-                                  note="the value of `friction`"), &
-                            key_t("scene", "alert_distance", kind_real, "-1", ">= 0", "gap below which two bodies make a contact", &
-                                  unit="m", note="0.1 of the largest radius")]
-
-  type(key_t), parameter :: time_keys(*) = [ &
-                key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
-                      key_t("time", "steps", kind_integer, "0", ">= 0", "number of time steps", note="required", required=.true.), &
-                            key_t("time", "theta", kind_real, "0.5", "in [0.5, 1]", &
-                                  "weight of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
-
-  type(key_t), parameter :: solver_keys(*) = [ &
-                            key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep", &
-                                  "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP"), &
-                            key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
-                                  "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
-                  key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &
-                      key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
-                            key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
-                            key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
-                            "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)"), &
-                key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
-                        key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
-                            key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
-          "after a solve that gave up: go on; write the step and stop; stop without it. One that diverged always stops without it")]
-
-  type(key_t), parameter :: decomposition_keys(*) = [ &
-                            key_t("decomposition", "partition", kind_choice, "'grid'", "grid metis", &
-                                  "equal boxes, or cells with grains in them shared out by METIS"), &
-                            key_t("decomposition", "kind", kind_choice, "'dual'", "dual primal", &
-                                  "a contact belongs to the subdomain of its midpoint, or of the centre of its candidate"), &
-                            key_t("decomposition", "grid", kind_integer, "3*0", ">= 1", &
-                                  "boxes along each axis, two entries in 2D, three in 3D; only with `partition = 'grid'`", &
-                                  count=3, note="found from `subdomains`"), &
-                            key_t("decomposition", "subdomains", kind_integer, "1", ">= 1", &
-                              "number of subdomains; `method = 'nlgs'` has one", note="the product of `grid` if given, else `1`"), &
-             key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again")]
-
-  type(key_t), parameter :: enriched_keys(*) = [ &
-                            key_t("enriched", "direction", kind_real, "0.3", ">= 0", "search direction l", unit="1/W_aa or kg"), &
-                            key_t("enriched", "direction_unit", kind_choice, "'relative'", "relative absolute", &
-                                  "l in units of 1/W_aa, the inverse of the local operator of each contact, or in kg"), &
-                            key_t("enriched", "contacts", kind_choice, "'all'", "all active", &
-                                  "contacts that take part: all, or those that carry an impulse"), &
-                            key_t("enriched", "interface", kind_choice, "'mumps'", "mumps cg", &
-                                  "interface solve: direct, or conjugate gradient (`nscdd_ep` only)"), &
-                            key_t("enriched", "cg_tolerance", kind_real, "1e-12", "in (0, 1)", &
-                             "relative residual at which the conjugate gradient stops (`nscdd_ep` with `interface = 'cg'` only)"), &
-                            key_t("enriched", "cg_max_iterations", kind_integer, "10000", ">= 1", &
-                                "iterations after which the conjugate gradient gives up (`nscdd_ep` with `interface = 'cg'` only)")]
-
-  type(key_t), parameter :: output_keys(*) = [ &
-                            key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
-                  key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
-                            key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
-                    key_t("output", "trace", kind_logical, ".false.", "", "write the convergence of every solve, check by check"), &
-                            key_t("output", "final_bodies", kind_logical, ".false.", "", &
-                                  "write `final_bodies.h5`, a bodies file from which another scene starts")]
-
-  type(key_t), parameter :: keys(*) = [scene_keys, time_keys, solver_keys, decomposition_keys, enriched_keys, output_keys]
+  public :: find_group, find_key, nearest_group, nearest_key, has_word, choices_text, expected_text
 
 contains
 
@@ -223,6 +91,14 @@ contains
     swapped = from(i:i) == to(j - 1:j - 1) .and. from(i - 1:i - 1) == to(j:j)
   end function swapped
 
+  !> Is it one of some words?
+  pure logical function has_word(words, word)
+    !> separated by blanks
+    character(len=*), intent(in) :: words
+    character(len=*), intent(in) :: word
+    has_word = word /= "" .and. index(trim(word), " ") == 0 .and. index(" "//words//" ", " "//trim(word)//" ") > 0
+  end function has_word
+
   !> Words separated by blanks as a quoted list: 'a', 'b' or 'c'.
   pure function choices_text(words) result(text)
     character(len=*), intent(in) :: words
@@ -255,6 +131,7 @@ contains
       text = number_text("a finite real number", "3 finite real numbers", key)
     case (kind_logical)
       text = ".true. or .false."
+      if (key%count > 1) text = "at most "//to_text(key%count)//" of "//text
     case (kind_choice)
       text = choices_text(key%allowed)
     case default

@@ -10,6 +10,8 @@ module gravier_config_scan
   type :: group_text_t
     !> lower case
     character(len=:), allocatable :: name
+    !> number among the groups of that name
+    integer :: instance = 1
     !> where it starts
     integer :: line = 0
   end type group_text_t
@@ -18,6 +20,8 @@ module gravier_config_scan
   type :: assignment_t
     !> lower case
     character(len=:), allocatable :: group, key
+    !> number of the group among those of that name
+    integer :: instance = 1
     !> with its parentheses, empty when there is none
     character(len=:), allocatable :: index
     !> one line, without comments and without the commas at the end; may be empty
@@ -51,8 +55,8 @@ module gravier_config_scan
 contains
 
   !> Splits a text into groups and assignments. Groups and keys are not compared with any table.
-  !> Fails (status_input) on an empty file, on text outside groups, on a group given twice or not closed, on a quote
-  !> not closed on its line, and on anything else than assignments in a group.
+  !> Fails (status_input) on an empty file, on text outside groups, on a group not closed, on a quote not closed on its
+  !> line, and on anything else than assignments in a group.
   subroutine scan_groups(file, text, found, error)
     !> path, for messages
     character(len=*), intent(in) :: file
@@ -118,13 +122,16 @@ contains
     integer :: i
 
     if (name == "") call fail(cursor, "line "//to_text(line)//": expected the name of a group after &", error)
-    do i = 1, found%n_groups
-      if (found%groups(i)%name == name) call fail(cursor, "group &"//excerpt(name)//" is given twice (lines " &
-                                                 //to_text(found%groups(i)%line)//" and "//to_text(line)//"): expected once", error)
-    end do
+    associate (group => found%groups(found%n_groups + 1))
+      group%name = name
+      group%line = line
+      do i = found%n_groups, 1, -1
+        if (found%groups(i)%name /= name) cycle
+        group%instance = found%groups(i)%instance + 1
+        exit
+      end do
+    end associate
     found%n_groups = found%n_groups + 1
-    found%groups(found%n_groups)%name = name
-    found%groups(found%n_groups)%line = line
   end subroutine add_group
 
   !> Passes the `/` or `&end` of a group; fails at another group and at the end of the text.
@@ -165,6 +172,7 @@ contains
       return
     end if
     item%group = group
+    item%instance = found%groups(found%n_groups)%instance
     call take_name(cursor, item%key)
     call take_index(cursor, item%index)
     call skip_blanks(cursor, " ")

@@ -2,33 +2,43 @@
 module gravier_config_slots
   use gravier_kinds, only: dp
   use gravier_config_types, only: config_t, text_length, choice_length
-  use gravier_config_keys, only: key_t
+  use gravier_config_table, only: key_t, groups, keys
+  use gravier_config_keys, only: find_group, find_key, has_word
   implicit none
   private
-  public :: slot_t, slot_of
+  public :: slot_t, slot_of, group_count, belongs, chosen_word
 
-  !> The variable behind a key: the one pointer that fits the key's kind and count is associated.
+  !> The variable behind a key: of the pointers to values, the one that fits the key's kind and count is associated.
   type :: slot_t
     integer, pointer :: integer => null()
     integer, pointer :: integers(:) => null()
     real(dp), pointer :: real => null()
     real(dp), pointer :: reals(:) => null()
     logical, pointer :: logical => null()
+    logical, pointer :: logicals(:) => null()
     character(len=choice_length), pointer :: choice => null()
     character(len=text_length), pointer :: text => null()
+    !> is the key in the file? associated where the config_t has room for the answer
+    logical, pointer :: given => null()
   end type slot_t
 
 contains
 
   !> The variable of a key of the table in a config_t, which must live as long as the slot is used.
-  function slot_of(config, key) result(slot)
+  function slot_of(config, key, instance) result(slot)
     type(config_t), target, intent(inout) :: config
     type(key_t), intent(in) :: key
+    !> which of the groups of that name, 1 for a group that stands once
+    integer, intent(in) :: instance
     type(slot_t) :: slot
 
     select case (key%group)
     case ("scene")
       call scene_slot(config, key%name, slot)
+    case ("boundary")
+      call boundary_slot(config, instance, key%name, slot)
+    case ("sample")
+      call sample_slot(config, key%name, slot)
     case ("time")
       call time_slot(config, key%name, slot)
     case ("solver")
@@ -42,6 +52,41 @@ contains
     end select
   end function slot_of
 
+  !> How many groups of a name count: each &boundary of the file, &sample where it belongs, one of any other.
+  pure integer function group_count(config, group)
+    type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: group
+    integer :: g
+
+    g = find_group(group)
+    group_count = 1
+    if (groups(g)%bodies /= "" .and. groups(g)%bodies /= config%scene%bodies) group_count = 0
+    if (groups(g)%repeated) group_count = size(config%boundaries)
+  end function group_count
+
+  !> Does a key belong to its group as the choice stands on which that hangs?
+  logical function belongs(config, key, instance)
+    type(config_t), target, intent(inout) :: config
+    type(key_t), intent(in) :: key
+    !> as in slot_of
+    integer, intent(in) :: instance
+    belongs = key%chooser == ""
+    if (.not. belongs) belongs = has_word(key%chosen, chosen_word(config, key, instance))
+  end function belongs
+
+  !> The word chosen for the key on which it hangs whether a key belongs to its group.
+  function chosen_word(config, key, instance) result(word)
+    type(config_t), target, intent(inout) :: config
+    !> with a chooser
+    type(key_t), intent(in) :: key
+    !> as in slot_of
+    integer, intent(in) :: instance
+    character(len=:), allocatable :: word
+    type(slot_t) :: slot
+    slot = slot_of(config, keys(find_key(key%group, key%chooser)), instance)
+    word = trim(slot%choice)
+  end function chosen_word
+
   subroutine scene_slot(config, name, slot)
     type(config_t), target, intent(inout) :: config
     character(len=*), intent(in) :: name
@@ -51,6 +96,8 @@ contains
     case ("title"); slot%text => config%scene%title
     case ("dimension"); slot%integer => config%scene%dimension
     case ("gravity"); slot%reals => config%scene%gravity
+    case ("gravity_table"); slot%text => config%scene%gravity_table
+    case ("body_force"); slot%reals => config%scene%body_force
     case ("bodies"); slot%choice => config%scene%bodies
     case ("bodies_file"); slot%text => config%scene%bodies_file
     case ("column_count"); slot%integer => config%scene%column_count
@@ -63,9 +110,86 @@ contains
     case ("seed"); slot%integer => config%scene%seed
     case ("friction"); slot%real => config%scene%friction
     case ("wall_friction"); slot%real => config%scene%wall_friction
+    case ("restitution"); slot%real => config%scene%restitution
+    case ("wall_restitution"); slot%real => config%scene%wall_restitution
+    case ("rotation"); slot%logical => config%scene%rotation
+    case ("period"); slot%reals => config%scene%period
+    case ("period_origin"); slot%reals => config%scene%period_origin
     case ("alert_distance"); slot%real => config%scene%alert_distance
+    case ("skin"); slot%real => config%scene%skin
+    case ("overlap_allowed"); slot%real => config%scene%overlap_allowed
+    case ("overlap_projection"); slot%logical => config%scene%overlap_projection
+    end select
+    select case (name)
+    case ("alert_distance"); slot%given => config%scene%alert_given
+    case ("skin"); slot%given => config%scene%skin_given
+    case ("overlap_allowed"); slot%given => config%scene%overlap_given
     end select
   end subroutine scene_slot
+
+  subroutine boundary_slot(config, instance, name, slot)
+    type(config_t), target, intent(inout) :: config
+    !> number of the boundary
+    integer, intent(in) :: instance
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("name"); slot%text => config%boundaries(instance)%name
+    case ("shape"); slot%choice => config%boundaries(instance)%shape
+    case ("point"); slot%reals => config%boundaries(instance)%point
+    case ("normal"); slot%reals => config%boundaries(instance)%normal
+    case ("end"); slot%reals => config%boundaries(instance)%end_point
+    case ("edge_a"); slot%reals => config%boundaries(instance)%edge_a
+    case ("edge_b"); slot%reals => config%boundaries(instance)%edge_b
+    case ("axis"); slot%reals => config%boundaries(instance)%axis
+    case ("radius"); slot%real => config%boundaries(instance)%radius
+    case ("group"); slot%integer => config%boundaries(instance)%group
+    case ("velocity"); slot%reals => config%boundaries(instance)%velocity
+    case ("rotation"); slot%reals => config%boundaries(instance)%rotation
+    case ("pivot"); slot%reals => config%boundaries(instance)%pivot
+    case ("free"); slot%logicals => config%boundaries(instance)%free
+    case ("force"); slot%reals => config%boundaries(instance)%force
+    case ("pressure"); slot%real => config%boundaries(instance)%pressure
+    case ("mass"); slot%real => config%boundaries(instance)%mass
+    case ("table"); slot%text => config%boundaries(instance)%table
+    case ("friction"); slot%real => config%boundaries(instance)%friction
+    case ("restitution"); slot%real => config%boundaries(instance)%restitution
+    case ("remove_at"); slot%real => config%boundaries(instance)%remove_at
+    end select
+    select case (name)
+    case ("pivot"); slot%given => config%boundaries(instance)%pivot_given
+    case ("friction"); slot%given => config%boundaries(instance)%friction_given
+    case ("restitution"); slot%given => config%boundaries(instance)%restitution_given
+    case ("remove_at"); slot%given => config%boundaries(instance)%remove_given
+    end select
+  end subroutine boundary_slot
+
+  subroutine sample_slot(config, name, slot)
+    type(config_t), target, intent(inout) :: config
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("arrangement"); slot%choice => config%sample%arrangement
+    case ("preparation"); slot%choice => config%sample%preparation
+    case ("count"); slot%integer => config%sample%count
+    case ("radii"); slot%choice => config%sample%radii
+    case ("radius"); slot%real => config%sample%radius
+    case ("radius_min"); slot%real => config%sample%radius_min
+    case ("radius_max"); slot%real => config%sample%radius_max
+    case ("radius_mean"); slot%real => config%sample%radius_mean
+    case ("radius_deviation"); slot%real => config%sample%radius_deviation
+    case ("radius_table"); slot%text => config%sample%radius_table
+    case ("box"); slot%reals => config%sample%box
+    case ("solid_fraction"); slot%real => config%sample%solid_fraction
+    case ("seed"); slot%integer => config%sample%seed
+    case ("pressure"); slot%real => config%sample%pressure
+    case ("rest_tolerance"); slot%real => config%sample%rest_tolerance
+    case ("max_steps"); slot%integer => config%sample%max_steps
+    case ("file"); slot%text => config%sample%file
+    end select
+  end subroutine sample_slot
 
   subroutine time_slot(config, name, slot)
     type(config_t), target, intent(inout) :: config
@@ -108,6 +232,7 @@ contains
     case ("grid"); slot%integers => config%decomposition%grid
     case ("subdomains"); slot%integer => config%decomposition%subdomains
     case ("repartition_every"); slot%integer => config%decomposition%repartition_every
+    case ("repartition_imbalance"); slot%real => config%decomposition%repartition_imbalance
     end select
   end subroutine decomposition_slot
 
@@ -137,6 +262,13 @@ contains
     case ("contacts"); slot%logical => config%output%contacts
     case ("trace"); slot%logical => config%output%trace
     case ("final_bodies"); slot%logical => config%output%final_bodies
+    case ("checkpoint_every"); slot%integer => config%output%checkpoint_every
+    case ("checkpoint_seconds"); slot%real => config%output%checkpoint_seconds
+    case ("walltime"); slot%real => config%output%walltime
+    case ("energy"); slot%logical => config%output%energy
+    case ("stress"); slot%logical => config%output%stress
+    case ("structure"); slot%logical => config%output%structure
+    case ("boundary_forces"); slot%logical => config%output%boundary_forces
     end select
   end subroutine output_slot
 

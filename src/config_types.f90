@@ -133,7 +133,6 @@ module gravier_config_types
   type :: boundary_config_t
     !> unique; 'boundary K', K its number, when not given
     character(len=text_length) :: name
-    logical :: name_given = .false.
     !> plane, segment, rectangle, circle, cylinder, grains or outlet
     character(len=choice_length) :: shape
     !> m: a point of a plane, outlet or axis of a cylinder, first end of a segment, corner of a rectangle, centre of a circle
@@ -198,7 +197,6 @@ module gravier_config_types
     real(dp) :: box(3)
     !> of a loose sample whose last size is 0
     real(dp) :: solid_fraction
-    logical :: solid_fraction_given = .false.
     integer :: seed
     !> Pa (N/m in 2D): compacted
     real(dp) :: pressure

@@ -6,7 +6,8 @@ module gravier_config_value
   use gravier_kinds, only: dp
   use gravier_text, only: lower
   use gravier_config_types, only: text_length, choice_length
-  use gravier_config_keys, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_table, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_keys, only: has_word
   use gravier_config_slots, only: slot_t
   implicit none
   private
@@ -42,7 +43,7 @@ contains
     case (kind_real)
       call read_real(key, index//" = "//value, slot, touched, failed)
     case (kind_logical)
-      call read_logical(value, slot, touched, failed)
+      call read_logical(key, index, value, slot, touched, failed)
     case default
       call read_text(key, value, slot, touched, failed)
     end select
@@ -100,26 +101,49 @@ contains
   end subroutine read_real
 
   !> Only T, F, TRUE and FALSE, with or without full stops: the intrinsic read would take `tomato` as true.
-  subroutine read_logical(value, slot, touched, failed)
+  subroutine read_logical(key, index, value, slot, touched, failed)
+    type(key_t), intent(in) :: key
+    !> with its parentheses, or empty
+    character(len=*), intent(in) :: index
     character(len=*), intent(in) :: value
     type(slot_t), intent(inout) :: slot
     logical, intent(out) :: touched(most_entries)
     logical, intent(out) :: failed
-    logical :: read_one
+    logical :: values(most_entries), again(most_entries)
     integer :: status
 
     touched = .false.
-    select case (lower(value))
-    case ("t", "f", ".t.", ".f.", "true", "false", ".true.", ".false.")
-      call logical_of_record("= "//value, read_one, status)
-      failed = status /= 0
-    case default
-      failed = .true.
-    end select
+    failed = .not. are_logicals(value)
     if (failed) return
-    slot%logical = read_one
-    touched(1) = .true.
+    values = .false.
+    again = .true.
+    call logicals_of_record(index//" = "//value, values, status)
+    if (status == 0) call logicals_of_record(index//" = "//value, again, status)
+    touched = values .eqv. again
+    failed = status /= 0 .or. .not. fits(touched, key%count)
+    if (failed) return
+    if (key%count == 1) slot%logical = values(1)
+    if (key%count > 1) where (touched) slot%logicals = values
   end subroutine read_logical
+
+  !> Are the entries of a list, each perhaps after a repeat count, all words for a logical value?
+  pure logical function are_logicals(list)
+    character(len=*), intent(in) :: list
+    character(len=:), allocatable :: entry
+    integer :: first, length, star
+
+    are_logicals = .true.
+    first = 1
+    do while (first <= len(list) .and. are_logicals)
+      length = scan(list(first:)//",", " ,") - 1
+      entry = lower(list(first:first + length - 1))
+      star = index(entry, "*")
+      if (star > 1) are_logicals = verify(entry(:star - 1), "0123456789") == 0
+      if (length > 0 .and. are_logicals) &
+        are_logicals = has_word("t f .t. .f. true false .true. .false.", entry(star + 1:))
+      first = first + length + 1
+    end do
+  end function are_logicals
 
   !> A text of at most text_length characters, or one of the choices of the key in any case.
   subroutine read_text(key, value, slot, touched, failed)
@@ -138,7 +162,7 @@ contains
     failed = status /= 0 .or. len_trim(read_one) > text_length
     if (failed) return
     if (key%kind == kind_choice) then
-      failed = .not. is_choice(lower(trim(read_one)), trim(key%allowed))
+      failed = .not. has_word(trim(key%allowed), lower(trim(read_one)))
       if (.not. failed) slot%choice = lower(trim(read_one))
     else
       slot%text = read_one(:text_length)
@@ -155,14 +179,6 @@ contains
     if (n < 2 .or. n > longest_text) return
     is_quoted = scan(value(1:1), "'""") == 1 .and. value(n:n) == value(1:1)
   end function is_quoted
-
-  pure logical function is_choice(word, words)
-    !> without blanks at the end
-    character(len=*), intent(in) :: word
-    !> separated by blanks
-    character(len=*), intent(in) :: words
-    is_choice = word /= "" .and. index(word, " ") == 0 .and. index(" "//words//" ", " "//word//" ") > 0
-  end function is_choice
 
   subroutine integers_of_record(assignment, value, status)
     !> `(index) = values`
@@ -200,18 +216,19 @@ contains
     if (status /= 0) call forget_failed_read()
   end subroutine reals_of_record
 
-  subroutine logical_of_record(assignment, value, status)
+  subroutine logicals_of_record(assignment, value, status)
+    !> `(index) = values`
     character(len=*), intent(in) :: assignment
-    logical, intent(out) :: value
+    logical, intent(inout) :: value(most_entries)
+    !> not 0: it is not a list of logicals
     integer, intent(out) :: status
     character(len=:), allocatable :: record
     namelist /one/ value
 
-    value = .false.
-    record = "&one value "//assignment//" /"
+    record = "&one value"//assignment//" /"
     read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
-  end subroutine logical_of_record
+  end subroutine logicals_of_record
 
   subroutine text_of_record(assignment, value, status)
     character(len=*), intent(in) :: assignment

@@ -3,9 +3,9 @@ module gravier_config_write
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
   use gravier_config_types, only: config_t
-  use gravier_config_keys, only: group_t, key_t, groups, keys, kind_integer, kind_real, kind_logical, kind_choice, &
-                                 choices_text
-  use gravier_config_slots, only: slot_t, slot_of
+  use gravier_config_table, only: group_t, key_t, groups, keys, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_keys, only: choices_text
+  use gravier_config_slots, only: slot_t, slot_of, group_count, belongs
   use gravier_config_value, only: number_of
   implicit none
   private
@@ -56,31 +56,51 @@ contains
     character(len=:), allocatable :: text
     !> a copy to point into
     type(config_t), target :: copy
-    integer :: g, k
+    integer :: g, k, instance
 
     copy = config
     text = ""
     do g = 1, size(groups)
-      text = text//"&"//trim(groups(g)%name)//newline
-      do k = 1, size(keys)
-        if (keys(k)%group == groups(g)%name) text = text//active_line(copy, keys(k))
+      do instance = 1, group_count(config, groups(g)%name)
+        text = text//"&"//trim(groups(g)%name)//newline
+        do k = 1, size(keys)
+          if (keys(k)%group == groups(g)%name) text = text//active_line(copy, keys(k), instance)
+        end do
+        text = text//"/"//newline
       end do
-      text = text//"/"//newline
     end do
   end function active_text
 
-  !> The line of one option with its newline; empty for an option that does not belong to the scene's bodies.
-  function active_line(config, key) result(line)
+  !> The line of one option with its newline, a comment where the program finds the value; empty for an option that does
+  !> not count.
+  function active_line(config, key, instance) result(line)
     type(config_t), target, intent(inout) :: config
     type(key_t), intent(in) :: key
+    !> which of the groups of that name
+    integer, intent(in) :: instance
     character(len=:), allocatable :: line
+    type(slot_t) :: slot
 
     line = ""
-    if (key%bodies /= "" .and. index(key%bodies, trim(config%scene%bodies)) == 0) return
-    line = "  "//trim(key%name)//" = "//value_text(key, slot_of(config, key))//newline
-    if (key%group == "scene" .and. key%name == "alert_distance" .and. .not. config%scene%alert_given) &
-      line = "  ! alert_distance = "//trim(key%note)//newline
+    if (.not. in_force(config, key, instance)) return
+    slot = slot_of(config, key, instance)
+    line = "  "//trim(key%name)//" = "//value_text(key, slot)//newline
+    if (.not. associated(slot%given)) return
+    if (.not. slot%given) line = "  ! "//trim(key%name)//" = "//trim(key%note)//newline
   end function active_line
+
+  !> Does an option count as its group stands? One that does not would be refused in the file.
+  logical function in_force(config, key, instance)
+    type(config_t), target, intent(inout) :: config
+    type(key_t), intent(in) :: key
+    !> which of the groups of that name
+    integer, intent(in) :: instance
+
+    in_force = belongs(config, key, instance)
+    if (key%group == "boundary" .and. key%name == "mass") in_force = any(config%boundaries(instance)%free)
+    if (key%group == "sample" .and. key%name == "solid_fraction") &
+      in_force = in_force .and. config%sample%box(config%scene%dimension) <= 0.0_dp
+  end function in_force
 
   !> The value of a key as it would be typed after the equal sign; reading it back gives the same value.
   function value_text(key, slot) result(text)
@@ -104,13 +124,23 @@ contains
         text = text//", "//shortest(slot%reals(i))
       end do
     case (kind_logical)
-      text = trim(merge(".true. ", ".false.", slot%logical))
+      if (key%count == 1) text = logical_text(slot%logical)
+      if (key%count > 1) text = logical_text(slot%logicals(1))
+      do i = 2, key%count
+        text = text//", "//logical_text(slot%logicals(i))
+      end do
     case (kind_choice)
       text = "'"//trim(slot%choice)//"'"
     case default
       text = quoted(trim(slot%text))
     end select
   end function value_text
+
+  pure function logical_text(value) result(text)
+    logical, intent(in) :: value
+    character(len=:), allocatable :: text
+    text = trim(merge(".true. ", ".false.", value))
+  end function logical_text
 
   !> The text in single quotes, those within it doubled.
   pure function quoted(text) result(literal)
@@ -189,7 +219,8 @@ contains
            //"Units are SI. Names and words may be in any case; texts and words stand in quotes; `!` starts a comment."//newline &
            //"A list takes blanks or commas between its entries, `2*0.5` for `0.5, 0.5`, and `grid(2) = 4` for one entry." &
            //newline &
-           //"A group or a key that is not on this page is refused, and so is one that is given twice."//newline//newline &
+           //"A group or a key that is not on this page is refused, and so is one that is given twice;"//newline &
+           //"`&boundary` alone may stand any number of times."//newline//newline &
            //"The shortest input:"//newline//newline &
            //"    &scene bodies = 'column' /"//newline &
            //"    &time  step = 0.01, steps = 10 /"//newline
@@ -199,8 +230,15 @@ contains
     type(group_t), intent(in) :: group
     character(len=:), allocatable :: text
     text = newline//"## &"//trim(group%name)//newline//newline//trim(group%meaning)
-    if (group%required) text = text//" Required."
-    if (.not. group%required) text = text//" May be absent."
+    if (group%required) then
+      text = text//" Required."
+    else if (group%bodies /= "") then
+      text = text//" Required with `bodies = '"//trim(group%bodies)//"'` of `&scene`, and only there."
+    else if (group%repeated) then
+      text = text//" May be absent, or stand any number of times."
+    else
+      text = text//" May be absent."
+    end if
     text = text//newline//newline//"| key | value | unit | default | meaning |"//newline &
            //"|---|---|---|---|---|"//newline
   end function group_heading
@@ -217,7 +255,7 @@ contains
       row = row//"`"//trim(key%default)//"`"
     end if
     row = row//" | "//trim(key%meaning)
-    if (key%bodies /= "") row = row//" (only with `bodies` = "//choices_text(key%bodies)//")"
+    if (key%chooser /= "") row = row//" (only with `"//trim(key%chooser)//"` = "//choices_text(key%chosen)//")"
     row = row//" |"
   end function key_row
 

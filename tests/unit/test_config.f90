@@ -4,7 +4,7 @@ program test_config
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
-  use gravier_config, only: config_t, parse_config, write_active, write_key_reference
+  use gravier_config, only: config_t, scene_config_t, parse_config, write_active, write_key_reference
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -15,6 +15,9 @@ program test_config
   character(len=*), parameter :: column = "&scene bodies = 'column' /" // time
   character(len=*), parameter :: lattice_keys = " lattice_count = 4, 5 radius_min = 0.1 radius_max = 0.2 "
   character(len=*), parameter :: positive = "expected a finite real number > 0"
+  character(len=*), parameter :: third = "expected a third component of 0 where dimension = 2"
+  character(len=*), parameter :: plane_keys = " shape = 'plane' normal = 0, 1 "
+  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder' or 'grains'"
 
   call MPI_Init()
   call test_whole_file()
@@ -40,7 +43,21 @@ program test_config
   call test_rules_of_time_and_solver()
   call test_rules_of_decomposition()
   call test_rules_of_enriched_and_output()
+  call test_boundaries()
+  call test_boundary_defaults()
+  call test_boundary_logicals()
+  call test_messages_of_groups()
+  call test_shapes()
+  call test_keys_of_shapes()
+  call test_rules_of_boundary()
+  call test_rules_of_free_boundary()
+  call test_planar_boundaries()
+  call test_sample()
+  call test_keys_of_sample()
+  call test_rules_of_sample()
+  call test_rules_of_box()
   call test_active_options()
+  call test_active_groups()
   call test_round_trip()
   call test_reference()
   call finish_checks()
@@ -104,25 +121,55 @@ contains
     call check_close(config%scene%wall_friction, 0.625_dp, 0.0_dp, "wall_friction")
     call check_close(config%scene%alert_distance, 0.125_dp, 0.0_dp, "alert_distance")
     call check(config%scene%alert_given, "alert_given")
+    call check_whole_effects(config%scene)
     call check_close(config%time%step, 0.0078125_dp, 0.0_dp, "step")
     call check_equal(config%time%steps, 40, "steps")
     call check_close(config%time%theta, 0.75_dp, 0.0_dp, "theta")
     call check_whole_methods(config)
   end subroutine test_whole_file
 
+  subroutine check_whole_effects(scene)
+    type(scene_config_t), intent(in) :: scene
+
+    call check_close(scene%restitution, 0.25_dp, 0.0_dp, "restitution")
+    call check_close(scene%wall_restitution, 0.75_dp, 0.0_dp, "wall_restitution")
+    call check(.not. scene%rotation, "rotation")
+    call check_vector(scene%period, [0.0_dp, 8.0_dp, 16.0_dp], "period")
+    call check_vector(scene%period_origin, [-1.0_dp, -2.0_dp, -3.0_dp], "period_origin")
+    call check_vector(scene%body_force, [4.0_dp, 5.0_dp, 6.0_dp], "body_force")
+    call check_equal(scene%gravity_table, "g.csv", "gravity_table")
+    call check_close(scene%skin, 0.375_dp, 0.0_dp, "skin")
+    call check(scene%skin_given, "skin_given")
+    call check_close(scene%overlap_allowed, 0.0625_dp, 0.0_dp, "overlap_allowed")
+    call check(scene%overlap_given, "overlap_given")
+    call check(.not. scene%overlap_projection, "overlap_projection")
+  end subroutine check_whole_effects
+
+  subroutine check_vector(vector, expected, name)
+    !> shape (3)
+    real(dp), intent(in) :: vector(:), expected(:)
+    character(len=*), intent(in) :: name
+    call check(all(abs(vector - expected) <= 0.0_dp), name)
+  end subroutine check_vector
+
   pure function whole_file() result(text)
     character(len=:), allocatable :: text
     text = "&scene title = 'three spheres', dimension = 3, gravity = 0.5, -0.25, -1.5" // newline &
       // "  bodies = 'column', column_count = 7, radius = 0.5, mass = 2.0, friction = 0.375" // newline &
-      // "  wall_friction = 0.625, alert_distance = 0.125" // newline // "/" // newline &
+      // "  wall_friction = 0.625, restitution = 0.25, wall_restitution = 0.75, rotation = .false." // newline &
+      // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6, gravity_table = 'g.csv'" // newline &
+      // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
+      // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
       // "  check_every = 5, warm_start = .false., on_failure = 'stop' /" // newline &
       // "&decomposition partition = 'grid', kind = 'primal', grid = 1, 2, 3, subdomains = 6" // newline &
-      // "  repartition_every = 9 /" // newline &
+      // "  repartition_every = 9, repartition_imbalance = 1.5 /" // newline &
       // "&enriched direction = 2.5, direction_unit = 'absolute', contacts = 'active', interface = 'cg'" // newline &
       // "  cg_tolerance = 0.0625, cg_max_iterations = 77 /" // newline &
-      // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true. /" // newline
+      // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
+      // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, energy = .true., stress = .true." // newline &
+      // "  structure = .true., boundary_forces = .true. /" // newline
   end function whole_file
 
   subroutine check_whole_methods(config)
@@ -141,6 +188,7 @@ contains
     call check(all(config%decomposition%grid == [1, 2, 3]), "grid")
     call check_equal(config%decomposition%subdomains, 6, "subdomains")
     call check_equal(config%decomposition%repartition_every, 9, "repartition_every")
+    call check_close(config%decomposition%repartition_imbalance, 1.5_dp, 0.0_dp, "repartition_imbalance")
     call check_close(config%enriched%direction, 2.5_dp, 0.0_dp, "direction")
     call check_equal(config%enriched%direction_unit, "absolute", "direction_unit")
     call check_equal(config%enriched%contacts, "active", "contacts of enriched")
@@ -152,6 +200,13 @@ contains
     call check(.not. config%output%contacts, "contacts of output")
     call check(config%output%trace, "trace")
     call check(config%output%final_bodies, "final_bodies")
+    call check_equal(config%output%checkpoint_every, 6, "checkpoint_every")
+    call check_close(config%output%checkpoint_seconds, 60.0_dp, 0.0_dp, "checkpoint_seconds")
+    call check_close(config%output%walltime, 3600.0_dp, 0.0_dp, "walltime")
+    call check(config%output%energy, "energy")
+    call check(config%output%stress, "stress")
+    call check(config%output%structure, "structure")
+    call check(config%output%boundary_forces, "boundary_forces")
   end subroutine check_whole_methods
 
   subroutine test_defaults()
@@ -176,9 +231,26 @@ contains
     call check_close(config%scene%wall_friction, 0.0_dp, 0.0_dp, "default wall_friction")
     call check(config%scene%alert_distance < 0.0_dp, "default alert_distance")
     call check(.not. config%scene%alert_given, "default alert_given")
+    call check_default_effects(config%scene)
+    call check_equal(size(config%boundaries), 0, "no boundary by default")
     call check_close(config%time%theta, 0.5_dp, 0.0_dp, "default theta")
     call check_default_methods(config)
   end subroutine test_defaults
+
+  subroutine check_default_effects(scene)
+    type(scene_config_t), intent(in) :: scene
+
+    call check_close(scene%restitution, 0.0_dp, 0.0_dp, "default restitution")
+    call check_close(scene%wall_restitution, 0.0_dp, 0.0_dp, "default wall_restitution")
+    call check(scene%rotation, "default rotation")
+    call check_vector(scene%period, spread(0.0_dp, 1, 3), "default period")
+    call check_vector(scene%period_origin, spread(0.0_dp, 1, 3), "default period_origin")
+    call check_vector(scene%body_force, spread(0.0_dp, 1, 3), "default body_force")
+    call check_equal(scene%gravity_table, "", "default gravity_table")
+    call check(.not. scene%skin_given, "default skin_given")
+    call check(.not. scene%overlap_given, "default overlap_given")
+    call check(scene%overlap_projection, "default overlap_projection")
+  end subroutine check_default_effects
 
   subroutine check_default_methods(config)
     type(config_t), intent(in) :: config
@@ -197,6 +269,7 @@ contains
     call check(all(config%decomposition%grid == 0), "default grid")
     call check_equal(config%decomposition%subdomains, 1, "default subdomains")
     call check_equal(config%decomposition%repartition_every, 0, "default repartition_every")
+    call check_close(config%decomposition%repartition_imbalance, 0.0_dp, 0.0_dp, "default repartition_imbalance")
     call check_close(config%enriched%direction, 0.3_dp, 1.0e-15_dp, "default direction")
     call check_equal(config%enriched%direction_unit, "relative", "default direction_unit")
     call check_equal(config%enriched%contacts, "all", "default contacts of enriched")
@@ -208,6 +281,13 @@ contains
     call check(config%output%contacts, "default contacts of output")
     call check(.not. config%output%trace, "default trace")
     call check(.not. config%output%final_bodies, "default final_bodies")
+    call check_equal(config%output%checkpoint_every, 0, "default checkpoint_every")
+    call check_close(config%output%checkpoint_seconds, 0.0_dp, 0.0_dp, "default checkpoint_seconds")
+    call check_close(config%output%walltime, 0.0_dp, 0.0_dp, "default walltime")
+    call check(.not. config%output%energy, "default energy")
+    call check(.not. config%output%stress, "default stress")
+    call check(.not. config%output%structure, "default structure")
+    call check(.not. config%output%boundary_forces, "default boundary_forces")
   end subroutine check_default_methods
 
   subroutine test_defaults_in_space()
@@ -228,6 +308,12 @@ contains
     call check_close(config%scene%wall_friction, 0.25_dp, 0.0_dp, "wall_friction follows friction")
     call accept(scene("bodies = 'column' friction = 0.25 wall_friction = 0"), "wall_friction", config)
     call check_close(config%scene%wall_friction, 0.0_dp, 0.0_dp, "wall_friction given as 0")
+    call accept(scene("bodies = 'column' restitution = 0.25"), "restitution alone", config)
+    call check_close(config%scene%wall_restitution, 0.25_dp, 0.0_dp, "wall_restitution follows restitution")
+    call accept(scene("bodies = 'column' restitution = 1 wall_restitution = 0"), "wall_restitution", config)
+    call check_close(config%scene%wall_restitution, 0.0_dp, 0.0_dp, "wall_restitution given as 0")
+    call accept(scene("bodies = 'column' skin = 0"), "skin = 0", config)
+    call check(config%scene%skin_given, "skin_given where skin = 0")
     call accept(scene("bodies = 'column' alert_distance = 0"), "alert_distance = 0", config)
     call check(config%scene%alert_given, "alert_given where alert_distance = 0")
     call accept(scene("bodies = 'lattice'" // lattice_keys), "a lattice in 2D", config)
@@ -441,7 +527,8 @@ contains
   subroutine test_refused_names()
     call refuse(column // "&solvr /", "unknown group &solvr; did you mean &solver?")
     call refuse(column // "&physics /", &
-      "unknown group &physics: expected one of &scene &time &solver &decomposition &enriched &output")
+      "unknown group &physics: expected one of &scene &boundary &sample &time &solver &decomposition " &
+      // "&enriched &output")
     call refuse(column // "&solver methd = 'nlgs' /", "unknown key 'methd' in &solver; did you mean 'method'?")
     call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
     call refuse(column // "&time sweeps = 3 /", "group &time is given twice (lines 1 and 1): expected once")
@@ -452,7 +539,7 @@ contains
       "unknown key '" // repeat("step", 15) // "' in &time: expected one of step steps theta")
     call refuse("&scene bodies = 'column' /", "group &time is missing: expected &time ... /")
     call refuse(time, "group &scene is missing: expected &scene ... /")
-    call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice' or 'file'")
+    call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice', 'file' or 'sample'")
     call refuse("&scene bodies = 'column' / &time steps = 1 /", &
       "&time step is missing: expected a finite real number > 0 (s)")
     call refuse("&scene bodies = 'column' / &time step = 1 /", "&time steps is missing: expected an integer >= 0")
@@ -472,11 +559,12 @@ contains
 
   !> Values that are not of the key's kind.
   subroutine test_refused_kinds()
-    call refuse(scene("bodies = column"), "&scene bodies = column: expected 'column', 'lattice' or 'file'")
-    call refuse(scene("bodies = 'columns'"), "&scene bodies = 'columns': expected 'column', 'lattice' or 'file'")
-    call refuse(scene("bodies = 'column lattice'"), "&scene bodies = 'column lattice': expected 'column', 'lattice' or 'file'")
-    call refuse(scene("bodies = ''"), "&scene bodies = '': expected 'column', 'lattice' or 'file'")
-    call refuse(scene("bodies = 3"), "&scene bodies = 3: expected 'column', 'lattice' or 'file'")
+    call refuse(scene("bodies = column"), "&scene bodies = column: expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse(scene("bodies = 'columns'"), "&scene bodies = 'columns': expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse(scene("bodies = 'column lattice'"), &
+      "&scene bodies = 'column lattice': expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse(scene("bodies = ''"), "&scene bodies = '': expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse(scene("bodies = 3"), "&scene bodies = 3: expected 'column', 'lattice', 'file' or 'sample'")
     call refuse(scene("bodies = 'column' title = 3"), "&scene title = 3: expected a text in quotes, at most 4096 characters")
     call refuse(scene("bodies = 'column' title = 'a', 'b'"), &
       "&scene title = 'a', 'b': expected a text in quotes, at most 4096 characters")
@@ -544,6 +632,22 @@ contains
       "&scene wall_friction = -1: expected a finite real number >= 0")
     call refuse(scene("bodies = 'column' alert_distance = -1"), &
       "&scene alert_distance = -1: expected a finite real number >= 0 (m)")
+    call refuse(scene("bodies = 'column' restitution = 1.5"), &
+      "&scene restitution = 1.5: expected a finite real number in [0, 1]")
+    call refuse(scene("bodies = 'column' restitution = -0.5"), &
+      "&scene restitution = -0.5: expected a finite real number in [0, 1]")
+    call refuse(scene("bodies = 'column' wall_restitution = -1"), &
+      "&scene wall_restitution = -1: expected a finite real number in [0, 1]")
+    call refuse(scene("bodies = 'column' wall_restitution = 2"), &
+      "&scene wall_restitution = 2: expected a finite real number in [0, 1]")
+    call refuse(scene("bodies = 'column' period = 1, -1"), &
+      "&scene period = 1, -1: expected at most 3 finite real numbers >= 0 (m)")
+    call refuse(scene("bodies = 'column' period(3) = 1"), "&scene period(3) = 1: " // third)
+    call refuse(scene("bodies = 'column' period_origin = 0, 0, 1"), "&scene period_origin = 0, 0, 1: " // third)
+    call refuse(scene("bodies = 'column' body_force(3) = -1"), "&scene body_force(3) = -1: " // third)
+    call refuse(scene("bodies = 'column' skin = -1"), "&scene skin = -1: expected a finite real number >= 0 (m)")
+    call refuse(scene("bodies = 'column' overlap_allowed = 0"), "&scene overlap_allowed = 0: " // positive // " (m)")
+    call refuse(scene("bodies = 'column' rotation = 0"), "&scene rotation = 0: expected .true. or .false.")
     call refuse(scene("bodies = 'column' column_count = 0"), "&scene column_count = 0: expected an integer >= 1")
     call refuse(scene("bodies = 'column' radius = 0"), "&scene radius = 0: " // positive // " (m)")
     call refuse(scene("bodies = 'column' mass = 0"), "&scene mass = 0: " // positive // " (kg)")
@@ -558,7 +662,7 @@ contains
   !> Keys that belong to another kind of bodies.
   subroutine test_rules_of_bodies()
     call refuse_stranger("column", "", "bodies_file = 'a.h5'", "'file'")
-    call refuse_stranger("column", "", "density = 1", "'lattice' or 'file'")
+    call refuse_stranger("column", "", "density = 1", "'lattice', 'file' or 'sample'")
     call refuse_stranger("column", "", "lattice_count = 1, 1", "'lattice'")
     call refuse_stranger("column", "", "radius_min = 1", "'lattice'")
     call refuse_stranger("column", "", "radius_max = 1", "'lattice'")
@@ -571,15 +675,17 @@ contains
     call refuse_stranger("lattice", lattice_keys, "bodies_file = 'a.h5'", "'file'")
   end subroutine test_rules_of_bodies
 
-  subroutine refuse_stranger(bodies, keys, assignment, owners)
+  subroutine refuse_stranger(bodies, keys, assignment, owners, groups)
     !> the kind of bodies, and the keys that it needs
     character(len=*), intent(in) :: bodies, keys
     !> what does not belong there, and to what it belongs
     character(len=*), intent(in) :: assignment, owners
+    !> that the bodies need
+    character(len=*), intent(in), optional :: groups
     character(len=:), allocatable :: key
     key = assignment(:index(assignment, " ") - 1)
-    call refuse(scene("bodies = '" // bodies // "' " // keys // " " // assignment), "&scene " // assignment // ": " // key &
-      // " belongs to bodies = " // owners // ", expected without it where bodies = '" // bodies // "'")
+    call refuse(scene("bodies = '" // bodies // "' " // keys // " " // assignment, groups), "&scene " // assignment // ": " &
+      // key // " belongs to bodies = " // owners // ", expected without it where bodies = '" // bodies // "'")
   end subroutine refuse_stranger
 
   subroutine test_rules_of_lattice()
@@ -639,6 +745,10 @@ contains
 
     call refuse(nscdd // "subdomains = 0 /", "&decomposition subdomains = 0: expected an integer >= 1")
     call refuse(nscdd // "repartition_every = -1 /", "&decomposition repartition_every = -1: expected an integer >= 0")
+    call refuse(nscdd // "repartition_imbalance = 1 /", &
+      "&decomposition repartition_imbalance = 1: expected a finite real number 0 or > 1")
+    call refuse(nscdd // "repartition_imbalance = -2 /", &
+      "&decomposition repartition_imbalance = -2: expected a finite real number 0 or > 1")
     call refuse(nscdd // "partition = 'metis' grid = 2, 2 /", &
       "&decomposition grid = 2, 2: expected no grid where partition = 'metis': give subdomains, or partition = 'grid'")
     call refuse(nscdd // "grid = 2 /", "&decomposition grid = 2: expected 2 integers >= 1 where dimension = 2")
@@ -662,7 +772,450 @@ contains
     call refuse(column // "&output directory = '' /", &
       "&output directory = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(column // "&output every = -1 /", "&output every = -1: expected an integer >= 0")
+    call refuse(column // "&output checkpoint_every = -1 /", "&output checkpoint_every = -1: expected an integer >= 0")
+    call refuse(column // "&output checkpoint_seconds = -1 /", &
+      "&output checkpoint_seconds = -1: expected a finite real number >= 0 (s)")
+    call refuse(column // "&output walltime = -1 /", "&output walltime = -1: expected a finite real number >= 0 (s)")
   end subroutine test_rules_of_enriched_and_output
+
+  !> Any number of boundaries, in the order of the file.
+  subroutine test_boundaries()
+    type(config_t) :: config
+
+    call accept("&boundary name = 'floor'" // plane_keys // "friction = 0.5 remove_at = 3 /" &
+      // scene("bodies = 'column' wall_friction = 0.25 wall_restitution = 0.75") &
+      // "&boundary shape = 'circle' radius = 2 point = 1, 2 pivot = 3, 4 rotation = 5 velocity = 6, 7 table = 't.csv' /" &
+      // "&BOUNDARY Name = ""a, 'lid'"" shape = 'plane' normal = 0, -1 free(2) = T mass = 8 force(2) = -9 pressure = 10" &
+      // " restitution = 0.125 /", "three boundaries", config)
+    call check_equal(size(config%boundaries), 3, "number of boundaries")
+    if (size(config%boundaries) /= 3) return
+    associate (floor => config%boundaries(1), drum => config%boundaries(2), lid => config%boundaries(3))
+      call check_equal(floor%name, "floor", "name of the 1st")
+      call check_equal(drum%name, "boundary 2", "default name of the 2nd")
+      call check_equal(lid%name, "a, 'lid'", "name of the 3rd")
+      call check_equal(floor%shape, "plane", "shape of the 1st")
+      call check_equal(drum%shape, "circle", "shape of the 2nd")
+      call check_vector(floor%normal, [0.0_dp, 1.0_dp, 0.0_dp], "normal of the 1st")
+      call check_vector(lid%normal, [0.0_dp, -1.0_dp, 0.0_dp], "normal of the 3rd")
+      call check_close(floor%friction, 0.5_dp, 0.0_dp, "friction of the 1st")
+      call check_close(drum%friction, 0.25_dp, 0.0_dp, "friction of the 2nd is wall_friction")
+      call check(floor%friction_given .and. .not. drum%friction_given, "friction_given")
+      call check_close(lid%restitution, 0.125_dp, 0.0_dp, "restitution of the 3rd")
+      call check_close(drum%restitution, 0.75_dp, 0.0_dp, "restitution of the 2nd is wall_restitution")
+      call check(lid%restitution_given .and. .not. drum%restitution_given, "restitution_given")
+      call check_close(floor%remove_at, 3.0_dp, 0.0_dp, "remove_at of the 1st")
+      call check(floor%remove_given .and. .not. drum%remove_given, "remove_given")
+      call check(drum%remove_at > 1.0e300_dp, "the 2nd is never taken away")
+      call check_close(drum%radius, 2.0_dp, 0.0_dp, "radius of the 2nd")
+      call check_vector(drum%point, [1.0_dp, 2.0_dp, 0.0_dp], "point of the 2nd")
+      call check_vector(drum%pivot, [3.0_dp, 4.0_dp, 0.0_dp], "pivot of the 2nd")
+      call check(drum%pivot_given .and. .not. lid%pivot_given, "pivot_given")
+      call check_vector(drum%rotation, [5.0_dp, 0.0_dp, 0.0_dp], "rotation of the 2nd")
+      call check_vector(drum%velocity, [6.0_dp, 7.0_dp, 0.0_dp], "velocity of the 2nd")
+      call check_equal(drum%table, "t.csv", "table of the 2nd")
+      call check(all(lid%free .eqv. [.false., .true., .false.]), "free of the 3rd")
+      call check_vector(lid%force, [0.0_dp, -9.0_dp, 0.0_dp], "force of the 3rd")
+      call check_close(lid%pressure, 10.0_dp, 0.0_dp, "pressure of the 3rd")
+      call check_close(lid%mass, 8.0_dp, 0.0_dp, "mass of the 3rd")
+    end associate
+  end subroutine test_boundaries
+
+  subroutine test_boundary_defaults()
+    type(config_t) :: config
+
+    call accept(column // "&boundary" // plane_keys // "point = 1, 2 /", "a plane", config)
+    associate (plane => config%boundaries(1))
+      call check_equal(plane%name, "boundary 1", "default name")
+      call check_vector(plane%point, [1.0_dp, 2.0_dp, 0.0_dp], "point")
+      call check_vector(plane%pivot, plane%point, "default pivot")
+      call check_vector(plane%velocity, spread(0.0_dp, 1, 3), "default velocity")
+      call check_vector(plane%rotation, spread(0.0_dp, 1, 3), "default rotation of a boundary")
+      call check_vector(plane%force, spread(0.0_dp, 1, 3), "default force")
+      call check_close(plane%pressure, 0.0_dp, 0.0_dp, "default pressure")
+      call check(.not. any(plane%free), "default free")
+      call check_equal(plane%table, "", "default table")
+      call check_close(plane%friction, 0.0_dp, 0.0_dp, "default friction of a boundary")
+      call check_close(plane%restitution, 0.0_dp, 0.0_dp, "default restitution of a boundary")
+    end associate
+    call accept(column // "&boundary" // plane_keys // "/", "a plane through the origin", config)
+    call check_vector(config%boundaries(1)%point, spread(0.0_dp, 1, 3), "default point")
+    call accept(column // "&boundary" // plane_keys // "point = 1, 2 pivot(1) = 3 /", "half a pivot", config)
+    call check_vector(config%boundaries(1)%pivot, [3.0_dp, 2.0_dp, 0.0_dp], "pivot(1) given alone")
+  end subroutine test_boundary_defaults
+
+  !> Lists of logicals.
+  subroutine test_boundary_logicals()
+    character(len=*), parameter :: plane = "&boundary shape = 'plane' normal = 1, 1, 1 mass = 1 "
+    character(len=*), parameter :: space = "&scene bodies = 'column' dimension = 3 /" // time
+    character(len=*), parameter :: expected = ": expected at most 3 of .true. or .false."
+    type(config_t) :: config
+
+    call accept(space // plane // "free = T, .false. True /", "three logicals", config)
+    call check(all(config%boundaries(1)%free .eqv. [.true., .false., .true.]), "free = T, .false. True")
+    call accept(space // plane // "free = 2*.true. /", "a repeat count", config)
+    call check(all(config%boundaries(1)%free .eqv. [.true., .true., .false.]), "free = 2*.true.")
+    call accept(space // plane // "free(3) = .t. free(1:2) = f, f /", "entries of a logical", config)
+    call check(all(config%boundaries(1)%free .eqv. [.false., .false., .true.]), "free(3) and free(1:2)")
+    call accept(space // plane // "free = , T /", "a null value in a list of logicals", config)
+    call check(all(config%boundaries(1)%free .eqv. [.false., .true., .false.]), "free = , T")
+    call refuse(space // plane // "free = tomato /", "&boundary (the 1st) free = tomato" // expected)
+    call refuse(space // plane // "free = T tomato /", "&boundary (the 1st) free = T tomato" // expected)
+    call refuse(space // plane // "free = 4*T /", "&boundary (the 1st) free = 4*T" // expected)
+    call refuse(space // plane // "free = 3* /", "&boundary (the 1st) free = 3*" // expected)
+    call refuse(space // plane // "free = x*T /", "&boundary (the 1st) free = x*T" // expected)
+    call refuse(space // plane // "free = 1 /", "&boundary (the 1st) free = 1" // expected)
+    call refuse(space // plane // "free = /", "&boundary (the 1st) free = (nothing)" // expected)
+    call refuse(space // plane // "free = T free(1) = T /", &
+      "&boundary (the 1st) free(1) = T: expected once, but it is given twice, first as free = T")
+    call refuse(column // "&output trace = T, T /", "&output trace = T, T: expected .true. or .false.")
+  end subroutine test_boundary_logicals
+
+  !> Messages name the group and which one.
+  subroutine test_messages_of_groups()
+    character(len=*), parameter :: plane = "&boundary" // plane_keys // "/ "
+    integer :: i
+    character(len=:), allocatable :: many
+
+    call refuse(column // plane // "&boundary radius = -1 shape = 'circle' name = 'lid' /", &
+      "&boundary (the 2nd, 'lid') radius = -1: " // positive // " (m)")
+    call refuse(column // plane // plane // "&boundary radius = one name = 'it''s' /", &
+      "&boundary (the 3rd, 'it''s') radius = one: " // positive // " (m)")
+    call refuse(column // "&boundary radius = one / " // plane, "&boundary (the 1st) radius = one: " // positive // " (m)")
+    call refuse(column // plane // "&boundary name = lid /", &
+      "&boundary (the 2nd) name = lid: expected a text in quotes, not empty, at most 4096 characters")
+    call refuse(column // plane // "&boundary name = 'a' name = 'b' /", &
+      "&boundary (the 2nd, 'a') name = 'b': expected once, but it is given twice, first as name = 'a'")
+    call refuse(column // plane // "&boundary shap = 'plane' /", "unknown key 'shap' in &boundary; did you mean 'shape'?")
+    call refuse(column // "&boundry /", "unknown group &boundry; did you mean &boundary?")
+    call refuse(column // plane // "&boundary name = 'b' /", "&boundary (the 2nd, 'b') shape is missing: expected 'plane', " &
+      // "'segment', 'rectangle', 'circle', 'cylinder', 'grains' or 'outlet'")
+    many = column
+    do i = 1, 21
+      many = many // plane
+      if (i == 3) call refuse(many // "&boundary name = '' /", "&boundary (the 4th, '') shape is missing: expected 'plane', " &
+        // "'segment', 'rectangle', 'circle', 'cylinder', 'grains' or 'outlet'")
+      if (i == 10) call refuse(many // "&boundary group = a /", "&boundary (the 11th) group = a: expected an integer >= 1")
+    end do
+    call refuse(many // "&boundary group = a /", "&boundary (the 22nd) group = a: expected an integer >= 1")
+  end subroutine test_messages_of_groups
+
+  !> Each shape in its dimension, and not in the other.
+  subroutine test_shapes()
+    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'grains' or 'outlet' where dimension = 2"
+    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'grains' or 'outlet' where dimension = 3"
+    character(len=*), parameter :: file = "&scene bodies = 'file' bodies_file = 'a.h5' /" // time
+    character(len=*), parameter :: space = "&scene bodies = 'file' bodies_file = 'a.h5' dimension = 3 /" // time
+    character(len=*), parameter :: segment = "&boundary shape = 'segment' end = 1, 1 /"
+    character(len=*), parameter :: rectangle = "&boundary shape = 'rectangle' edge_a = 1, 2, 2 edge_b = 0, 1, -1 /"
+    character(len=*), parameter :: circle = "&boundary shape = 'circle' radius = 1 /"
+    character(len=*), parameter :: cylinder = "&boundary shape = 'cylinder' radius = 1 axis = 1, 1, 1 /"
+    character(len=*), parameter :: others = "&boundary" // plane_keys // "/ &boundary shape = 'outlet' normal(1) = -1 / " &
+      // "&boundary shape = 'grains' group = 1 /"
+    type(config_t) :: config
+
+    call accept(file // segment // circle // others, "the shapes of the plane", config)
+    call check_vector(config%boundaries(1)%end_point, [1.0_dp, 1.0_dp, 0.0_dp], "end of a segment")
+    call check_equal(config%boundaries(5)%group, 1, "group of grains")
+    call accept(space // rectangle // cylinder // others, "the shapes of space", config)
+    call check_vector(config%boundaries(1)%edge_a, [1.0_dp, 2.0_dp, 2.0_dp], "edge_a of a rectangle")
+    call check_vector(config%boundaries(1)%edge_b, [0.0_dp, 1.0_dp, -1.0_dp], "edge_b of a rectangle")
+    call check_vector(config%boundaries(2)%axis, [1.0_dp, 1.0_dp, 1.0_dp], "axis of a cylinder")
+    call refuse(space // segment, "&boundary (the 1st) shape = 'segment': expected " // in_space)
+    call refuse(space // circle, "&boundary (the 1st) shape = 'circle': expected " // in_space)
+    call refuse(file // "&boundary shape = 'rectangle' edge_a = 1, 0 edge_b = 0, 1 /", &
+      "&boundary (the 1st) shape = 'rectangle': expected " // in_plane)
+    call refuse(file // "&boundary shape = 'cylinder' axis(1) = 1 radius = 1 /", &
+      "&boundary (the 1st) shape = 'cylinder': expected " // in_plane)
+    call refuse(column // "&boundary shape = 'grains' group = 1 /", "&boundary (the 1st) shape = 'grains': expected another " &
+      // "shape where bodies = 'column': the groups of grains come from a bodies file")
+  end subroutine test_shapes
+
+  !> Keys that a shape needs, and keys that it does not have.
+  subroutine test_keys_of_shapes()
+    character(len=*), parameter :: numbers = "expected at most 3 finite real numbers"
+
+    call refuse_without("shape = 'plane'", "normal", numbers // " not all 0, required by shape = 'plane'")
+    call refuse_without("shape = 'outlet'", "normal", numbers // " not all 0, required by shape = 'outlet'")
+    call refuse_without("shape = 'segment'", "end", numbers // " (m), required by shape = 'segment'")
+    call refuse_without("shape = 'rectangle' edge_b = 0, 1", "edge_a", &
+      numbers // " not all 0 (m), required by shape = 'rectangle'")
+    call refuse_without("shape = 'rectangle' edge_a = 0, 1", "edge_b", &
+      numbers // " not all 0 (m), required by shape = 'rectangle'")
+    call refuse_without("shape = 'circle'", "radius", positive // " (m), required by shape = 'circle'")
+    call refuse_without("shape = 'cylinder' radius = 1", "axis", numbers // " not all 0, required by shape = 'cylinder'")
+    call refuse_without("shape = 'cylinder' axis(1) = 1", "radius", positive // " (m), required by shape = 'cylinder'")
+    call refuse_without("shape = 'grains'", "group", "expected an integer >= 1, required by shape = 'grains'")
+    call refuse_foreign("grains", "group = 1", "point(1) = 1", &
+      "'plane', 'segment', 'rectangle', 'circle', 'cylinder' or 'outlet'")
+    call refuse_foreign("circle", "radius = 1", "normal(1) = 1", "'plane' or 'outlet'")
+    call refuse_foreign("plane", "normal(1) = 1", "end(1) = 1", "'segment'")
+    call refuse_foreign("plane", "normal(1) = 1", "edge_a = 0, 1", "'rectangle'")
+    call refuse_foreign("plane", "normal(1) = 1", "edge_b = 0, 1", "'rectangle'")
+    call refuse_foreign("plane", "normal(1) = 1", "axis = 0, 1", "'cylinder'")
+    call refuse_foreign("plane", "normal(1) = 1", "radius = 1", "'circle' or 'cylinder'")
+    call refuse_foreign("plane", "normal(1) = 1", "group = 1", "'grains'")
+    call refuse_foreign("circle", "radius = 1", "pressure = 1", "'plane'")
+    call refuse_foreign("outlet", "normal(1) = 1", "free = T", solid_shapes)
+    call refuse_foreign("outlet", "normal(1) = 1", "force(1) = 1", solid_shapes)
+    call refuse_foreign("outlet", "normal(1) = 1", "mass = 1", solid_shapes)
+    call refuse_foreign("outlet", "normal(1) = 1", "friction = 1", solid_shapes)
+    call refuse_foreign("outlet", "normal(1) = 1", "restitution = 1", solid_shapes)
+  end subroutine test_keys_of_shapes
+
+  subroutine refuse_without(keys, key, message)
+    !> of &boundary, and the one that is not there
+    character(len=*), intent(in) :: keys, key, message
+    call refuse(column // "&boundary " // keys // " /", "&boundary (the 1st) " // key // " is missing: " // message)
+  end subroutine refuse_without
+
+  subroutine refuse_foreign(shape, keys, assignment, owners)
+    !> the shape, and the keys that it needs
+    character(len=*), intent(in) :: shape, keys
+    !> what does not belong there, and to what it belongs
+    character(len=*), intent(in) :: assignment, owners
+    call refuse(column // "&boundary shape = '" // shape // "' " // keys // " " // assignment // " /", &
+      "&boundary (the 1st) " // assignment // ": " // assignment(:scan(assignment, " (") - 1) // " belongs to shape = " &
+      // owners // ", expected without it where shape = '" // shape // "'")
+  end subroutine refuse_foreign
+
+  subroutine test_rules_of_boundary()
+    character(len=*), parameter :: numbers = "expected at most 3 finite real numbers not all 0"
+    character(len=*), parameter :: file = "&scene bodies = 'file' bodies_file = 'a.h5' dimension = 3 /" // time
+    character(len=*), parameter :: rectangle = "&boundary shape = 'rectangle' edge_a = 1, 0 "
+    character(len=*), parameter :: plane = column // "&boundary name = 'a'" // plane_keys
+    character(len=*), parameter :: first = "&boundary (the 1st) "
+    character(len=*), parameter :: own = "expected a name of its own, but the 1st has it too"
+    type(config_t) :: config
+
+    call refuse(plane // "/ &boundary name = 'a'" // plane_keys // "/", "&boundary (the 2nd, 'a') name = 'a': " // own)
+    call refuse(column // "&boundary name = 'boundary 2'" // plane_keys // "/ &boundary" // plane_keys // "/", &
+      "&boundary (the 2nd) name: " // own)
+    call refuse(column // "&boundary name = ' '" // plane_keys // "/", &
+      "&boundary (the 1st, ' ') name = ' ': expected a text in quotes, not empty, at most 4096 characters")
+    call refuse(column // "&boundary shape = 'plane' normal = 3*0 /", first // "normal = 3*0: " // numbers)
+    call refuse(column // "&boundary shape = 'segment' point = 1, 2 end = 1, 2 /", &
+      first // "end = 1, 2: expected another point than point")
+    call refuse(file // "&boundary shape = 'rectangle' edge_a = 3*0 edge_b = 0, 1 /", &
+      first // "edge_a = 3*0: " // numbers // " (m)")
+    call refuse(file // rectangle // "edge_b = 3*0 /", first // "edge_b = 3*0: " // numbers // " (m)")
+    call refuse(file // rectangle // "edge_b = 2e-6, 1 /", &
+      first // "edge_b = 2e-6, 1: expected an edge at right angles to edge_a = 1, 0, within 1e-6")
+    call accept(file // rectangle // "edge_b = 0.5e-6, 1 /", "edges at right angles within 1e-6", config)
+    call accept(file // rectangle // "edge_b = 0, 1e-300 /", "a very short edge", config)
+    call refuse(file // "&boundary shape = 'cylinder' axis = 0 radius = 1 /", first // "axis = 0: " // numbers)
+    call refuse(file // "&boundary shape = 'cylinder' axis = 1 radius = 0 /", first // "radius = 0: " // positive // " (m)")
+    call refuse(column // "&boundary shape = 'circle' radius = 0 /", first // "radius = 0: " // positive // " (m)")
+    call refuse(file // "&boundary shape = 'grains' group = 0 /", first // "group = 0: expected an integer >= 1")
+    call refuse(plane // "friction = -1 /", "&boundary (the 1st, 'a') friction = -1: expected a finite real number >= 0")
+    call refuse(plane // "restitution = -0.5 /", &
+      "&boundary (the 1st, 'a') restitution = -0.5: expected a finite real number in [0, 1]")
+    call refuse(plane // "restitution = 1.5 /", &
+      "&boundary (the 1st, 'a') restitution = 1.5: expected a finite real number in [0, 1]")
+    call refuse(plane // "remove_at = -1 /", &
+      "&boundary (the 1st, 'a') remove_at = -1: expected a finite real number >= 0 (s)")
+  end subroutine test_rules_of_boundary
+
+  subroutine test_rules_of_free_boundary()
+    character(len=*), parameter :: plane = column // "&boundary shape = 'plane' normal = 0, 1 "
+    character(len=*), parameter :: first = "&boundary (the 1st) "
+    character(len=*), parameter :: no_pressure = "expected 0 where no component along normal is free"
+    type(config_t) :: config
+
+    call accept(plane // "free = F, T mass = 2 force(2) = 3 pressure = 4 velocity = 5 /", "a free plane", config)
+    call accept(plane // "free = 3*F force = 3*0 pressure = 0 rotation = 1 /", "a plane whose loads are 0", config)
+    call refuse(plane // "free = T /", first // "mass is missing: " // positive // " (kg), required by free = T")
+    call refuse(plane // "free = T mass = 0 /", first // "mass = 0: " // positive // " (kg)")
+    call refuse(plane // "mass = 1 /", first // "mass = 1: expected a boundary without it where no component is free")
+    call refuse(plane // "free = T mass = 1 rotation = 1 /", &
+      first // "rotation = 1: expected 0 where a component of the translation is free")
+    call refuse(plane // "free = T mass = 1 force = 1, 1 /", &
+      first // "force = 1, 1: expected 0 along each component that is not free")
+    call refuse(plane // "pressure = 1 /", first // "pressure = 1: " // no_pressure)
+    call refuse(plane // "free = T, F mass = 1 pressure = 1 /", first // "pressure = 1: " // no_pressure)
+  end subroutine test_rules_of_free_boundary
+
+  !> What has no third component in 2D; a rotation has one.
+  subroutine test_planar_boundaries()
+    character(len=*), parameter :: plane = column // "&boundary" // plane_keys
+    character(len=*), parameter :: first = "&boundary (the 1st) "
+    character(len=*), parameter :: space = "&scene bodies = 'column' dimension = 3 /" // time
+    type(config_t) :: config
+
+    call refuse(plane // "point(3) = 1 /", first // "point(3) = 1: " // third)
+    call refuse(column // "&boundary shape = 'plane' normal = 0, 0, 1 /", first // "normal = 0, 0, 1: " // third)
+    call refuse(column // "&boundary shape = 'segment' end = 1, 1, 1 /", first // "end = 1, 1, 1: " // third)
+    call refuse(plane // "velocity(3) = 1 /", first // "velocity(3) = 1: " // third)
+    call refuse(plane // "pivot(3) = 1 /", first // "pivot(3) = 1: " // third)
+    call refuse(plane // "force(3) = 1 /", first // "force(3) = 1: " // third)
+    call refuse(plane // "free(3) = T mass = 1 /", &
+      first // "free(3) = T: expected a third component of .false. where dimension = 2")
+    call refuse(plane // "rotation = 0, 0, 1 /", first // "rotation = 0, 0, 1: expected one entry where dimension = 2")
+    call refuse(plane // "rotation = 0, 1 /", first // "rotation = 0, 1: expected one entry where dimension = 2")
+    call accept(space // "&boundary" // plane_keys // "point(3) = 1 velocity(3) = 2 pivot(3) = 3 rotation = 4, 5, 6 /", &
+      "a plane in 3D", config)
+    call check_vector(config%boundaries(1)%rotation, [4.0_dp, 5.0_dp, 6.0_dp], "rotation in 3D")
+  end subroutine test_planar_boundaries
+
+  !> Text of an input with a sample: keys of &sample, and more keys of &scene.
+  pure function sample(keys, scene_keys) result(text)
+    character(len=*), intent(in) :: keys
+    character(len=*), intent(in), optional :: scene_keys
+    character(len=:), allocatable :: text
+    text = ""
+    if (present(scene_keys)) text = scene_keys
+    text = "&scene bodies = 'sample' " // text // " /" // time // "&sample " // keys // " /"
+  end function sample
+
+  subroutine test_sample()
+    character(len=*), parameter :: shortest = "count = 10 radius = 0.5 box = 4 "
+    type(config_t) :: config
+
+    call accept(sample(shortest), "the shortest sample", config)
+    associate (made => config%sample)
+      call check_equal(made%arrangement, "loose", "default arrangement")
+      call check_equal(made%preparation, "none", "default preparation")
+      call check_equal(made%radii, "single", "default radii")
+      call check_equal(made%count, 10, "count")
+      call check_close(made%radius, 0.5_dp, 0.0_dp, "radius of a sample")
+      call check_vector(made%box, [4.0_dp, 0.0_dp, 0.0_dp], "box")
+      call check_close(made%solid_fraction, 0.35_dp, 0.0_dp, "default solid_fraction in 2D")
+      call check_equal(made%seed, 1, "default seed of a sample")
+      call check_equal(made%file, "sample.h5", "default file")
+      call check_close(made%rest_tolerance, 1.0e-6_dp, 0.0_dp, "default rest_tolerance")
+      call check_equal(made%max_steps, 100000, "default max_steps")
+    end associate
+    call accept(sample("count = 10 radius = 0.5 box = 4, 5", "dimension = 3 density = 2"), "a sample in 3D", config)
+    call check_close(config%sample%solid_fraction, 0.2_dp, 0.0_dp, "default solid_fraction in 3D")
+    call check_close(config%scene%density, 2.0_dp, 0.0_dp, "density of a sample")
+    call accept(sample("arrangement = 'lattice' preparation = 'settled' count = 10 radii = 'uniform' radius_min = 1 " &
+      // "radius_max = 1 box = 40, 50 seed = 7 rest_tolerance = 1e-3 max_steps = 20 file = 'a.h5'"), "a lattice", config)
+    call check_equal(config%sample%seed, 7, "seed of a sample")
+    call check_close(config%sample%rest_tolerance, 1.0e-3_dp, 0.0_dp, "rest_tolerance")
+    call check_equal(config%sample%max_steps, 20, "max_steps")
+    call check_equal(config%sample%file, "a.h5", "file of a sample")
+    call accept(sample("preparation = 'compacted' pressure = 100 count = 10 radii = 'log_normal' radius_min = 1 " &
+      // "radius_max = 3 radius_mean = 2 radius_deviation = 0.5 solid_fraction = 0.5", "period = 40"), "log-normal", config)
+    call check_close(config%sample%pressure, 100.0_dp, 0.0_dp, "pressure of a sample")
+    call check_close(config%sample%radius_mean, 2.0_dp, 0.0_dp, "radius_mean")
+    call check_close(config%sample%radius_deviation, 0.5_dp, 0.0_dp, "radius_deviation")
+    call check_close(config%sample%solid_fraction, 0.5_dp, 0.0_dp, "solid_fraction")
+    call check_vector(config%sample%box, [40.0_dp, 0.0_dp, 0.0_dp], "a box takes the period")
+    call accept(sample("count = 10 radii = 'table' radius_table = 'r.csv' box = 0, 5", "period(1) = 40"), "a table", config)
+    call check_equal(config%sample%radius_table, "r.csv", "radius_table")
+    call check_vector(config%sample%box, [40.0_dp, 5.0_dp, 0.0_dp], "a box with the period along one axis")
+  end subroutine test_sample
+
+  !> Keys that a choice needs, and keys that it does not have; the group itself.
+  subroutine test_keys_of_sample()
+    character(len=*), parameter :: bounded = "'uniform', 'uniform_volume' or 'log_normal'"
+
+    call refuse(column // "&sample count = 1 radius = 1 /", &
+      "group &sample belongs to bodies = 'sample', expected without it where bodies = 'column'")
+    call refuse("&scene bodies = 'sample' /" // time, &
+      "group &sample is missing: expected &sample ... /, required by bodies = 'sample'")
+    call refuse(sample("count = 1 radius = 1 box = 1") // "&sample /", &
+      "group &sample is given twice (lines 1 and 1): expected once")
+    call refuse("&scene /" // time // "&sample /", "&scene bodies is missing: expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse(sample("radius = 1 box = 1"), "&sample count is missing: expected an integer >= 1")
+    call refuse(sample("count = 1 box = 1"), "&sample radius is missing: " // positive // " (m), required by radii = 'single'")
+    call refuse(sample("count = 1 box = 1 radii = 'uniform' radius_max = 1"), &
+      "&sample radius_min is missing: " // positive // " (m), required by radii = 'uniform'")
+    call refuse(sample("count = 1 box = 1 radii = 'uniform_volume' radius_min = 1"), &
+      "&sample radius_max is missing: " // positive // " (m), required by radii = 'uniform_volume'")
+    call refuse(sample("count = 1 box = 1 radii = 'log_normal' radius_min = 1 radius_max = 1 radius_deviation = 1"), &
+      "&sample radius_mean is missing: " // positive // " (m), required by radii = 'log_normal'")
+    call refuse(sample("count = 1 box = 1 radii = 'log_normal' radius_min = 1 radius_max = 1 radius_mean = 1"), &
+      "&sample radius_deviation is missing: " // positive // ", required by radii = 'log_normal'")
+    call refuse(sample("count = 1 box = 1 radii = 'table'"), "&sample radius_table is missing: expected a text in quotes, " &
+      // "not empty, at most 4096 characters, required by radii = 'table'")
+    call refuse(sample("count = 1 box = 1 radius = 1 preparation = 'compacted'"), &
+      "&sample pressure is missing: " // positive // " (Pa, N/m in 2D), required by preparation = 'compacted'")
+    call refuse_extra("radii", "single", "radius_min = 1", bounded)
+    call refuse_extra("radii", "single", "radius_max = 1", bounded)
+    call refuse_extra("radii", "single", "radius_mean = 1", "'log_normal'")
+    call refuse_extra("radii", "single", "radius_deviation = 1", "'log_normal'")
+    call refuse_extra("radii", "single", "radius_table = 'a'", "'table'")
+    call refuse_extra("preparation", "settled", "pressure = 1", "'compacted'")
+    call refuse_extra("preparation", "none", "rest_tolerance = 1", "'settled' or 'compacted'")
+    call refuse_extra("preparation", "none", "max_steps = 1", "'settled' or 'compacted'")
+    call refuse_extra("arrangement", "lattice", "solid_fraction = 0.5", "'loose'")
+    call refuse(sample("count = 1 box = 1 radii = 'uniform' radius_min = 1 radius_max = 1 radius = 1"), &
+      "&sample radius = 1: radius belongs to radii = 'single', expected without it where radii = 'uniform'")
+    call refuse_stranger("sample", "", "seed = 1", "'lattice'", "&sample count = 1 radius = 1 box = 1 /")
+  end subroutine test_keys_of_sample
+
+  subroutine refuse_extra(choice, word, assignment, owners)
+    !> a choice of &sample and its word
+    character(len=*), intent(in) :: choice, word
+    !> what does not belong there, and to what it belongs
+    character(len=*), intent(in) :: assignment, owners
+    call refuse(sample("count = 1 box = 1 radius = 1 " // choice // " = '" // word // "' " // assignment), &
+      "&sample " // assignment // ": " // assignment(:index(assignment, " ") - 1) // " belongs to " // choice // " = " &
+      // owners // ", expected without it where " // choice // " = '" // word // "'")
+  end subroutine refuse_extra
+
+  subroutine test_rules_of_sample()
+    character(len=*), parameter :: boxed = "count = 1 box = 1 "
+    character(len=*), parameter :: made = boxed // "radius = 1 "
+    character(len=*), parameter :: uniform = boxed // "radii = 'uniform' "
+    character(len=*), parameter :: log_normal = boxed // "radii = 'log_normal' radius_min = 1 radius_max = 2 "
+    character(len=*), parameter :: between = &
+      "expected a radius from radius_min to radius_max, here radius_min = 1 and radius_max = 2"
+
+    call refuse(sample("count = 0 box = 1 radius = 1"), "&sample count = 0: expected an integer >= 1")
+    call refuse(sample(boxed // "radius = 0"), "&sample radius = 0: " // positive // " (m)")
+    call refuse(sample(uniform // "radius_min = 0 radius_max = 1"), "&sample radius_min = 0: " // positive // " (m)")
+    call refuse(sample(uniform // "radius_min = 1 radius_max = 0"), "&sample radius_max = 0: " // positive // " (m)")
+    call refuse(sample(uniform // "radius_min = 2 radius_max = 1"), &
+      "&sample radius_min = 2: expected at most radius_max, here radius_max = 1")
+    call refuse(sample(log_normal // "radius_mean = 0 radius_deviation = 1"), &
+      "&sample radius_mean = 0: " // positive // " (m)")
+    call refuse(sample(log_normal // "radius_mean = 0.5 radius_deviation = 1"), "&sample radius_mean = 0.5: " // between)
+    call refuse(sample(log_normal // "radius_mean = 3 radius_deviation = 1"), "&sample radius_mean = 3: " // between)
+    call refuse(sample(log_normal // "radius_mean = 1 radius_deviation = 0"), "&sample radius_deviation = 0: " // positive)
+    call refuse(sample(boxed // "radii = 'table' radius_table = ''"), &
+      "&sample radius_table = '': expected a text in quotes, not empty, at most 4096 characters")
+    call refuse(sample(made // "solid_fraction = 0"), "&sample solid_fraction = 0: expected a finite real number in (0, 0.6)")
+    call refuse(sample(made // "solid_fraction = 0.6"), &
+      "&sample solid_fraction = 0.6: expected a finite real number in (0, 0.6)")
+    call refuse(sample(made // "preparation = 'compacted' pressure = 0"), &
+      "&sample pressure = 0: " // positive // " (Pa, N/m in 2D)")
+    call refuse(sample(made // "preparation = 'settled' rest_tolerance = 0"), "&sample rest_tolerance = 0: " // positive)
+    call refuse(sample(made // "preparation = 'settled' max_steps = 0"), "&sample max_steps = 0: expected an integer >= 1")
+    call refuse(sample(made // "preparation = 'settled'", "gravity = 3*0"), "&sample preparation = 'settled': " &
+      // "expected another one where gravity does not point down the last axis")
+    call refuse(sample(made // "preparation = 'settled'", "period(2) = 1"), "&sample preparation = 'settled': " &
+      // "expected another one where the last axis is periodic")
+    call refuse(sample(made // "file = ''"), &
+      "&sample file = '': expected a text in quotes, not empty, at most 4096 characters")
+    call refuse(sample(made // "arrangement = 'dense'"), "&sample arrangement = 'dense': expected 'lattice' or 'loose'")
+    call refuse(sample(made // "preparation = 'shaken'"), &
+      "&sample preparation = 'shaken': expected 'none', 'settled' or 'compacted'")
+    call refuse(sample(boxed // "radii = 'normal'"), &
+      "&sample radii = 'normal': expected 'single', 'uniform', 'uniform_volume', 'log_normal' or 'table'")
+  end subroutine test_rules_of_sample
+
+  subroutine test_rules_of_box()
+    character(len=*), parameter :: grains = "count = 1 radius = 1 "
+    character(len=*), parameter :: needed = "&sample box is missing: expected at most 3 finite real numbers >= 0 (m), " &
+      // "required by each axis that is not periodic but the last"
+    character(len=*), parameter :: sizes = "expected sizes > 0, of which the last may be 0"
+    type(config_t) :: config
+
+    call refuse(sample(grains), needed)
+    call refuse(sample(grains, "period(1) = 1 dimension = 3"), needed)
+    call accept(sample(grains, "period(1:2) = 1, 2 dimension = 3"), "no box where all axes but the last are periodic", config)
+    call refuse(sample(grains // "box = 0, 1"), "&sample box = 0, 1: " // sizes)
+    call refuse(sample(grains // "box = 1", "dimension = 3"), "&sample box = 1: " // sizes)
+    call refuse(sample(grains // "box = 1, -1"), "&sample box = 1, -1: expected at most 3 finite real numbers >= 0 (m)")
+    call refuse(sample(grains // "box = 1, 1, 1"), "&sample box = 1, 1, 1: " // third)
+    call refuse(sample(grains // "box = 1, 1", "period = 0, 2"), &
+      "&sample box = 1, 1: expected the same sizes as &scene period = 0, 2 along each axis that is periodic")
+    call refuse(sample(grains // "box = 1, 1 solid_fraction = 0.5"), &
+      "&sample solid_fraction = 0.5: expected a sample without it where the last size of the box is given")
+    call refuse(sample(grains // "box = 1 solid_fraction = 0.5", "period(2) = 1"), &
+      "&sample solid_fraction = 0.5: expected a sample without it where the last size of the box is given")
+  end subroutine test_rules_of_box
 
   !> The options in force are those that count: none of another kind of bodies.
   subroutine test_active_options()
@@ -684,6 +1237,40 @@ contains
     call check(index(text, "bodies_file") == 0, "no line of a key of the bodies file")
     call check_written(text, config)
   end subroutine test_active_options
+
+  !> Each boundary with what is given or matters for its shape; the sample where there is one.
+  subroutine test_active_groups()
+    type(config_t) :: config
+    character(len=:), allocatable :: text
+
+    call accept(column // "&boundary shape = 'circle' radius = 2 friction = 0.5 free(2) = T mass = 3 / " &
+      // "&boundary" // plane_keys // "/", "boundaries to write back", config)
+    call write_active(text, config)
+    call check(index(text, "&sample") == 0, "no group of a sample")
+    call check_equal(text(index(text, "&boundary"):index(text, "&time") - 1), "&boundary" // newline &
+      // "  name = 'boundary 1'" // newline // "  shape = 'circle'" // newline // "  point = 0.0, 0.0, 0.0" // newline &
+      // "  radius = 2.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline // "  rotation = 0.0, 0.0, 0.0" // newline &
+      // "  ! pivot = the value of `point`" // newline // "  free = .false., .true., .false." // newline &
+      // "  force = 0.0, 0.0, 0.0" // newline // "  mass = 3.0" // newline // "  table = ''" // newline &
+      // "  friction = 0.5" // newline // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
+      // "  ! remove_at = never" // newline // "/" // newline // "&boundary" // newline &
+      // "  name = 'boundary 2'" // newline // "  shape = 'plane'" // newline // "  point = 0.0, 0.0, 0.0" // newline &
+      // "  normal = 0.0, 1.0, 0.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline &
+      // "  rotation = 0.0, 0.0, 0.0" // newline // "  ! pivot = the value of `point`" // newline &
+      // "  free = .false., .false., .false." // newline // "  force = 0.0, 0.0, 0.0" // newline &
+      // "  pressure = 0.0" // newline // "  table = ''" // newline &
+      // "  ! friction = the value of `wall_friction` of `&scene`" // newline &
+      // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline // "  ! remove_at = never" // newline &
+      // "/" // newline, "boundaries written back")
+    call accept(sample("count = 10 radius = 0.5 box = 4"), "a sample to write back", config)
+    call write_active(text, config)
+    call check_equal(text(index(text, "&sample"):index(text, "&time") - 1), "&sample" // newline &
+      // "  arrangement = 'loose'" // newline // "  preparation = 'none'" // newline // "  count = 10" // newline &
+      // "  radii = 'single'" // newline // "  radius = 0.5" // newline // "  box = 4.0, 0.0, 0.0" // newline &
+      // "  solid_fraction = 0.35" // newline // "  seed = 1" // newline // "  file = 'sample.h5'" // newline &
+      // "/" // newline, "a sample written back")
+    call check(index(text, "&boundary") == 0, "no group of a boundary")
+  end subroutine test_active_groups
 
   subroutine check_line(text, line)
     character(len=*), intent(in) :: text, line
@@ -721,6 +1308,16 @@ contains
       // "wall_friction = 0.30000000000000004"), "a bodies file")
     call check_round_trip(column // "&solver method = 'nscdd' tolerance = 1.7976931348623157e308 / " &
       // "&decomposition grid = 3, 2 /", "a grid")
+    call check_round_trip(scene("bodies = 'file' bodies_file = 'a.h5' dimension = 3 wall_friction = 0.1") &
+      // "&boundary shape = 'rectangle' name = 'it''s' edge_a = 1, 2, 2 edge_b = 0, 1, -1 restitution = 0.3 / " &
+      // "&boundary shape = 'grains' group = 3 pivot = 1, 2, 3 rotation = 4, 5, 6 remove_at = 0.7 / " &
+      // "&boundary shape = 'cylinder' radius = 0.1 axis = 1 free(3) = T mass = 2 force(3) = -0.1 / " &
+      // "&boundary shape = 'plane' normal = 0, 0, -1 free(3) = T mass = 2 pressure = 1e5 friction = 0 / " &
+      // "&boundary shape = 'outlet' normal = 1 table = 't.csv' /", "boundaries")
+    call check_round_trip(sample("count = 10 radius = 0.1 box = 4, 5"), "a sample in a full box")
+    call check_round_trip(sample("count = 10 radius = 0.1 solid_fraction = 0.4", "period = 0.3"), "a periodic sample")
+    call check_round_trip(sample("count = 10 radii = 'table' radius_table = 'a' box = 4 arrangement = 'lattice' " &
+      // "preparation = 'compacted' pressure = 3"), "a compacted lattice")
   end subroutine test_round_trip
 
   subroutine check_round_trip(text, name)

@@ -1,0 +1,155 @@
+!> Rules of the &boundary groups.
+module gravier_config_check_boundary
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_config_types, only: config_t, boundary_config_t
+  use gravier_config_keys, only: choices_text, has_word
+  use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, ordinal
+  implicit none
+  private
+  public :: check_boundaries
+
+  !> shapes of each dimension
+  character(len=*), parameter :: shapes_of(2:3) = ["plane segment circle grains outlet     ", &
+                                                   "plane rectangle cylinder grains outlet "]
+  !> largest cosine of the angle between the edges of a rectangle
+  real(dp), parameter :: right_angle = 1.0e-6_dp
+
+contains
+
+  !> Fails (status_input) with the first rule that a boundary breaks. Keys that do not belong to its shape are not given.
+  subroutine check_boundaries(report, config, error)
+    !> its instance comes back as 1
+    type(report_t), intent(inout) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i
+
+    do i = 1, size(config%boundaries)
+      report%instance = i
+      call check_name(report, config%boundaries(:i), error)
+      call check_shape(report, config, config%boundaries(i), error)
+      call check_size(report, config%boundaries(i), error)
+      call check_free(report, config%boundaries(i), error)
+      call check_loads(report, config%boundaries(i), error)
+      call check_contact(report, config%boundaries(i), error)
+      if (allocated(error)) return
+    end do
+    report%instance = 1
+  end subroutine check_boundaries
+
+  !> The last of some boundaries has a name of its own.
+  subroutine check_name(report, boundaries, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundaries(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n, i
+
+    n = size(boundaries)
+    call expect(report, boundaries(n)%name /= "", "boundary", "name", error)
+    do i = 1, n - 1
+      call expect(report, boundaries(i)%name /= boundaries(n)%name, "boundary", "name", error, &
+                  "a name of its own, but the "//ordinal(i)//" has it too")
+    end do
+  end subroutine check_name
+
+  subroutine check_shape(report, config, boundary, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(boundary_config_t), intent(in) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: shapes
+
+    shapes = trim(shapes_of(config%scene%dimension))
+    call expect(report, has_word(shapes, boundary%shape), "boundary", "shape", error, &
+                choices_text(shapes)//" where dimension = "//merge("2", "3", config%scene%dimension == 2))
+    call expect(report, boundary%shape /= "grains" .or. config%scene%bodies == "file", "boundary", "shape", error, &
+                "another shape where bodies = '"//trim(config%scene%bodies)//"': the groups of grains come from a bodies file")
+  end subroutine check_shape
+
+  !> Where it is and how large.
+  subroutine check_size(report, boundary, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+
+    select case (boundary%shape)
+    case ("plane", "outlet")
+      call expect(report, is_vector(boundary%normal), "boundary", "normal", error)
+    case ("segment")
+      call expect(report, any(abs(boundary%end_point - boundary%point) > 0.0_dp), "boundary", "end", error, &
+                  "another point than point")
+    case ("rectangle")
+      call expect(report, is_vector(boundary%edge_a), "boundary", "edge_a", error)
+      call expect(report, is_vector(boundary%edge_b), "boundary", "edge_b", error)
+      if (allocated(error)) return
+      call expect(report, abs(cosine(boundary%edge_a, boundary%edge_b)) <= right_angle, "boundary", "edge_b", error, &
+                  "an edge at right angles to "//shown_text(report, "boundary", "edge_a")//", within 1e-6")
+    case ("circle")
+      call expect(report, boundary%radius > 0.0_dp, "boundary", "radius", error)
+    case ("cylinder")
+      call expect(report, is_vector(boundary%axis), "boundary", "axis", error)
+      call expect(report, boundary%radius > 0.0_dp, "boundary", "radius", error)
+    case ("grains")
+      call expect(report, boundary%group >= 1, "boundary", "group", error)
+    end select
+  end subroutine check_size
+
+  !> Mass and rotation of a boundary that forces move, and of others.
+  subroutine check_free(report, boundary, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: is_absent
+
+    if (.not. any(boundary%free)) then
+      is_absent = .not. is_given(report, "boundary", "mass")
+      call expect(report, is_absent, "boundary", "mass", error, "a boundary without it where no component is free")
+      return
+    end if
+    call miss(report, "boundary", "mass", error, shown_text(report, "boundary", "free"))
+    call expect(report, boundary%mass > 0.0_dp, "boundary", "mass", error)
+    call expect(report, all(abs(boundary%rotation) <= 0.0_dp), "boundary", "rotation", error, &
+                "0 where a component of the translation is free")
+  end subroutine check_free
+
+  !> Loads without effect: on what is not free.
+  subroutine check_loads(report, boundary, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+
+    call expect(report, all(boundary%free .or. abs(boundary%force) <= 0.0_dp), "boundary", "force", error, &
+                "0 along each component that is not free")
+    call expect(report, any(abs(boundary%normal) > 0.0_dp .and. boundary%free) .or. abs(boundary%pressure) <= 0.0_dp, &
+                "boundary", "pressure", error, "0 where no component along normal is free")
+  end subroutine check_loads
+
+  subroutine check_contact(report, boundary, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+
+    call expect(report, boundary%friction >= 0.0_dp, "boundary", "friction", error)
+    call expect(report, boundary%restitution >= 0.0_dp .and. boundary%restitution <= 1.0_dp, "boundary", "restitution", error)
+    call expect(report, boundary%remove_at >= 0.0_dp, "boundary", "remove_at", error)
+  end subroutine check_contact
+
+  !> Is it another vector than 0?
+  pure logical function is_vector(vector)
+    !> shape (3)
+    real(dp), intent(in) :: vector(:)
+    is_vector = any(abs(vector) > 0.0_dp)
+  end function is_vector
+
+  !> Cosine of the angle between two vectors other than 0.
+  pure real(dp) function cosine(a, b)
+    !> shape (3); of any length that a number can say
+    real(dp), intent(in) :: a(:), b(:)
+    real(dp) :: u(size(a)), v(size(b))
+    u = a/maxval(abs(a))
+    v = b/maxval(abs(b))
+    cosine = dot_product(u, v)/(norm2(u)*norm2(v))
+  end function cosine
+
+end module gravier_config_check_boundary

@@ -1,0 +1,91 @@
+!> Rules of the &sample group.
+module gravier_config_check_sample
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_config_types, only: config_t, sample_config_t
+  use gravier_config_report, only: report_t, expect, miss, is_given, shown_text
+  implicit none
+  private
+  public :: check_sample
+
+contains
+
+  !> Fails (status_input) with the first rule that the sample breaks. Keys that do not belong to its choices are not given.
+  subroutine check_sample(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+
+    call expect(report, config%sample%count >= 1, "sample", "count", error)
+    call check_radii(report, config%sample, error)
+    call check_box(report, config, error)
+    call check_preparation(report, config, error)
+    call expect(report, config%sample%file /= "", "sample", "file", error)
+  end subroutine check_sample
+
+  subroutine check_radii(report, sample, error)
+    type(report_t), intent(in) :: report
+    type(sample_config_t), intent(in) :: sample
+    type(error_t), allocatable, intent(inout) :: error
+
+    select case (sample%radii)
+    case ("single")
+      call expect(report, sample%radius > 0.0_dp, "sample", "radius", error)
+    case ("table")
+      call expect(report, sample%radius_table /= "", "sample", "radius_table", error)
+    case default
+      call expect(report, sample%radius_min > 0.0_dp, "sample", "radius_min", error)
+      call expect(report, sample%radius_max > 0.0_dp, "sample", "radius_max", error)
+      call expect(report, sample%radius_min <= sample%radius_max, "sample", "radius_min", error, &
+                  "at most radius_max, here "//shown_text(report, "sample", "radius_max"))
+    end select
+    if (sample%radii /= "log_normal") return
+    call expect(report, sample%radius_mean > 0.0_dp, "sample", "radius_mean", error)
+    call expect(report, sample%radius_mean >= sample%radius_min .and. sample%radius_mean <= sample%radius_max, &
+                "sample", "radius_mean", error, "a radius from radius_min to radius_max, here " &
+                //shown_text(report, "sample", "radius_min")//" and "//shown_text(report, "sample", "radius_max"))
+    call expect(report, sample%radius_deviation > 0.0_dp, "sample", "radius_deviation", error)
+  end subroutine check_radii
+
+  !> The box fits the period; what it leaves open is its last size, which another key or the grains give.
+  subroutine check_box(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: nd
+
+    nd = config%scene%dimension
+    associate (sample => config%sample, period => config%scene%period)
+      call expect(report, all(sample%box >= 0.0_dp), "sample", "box", error)
+      if (any(.not. sample%box(:nd - 1) > 0.0_dp)) &
+        call miss(report, "sample", "box", error, "each axis that is not periodic but the last")
+      call expect(report, all(sample%box(:nd - 1) > 0.0_dp), "sample", "box", error, &
+                  "sizes > 0, of which the last may be 0")
+      call expect(report, all(period <= 0.0_dp .or. abs(sample%box - period) <= 0.0_dp), "sample", "box", error, &
+                  "the same sizes as &scene "//shown_text(report, "scene", "period")//" along each axis that is periodic")
+      call expect(report, sample%box(nd) <= 0.0_dp .or. .not. is_given(report, "sample", "solid_fraction"), &
+                  "sample", "solid_fraction", error, "a sample without it where the last size of the box is given")
+      call expect(report, sample%solid_fraction > 0.0_dp .and. sample%solid_fraction < 0.6_dp, &
+                  "sample", "solid_fraction", error)
+    end associate
+  end subroutine check_box
+
+  subroutine check_preparation(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: nd
+
+    nd = config%scene%dimension
+    associate (sample => config%sample)
+      call expect(report, sample%preparation /= "settled" .or. config%scene%gravity(nd) < 0.0_dp, &
+                  "sample", "preparation", error, "another one where gravity does not point down the last axis")
+      call expect(report, sample%preparation /= "settled" .or. config%scene%period(nd) <= 0.0_dp, &
+                  "sample", "preparation", error, "another one where the last axis is periodic")
+      call expect(report, sample%preparation /= "compacted" .or. sample%pressure > 0.0_dp, "sample", "pressure", error)
+      call expect(report, sample%rest_tolerance > 0.0_dp, "sample", "rest_tolerance", error)
+      call expect(report, sample%max_steps >= 1, "sample", "max_steps", error)
+    end associate
+  end subroutine check_preparation
+
+end module gravier_config_check_sample

@@ -1,0 +1,288 @@
+!> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
+!> The reader, its messages and the reference in doc/keys.md all come from this table.
+module gravier_config_table
+  implicit none
+  private
+  public :: group_t, key_t, groups, keys
+  public :: kind_integer, kind_real, kind_logical, kind_choice, kind_text
+
+  !> what a value is
+  integer, parameter :: kind_integer = 1
+  integer, parameter :: kind_real = 2
+  integer, parameter :: kind_logical = 3
+  !> one of a few words, in quotes
+  integer, parameter :: kind_choice = 4
+  !> any text, in quotes
+  integer, parameter :: kind_text = 5
+
+  !> A namelist group.
+  type :: group_t
+    character(len=16) :: name
+    !> must the file have it?
+    logical :: required
+    character(len=120) :: meaning
+    !> may it stand more than once?
+    logical :: repeated = .false.
+    !> the kind of bodies (&scene bodies) to which the group belongs, and which requires it; blank: all
+    character(len=16) :: bodies = ""
+  end type group_t
+
+  !> A key of a group.
+  type :: key_t
+    character(len=16) :: group
+    character(len=24) :: name
+    !> one of the kind_ constants
+    integer :: kind
+    !> the default, as it would be typed after the equal sign
+    character(len=16) :: default
+    !> a choice: the words, separated by blanks; otherwise a rule that follows "a finite real number", "an integer"
+    character(len=56) :: allowed
+    character(len=200) :: meaning
+    !> number of entries
+    integer :: count = 1
+    !> of several reals or logicals: the entries that may differ from 0 and .false. in 2D
+    integer :: planar = 2
+    character(len=24) :: unit = ""
+    !> replaces the default in the reference where no constant can say it
+    character(len=56) :: note = ""
+    !> the choice of the same group on which it hangs whether the key may be given; blank: always
+    character(len=16) :: chooser = ""
+    !> the words of that choice to which the key belongs, separated by blanks
+    character(len=56) :: chosen = ""
+    !> must each group give it? with the note "required" only: a key that has the note and a chooser, where it belongs
+    logical :: required = .false.
+  end type key_t
+
+  !> shapes of a boundary that carry forces, and those that have a point
+  character(len=*), parameter :: solid_shapes = "plane segment rectangle circle cylinder grains"
+  character(len=*), parameter :: shapes_with_point = "plane segment rectangle circle cylinder outlet"
+  !> distributions of the radii that have bounds
+  character(len=*), parameter :: bounded_radii = "uniform uniform_volume log_normal"
+
+  ! fprettify leaves the tables as they are laid out here
+  !&<
+  type(group_t), parameter :: groups(*) = &
+    [group_t("scene", .true., "The bodies, their loads and their contact laws."), &
+     group_t("boundary", .false., "A boundary: a wall of some shape, glued grains, or an outlet.", repeated=.true.), &
+     group_t("sample", .false., "The grains that are generated.", bodies="sample"), &
+     group_t("time", .true., "The time steps."), &
+     group_t("solver", .false., "The method that solves the contacts of every step, and when it stops."), &
+     group_t("decomposition", .false., "The subdomains of the domain decomposition methods."), &
+     group_t("enriched", .false., &
+             "The enriched methods `schwarz_ec` and `nscdd_ep`; the other methods ignore this group."), &
+     group_t("output", .false., "The results.")]
+
+  type(key_t), parameter :: scene_keys(*) = &
+    [key_t("scene", "title", kind_text, "''", "", "a title for the log and the results"), &
+     key_t("scene", "dimension", kind_integer, "2", "2 or 3", "disks in the plane (2) or spheres in space (3)"), &
+     key_t("scene", "gravity", kind_real, "0, -9.81, 0", "", &
+           "acceleration of gravity; its third component is 0 in 2D", &
+           count=3, unit="m/s^2", note="`0, -9.81, 0` in 2D, `0, 0, -9.81` in 3D"), &
+     key_t("scene", "gravity_table", kind_text, "''", "", &
+           "path of a CSV file with columns `time,gx,gy` and, in 3D, `gz`, which replaces `gravity`: linear in time between "// &
+           "its rows, constant outside"), &
+     key_t("scene", "body_force", kind_real, "3*0", "", "force on each volume of the grains; its third component is 0 in 2D", &
+           count=3, unit="N/m^3, N/m^2 in 2D"), &
+     key_t("scene", "bodies", kind_choice, "''", "column lattice file sample", &
+           "where the bodies come from: a column of equal bodies, a loose lattice of random radii, a bodies file, or `&sample`", &
+           note="required", required=.true.), &
+     key_t("scene", "bodies_file", kind_text, "''", "not empty", "path of the bodies file", &
+           note="required", chooser="bodies", chosen="file"), &
+     key_t("scene", "column_count", kind_integer, "3", ">= 1", "number of bodies in the column", &
+           chooser="bodies", chosen="column"), &
+     key_t("scene", "radius", kind_real, "1.0", "> 0", "radius of each body", unit="m", chooser="bodies", chosen="column"), &
+     key_t("scene", "mass", kind_real, "1.0", "> 0", "mass of each body", unit="kg", chooser="bodies", chosen="column"), &
+     key_t("scene", "density", kind_real, "2500", "> 0", &
+           "density of the bodies; with `bodies = 'file'`, where the file gives no masses", &
+           unit="kg/m^3, kg/m^2 in 2D", chooser="bodies", chosen="lattice file sample"), &
+     key_t("scene", "lattice_count", kind_integer, "3*0", ">= 1", &
+           "number of bodies along each axis: two entries in 2D, three in 3D", &
+           count=3, note="required", chooser="bodies", chosen="lattice"), &
+     key_t("scene", "radius_min", kind_real, "0", "> 0", "smallest radius", &
+           unit="m", note="required", chooser="bodies", chosen="lattice"), &
+     key_t("scene", "radius_max", kind_real, "0", "> 0", "largest radius, at least `radius_min`", &
+           unit="m", note="required", chooser="bodies", chosen="lattice"), &
+     key_t("scene", "seed", kind_integer, "1", "", "seed of the random radii", chooser="bodies", chosen="lattice"), &
+     key_t("scene", "friction", kind_real, "0.0", ">= 0", "friction coefficient between bodies"), &
+     key_t("scene", "wall_friction", kind_real, "-1", ">= 0", "friction coefficient between bodies and boundaries", &
+           note="the value of `friction`"), &
+     key_t("scene", "restitution", kind_real, "0.0", "in [0, 1]", "normal restitution coefficient between bodies"), &
+     key_t("scene", "wall_restitution", kind_real, "-1", "in [0, 1]", &
+           "normal restitution coefficient between bodies and boundaries", note="the value of `restitution`"), &
+     key_t("scene", "rotation", kind_logical, ".true.", "", "grains turn where friction asks; `.false.`: they never turn"), &
+     key_t("scene", "period", kind_real, "3*0", ">= 0", &
+           "length after which the scene repeats itself along each axis, 0: it does not; the third is 0 in 2D", &
+           count=3, unit="m"), &
+     key_t("scene", "period_origin", kind_real, "3*0", "", &
+           "lower corner of the period, and of the box of a sample; its third component is 0 in 2D", count=3, unit="m"), &
+     key_t("scene", "alert_distance", kind_real, "-1", ">= 0", "gap below which two bodies make a contact", &
+           unit="m", note="0.1 of the largest radius"), &
+     key_t("scene", "skin", kind_real, "-1", ">= 0", "distance within which neighbour lists stay valid", &
+           unit="m", note="0.2 of the mean radius"), &
+     key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
+           unit="m", note="0.01 of the mean radius"), &
+     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take back larger overlaps by moving the grains apart")]
+
+  type(key_t), parameter :: boundary_keys(*) = &
+    [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
+           note="`'boundary K'`, K its number"), &
+     key_t("boundary", "shape", kind_choice, "''", "plane segment rectangle circle cylinder grains outlet", &
+           "what it is: `segment` and `circle` in 2D, `rectangle` and `cylinder` in 3D only; `grains`: glued grains of the "// &
+           "bodies file; `outlet`: a plane behind which grains leave the scene", &
+           note="required", required=.true.), &
+     key_t("boundary", "point", kind_real, "3*0", "", &
+           "a point of a plane, of an outlet or of the axis of a cylinder, the first end of a segment, a corner of a "// &
+           "rectangle, the centre of a circle", &
+           count=3, unit="m", chooser="shape", chosen=shapes_with_point), &
+     key_t("boundary", "normal", kind_real, "3*0", "not all 0", "direction towards the free side, of any length", &
+           count=3, note="required", chooser="shape", chosen="plane outlet"), &
+     key_t("boundary", "end", kind_real, "3*0", "", "the second end, another than `point`", &
+           count=3, unit="m", note="required", chooser="shape", chosen="segment"), &
+     key_t("boundary", "edge_a", kind_real, "3*0", "not all 0", "an edge, from the corner `point`", &
+           count=3, unit="m", note="required", chooser="shape", chosen="rectangle"), &
+     key_t("boundary", "edge_b", kind_real, "3*0", "not all 0", &
+           "the other edge from the corner `point`, at right angles to `edge_a` within 1e-6", &
+           count=3, unit="m", note="required", chooser="shape", chosen="rectangle"), &
+     key_t("boundary", "axis", kind_real, "3*0", "not all 0", "direction of the axis, of any length", &
+           count=3, note="required", chooser="shape", chosen="cylinder"), &
+     key_t("boundary", "radius", kind_real, "0", "> 0", "radius; the grains are inside", &
+           unit="m", note="required", chooser="shape", chosen="circle cylinder"), &
+     key_t("boundary", "group", kind_integer, "0", ">= 1", "number of the group of grains in the bodies file", &
+           note="required", chooser="shape", chosen="grains"), &
+     key_t("boundary", "velocity", kind_real, "3*0", "", "prescribed velocity; its third component is 0 in 2D", &
+           count=3, unit="m/s"), &
+     key_t("boundary", "rotation", kind_real, "3*0", "", &
+           "prescribed rate of rotation: one entry in 2D, about the third axis; three in 3D; 0 where a component is `free`", &
+           count=3, planar=1, unit="rad/s"), &
+     key_t("boundary", "pivot", kind_real, "3*0", "", "the point it turns about", &
+           count=3, unit="m", note="the value of `point`"), &
+     key_t("boundary", "free", kind_logical, "3*.false.", "", &
+           "components of its translation that forces move; the third is `.false.` in 2D", &
+           count=3, chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "force", kind_real, "3*0", "", "force on the free components, 0 on the others", &
+           count=3, unit="N", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "pressure", kind_real, "0", "", &
+           "adds the force -`pressure` area `normal` on the free components, of which one must lie along `normal`; "// &
+           "the area comes from the planes that face each other", &
+           unit="Pa, N/m in 2D", chooser="shape", chosen="plane"), &
+     key_t("boundary", "mass", kind_real, "0", "> 0", "inertia of a boundary that has free components; only there", &
+           unit="kg", note="required where a component is `free`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "table", kind_text, "''", "", &
+           "path of a CSV file with a column `time` and any of `vx,vy,vz`, `omega` (2D) or `wx,wy,wz` (3D), `fx,fy,fz`, "// &
+           "`pressure`, which replace the constants: linear in time, constant outside"), &
+     key_t("boundary", "friction", kind_real, "-1", ">= 0", "friction coefficient between grains and this boundary", &
+           note="the value of `wall_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "restitution", kind_real, "-1", "in [0, 1]", &
+           "normal restitution coefficient between grains and this boundary", &
+           note="the value of `wall_restitution` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is taken away", &
+           unit="s", note="never")]
+
+  type(key_t), parameter :: sample_keys(*) = &
+    [key_t("sample", "arrangement", kind_choice, "'loose'", "lattice loose", &
+           "grains in the cells of a lattice, or at random without touching"), &
+     key_t("sample", "preparation", kind_choice, "'none'", "none settled compacted", &
+           "what the program `gravier_sample` does with the grains: nothing, let gravity settle them, or press them together"), &
+     key_t("sample", "count", kind_integer, "0", ">= 1", "number of grains", note="required", required=.true.), &
+     key_t("sample", "radii", kind_choice, "'single'", "single uniform uniform_volume log_normal table", &
+           "distribution of the radii: one radius, uniform by number, uniform by volume, log-normal, or from a table"), &
+     key_t("sample", "radius", kind_real, "0", "> 0", "radius of all grains", &
+           unit="m", note="required", chooser="radii", chosen="single"), &
+     key_t("sample", "radius_min", kind_real, "0", "> 0", "smallest radius", &
+           unit="m", note="required", chooser="radii", chosen=bounded_radii), &
+     key_t("sample", "radius_max", kind_real, "0", "> 0", "largest radius, at least `radius_min`", &
+           unit="m", note="required", chooser="radii", chosen=bounded_radii), &
+     key_t("sample", "radius_mean", kind_real, "0", "> 0", &
+           "radius whose logarithm is the mean of the logarithms, from `radius_min` to `radius_max`", &
+           unit="m", note="required", chooser="radii", chosen="log_normal"), &
+     key_t("sample", "radius_deviation", kind_real, "0", "> 0", "standard deviation of ln(radius/`radius_mean`)", &
+           note="required", chooser="radii", chosen="log_normal"), &
+     key_t("sample", "radius_table", kind_text, "''", "not empty", "path of a CSV file with columns `radius,share`", &
+           note="required", chooser="radii", chosen="table"), &
+     key_t("sample", "box", kind_real, "3*0", ">= 0", &
+           "size of the box along each axis; the last may be 0: as high as the grains ask, for loose ones by `solid_fraction`; "// &
+           "the third is 0 in 2D", &
+           count=3, unit="m", note="the period, along an axis that is periodic"), &
+     key_t("sample", "solid_fraction", kind_real, "0.35", "in (0, 0.6)", &
+           "share of the box that the grains fill; only where the last size of the box is 0", &
+           note="`0.35` in 2D, `0.2` in 3D", chooser="arrangement", chosen="loose"), &
+     key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii and places"), &
+     key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &
+           unit="Pa, N/m in 2D", note="required", chooser="preparation", chosen="compacted"), &
+     key_t("sample", "rest_tolerance", kind_real, "1e-6", "> 0", &
+           "mean kinetic energy of a grain at rest, over m g R (settled) or over `pressure` R^`dimension` (compacted)", &
+           chooser="preparation", chosen="settled compacted"), &
+     key_t("sample", "max_steps", kind_integer, "100000", ">= 1", "steps after which the preparation gives up", &
+           chooser="preparation", chosen="settled compacted"), &
+     key_t("sample", "file", kind_text, "'sample.h5'", "not empty", "the bodies file that `gravier_sample` writes")]
+
+  type(key_t), parameter :: time_keys(*) = &
+    [key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
+     key_t("time", "steps", kind_integer, "0", ">= 0", "number of time steps", note="required", required=.true.), &
+     key_t("time", "theta", kind_real, "0.5", "in [0.5, 1]", &
+           "weight of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
+
+  type(key_t), parameter :: solver_keys(*) = &
+    [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep", &
+           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP"), &
+     key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
+           "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
+     key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &
+     key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
+     key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
+     key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
+           "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)"), &
+     key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
+     key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
+     key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
+           "after a solve that gave up: go on; write the step and stop; stop without it. "// &
+           "One that diverged always stops without it")]
+
+  type(key_t), parameter :: decomposition_keys(*) = &
+    [key_t("decomposition", "partition", kind_choice, "'grid'", "grid metis", &
+           "equal boxes, or cells with grains in them shared out by METIS"), &
+     key_t("decomposition", "kind", kind_choice, "'dual'", "dual primal", &
+           "a contact belongs to the subdomain of its midpoint, or of the centre of its candidate"), &
+     key_t("decomposition", "grid", kind_integer, "3*0", ">= 1", &
+           "boxes along each axis, two entries in 2D, three in 3D; only with `partition = 'grid'`", &
+           count=3, note="found from `subdomains`"), &
+     key_t("decomposition", "subdomains", kind_integer, "1", ">= 1", "number of subdomains; `method = 'nlgs'` has one", &
+           note="the product of `grid` if given, else `1`"), &
+     key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again"), &
+     key_t("decomposition", "repartition_imbalance", kind_real, "0.0", "0 or > 1", &
+           "largest over mean number of contacts of a subdomain that asks for a new partition; 0: never")]
+
+  type(key_t), parameter :: enriched_keys(*) = &
+    [key_t("enriched", "direction", kind_real, "0.3", ">= 0", "search direction l", unit="1/W_aa or kg"), &
+     key_t("enriched", "direction_unit", kind_choice, "'relative'", "relative absolute", &
+           "l in units of 1/W_aa, the inverse of the local operator of each contact, or in kg"), &
+     key_t("enriched", "contacts", kind_choice, "'all'", "all active", &
+           "contacts that take part: all, or those that carry an impulse"), &
+     key_t("enriched", "interface", kind_choice, "'mumps'", "mumps cg", &
+           "interface solve: direct, or conjugate gradient (`nscdd_ep` only)"), &
+     key_t("enriched", "cg_tolerance", kind_real, "1e-12", "in (0, 1)", &
+           "relative residual at which the conjugate gradient stops (`nscdd_ep` with `interface = 'cg'` only)"), &
+     key_t("enriched", "cg_max_iterations", kind_integer, "10000", ">= 1", &
+           "iterations after which the conjugate gradient gives up (`nscdd_ep` with `interface = 'cg'` only)")]
+
+  type(key_t), parameter :: output_keys(*) = &
+    [key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
+     key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
+     key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
+     key_t("output", "trace", kind_logical, ".false.", "", "write the convergence of every solve, check by check"), &
+     key_t("output", "final_bodies", kind_logical, ".false.", "", &
+           "write `final_bodies.h5`, a bodies file from which another scene starts"), &
+     key_t("output", "checkpoint_every", kind_integer, "0", ">= 0", "steps between two checkpoints; 0: never"), &
+     key_t("output", "checkpoint_seconds", kind_real, "0.0", ">= 0", "wall time between two checkpoints; 0: never", unit="s"), &
+     key_t("output", "walltime", kind_real, "0.0", ">= 0", &
+           "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s"), &
+     key_t("output", "energy", kind_logical, ".false.", "", "write the energies and works of each step"), &
+     key_t("output", "stress", kind_logical, ".false.", "", "write the mean stress of the grains"), &
+     key_t("output", "structure", kind_logical, ".false.", "", "write coordination, fabric and solid fraction"), &
+     key_t("output", "boundary_forces", kind_logical, ".false.", "", "write the forces on each boundary")]
+  !&>
+
+  type(key_t), parameter :: keys(*) = [scene_keys, boundary_keys, sample_keys, time_keys, solver_keys, decomposition_keys, &
+                                       enriched_keys, output_keys]
+
+end module gravier_config_table
