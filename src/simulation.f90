@@ -154,11 +154,14 @@ contains
     !> (nd) [m]; edge of a detection cell [m]
     real(dp), intent(in) :: lower(:), upper(:), edge
     type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
     integer :: boxes(3)
 
     associate (config => self%config%decomposition, partition => self%decomposition%partition)
       if (config%partition == "metis") then
-        call partition%init_graph(self%comm, lower, upper, edge, bodies, config%subdomains, error)
+        call list_centres(bodies, size(lower), points, weights)
+        call partition%init_graph(self%comm, lower, upper, edge, points, weights, config%subdomains, error)
       else
         boxes(:) = config%grid
         if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, config%subdomains)
@@ -166,6 +169,24 @@ contains
       end if
     end associate
   end subroutine cut
+
+  !> Centres of the grains [m], each of weight 1.
+  subroutine list_centres(bodies, nd, points, weights)
+    type(body_set_t), intent(in) :: bodies(:)
+    integer, intent(in) :: nd
+    real(dp), allocatable, intent(out) :: points(:, :)
+    integer, allocatable, intent(out) :: weights(:)
+    integer :: s, n
+
+    n = sum(bodies%n)
+    allocate (points(nd, n))
+    allocate (weights(n), source=1)
+    n = 0
+    do s = 1, size(bodies)
+      points(:, n + 1:n + bodies(s)%n) = bodies(s)%position(:, 1:bodies(s)%n)
+      n = n + bodies(s)%n
+    end do
+  end subroutine list_centres
 
   !> Move grains to q_m, bring each to its subdomain, detect the contacts and start them from the impulses of the
   !> last step. Collective.
