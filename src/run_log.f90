@@ -136,8 +136,8 @@ contains
     character(len=:), allocatable :: text
     integer :: d
 
-    if (simulation%config%decomposition%partition == "metis") then
-      text = "METIS"
+    if (simulation%decomposition%partition%n_cells() > 0) then
+      text = "METIS on "//to_text(simulation%decomposition%partition%n_cells())//" cells"
       return
     end if
     text = "grid "//to_text(simulation%decomposition%partition%boxes(1))

@@ -1,9 +1,9 @@
 !> A grid of equal cells over a box; points outside belong to the nearest cell of the border.
 module gravier_cell_grid
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: cell_grid_t
+  public :: cell_grid_t, count_along
 
   type :: cell_grid_t
     !> space dimension
@@ -25,7 +25,7 @@ module gravier_cell_grid
 contains
 
   !> Cover the box [lower, upper] by cells of edge `edge` or larger, by doubling, so that there are at most
-  !> `limit` cells (at least 1 along each axis).
+  !> `limit` cells (at least 1 along each axis), and fewer than huge(1) whatever the limit.
   pure subroutine cell_grid_init(self, lower, upper, edge, limit)
     class(cell_grid_t), intent(inout) :: self
     !> (nd) [m]
@@ -33,7 +33,7 @@ contains
     !> smallest edge allowed [m]
     real(dp), intent(in) :: edge
     integer(i8), intent(in) :: limit
-    real(dp) :: counts(3)
+    real(dp) :: counts(3), most
     integer :: d
 
     self%nd = size(lower)
@@ -41,16 +41,33 @@ contains
     self%origin(:) = 0.0_dp
     self%origin(1:self%nd) = lower
     self%edge = edge
+    most = real(min(max(limit, 1_i8), huge(0_i4) - 1_i8), dp)
     do
       counts(:) = 1.0_dp
+      if (self%edge > 0.25_dp*huge(1.0_dp)) exit
       do d = 1, self%nd
-        counts(d) = aint((upper(d) - lower(d))/self%edge) + 1.0_dp
+        counts(d) = count_along(lower(d), upper(d), self%edge)
       end do
-      if (product(counts) <= real(max(limit, 1_i8), dp)) exit
+      if (product(counts) <= most) exit
       self%edge = 2.0_dp*self%edge
     end do
     self%n(:) = nint(counts)
   end subroutine cell_grid_init
+
+  !> Cells of edge `edge` along an axis from `lower` to `upper`, at most huge(1): extents whose difference or whose quotient
+  !> has no number are cut off before.
+  pure real(dp) function count_along(lower, upper, edge) result(cells)
+    !> [m]
+    real(dp), intent(in) :: lower, upper, edge
+    real(dp) :: half
+
+    half = 0.5_dp*upper - 0.5_dp*lower
+    if (half/real(huge(0_i4) - 1, dp) > 0.5_dp*edge) then
+      cells = real(huge(0_i4), dp)
+    else
+      cells = aint(2.0_dp*(half/edge)) + 1.0_dp
+    end if
+  end function count_along
 
   !> Place of a point along each axis, from 0.
   pure subroutine cell_grid_locate(self, point, place)

@@ -1,39 +1,56 @@
 !> Partitions of space into subdomains: a grid of equal boxes (paper, (3)-(4)), or cells shared out by a graph partition.
 module gravier_partition
-  use gravier_kinds, only: dp, i4, i8
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_region, only: region_t
-  use gravier_cell_grid, only: cell_grid_t
-  use gravier_body_store, only: body_set_t
-  use gravier_graph_partition, only: partition_graph
+  use gravier_cell_grid, only: count_along
+  use gravier_cell_map, only: cell_map_t
+  use gravier_cell_groups, only: cell_groups_t
+  use gravier_cell_cut, only: cut_group
+  use gravier_cell_levels, only: cut_levels, cells_per_subdomain
   implicit none
   private
   public :: partition_t, choose_boxes, check_subdomains
 
-  !> Points outside the box of the partition belong to the nearest subdomain of its border.
+  !> kinds of a partition: boxes; cells with one map that every rank has; cells with a map for each group
+  integer, parameter :: kind_boxes = 0, kind_cells = 1, kind_groups = 2
+  !> words of a head before those of the groups
+  integer, parameter :: head_words = 30
+
+  !> Points outside the box of the partition belong to the nearest subdomain of its border, but along periodic axes to that
+  !> of their image inside.
   type, extends(region_t) :: partition_t
     integer :: nd = 2
     integer :: n_subdomains = 1
     !> bounding box at the time of the partition [m]
     real(dp) :: lower(3) = 0.0_dp, upper(3) = 1.0_dp
+    !> set by the caller before init: period along each axis, 0 where there is none [m]; along a periodic axis the box is
+    !> [lower, lower + period)
+    real(dp) :: period(3) = 0.0_dp
+    !> set by the caller before init_graph where another bound is wanted: cells of one graph, so that what a rank holds of
+    !> them stays bounded whatever the scene
+    integer(i8) :: cell_limit = 262144_i8
     !> grid: boxes along each axis
     integer :: boxes(3) = 1
-    !> graph: cells, and the subdomain of each; not allocated for a grid
-    type(cell_grid_t) :: cells
-    integer, allocatable :: subdomain_of_cell(:)
+    !> boxes or cells
+    type(cell_map_t) :: cells
+    !> graph: the subdomains of the cells
+    type(cell_groups_t) :: groups
+    !> one of the kind_ constants
+    integer, private :: kind = kind_boxes
   contains
     procedure :: owner => partition_owner
+    procedure :: relay => partition_relay
     procedure :: near => partition_near
+    procedure :: n_cells => partition_n_cells
     procedure :: init_grid => partition_init_grid
     procedure :: init_graph => partition_init_graph
+    procedure :: get_head => partition_get_head
+    procedure :: get_map => partition_get_map
+    procedure :: restore => partition_restore
   end type partition_t
-
-  !> cells of the graph, whatever the scene: what each rank holds of it stays bounded
-  integer(i8), parameter :: cell_limit = 262144_i8
-  !> cells wanted per subdomain where there are many subdomains
-  integer(i8), parameter :: cells_per_subdomain = 64_i8
 
 contains
 
@@ -46,11 +63,14 @@ contains
     !> edge of a detection cell [m]: no more boxes than cells
     real(dp), intent(in) :: edge
     type(error_t), allocatable, intent(inout) :: error
+    type(cell_groups_t) :: none
 
-    if (allocated(self%subdomain_of_cell)) deallocate (self%subdomain_of_cell)
     call set_box(self, lower, upper)
+    self%kind = kind_boxes
+    self%groups = none
     self%boxes(:) = boxes
-    self%n_subdomains = product(boxes)
+    self%n_subdomains = int(min(product(real(boxes, dp)), real(huge(1), dp)))
+    call self%cells%set_boxes(lower, upper, self%period(1:self%nd), boxes)
     call check_subdomains(lower, upper, edge, self%n_subdomains, error)
   end subroutine partition_init_grid
 
@@ -62,14 +82,19 @@ contains
     real(dp), intent(in) :: edge
     integer, intent(in) :: n_subdomains
     type(error_t), allocatable, intent(inout) :: error
-    type(cell_grid_t) :: cells
+    real(dp) :: cells
+    integer :: d
 
-    call cells%init(lower, upper, edge, huge(0_i4) - 1_i8)
-    call refuse_too_many(n_subdomains, cells%cells(), error)
+    cells = 1.0_dp
+    do d = 1, size(lower)
+      cells = min(cells*count_along(lower(d), upper(d), edge), real(huge(1), dp))
+    end do
+    call refuse_too_many(n_subdomains, int(cells, i8), error)
   end subroutine check_subdomains
 
   subroutine refuse_too_many(n_subdomains, n_cells, error)
-    integer, intent(in) :: n_subdomains, n_cells
+    integer, intent(in) :: n_subdomains
+    integer(i8), intent(in) :: n_cells
     type(error_t), allocatable, intent(inout) :: error
 
     if (n_subdomains > n_cells) call raise(error, status_input, "&decomposition subdomains = "//to_text(n_subdomains)// &
@@ -88,12 +113,15 @@ contains
   end subroutine set_box
 
   !> Boxes along each axis for `n_subdomains`: of all factorisations, the one that cuts the least surface.
-  pure function choose_boxes(lower, upper, n_subdomains) result(boxes)
+  pure function choose_boxes(lower, upper, n_subdomains, period) result(boxes)
     !> (nd) [m]
     real(dp), intent(in) :: lower(:), upper(:)
     integer, intent(in) :: n_subdomains
-    integer :: boxes(3)
-    integer :: a, b, c
+    !> (nd at least) [m], 0 along axes that are not periodic: along the others two boxes or more meet at the ends too
+    real(dp), intent(in), optional :: period(:)
+    integer :: boxes(3), counts(3), cuts(3)
+    integer :: i, j
+    integer, allocatable :: divisor(:)
     real(dp) :: extent(3), cut, least
 
     extent(:) = 1.0_dp
@@ -102,193 +130,169 @@ contains
     boxes(:) = 1
     boxes(1) = n_subdomains
     least = huge(1.0_dp)
-    do a = 1, n_subdomains
-      if (mod(n_subdomains, a) /= 0) cycle
-      do b = 1, n_subdomains/a
-        if (mod(n_subdomains/a, b) /= 0) cycle
-        c = n_subdomains/(a*b)
-        if (size(lower) == 2 .and. c > 1) cycle
-        cut = (a - 1)*extent(2)*extent(3) + (b - 1)*extent(1)*extent(3) + (c - 1)*extent(1)*extent(2)
+    call list_divisors(n_subdomains, divisor)
+    do i = 1, size(divisor)
+      do j = 1, size(divisor)
+        if (mod(n_subdomains/divisor(i), divisor(j)) /= 0) cycle
+        counts(1) = divisor(i)
+        counts(2) = divisor(j)
+        counts(3) = (n_subdomains/divisor(i))/divisor(j)
+        if (size(lower) == 2 .and. counts(3) > 1) cycle
+        cuts(:) = counts - 1
+        if (present(period)) then
+          where (counts(1:size(lower)) > 1 .and. period(1:size(lower)) > 0.0_dp) cuts(1:size(lower)) = counts(1:size(lower))
+        end if
+        cut = cuts(1)*extent(2)*extent(3) + cuts(2)*extent(1)*extent(3) + cuts(3)*extent(1)*extent(2)
         if (cut < least) then
           least = cut
-          boxes(1) = a
-          boxes(2) = b
-          boxes(3) = c
+          boxes(:) = counts
         end if
       end do
     end do
   end function choose_boxes
 
-  !> Cells shared out so that each subdomain holds about as many grains and few neighbours are cut. Each rank
-  !> gives its own grains; the number of cells is bounded, so that what a rank holds does not grow with the scene.
-  !> Collective; every rank computes the same partition.
-  subroutine partition_init_graph(self, comm, lower, upper, edge, bodies, n_subdomains, error)
+  !> Divisors of `n`, ascending.
+  pure subroutine list_divisors(n, divisor)
+    integer, intent(in) :: n
+    integer, allocatable, intent(out) :: divisor(:)
+    integer :: low(2000), high(2000), k, n_low, n_high
+
+    n_low = 0
+    n_high = 0
+    k = 1
+    ! an integer has fewer than 2000 divisors
+    do while (k <= n/k)
+      if (mod(n, k) == 0) then
+        n_low = n_low + 1
+        low(n_low) = k
+        if (n/k /= k) then
+          n_high = n_high + 1
+          high(n_high) = n/k
+        end if
+      end if
+      k = k + 1
+    end do
+    allocate (divisor(n_low + n_high))
+    divisor(1:n_low) = low(1:n_low)
+    divisor(n_low + 1:) = high(n_high:1:-1)
+  end subroutine list_divisors
+
+  !> Cells shared out so that each subdomain holds about as much weight and few neighbours are cut. Each rank gives points of
+  !> its own. The graph that a rank cuts and what it keeps of the cells are bounded: where one graph of cell_limit cells gives
+  !> each subdomain too few, its cells make groups of subdomains, and the group of a cell is cut by itself, more finely.
+  !> Errors are the same on all ranks, and so is the partition on any number of ranks. Collective.
+  subroutine partition_init_graph(self, comm, lower, upper, edge, points, weights, n_subdomains, error)
     class(partition_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     !> (nd) [m]
     real(dp), intent(in) :: lower(:), upper(:)
     !> smallest edge of a cell [m]
     real(dp), intent(in) :: edge
-    !> of the subdomains of this rank
-    type(body_set_t), intent(in) :: bodies(:)
+    !> (nd, points of this rank) [m]
+    real(dp), intent(in), contiguous :: points(:, :)
+    !> (points of this rank): 0 and more
+    integer, intent(in), contiguous :: weights(:)
     integer, intent(in) :: n_subdomains
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: grains(:)
-    integer, allocatable :: vertex(:)
-    integer(i4), allocatable :: part(:)
-    integer :: s, k, cell, n
+    integer(i8), allocatable :: weight(:)
+    integer(i8) :: occupied
+    real(dp) :: cell_edge
+    integer :: k, cell, place(3)
 
     call set_box(self, lower, upper)
     self%n_subdomains = n_subdomains
-    call self%cells%init(lower, upper, edge, max(cell_limit, cells_per_subdomain*n_subdomains))
-    allocate (grains(self%cells%cells()), source=0_i8)
-    do s = 1, size(bodies)
-      do k = 1, bodies(s)%n
-        cell = self%cells%index_of(bodies(s)%position(:, k))
-        grains(cell) = grains(cell) + 1
-      end do
+    cell_edge = edge
+    call self%cells%set_cells(lower, upper, self%period(1:self%nd), cell_edge, self%cell_limit)
+    allocate (weight(self%cells%cells()), source=0_i8)
+    do k = 1, size(weights)
+      call self%cells%locate(points(:, k), place)
+      cell = self%cells%cell_at(place)
+      weight(cell) = weight(cell) + weights(k)
     end do
-    call comm%sum_counts(grains)
-    allocate (vertex(size(grains)), source=0)
-    n = 0
-    do cell = 1, size(grains)
-      if (grains(cell) == 0) cycle
-      n = n + 1
-      vertex(cell) = n
-    end do
-    call refuse_too_many(n_subdomains, n, error)
-    if (allocated(error)) return
-    allocate (part(n))
-    call cut_cells(self%cells, grains, vertex, n_subdomains, part, error)
-    if (allocated(error)) return
-    call number_cells(self, vertex, part)
+    call comm%sum_counts(weight)
+    occupied = count(weight > 0)
+    if (cells_per_subdomain*n_subdomains <= self%cell_limit) then
+      self%kind = kind_cells
+      call refuse_too_many(n_subdomains, occupied, error)
+      if (.not. allocated(error)) call cut_once(self, weight, error)
+      call comm%agree(error)
+    else
+      self%kind = kind_groups
+      ! as many pieces along the edge of a cell as leave them no smaller than asked for
+      call self%cells%set_split(int(min(cell_edge/edge, real(huge(1), dp))))
+      call cut_levels(self%groups, comm, self%cells, weight, points, weights, n_subdomains, self%cell_limit, occupied, error)
+      call refuse_too_many(n_subdomains, occupied, error)
+      call comm%agree(error)
+      self%cells = self%groups%cells
+    end if
   end subroutine partition_init_graph
 
-  !> Build the graph of occupied cells and cut it. Cells that share a face weigh more than those that share a corner.
-  subroutine cut_cells(cells, grains, vertex, n_parts, part, error)
-    type(cell_grid_t), intent(in) :: cells
-    integer(i8), intent(in), contiguous :: grains(:)
-    integer, intent(in), contiguous :: vertex(:)
-    integer, intent(in) :: n_parts
-    integer(i4), intent(out), contiguous :: part(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer(i4), allocatable :: first(:), neighbour(:), edge_weight(:), vertex_weight(:)
-    integer :: cell, other, v, n, list(26), apart(26), n_list, k
-
-    allocate (first(size(part) + 1), vertex_weight(size(part)), neighbour(26*size(part)), edge_weight(26*size(part)))
-    n = 0
-    do cell = 1, size(vertex)
-      v = vertex(cell)
-      if (v == 0) cycle
-      first(v) = n + 1
-      vertex_weight(v) = int(min(grains(cell), 1000000_i8), i4)
-      call list_neighbours(cells, cell, list, apart, n_list)
-      do k = 1, n_list
-        other = list(k)
-        if (vertex(other) == 0) cycle
-        n = n + 1
-        neighbour(n) = vertex(other)
-        edge_weight(n) = int(min(grains(cell), grains(other), 100000_i8), i4)*merge(4, 1, apart(k) == 1)
-      end do
-    end do
-    first(size(part) + 1) = n + 1
-    call partition_graph(first, neighbour(1:n), vertex_weight, edge_weight(1:n), n_parts, part, error)
-  end subroutine cut_cells
-
-  !> The cells around a cell, and along how many axes each lies apart.
-  pure subroutine list_neighbours(cells, cell, list, apart, n)
-    type(cell_grid_t), intent(in) :: cells
-    integer, intent(in) :: cell
-    integer, intent(out) :: list(26), apart(26), n
-    integer :: place(3), other(3), x, y, z
-
-    place(1) = mod(cell - 1, cells%n(1))
-    place(2) = mod((cell - 1)/cells%n(1), cells%n(2))
-    place(3) = (cell - 1)/(cells%n(1)*cells%n(2))
-    list(:) = 0
-    apart(:) = 0
-    n = 0
-    do z = max(place(3) - 1, 0), min(place(3) + 1, cells%n(3) - 1)
-      do y = max(place(2) - 1, 0), min(place(2) + 1, cells%n(2) - 1)
-        do x = max(place(1) - 1, 0), min(place(1) + 1, cells%n(1) - 1)
-          other(1) = x
-          other(2) = y
-          other(3) = z
-          if (all(other == place)) cycle
-          n = n + 1
-          list(n) = cells%flat(other)
-          apart(n) = count(other /= place)
-        end do
-      end do
-    end do
-  end subroutine list_neighbours
-
-  !> Give subdomains numbers in the order in which the cells meet them, and every empty cell to a near subdomain.
-  subroutine number_cells(self, vertex, part)
+  !> One graph, that every rank cuts by itself.
+  subroutine cut_once(self, weight, error)
     class(partition_t), intent(inout) :: self
-    integer, intent(in), contiguous :: vertex(:)
-    integer(i4), intent(in), contiguous :: part(:)
-    integer, allocatable :: number_of(:), queue(:)
-    integer :: cell, n, head, tail, list(26), apart(26), n_list, k
+    !> (cells)
+    integer(i8), intent(in), contiguous :: weight(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: owner(:)
 
-    if (allocated(self%subdomain_of_cell)) deallocate (self%subdomain_of_cell)
-    allocate (self%subdomain_of_cell(size(vertex)), number_of(self%n_subdomains), source=0)
-    allocate (queue(size(vertex)))
-    n = 0
-    tail = 0
-    do cell = 1, size(vertex)
-      if (vertex(cell) == 0) cycle
-      if (number_of(part(vertex(cell))) == 0) then
-        n = n + 1
-        number_of(part(vertex(cell))) = n
-      end if
-      self%subdomain_of_cell(cell) = number_of(part(vertex(cell)))
-      tail = tail + 1
-      queue(tail) = cell
-    end do
-    head = 1
-    do while (head <= tail)
-      call list_neighbours(self%cells, queue(head), list, apart, n_list)
-      do k = 1, n_list
-        if (self%subdomain_of_cell(list(k)) > 0) cycle
-        self%subdomain_of_cell(list(k)) = self%subdomain_of_cell(queue(head))
-        tail = tail + 1
-        queue(tail) = list(k)
-      end do
-      head = head + 1
-    end do
-  end subroutine number_cells
+    call set_one_group(self)
+    allocate (owner(size(weight)))
+    call cut_group(self%groups, 1, weight, self%n_subdomains, owner, error)
+    call move_alloc(owner, self%groups%maps(1)%subdomain)
+  end subroutine cut_once
 
-  !> Subdomain that holds a point.
+  subroutine set_one_group(self)
+    class(partition_t), intent(inout) :: self
+    integer, allocatable :: group_of_cell(:)
+    logical, allocatable :: in_pieces(:)
+    integer :: counts(1)
+
+    allocate (group_of_cell(self%cells%cells()), source=1)
+    allocate (in_pieces(self%cells%cells()), source=.true.)
+    call self%groups%set(self%cells, 1, group_of_cell, in_pieces)
+    counts(1) = self%n_subdomains
+    call self%groups%set_first(counts)
+    call self%groups%hold(1)
+  end subroutine set_one_group
+
+  !> Subdomain that holds a point; 0 where this rank does not know it: far from its own subdomains, see `relay`.
   pure integer function partition_owner(self, point) result(subdomain)
     class(partition_t), intent(in) :: self
     real(dp), intent(in) :: point(:)
-    integer :: d, place
+    integer :: place(3)
 
-    if (allocated(self%subdomain_of_cell)) then
-      subdomain = self%subdomain_of_cell(self%cells%index_of(point))
-      return
-    end if
-    subdomain = 0
-    do d = self%nd, 1, -1
-      place = box_along(self, d, point(d))
-      subdomain = subdomain*self%boxes(d) + place
-    end do
-    subdomain = subdomain + 1
+    call self%cells%locate(point, place)
+    subdomain = subdomain_at(self, place)
   end function partition_owner
 
-  !> Box along axis `d`, from 0, that holds coordinate `x`.
-  pure integer function box_along(self, d, x) result(place)
+  pure integer function subdomain_at(self, place) result(subdomain)
     class(partition_t), intent(in) :: self
-    integer, intent(in) :: d
-    real(dp), intent(in) :: x
-    real(dp) :: y
+    integer, intent(in) :: place(3)
 
-    y = (x - self%lower(d))/(self%upper(d) - self%lower(d))*self%boxes(d)
-    place = int(min(max(y, 0.0_dp), real(self%boxes(d) - 1, dp)))
-  end function box_along
+    if (self%kind == kind_boxes) then
+      subdomain = self%cells%cell_at(place)
+    else
+      subdomain = self%groups%subdomain_at(place)
+    end if
+  end function subdomain_at
 
-  !> Subdomains that may hold a point within `reach` of `point`, each once.
+  !> A subdomain on whose rank the owner of a point is known, whichever rank asks.
+  pure integer function partition_relay(self, point) result(subdomain)
+    class(partition_t), intent(in) :: self
+    real(dp), intent(in) :: point(:)
+    integer :: place(3)
+
+    call self%cells%locate(point, place)
+    if (self%kind == kind_groups) then
+      subdomain = self%groups%first(self%groups%group_of_cell(self%cells%cell_at(place)))
+    else
+      subdomain = subdomain_at(self, place)
+    end if
+  end function partition_relay
+
+  !> Subdomains that may hold a point within `reach` of any image of `point`, each once. Around points of the subdomains of
+  !> this rank all are known as long as `reach` is no longer than the edge given to init_graph; elsewhere 0 stands for those
+  !> that are not.
   pure subroutine partition_near(self, point, reach, list, n)
     class(partition_t), intent(in) :: self
     !> (nd) [m]
@@ -297,40 +301,30 @@ contains
     !> the first n are set; grown where needed
     integer, allocatable, intent(inout) :: list(:)
     integer, intent(out) :: n
-    integer :: low(3), high(3), x, y, z, d, place(3)
-    real(dp) :: margin, corner(size(point))
+    integer :: low(3), high(3), sides(3), x, y, z, place(3)
 
-    low(:) = 0
-    high(:) = 0
-    ! a little more than reach, so that rounding excludes nobody
-    margin = reach*(1.0_dp + 1.0e-9_dp) + 1.0e-12_dp*maxval(abs(point))
-    if (allocated(self%subdomain_of_cell)) then
-      corner(:) = point - margin
-      call self%cells%locate(corner, low)
-      corner(:) = point + margin
-      call self%cells%locate(corner, high)
-    else
-      do d = 1, self%nd
-        low(d) = box_along(self, d, point(d) - margin)
-        high(d) = box_along(self, d, point(d) + margin)
-      end do
-    end if
+    call self%cells%range(point, reach, low, high)
+    sides(:) = 1
+    sides(1:self%nd) = self%cells%n(1:self%nd)*self%cells%split
     n = 0
     do z = low(3), high(3)
+      place(3) = modulo(z, sides(3))
       do y = low(2), high(2)
+        place(2) = modulo(y, sides(2))
         do x = low(1), high(1)
-          place(1) = x
-          place(2) = y
-          place(3) = z
-          if (allocated(self%subdomain_of_cell)) then
-            call add_once(list, n, self%subdomain_of_cell(self%cells%flat(place)))
-          else
-            call add_once(list, n, 1 + x + self%boxes(1)*(y + self%boxes(2)*z))
-          end if
+          place(1) = modulo(x, sides(1))
+          call add_once(list, n, subdomain_at(self, place))
         end do
       end do
     end do
   end subroutine partition_near
+
+  !> Cells that a graph partition shares out, over all groups; 0 for boxes.
+  pure integer(i8) function partition_n_cells(self) result(n)
+    class(partition_t), intent(in) :: self
+    n = 0
+    if (self%kind /= kind_boxes) n = sum(self%groups%length)
+  end function partition_n_cells
 
   !> Add `value` to the first `n` of `list` unless it is there.
   pure subroutine add_once(list, n, value)
@@ -348,5 +342,152 @@ contains
     n = n + 1
     list(n) = value
   end subroutine add_once
+
+  !> The partition in words but for the maps of its cells; the same on every rank.
+  pure subroutine partition_get_head(self, words)
+    class(partition_t), intent(in) :: self
+    integer(i8), allocatable, intent(out) :: words(:)
+    real(dp) :: reals(18)
+    integer :: n, k, cell
+
+    n = 0
+    if (self%kind == kind_groups) n = self%groups%n + 1 + size(self%groups%group_of_cell)
+    allocate (words(head_words + n), source=0_i8)
+    words(1) = self%kind
+    words(2) = self%nd
+    words(3) = self%n_subdomains
+    words(4) = self%cell_limit
+    words(5:7) = self%boxes
+    words(8:10) = self%cells%n
+    words(11) = self%cells%split
+    reals(1:3) = self%lower
+    reals(4:6) = self%upper
+    reals(7:9) = self%period
+    reals(10:12) = self%cells%origin
+    reals(13:15) = self%cells%unit
+    reals(16:18) = self%cells%scale
+    do k = 1, size(reals)
+      words(11 + k) = transfer(reals(k), 1_i8)
+    end do
+    if (self%kind /= kind_groups) return
+    n = self%groups%n
+    words(head_words) = n
+    words(head_words + 1:head_words + n + 1) = self%groups%first
+    do cell = 1, size(self%groups%group_of_cell)
+      words(head_words + n + 1 + cell) = 2_i8*self%groups%group_of_cell(cell) + merge(1, 0, self%groups%in_pieces(cell))
+    end do
+  end subroutine partition_get_head
+
+  !> The words to be stored with a subdomain of this rank: the map of its group with the first one of each, none with the
+  !> others.
+  pure subroutine partition_get_map(self, subdomain, words)
+    class(partition_t), intent(in) :: self
+    integer, intent(in) :: subdomain
+    integer(i8), allocatable, intent(out) :: words(:)
+    integer :: g
+
+    if (self%kind /= kind_boxes) then
+      g = self%groups%group_of(subdomain)
+      if (self%groups%first(g) == subdomain) then
+        allocate (words(self%groups%length(g)))
+        words(:) = self%groups%maps(self%groups%known(g))%subdomain
+        return
+      end if
+    end if
+    allocate (words(0))
+  end subroutine partition_get_map
+
+  !> The partition that get_head and get_map gave words of, on any number of ranks. Collective.
+  subroutine partition_restore(self, comm, head, words, counts)
+    class(partition_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    !> the same on every rank
+    integer(i8), intent(in), contiguous :: head(:)
+    !> of the subdomains of this rank, one after the other, and how many each has
+    integer(i8), intent(in), contiguous :: words(:)
+    integer, intent(in), contiguous :: counts(:)
+    type(cell_groups_t) :: none
+
+    call read_head(self, head)
+    self%groups = none
+    if (self%kind == kind_cells) then
+      call set_one_group(self)
+      call restore_one_map(self, comm, words)
+    else if (self%kind == kind_groups) then
+      call restore_maps(self, comm, head, words, counts)
+    end if
+  end subroutine partition_restore
+
+  subroutine read_head(self, head)
+    class(partition_t), intent(inout) :: self
+    integer(i8), intent(in), contiguous :: head(:)
+    real(dp) :: reals(18)
+    integer :: k
+
+    self%kind = int(head(1))
+    self%nd = int(head(2))
+    self%n_subdomains = int(head(3))
+    self%cell_limit = head(4)
+    self%boxes(:) = int(head(5:7))
+    self%cells%nd = self%nd
+    self%cells%n(:) = int(head(8:10))
+    self%cells%split = int(head(11))
+    do k = 1, size(reals)
+      reals(k) = transfer(head(11 + k), 1.0_dp)
+    end do
+    self%lower(:) = reals(1:3)
+    self%upper(:) = reals(4:6)
+    self%period(:) = reals(7:9)
+    self%cells%origin(:) = reals(10:12)
+    self%cells%unit(:) = reals(13:15)
+    self%cells%scale(:) = reals(16:18)
+    self%cells%period(:) = 0.0_dp
+    self%cells%period(1:self%nd) = self%period(1:self%nd)
+  end subroutine read_head
+
+  !> Give every rank the map that was stored with subdomain 1.
+  subroutine restore_one_map(self, comm, words)
+    class(partition_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    integer(i8), intent(in), contiguous :: words(:)
+    integer(i8), allocatable :: map(:)
+
+    allocate (map(self%groups%length(1)), source=0_i8)
+    if (comm%rank_of(1, self%n_subdomains) == comm%rank) map(:) = words(1:size(map))
+    call comm%sum_counts(map)
+    self%groups%maps(1)%subdomain(:) = int(map)
+  end subroutine restore_one_map
+
+  !> Take the maps stored with the subdomains of this rank, and share them.
+  subroutine restore_maps(self, comm, head, words, counts)
+    class(partition_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    integer(i8), intent(in), contiguous :: head(:), words(:)
+    integer, intent(in), contiguous :: counts(:)
+    integer, allocatable :: group_of_cell(:), holder(:)
+    logical, allocatable :: in_pieces(:)
+    integer :: n, cell, g, s, next
+
+    n = int(head(head_words))
+    allocate (group_of_cell(self%cells%cells()), in_pieces(self%cells%cells()), holder(n))
+    do cell = 1, size(group_of_cell)
+      group_of_cell(cell) = int(head(head_words + n + 1 + cell)/2)
+      in_pieces(cell) = mod(head(head_words + n + 1 + cell), 2_i8) == 1
+    end do
+    call self%groups%set(self%cells, n, group_of_cell, in_pieces)
+    self%groups%first(:) = int(head(head_words + 1:head_words + n + 1))
+    do g = 1, n
+      holder(g) = comm%rank_of(self%groups%first(g), self%n_subdomains)
+    end do
+    next = 0
+    do s = 1, size(counts)
+      if (counts(s) == 0) cycle
+      g = self%groups%group_of(comm%first_subdomain(comm%rank, self%n_subdomains) + s - 1)
+      call self%groups%hold(g)
+      self%groups%maps(self%groups%known(g))%subdomain(:) = int(words(next + 1:next + counts(s)))
+      next = next + counts(s)
+    end do
+    call self%groups%share(comm, holder)
+  end subroutine restore_maps
 
 end module gravier_partition

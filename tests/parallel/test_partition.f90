@@ -1,14 +1,16 @@
-!> Partitions of space: grids of boxes and shared out cells. Every point has one owner, `near` misses nobody, all ranks
-!> have the same partition, parts are balanced, impossible numbers are refused.
+!> Partitions of space: grids of boxes, shared out cells, on one level and on two, with and without periodic axes. Every point
+!> has one owner, `near` misses nobody, all ranks agree, parts are balanced, impossible numbers are refused, and a partition
+!> that was saved answers as before.
 program test_partition
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, status_input
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_body_store, only: body_set_t
-  use gravier_partition, only: partition_t, choose_boxes
-  use gravier_check, only: check, check_equal, finish_checks
+  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_partition, only: partition_t, choose_boxes, check_subdomains
+  use gravier_cell_levels, only: share_out
+  use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_grains = 1500
   type(communicator_t) :: comm, alone
@@ -19,6 +21,7 @@ program test_partition
   call test_boxes()
   call test_corners()
   call test_choice()
+  call test_periodic_choice()
   call test_too_many_boxes()
   call test_shared_cells(2, 1)
   call test_shared_cells(2, 7)
@@ -28,6 +31,15 @@ program test_partition
   call test_all_cells()
   call test_too_many_parts()
   call test_change_of_kind()
+  call test_periodic_boxes()
+  call test_extremes()
+  call test_weights()
+  call test_share_out()
+  call test_levels(2, 40, .false.)
+  call test_levels(2, 25, .true.)
+  call test_levels(3, 16, .true.)
+  call test_levels(3, 33, .false.)
+  call test_periodic_neighbours()
   call finish_checks()
   call alone%free()
   call comm%free()
@@ -232,50 +244,47 @@ contains
     call check_refused(error, 9, 8)
   end subroutine test_too_many_boxes
 
-  !> Grains of this rank: a heap, denser to one side, on part of the box only. Of `ranks` ranks, or all on this one.
-  subroutine make_grains(nd, rank, ranks, bodies)
+  !> Grains of rank `rank` of `ranks`: a heap, denser to one side, on part of the box only, each of weight 1.
+  subroutine make_grains(nd, rank, ranks, points, weights)
     integer, intent(in) :: nd, rank, ranks
-    type(body_set_t), allocatable, intent(out) :: bodies(:)
-    integer :: g, d, s, n
+    real(dp), allocatable, intent(out) :: points(:, :)
+    integer, allocatable, intent(out) :: weights(:)
+    integer :: g, d, n, round
 
-    allocate (bodies(2))
-    do s = 1, 2
+    do round = 1, 2
       n = 0
       do g = 1, n_grains
-        if (1 + mod(7*g, 2*ranks) == 2*rank + s) n = n + 1
-      end do
-      call bodies(s)%init(nd, nd, n)
-      n = 0
-      do g = 1, n_grains
-        if (1 + mod(7*g, 2*ranks) /= 2*rank + s) cycle
+        if (mod(7*g, ranks) /= rank) cycle
         n = n + 1
-        bodies(s)%id(n) = g
-        bodies(s)%position(1, n) = draw(g, 51, 0.0_dp, 1.0_dp)**2
+        if (round == 1) cycle
+        points(1, n) = draw(g, 51, 0.0_dp, 1.0_dp)**2
         do d = 2, nd
-          bodies(s)%position(d, n) = draw(g, 50 + d, 0.0_dp, 0.8_dp)
+          points(d, n) = draw(g, 50 + d, 0.0_dp, 0.8_dp)
         end do
       end do
+      if (round == 1) allocate (points(nd, n))
     end do
+    allocate (weights(n), source=1)
   end subroutine make_grains
 
   subroutine test_shared_cells(nd, n)
     integer, intent(in) :: nd, n
     type(partition_t) :: partition, serial
     type(error_t), allocatable :: error
-    type(body_set_t), allocatable :: bodies(:), all_bodies(:)
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:), list(:)
     real(dp) :: lower(nd), upper(nd), edge
-    integer, allocatable :: list(:)
     integer :: cell, next
     logical :: right
 
     lower(:) = 0.0_dp
     upper(:) = 1.0_dp
     edge = merge(0.04_dp, 0.12_dp, nd == 2)
-    call make_grains(nd, comm%rank, comm%size, bodies)
-    call partition%init_graph(comm, lower, upper, edge, bodies, n, error)
+    call make_grains(nd, comm%rank, comm%size, points, weights)
+    call partition%init_graph(comm, lower, upper, edge, points, weights, n, error)
     call check(.not. allocated(error), "cells shared out")
     call check_equal(partition%n_subdomains, n, "number of subdomains")
-    associate (owner => partition%subdomain_of_cell)
+    associate (owner => partition%groups%maps(1)%subdomain)
       call check(all(owner >= 1 .and. owner <= n), "every cell has a subdomain")
       ! subdomains are numbered in the order in which cells with grains meet them
       right = .true.
@@ -291,10 +300,11 @@ contains
       call check_balance(owner, list, n)
     end associate
     call check_near(partition, lower, upper)
+    call check_saved(partition, nd)
     ! one rank alone, with all grains, finds the same
-    call make_grains(nd, 0, 1, all_bodies)
-    call serial%init_graph(alone, lower, upper, edge, all_bodies, n, error)
-    call check(all(serial%subdomain_of_cell == partition%subdomain_of_cell), "the same on any number of ranks")
+    call make_grains(nd, 0, 1, points, weights)
+    call serial%init_graph(alone, lower, upper, edge, points, weights, n, error)
+    call check(all(serial%groups%maps(1)%subdomain == partition%groups%maps(1)%subdomain), "the same on any number of ranks")
   end subroutine test_shared_cells
 
   !> Grains of each cell.
@@ -302,15 +312,15 @@ contains
     type(partition_t), intent(in) :: partition
     integer, intent(in) :: nd
     integer, intent(inout) :: counts(:)
-    type(body_set_t), allocatable :: bodies(:)
-    integer :: s, k, cell
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
+    integer :: k, cell, place(3)
 
-    call make_grains(nd, 0, 1, bodies)
-    do s = 1, size(bodies)
-      do k = 1, bodies(s)%n
-        cell = partition%cells%index_of(bodies(s)%position(:, k))
-        counts(cell) = counts(cell) + 1
-      end do
+    call make_grains(nd, 0, 1, points, weights)
+    do k = 1, size(weights)
+      call partition%cells%locate(points(:, k), place)
+      cell = partition%cells%cell_at(place)
+      counts(cell) = counts(cell) + 1
     end do
   end subroutine count_grains
 
@@ -330,17 +340,17 @@ contains
     call check_equal(sum(grains), n_grains, "all grains are in cells")
   end subroutine check_balance
 
-  !> A grain in each of 12 cells.
-  subroutine make_row(bodies)
-    type(body_set_t), allocatable, intent(out) :: bodies(:)
+  !> A grain in each of 12 cells, on the last rank.
+  subroutine make_row(points, weights)
+    real(dp), allocatable, intent(out) :: points(:, :)
+    integer, allocatable, intent(out) :: weights(:)
     integer :: k
 
-    allocate (bodies(1))
-    call bodies(1)%init(2, 2, merge(12, 0, comm%rank == comm%size - 1))
-    do k = 1, bodies(1)%n
-      bodies(1)%id(k) = k
-      bodies(1)%position(1, k) = k - 0.5_dp
-      bodies(1)%position(2, k) = 0.5_dp
+    allocate (points(2, merge(12, 0, comm%rank == comm%size - 1)), weights(merge(12, 0, comm%rank == comm%size - 1)))
+    do k = 1, size(weights)
+      weights(k) = 1
+      points(1, k) = k - 0.5_dp
+      points(2, k) = 0.5_dp
     end do
   end subroutine make_row
 
@@ -349,14 +359,15 @@ contains
   subroutine test_all_cells()
     type(partition_t) :: partition
     type(error_t), allocatable :: error
-    type(body_set_t), allocatable :: bodies(:)
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
     integer :: k, n
     real(dp) :: point(2)
     integer, allocatable :: met(:)
 
-    call make_row(bodies)
+    call make_row(points, weights)
     do n = 6, 12, 6
-      call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, bodies, n, error)
+      call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, n, error)
       call check(.not. allocated(error), "cells of a row")
       allocate (met(n), source=0)
       do k = 1, 12
@@ -365,9 +376,11 @@ contains
         met(partition%owner(point)) = met(partition%owner(point)) + 1
       end do
       if (n == 6) call check(all(met == 2), "two cells for every subdomain")
-      call check(all(partition%subdomain_of_cell >= 1 .and. partition%subdomain_of_cell <= n), "empty cells have a subdomain")
+      associate (owner => partition%groups%maps(1)%subdomain)
+        call check(all(owner >= 1 .and. owner <= n), "empty cells have a subdomain")
+      end associate
       ! three rows up: the owner of one of the cells that are three steps away, diagonal steps being allowed
-      associate (row => partition%subdomain_of_cell(1:12))
+      associate (row => partition%groups%maps(1)%subdomain(1:12))
         do k = 1, 12
           point(1) = k - 0.5_dp
           point(2) = 3.5_dp
@@ -381,10 +394,11 @@ contains
   subroutine test_too_many_parts()
     type(partition_t) :: partition
     type(error_t), allocatable :: error
-    type(body_set_t), allocatable :: bodies(:)
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
 
-    call make_row(bodies)
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, bodies, 13, error)
+    call make_row(points, weights)
+    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, 13, error)
     call check_refused(error, 13, 12)
   end subroutine test_too_many_parts
 
@@ -392,15 +406,379 @@ contains
   subroutine test_change_of_kind()
     type(partition_t) :: partition
     type(error_t), allocatable :: error
-    type(body_set_t), allocatable :: bodies(:)
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
 
-    call make_row(bodies)
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, bodies, 12, error)
+    call make_row(points, weights)
+    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, 12, error)
     call partition%init_grid([0.0_dp, 0.0_dp], [12.0_dp, 4.0_dp], [3, 1, 1], 1.0_dp, error)
     call check_equal(partition%owner([11.0_dp, 1.0_dp]), 3, "boxes after cells")
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, bodies, 6, error)
+    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, 6, error)
     call check_equal(partition%owner([11.5_dp, 0.5_dp]), 6, "cells after boxes")
     call check_equal(partition%n_subdomains, 6, "subdomains of cells after boxes")
   end subroutine test_change_of_kind
+
+  !> Boxes on periodic axes: images have the same owner, and `near` looks through the faces.
+  subroutine test_periodic_boxes()
+    type(partition_t) :: partition
+    type(error_t), allocatable :: error
+    integer, allocatable :: list(:)
+    integer :: n
+
+    allocate (list(0))
+    partition%period(1) = 4.0_dp
+    call partition%init_grid([0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp], [4, 2, 1], 0.25_dp, error)
+    call check_equal(partition%owner([4.0_dp, 2.0_dp]), 5, "the upper end is the lower end")
+    call check_equal(partition%owner([-0.5_dp, 0.5_dp]), 4, "left of the box")
+    call check_equal(partition%owner([9.5_dp, 5.0_dp]), 6, "two periods right, above")
+    call check_equal(partition%relay([9.5_dp, 5.0_dp]), 6, "boxes need no relay")
+    call partition%near([0.25_dp, 0.5_dp], 0.3_dp, list, n)
+    call check(n == 2 .and. all([any(list(1:n) == 1), any(list(1:n) == 4)]), "near through a face")
+    call partition%near([0.5_dp, 0.5_dp], 1.9_dp, list, n)
+    call check_equal(n, 8, "near all around")
+    call check_near(partition, [0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp])
+    call check_saved(partition, 2)
+    partition%period(:) = 1.7_dp
+    call partition%init_grid([0.3_dp, -1.0_dp, 0.1_dp], [2.0_dp, 0.7_dp, 1.8_dp], [3, 1, 2], 0.05_dp, error)
+    call check_near(partition, [0.3_dp, -1.0_dp, 0.1_dp], [2.0_dp, 0.7_dp, 1.8_dp])
+    call check_images(partition, 3)
+  end subroutine test_periodic_boxes
+
+  !> Points of the box, and their images within the roundings of a few periods: the same owner, unless a border is near.
+  subroutine check_images(partition, nd)
+    type(partition_t), intent(in) :: partition
+    integer, intent(in) :: nd
+    real(dp) :: point(nd), image(nd)
+    integer, allocatable :: list(:)
+    integer :: k, d, n
+    logical :: same
+
+    allocate (list(8))
+    same = .true.
+    do k = 1, 1000
+      do d = 1, nd
+        point(d) = draw(k, 60 + d, partition%lower(d), partition%upper(d))
+        image(d) = point(d) + (mod(k*d, 7) - 3)*partition%period(d)
+      end do
+      call partition%near(point, 1.0e-12_dp, list, n)
+      if (n == 1) same = same .and. partition%owner(image) == partition%owner(point)
+    end do
+    call check(same, "images have the owner of the point")
+  end subroutine check_images
+
+  !> Two boxes on a periodic axis meet twice: the other axis is cut although it is longer across.
+  subroutine test_periodic_choice()
+    integer :: boxes(3)
+
+    boxes(:) = choose_boxes([0.0_dp, 0.0_dp], [1.5_dp, 1.0_dp], 2)
+    call check(all(boxes == [2, 1, 1]), "the cut across the long axis")
+    boxes(:) = choose_boxes([0.0_dp, 0.0_dp], [1.5_dp, 1.0_dp], 2, [1.5_dp, 0.0_dp])
+    call check(all(boxes == [1, 2, 1]), "not where it has to be cut twice")
+    boxes(:) = choose_boxes([0.0_dp, 0.0_dp], [1.5_dp, 1.0_dp], 2, [1.5_dp, 1.0_dp])
+    call check(all(boxes == [2, 1, 1]), "both axes cut twice")
+    ! a large prime, and many factors: at once
+    boxes(:) = choose_boxes([0.0_dp, 0.0_dp], [1.0_dp, 2.0_dp], 2147483647)
+    call check(all(boxes == [1, 2147483647, 1]), "boxes of a large prime")
+    boxes(:) = choose_boxes([0.0_dp, 0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp, 1.0_dp], 1073741824)
+    call check(all(boxes == 1024), "boxes of a power of two")
+  end subroutine test_periodic_choice
+
+  !> Extents and numbers that integers and reals cannot count.
+  subroutine test_extremes()
+    type(partition_t) :: partition
+    type(error_t), allocatable :: error
+    real(dp), parameter :: far(3) = 1.0e308_dp
+    real(dp) :: points(3, 2)
+
+    call check_subdomains(-far, far, 1.0e-3_dp, huge(1), error)
+    call check(.not. allocated(error), "cells without number")
+    call check_subdomains([0.0_dp, 0.0_dp, 0.0_dp], [2.0e3_dp, 2.0e3_dp, 2.0e3_dp], 1.0_dp, huge(1), error)
+    call check(.not. allocated(error), "more cells than integers")
+    call partition%init_grid([0.0_dp, 0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp, 1.0_dp], [100000, 100000, 100000], 0.1_dp, error)
+    call check(allocated(error), "a product of boxes without number")
+    deallocate (error)
+    points(:, 1) = -far
+    points(:, 2) = far
+    call partition%init_graph(comm, -far, far, 1.0e-3_dp, points, [1, 1], 2, error)
+    call check(.not. allocated(error), "a graph of cells without number")
+    call check(partition%owner(points(:, 1)) /= partition%owner(points(:, 2)), "parts of a scene without number")
+  end subroutine test_extremes
+
+  !> A row of 60 cells of weight 1, the last ten of weight 31 by their contacts (300 + 60 in all): parts of equal weight hold
+  !> unequal numbers of cells. A grain of a contact of weight 0 counts for nothing.
+  subroutine test_weights()
+    type(partition_t) :: partition
+    type(error_t), allocatable :: error
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
+    real(dp) :: point(2)
+    integer :: k, n, held(4)
+
+    n = merge(71, 0, comm%rank == 0)
+    allocate (points(2, n), weights(n))
+    do k = 1, n
+      points(1, k) = min(k, 60) - 0.5_dp
+      points(2, k) = 0.5_dp
+      weights(k) = 1
+      if (k <= 60) cycle
+      points(1, k) = k - 10 - 0.3_dp
+      weights(k) = merge(30, 0, k <= 70)
+    end do
+    if (n > 0) points(2, 71) = 3.5_dp
+    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [59.9_dp, 3.9_dp], 1.0_dp, points, weights, 4, error)
+    call check(.not. allocated(error), "weighted points")
+    held(:) = 0
+    do k = 1, 60
+      point(1) = k - 0.5_dp
+      point(2) = 0.5_dp
+      associate (part => partition%owner(point))
+        held(part) = held(part) + merge(31, 1, k > 50)
+      end associate
+    end do
+    ! 3 % over the mean of 90, and one of the heaviest cells
+    call check(maxval(held) <= 1.03*90 + 31 .and. minval(held) > 0, "weights decide the balance")
+  end subroutine test_weights
+
+  !> The largest share is below the mean times total/(total - groups); nobody gets more than it may.
+  subroutine test_share_out()
+    integer(i8) :: weight(40), most(40)
+    integer :: counts(40), k
+
+    do k = 1, 40
+      weight(k) = int(draw(k, 91, 1.0_dp, 40.0_dp)**3, i8) + 1
+    end do
+    most(:) = 1000000
+    call share_out(weight, most, 1300, counts)
+    call check_equal(sum(counts), 1300, "subdomains shared out")
+    call check(all(counts >= 1), "at least one each")
+    call check(maxval(real(weight, dp)/counts) <= real(sum(weight), dp)/(1300 - 40), "the largest share")
+    most(:) = 3
+    call share_out(weight, most, 118, counts)
+    call check(sum(counts) == 118 .and. all(counts >= 1 .and. counts <= 3), "as many as there may be")
+    call share_out(weight, most, 40, counts)
+    call check(all(counts == 1), "one each")
+    call share_out(weight, most, 120, counts)
+    call check(all(counts == 3), "all that there may be")
+  end subroutine test_share_out
+
+  !> A small bound on the cells of a graph: two levels. Points reach their owner by relay, each has exactly one, loads are
+  !> bounded, `near` is complete around the points of this rank, and nothing depends on the number of ranks.
+  subroutine test_levels(nd, n, is_periodic)
+    integer, intent(in) :: nd, n
+    logical, intent(in) :: is_periodic
+    type(partition_t) :: partition, serial
+    type(error_t), allocatable :: error
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
+    real(dp) :: lower(nd), upper(nd), edge
+
+    lower(:) = 0.0_dp
+    upper(:) = 1.0_dp
+    edge = merge(0.008_dp, 0.03_dp, nd == 2)
+    partition%cell_limit = 128
+    if (is_periodic) partition%period(1) = 1.0_dp
+    if (is_periodic) partition%period(nd) = 1.0_dp
+    call make_grains(nd, comm%rank, comm%size, points, weights)
+    call partition%init_graph(comm, lower, upper, edge, points, weights, n, error)
+    call check(.not. allocated(error), "cells shared out on two levels")
+    if (allocated(error)) return
+    call check(partition%groups%n > 1 .and. partition%cells%split > 1, "there are two levels")
+    call check(partition%cells%cells() <= 128, "cells of the first level")
+    call make_grains(nd, 0, 1, points, weights)
+    serial%cell_limit = partition%cell_limit
+    serial%period(:) = partition%period
+    call serial%init_graph(alone, lower, upper, edge, points, weights, n, error)
+    call check_levels(partition, serial, points)
+    call check_loads(serial, points, n)
+    call check_near(serial, lower, upper)
+    call check_far(partition, serial, points, edge)
+    call check_routes(partition, serial, nd)
+    call check_saved(partition, nd)
+  end subroutine test_levels
+
+  !> What this rank knows, it knows as one rank alone does; it knows the points of its own subdomains.
+  subroutine check_levels(partition, serial, points)
+    type(partition_t), intent(in) :: partition, serial
+    real(dp), intent(in) :: points(:, :)
+    integer :: k, owner, all_owner
+    logical :: same, own, relayed
+
+    same = .true.
+    own = .true.
+    relayed = .true.
+    do k = 1, size(points, 2)
+      owner = partition%owner(points(:, k))
+      all_owner = serial%owner(points(:, k))
+      same = same .and. (owner == 0 .or. owner == all_owner) .and. all_owner >= 1 .and. all_owner <= partition%n_subdomains
+      if (comm%rank_of(all_owner, partition%n_subdomains) == comm%rank) own = own .and. owner == all_owner
+      associate (relay => partition%relay(points(:, k)))
+        relayed = relayed .and. relay == serial%relay(points(:, k))
+        if (comm%rank_of(relay, partition%n_subdomains) == comm%rank) relayed = relayed .and. owner > 0
+      end associate
+    end do
+    call check(same, "two levels: the same on any number of ranks")
+    call check(own, "two levels: a rank knows its own points")
+    call check(relayed, "two levels: the relay knows the owner")
+  end subroutine check_levels
+
+  !> The shares of the groups differ from the mean by total/(total - groups) at most, METIS allows 3 %, and a piece cannot be
+  !> cut: a subdomain may hold one more of the fullest pieces. Where a part has few pieces METIS may miss by one more.
+  subroutine check_loads(serial, points, n)
+    type(partition_t), intent(in) :: serial
+    real(dp), intent(in) :: points(:, :)
+    integer, intent(in) :: n
+    integer, allocatable :: held(:), in_piece(:)
+    integer :: k, fullest, place(3), number
+    real(dp) :: bound
+
+    allocate (held(n), source=0)
+    fullest = 0
+    do k = 1, size(points, 2)
+      held(serial%owner(points(:, k))) = held(serial%owner(points(:, k))) + 1
+    end do
+    allocate (in_piece(serial%cells%cells()*int(serial%cells%pieces())), source=0)
+    do k = 1, size(points, 2)
+      call serial%cells%locate(points(:, k), place)
+      number = (serial%cells%cell_at(place) - 1)*int(serial%cells%pieces()) + 1 + serial%cells%piece_at(place)
+      in_piece(number) = in_piece(number) + 1
+    end do
+    fullest = maxval(in_piece)
+    bound = 1.03_dp*size(points, 2)/(n - serial%groups%n) + 2*fullest
+    call check(maxval(held) <= bound, "two levels: the fullest subdomain")
+    call check_equal(count(held == 0), 0, "two levels: no subdomain is empty")
+  end subroutine check_loads
+
+  !> Around the points of its own subdomains a rank knows all that are near, up to the edge.
+  subroutine check_far(partition, serial, points, edge)
+    type(partition_t), intent(in) :: partition, serial
+    real(dp), intent(in) :: points(:, :), edge
+    integer, allocatable :: list(:), all_list(:)
+    real(dp), allocatable :: point(:)
+    integer :: k, j, n, all_n
+    logical :: complete
+
+    allocate (list(4), all_list(4), point(size(points, 1)))
+    complete = .true.
+    do k = 1, size(points, 2)
+      point(:) = points(:, k)
+      if (comm%rank_of(serial%owner(point), partition%n_subdomains) /= comm%rank) cycle
+      call partition%near(point, edge, list, n)
+      call serial%near(point, edge, all_list, all_n)
+      complete = complete .and. n == all_n
+      do j = 1, n
+        complete = complete .and. list(j) > 0 .and. any(all_list(1:all_n) == list(j))
+      end do
+    end do
+    call check(complete, "two levels: near its own points a rank misses nobody")
+  end subroutine check_far
+
+  !> Points anywhere, outside too, sent to the relay, then to the owner: each arrives once, where one rank alone says.
+  subroutine check_routes(partition, serial, nd)
+    type(partition_t), intent(in) :: partition, serial
+    integer, intent(in) :: nd
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer, allocatable :: destination(:)
+    integer :: k, hop, owner
+    real(dp) :: point(nd)
+    logical :: right
+
+    allocate (received(1, 300))
+    do k = 1, 300
+      received(1, k) = 300*comm%rank + k
+    end do
+    do hop = 1, 2
+      call move_alloc(received, records)
+      allocate (destination(size(records, 2)))
+      do k = 1, size(destination)
+        point(:) = anywhere(nd, int(records(1, k)))
+        owner = partition%owner(point)
+        if (owner == 0 .and. hop == 1) owner = partition%relay(point)
+        call check(owner > 0, "two levels: a relay that does not know")
+        destination(k) = comm%rank_of(owner, partition%n_subdomains)
+      end do
+      call sparse_exchange(comm, records, destination, received)
+      deallocate (destination)
+    end do
+    right = .true.
+    do k = 1, size(received, 2)
+      point(:) = anywhere(nd, int(received(1, k)))
+      owner = serial%owner(point)
+      right = right .and. comm%rank_of(owner, partition%n_subdomains) == comm%rank
+      right = right .and. partition%owner(point) == owner
+    end do
+    call check(right, "two levels: points arrive at their owner")
+    call check_equal(comm%total(int(size(received, 2), i8)), 300_i8*comm%size, "two levels: all points arrive")
+  end subroutine check_routes
+
+  function anywhere(nd, k) result(point)
+    integer, intent(in) :: nd, k
+    real(dp) :: point(nd)
+    integer :: d
+    do d = 1, nd
+      point(d) = draw(k, 70 + d, -0.5_dp, 1.5_dp)
+    end do
+  end function anywhere
+
+  !> A partition made anew from the words that its subdomains and its head were stored in gives the same answers.
+  subroutine check_saved(partition, nd)
+    type(partition_t), intent(in) :: partition
+    integer, intent(in) :: nd
+    type(partition_t) :: other
+    integer(i8), allocatable :: head(:), map(:), words(:), longer(:)
+    integer, allocatable :: counts(:), list(:), other_list(:)
+    real(dp) :: point(nd)
+    integer :: s, k, first, n, other_n
+    logical :: same
+
+    call partition%get_head(head)
+    first = comm%first_subdomain(comm%rank, partition%n_subdomains)
+    allocate (counts(comm%first_subdomain(comm%rank + 1, partition%n_subdomains) - first), words(0))
+    do s = 1, size(counts)
+      call partition%get_map(first + s - 1, map)
+      counts(s) = size(map)
+      allocate (longer(size(words) + size(map)))
+      longer(1:size(words)) = words
+      longer(size(words) + 1:) = map
+      call move_alloc(longer, words)
+    end do
+    call other%restore(comm, head, words, counts)
+    call check_equal(other%n_subdomains, partition%n_subdomains, "subdomains restored")
+    call check_close(norm2(other%period - partition%period), 0.0_dp, 0.0_dp, "period restored")
+    call check(all(other%boxes == partition%boxes), "boxes restored")
+    allocate (list(8), other_list(8))
+    same = .true.
+    do k = 1, 2000
+      point(:) = anywhere(nd, k)
+      same = same .and. other%owner(point) == partition%owner(point) .and. other%relay(point) == partition%relay(point)
+      call partition%near(point, 0.03_dp, list, n)
+      call other%near(point, 0.03_dp, other_list, other_n)
+      same = same .and. n == other_n
+      if (n == other_n) same = same .and. all(list(1:n) == other_list(1:n))
+    end do
+    call check(same, "the same answers when restored")
+  end subroutine check_saved
+
+  !> A ring of 12 cells: two parts are two arcs, and cells 1 and 12 are neighbours. METIS has no reason to cut between them,
+  !> as it does where the ends are apart; weights of the edges say where: 12 and 1 are heavy.
+  subroutine test_periodic_neighbours()
+    type(partition_t) :: partition
+    type(error_t), allocatable :: error
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:), list(:)
+    integer :: n
+
+    call make_row(points, weights)
+    if (size(weights) > 0) weights(:) = [30, 10, 10, 1, 10, 10, 10, 10, 1, 10, 10, 30]
+    partition%period(1) = 12.0_dp
+    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [12.0_dp, 0.9_dp], 1.0_dp, points, weights, 2, error)
+    call check(.not. allocated(error), "cells of a ring")
+    call check_equal(partition%cells%n(1), 12, "whole cells fill the period")
+    call check_equal(partition%owner([0.5_dp, 0.5_dp]), partition%owner([11.5_dp, 0.5_dp]), "a ring is not cut where it is heavy")
+    call check_equal(partition%owner([12.5_dp, 0.5_dp]), partition%owner([0.5_dp, 0.5_dp]), "an image in the ring")
+    allocate (list(4))
+    call partition%near([0.25_dp, 0.5_dp], 12.0_dp, list, n)
+    call check_equal(n, 2, "near: both arcs once")
+    call check_saved(partition, 2)
+  end subroutine test_periodic_neighbours
 
 end program test_partition
