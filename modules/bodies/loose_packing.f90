@@ -54,11 +54,11 @@ module gravier_loose_packing
     integer(i8), allocatable :: id(:)
     real(dp), allocatable :: radius(:), position(:, :)
     !> class being placed, and those of its grains on this rank that have no place yet
-    integer :: class = 0
+    integer :: size_class = 0
     integer, allocatable :: waiting(:)
     !> places that each waiting grain tried in earlier rounds and tries in this one
     integer :: tried = 0, trials = 0
-    !> grains of each class that are in the brick of this rank or reach into it (0:class)
+    !> grains of each class that are in the brick of this rank or reach into it (0:size_class)
     type(placed_grains_t), allocatable :: placed(:)
     !> proposals of a round that are in the brick of this rank or reach into it
     type(placed_grains_t) :: rivals
@@ -90,7 +90,7 @@ contains
     real(dp), intent(out), contiguous :: position(:, :)
     type(error_t), allocatable, intent(inout) :: error
     type(placement_t) :: placement
-    integer :: class, last_class
+    integer :: size_class, last_class
     integer(i8) :: left
 
     position(:, :) = 0.0_dp
@@ -107,8 +107,8 @@ contains
     call placement%bricks%init(box, comm%size)
     last_class = placement%class_of(comm%lowest(minval(radius)))
     allocate (placement%placed(0:last_class))
-    do class = 0, last_class
-      call place_class(comm, placement, class, left)
+    do size_class = 0, last_class
+      call place_class(comm, placement, size_class, left)
       if (left > 0) then
         call raise_too_dense(comm, box, radius, left, error)
         return
@@ -157,19 +157,19 @@ contains
   end subroutine raise_too_dense
 
   !> Give the grains of one class their places. Collective.
-  subroutine place_class(comm, self, class, left)
+  subroutine place_class(comm, self, size_class, left)
     type(communicator_t), intent(in) :: comm
     type(placement_t), intent(inout) :: self
-    integer, intent(in) :: class
+    integer, intent(in) :: size_class
     !> grains of all ranks that found no place
     integer(i8), intent(out) :: left
     integer(i8) :: wanted, history(most_rounds)
     integer :: round
     logical, allocatable :: clear(:)
 
-    self%class = class
+    self%size_class = size_class
     self%tried = 0
-    call self%placed(class)%init(self%box, self%class_radius(class), .false.)
+    call self%placed(size_class)%init(self%box, self%class_radius(size_class), .false.)
     call self%choose_waiting()
     left = comm%total(size(self%waiting, kind=i8))
     wanted = max(left, int(fewest_trials, i8))
@@ -260,11 +260,11 @@ contains
   pure logical function is_clear(self, radius, position)
     type(placement_t), intent(in) :: self
     real(dp), intent(in) :: radius, position(:)
-    integer :: class
+    integer :: size_class
 
     is_clear = .false.
-    do class = 0, self%class
-      if (self%placed(class)%blocks(0_i8, radius, position)) return
+    do size_class = 0, self%size_class
+      if (self%placed(size_class)%blocks(0_i8, radius, position)) return
     end do
     is_clear = .true.
   end function is_clear
@@ -311,7 +311,7 @@ contains
     do k = 1, size(verdicts, 2)
       if (verdicts(1, k) == 0) then
         position(:) = real_of(verdicts(4:, k))
-        call self%placed(self%class)%insert(verdicts(2, k), real_of(verdicts(3, k)), position)
+        call self%placed(self%size_class)%insert(verdicts(2, k), real_of(verdicts(3, k)), position)
       else
         placed(verdicts(1, k)) = .true.
       end if
@@ -332,7 +332,7 @@ contains
     integer(i8) :: record(3 + self%box%nd)
     integer :: k
 
-    call self%rivals%init(self%box, self%class_radius(self%class), .true.)
+    call self%rivals%init(self%box, self%class_radius(self%size_class), .true.)
     do k = 1, size(proposals, 2)
       position(:) = real_of(proposals(5:, k))
       call self%rivals%insert(proposals(3, k), real_of(proposals(4, k)), position)
@@ -351,28 +351,28 @@ contains
   end subroutine judge_proposals
 
   !> Class of a radius.
-  pure integer function placement_class_of(self, radius) result(class)
+  pure integer function placement_class_of(self, radius) result(size_class)
     class(placement_t), intent(in) :: self
     real(dp), intent(in) :: radius
 
-    class = 0
-    do while (class < most_classes .and. radius <= self%class_radius(class + 1))
-      class = class + 1
+    size_class = 0
+    do while (size_class < most_classes .and. radius <= self%class_radius(size_class + 1))
+      size_class = size_class + 1
     end do
   end function placement_class_of
 
   !> Largest radius of a class [m].
-  pure real(dp) function placement_class_radius(self, class) result(radius)
+  pure real(dp) function placement_class_radius(self, size_class) result(radius)
     class(placement_t), intent(in) :: self
-    integer, intent(in) :: class
-    radius = self%largest*0.5_dp**class
+    integer, intent(in) :: size_class
+    radius = self%largest*0.5_dp**size_class
   end function placement_class_radius
 
   !> Distance within which a grain of the present class may overlap grains of this class or of those after it [m].
   pure real(dp) function placement_reach(self, radius) result(reach)
     class(placement_t), intent(in) :: self
     real(dp), intent(in) :: radius
-    reach = radius + self%class_radius(self%class)
+    reach = radius + self%class_radius(self%size_class)
   end function placement_reach
 
   !> Let all grains of this rank that are of the present class wait.
@@ -384,7 +384,7 @@ contains
     allocate (chosen(size(self%radius)))
     n = 0
     do k = 1, size(self%radius)
-      if (self%class_of(self%radius(k)) /= self%class) cycle
+      if (self%class_of(self%radius(k)) /= self%size_class) cycle
       n = n + 1
       chosen(n) = k
     end do
