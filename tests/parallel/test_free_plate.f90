@@ -247,6 +247,7 @@ contains
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
 
+    scheme%sweeps = 5
     control%tolerance = 1.0e-12_dp
     control%max_iterations = 3000
     call solve_contacts(problem, scheme, control, report, error)
