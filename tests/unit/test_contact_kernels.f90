@@ -3,7 +3,7 @@ program test_contact_kernels
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_contact_kernels, only: kernels_t, contact_jacobian, tangents
+  use gravier_contact_kernels, only: kernels_t, contact_jacobian, tangents, local_operator
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -30,14 +30,9 @@ program test_contact_kernels
       call test_velocity(dimension, friction, rotation)
       call test_one_contact(dimension, friction, rotation)
       call test_record(dimension, friction, rotation)
+      call test_components(dimension, friction, rotation)
     end do
-  end do
-  call test_local_operator(2)
-  call test_local_operator(3)
-  do k = 2, 3
-    call test_components(k, .false., .false.)
-    call test_components(k, .false., .true.)
-    call test_components(k, .true., .true.)
+    call test_local_operator(dimension)
   end do
   call test_no_contacts()
   call test_tangents()
