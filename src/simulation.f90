@@ -17,6 +17,7 @@ module gravier_simulation
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
+  use gravier_overlap_projection, only: project_overlaps
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -35,6 +36,8 @@ module gravier_simulation
     integer(i8) :: left = 0, fast = 0
     !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
     logical :: listed = .false., divided = .false., refused = .false.
+    !> places were projected, because some overlap exceeded what is allowed
+    logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
   end type step_figures_t
@@ -61,6 +64,8 @@ module gravier_simulation
     integer :: step = 0
     !> [s]
     real(dp) :: time = 0.0_dp
+    !> overlap beyond which places are projected; huge where that is off [m]
+    real(dp) :: overlap_allowed = huge(1.0_dp)
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
   contains
@@ -127,6 +132,9 @@ contains
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
+      self%overlap_allowed = huge(1.0_dp)
+      if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
+        & self%overlap_allowed = merge(config%overlap_allowed, 0.01_dp*scene%mean_radius, config%overlap_given)
       rule%kind = merge(rule_primal, rule_dual, self%config%decomposition%kind == "primal")
     end associate
   end subroutine set_physics
@@ -505,6 +513,8 @@ contains
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
     call move_to_end(self)
+    figures%projected = figures%max_overlap > self%overlap_allowed
+    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%overlap_allowed)
     if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     call stop_timer(phase_bodies)
     self%step = self%step + 1

@@ -16,7 +16,7 @@ module gravier_problem_builder
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
   implicit none
   private
-  public :: physics_t, interface_figures_t, build_problem, take_velocities, n_multiplicities
+  public :: physics_t, interface_figures_t, build_problem, take_velocities, take_displacements, n_multiplicities
 
   !> What acts on the grains of a scene.
   type :: physics_t
@@ -611,9 +611,8 @@ contains
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(in) :: problem
-    integer(i8), allocatable :: records(:, :), received(:, :)
-    integer, allocatable :: destination(:)
-    integer :: s, k, d, h
+    integer(i8), allocatable :: received(:, :)
+    integer :: s, k, d, h, place
 
     do s = 1, size(decomposition%home)
       associate (home => decomposition%home(s))
@@ -622,18 +621,55 @@ contains
         end do
       end associate
     end do
-    call list_returns(decomposition, problem, records, destination)
-    call sparse_exchange(decomposition%comm, records, destination, received)
+    call return_velocities(decomposition, problem, received)
     do k = 1, size(received, 2)
-      h = int(received(1, k)) - decomposition%first + 1
-      associate (home => decomposition%home(h))
-        s = find_sorted(home%id, received(2, k))
-        do d = 1, home%nv
-          home%velocity(d, s) = transfer(received(2 + d, k), 0.0_dp)
+      call find_home(decomposition, received(1:2, k), h, place)
+      do d = 1, decomposition%nv
+        decomposition%home(h)%velocity(d, place) = transfer(received(2 + d, k), 0.0_dp)
+      end do
+    end do
+  end subroutine take_velocities
+
+  !> Move the grains in contact by what v_global holds in the place of velocities [m]. Collective.
+  subroutine take_displacements(decomposition, problem)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    integer(i8), allocatable :: received(:, :)
+    integer :: k, d, h, place
+
+    call return_velocities(decomposition, problem, received)
+    do k = 1, size(received, 2)
+      call find_home(decomposition, received(1:2, k), h, place)
+      associate (position => decomposition%home(h)%position)
+        do d = 1, decomposition%nd
+          position(d, place) = position(d, place) + transfer(received(2 + d, k), 0.0_dp)
         end do
       end associate
     end do
-  end subroutine take_velocities
+  end subroutine take_displacements
+
+  !> Send v_global of the grains in contact to the ranks of their owners: records (owner, grain, velocity). Collective.
+  subroutine return_velocities(decomposition, problem, received)
+    type(decomposition_t), intent(in) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    integer(i8), allocatable, intent(out) :: received(:, :)
+    integer(i8), allocatable :: records(:, :)
+    integer, allocatable :: destination(:)
+
+    call list_returns(decomposition, problem, records, destination)
+    call sparse_exchange(decomposition%comm, records, destination, received)
+  end subroutine return_velocities
+
+  !> Subdomain of this rank and place in its home of a grain.
+  pure subroutine find_home(decomposition, key, h, place)
+    type(decomposition_t), intent(in) :: decomposition
+    !> owner and identifier
+    integer(i8), intent(in) :: key(2)
+    integer, intent(out) :: h, place
+
+    h = int(key(1)) - decomposition%first + 1
+    place = find_sorted(decomposition%home(h)%id, key(2))
+  end subroutine find_home
 
   !> Records (owner, grain, velocity) of the grains in contact, one per grain: from its owner where that is a
   !> sharer, else from the first sharer.
