@@ -129,15 +129,15 @@ contains
   !> Are the entries of a list, each perhaps after a repeat count and a star, all words for a logical value?
   pure logical function are_logicals(list)
     character(len=*), intent(in) :: list
-    character(len=:), allocatable :: entry
     integer :: first, length
 
     are_logicals = .true.
     first = 1
     do while (first <= len(list) .and. are_logicals)
       length = scan(list(first:)//",", " ,") - 1
-      entry = lower(list(first:first + length - 1))
-      if (length > 0) are_logicals = has_word("t f .t. .f. true false .true. .false.", entry(index(entry, "*") + 1:))
+      associate (entry => list(first:first + length - 1))
+        if (length > 0) are_logicals = has_word("t f .t. .f. true false .true. .false.", lower(entry(index(entry, "*") + 1:)))
+      end associate
       first = first + length + 1
     end do
   end function are_logicals
