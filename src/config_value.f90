@@ -126,21 +126,18 @@ contains
     if (key%count > 1) where (touched) slot%logicals = values
   end subroutine read_logical
 
-  !> Are the entries of a list, each perhaps after a repeat count, all words for a logical value?
+  !> Are the entries of a list, each perhaps after a repeat count and a star, all words for a logical value?
   pure logical function are_logicals(list)
     character(len=*), intent(in) :: list
-    character(len=:), allocatable :: entry
-    integer :: first, length, star
+    integer :: first, length
 
     are_logicals = .true.
     first = 1
     do while (first <= len(list) .and. are_logicals)
       length = scan(list(first:)//",", " ,") - 1
-      entry = lower(list(first:first + length - 1))
-      star = index(entry, "*")
-      if (star > 1) are_logicals = verify(entry(:star - 1), "0123456789") == 0
-      if (length > 0 .and. are_logicals) &
-        are_logicals = has_word("t f .t. .f. true false .true. .false.", entry(star + 1:))
+      associate (entry => list(first:first + length - 1))
+        if (length > 0) are_logicals = has_word("t f .t. .f. true false .true. .false.", lower(entry(index(entry, "*") + 1:)))
+      end associate
       first = first + length + 1
     end do
   end function are_logicals

@@ -863,6 +863,8 @@ contains
     call refuse(space // plane // "free = 4*T /", "&boundary (the 1st) free = 4*T" // expected)
     call refuse(space // plane // "free = 3* /", "&boundary (the 1st) free = 3*" // expected)
     call refuse(space // plane // "free = x*T /", "&boundary (the 1st) free = x*T" // expected)
+    call refuse(space // plane // "free = 2*2*T /", "&boundary (the 1st) free = 2*2*T" // expected)
+    call refuse(space // plane // "free = *T /", "&boundary (the 1st) free = *T" // expected)
     call refuse(space // plane // "free = 1 /", "&boundary (the 1st) free = 1" // expected)
     call refuse(space // plane // "free = /", "&boundary (the 1st) free = (nothing)" // expected)
     call refuse(space // plane // "free = T free(1) = T /", &
