@@ -13,8 +13,11 @@ module gravier_loose_packing
   private
   public :: place_loosely
 
-  !> grains of radii above R/2^(k+1) and up to R/2^k are class k, R the largest radius; the last has all that are smaller
-  integer, parameter :: most_classes = 30
+  !> Grains of radii from R/2^(k/4) down to R/2^((k + 1)/4) are class k, R the largest radius; the last has all that are
+  !> smaller. Classes are placed one after the other, since large grains would find no place after small ones. Grains of four
+  !> classes are kept in one table of cells.
+  integer, parameter :: classes_per_table = 4
+  integer, parameter :: last_of_classes = 30*classes_per_table
   !> fewest places tried in a round by all grains together, and most by one grain
   integer, parameter :: fewest_trials = 1000, most_trials = 1000
   !> rounds after which a class is given up
@@ -58,7 +61,7 @@ module gravier_loose_packing
     integer, allocatable :: waiting(:)
     !> places that each waiting grain tried in earlier rounds and tries in this one
     integer :: tried = 0, trials = 0
-    !> grains of each class that are in the brick of this rank or reach into it (0:size_class)
+    !> grains that are in the brick of this rank or reach into it, table by table from 0
     type(placed_grains_t), allocatable :: placed(:)
     !> proposals of a round that are in the brick of this rank or reach into it
     type(placed_grains_t) :: rivals
@@ -106,7 +109,7 @@ contains
     placement%position = position
     call placement%bricks%init(box, comm%size)
     last_class = placement%class_of(comm%lowest(minval(radius)))
-    allocate (placement%placed(0:last_class))
+    allocate (placement%placed(0:last_class/classes_per_table))
     do size_class = 0, last_class
       call place_class(comm, placement, size_class, left)
       if (left > 0) then
@@ -169,7 +172,8 @@ contains
 
     self%size_class = size_class
     self%tried = 0
-    call self%placed(size_class)%init(self%box, self%class_radius(size_class), .false.)
+    if (mod(size_class, classes_per_table) == 0) &
+      & call self%placed(size_class/classes_per_table)%init(self%box, self%class_radius(size_class), .false.)
     call self%choose_waiting()
     left = comm%total(size(self%waiting, kind=i8))
     wanted = max(left, int(fewest_trials, i8))
@@ -260,11 +264,11 @@ contains
   pure logical function is_clear(self, radius, position)
     type(placement_t), intent(in) :: self
     real(dp), intent(in) :: radius, position(:)
-    integer :: size_class
+    integer :: table
 
     is_clear = .false.
-    do size_class = 0, self%size_class
-      if (self%placed(size_class)%blocks(0_i8, radius, position)) return
+    do table = 0, self%size_class/classes_per_table
+      if (self%placed(table)%blocks(0_i8, radius, position)) return
     end do
     is_clear = .true.
   end function is_clear
@@ -305,13 +309,14 @@ contains
     integer(i8), intent(in), contiguous :: verdicts(:, :)
     logical :: placed(size(self%waiting))
     real(dp) :: position(self%box%nd)
-    integer :: k
+    integer :: table, k
 
     placed(:) = .false.
+    table = self%size_class/classes_per_table
     do k = 1, size(verdicts, 2)
       if (verdicts(1, k) == 0) then
         position(:) = real_of(verdicts(4:, k))
-        call self%placed(self%size_class)%insert(verdicts(2, k), real_of(verdicts(3, k)), position)
+        call self%placed(table)%insert(verdicts(2, k), real_of(verdicts(3, k)), position)
       else
         placed(verdicts(1, k)) = .true.
       end if
@@ -355,17 +360,14 @@ contains
     class(placement_t), intent(in) :: self
     real(dp), intent(in) :: radius
 
-    size_class = 0
-    do while (size_class < most_classes .and. radius <= self%class_radius(size_class + 1))
-      size_class = size_class + 1
-    end do
+    size_class = int(min(classes_per_table*log(self%largest/radius)/log(2.0_dp), real(last_of_classes, dp)))
   end function placement_class_of
 
-  !> Largest radius of a class [m].
+  !> Largest radius of a class, to a rounding [m].
   pure real(dp) function placement_class_radius(self, size_class) result(radius)
     class(placement_t), intent(in) :: self
     integer, intent(in) :: size_class
-    radius = self%largest*0.5_dp**size_class
+    radius = self%largest*0.5_dp**(size_class/real(classes_per_table, dp))
   end function placement_class_radius
 
   !> Distance within which a grain of the present class may overlap grains of this class or of those after it [m].

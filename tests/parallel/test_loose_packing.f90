@@ -293,12 +293,18 @@ contains
   subroutine test_lattice_refusals()
     type(lattice_t) :: lattice
     type(error_t), allocatable :: error
+    integer :: k
 
     call lattice%init(make_box(3, all_solid, 1.0_dp, 0.6_dp, 1.0_dp), 0.3_dp, 1_i8, error)
     call expect(error, "m wide along axis 2")
     call lattice%init(make_box(3, all_solid, 1e9_dp, 1e9_dp, 1.0_dp), 0.3_dp, 10_i8, error)
     call check(.not. allocated(error), "a few grains in a wide box")
     call check_close(lattice%height(), 0.63_dp, 1e-15_dp, "height of one layer")
+    ! the difference of the corners may be a rounding less than whole cells
+    do k = 1, 60
+      call lattice%init(make_box(2, all_solid, k*lattice%edge, 0.0_dp, 0.0_dp), 0.3_dp, 1000_i8, error)
+      call check_equal(lattice%cells(1), int(k, i8), "whole cells in the width")
+    end do
   end subroutine test_lattice_refusals
 
 end program test_loose_packing
