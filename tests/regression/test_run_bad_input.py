@@ -108,7 +108,7 @@ FILES = [
     key("output", "every", "-1", ">= 0"),
     key("output", "directory", "''", "not empty"),
     # the choice
-    key("scene", "bodies", "'cubes'", "'column', 'lattice' or 'file'"),
+    key("scene", "bodies", "'cubes'", "'column', 'lattice', 'file' or 'sample'"),
     key("solver", "method", "'jacobi'", "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd' or 'nscdd_ep'"),
     key("solver", "criterion", "'energy'", "'residual' or 'error'"),
     key("solver", "on_failure", "'panic'", "'continue', 'stop' or 'discard'"),
