@@ -15,8 +15,8 @@ module gravier_sample_rest
 
   !> A step is one at rest when its solve converged, the mean kinetic energy of a grain is below rest_tolerance m g R
   !> (settled) or rest_tolerance pressure R^nd (compacted), and the forces of the grains on the boundaries balance the loads:
-  !> their sum the weight (settled), or that on each plane its pressure (compacted). Without the second condition grains that
-  !> begin to fall, or wait for the planes to come, would be at rest. m and R are means.
+  !> their sum the weight (settled); that on each free plane the pressure, and their sum nothing (compacted). Without the
+  !> second condition grains that begin to fall, or wait for the planes to come, would be at rest. m and R are means.
   type :: rest_t
     logical :: compacted = .false.
     !> of the last step: mean kinetic energy over its scale, share of the loads that is not balanced, largest overlap [m]
@@ -52,10 +52,8 @@ contains
     self%overlap = figures%max_overlap
     call measure_pressures(self, simulation)
     if (self%compacted) then
-      associate (pressure => simulation%config%sample%pressure)
-        self%imbalance = maxval(abs(self%pressure - pressure))/pressure
-        scale = pressure*simulation%decomposition%rule%mean_radius**simulation%decomposition%nd
-      end associate
+      self%imbalance = unbalanced_pressure(self, simulation)
+      scale = simulation%config%sample%pressure*simulation%decomposition%rule%mean_radius**simulation%decomposition%nd
     else
       call weigh(simulation, scale, self%imbalance)
       scale = scale/simulation%n_grains*simulation%decomposition%rule%mean_radius
@@ -88,6 +86,26 @@ contains
         & (simulation%physics%h*simulation%facing_area(b))
     end do
   end subroutine measure_pressures
+
+  !> Largest deviation of the stress on a free plane from the pressure, or of the sum of all forces from 0, over the pressure
+  !> on a free plane.
+  pure real(dp) function unbalanced_pressure(self, simulation) result(unbalanced)
+    type(rest_t), intent(in) :: self
+    type(simulation_t), intent(in) :: simulation
+    real(dp) :: largest_area
+    integer :: b
+
+    unbalanced = 0.0_dp
+    largest_area = 0.0_dp
+    associate (pressure => simulation%config%sample%pressure)
+      do b = 1, size(self%pressure)
+        if (.not. simulation%decomposition%boundaries(b)%is_driven()) cycle
+        unbalanced = max(unbalanced, abs(self%pressure(b)/pressure - 1.0_dp))
+        largest_area = max(largest_area, simulation%facing_area(b))
+      end do
+      unbalanced = max(unbalanced, norm2(sum(simulation%boundary_impulses, dim=2))/(simulation%physics%h*pressure*largest_area))
+    end associate
+  end function unbalanced_pressure
 
   !> Load on all grains, and the share of it that boundaries do not bear. Collective.
   subroutine weigh(simulation, weight, missing)
