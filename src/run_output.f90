@@ -2,6 +2,7 @@
 module gravier_run_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t
@@ -36,13 +37,21 @@ contains
     !> the command line of the program
     character(len=*), intent(in) :: command
     type(error_t), allocatable, intent(inout) :: error
+    character(len=32), allocatable :: name(:)
+    character(len=5), allocatable :: shape(:)
+    integer :: i
 
     self%comm => simulation%comm
     self%directory = trim(simulation%config%output%directory)//"/"
     call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
       & simulation%config%scene%dimension, error)
     associate (walls => simulation%decomposition%walls)
-      call self%results%write_walls(walls%id, walls%point, walls%normal, error)
+      allocate (name(size(walls%id)))
+      allocate (shape(size(walls%id)), source="plane")
+      do i = 1, size(name)
+        name(i) = "wall "//to_text(walls%id(i))
+      end do
+      call self%results%write_boundaries(walls%id, name, shape, walls%normal, error)
     end associate
     if (self%comm%rank == 0) then
       call self%history%open(self%directory//"history.csv", "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,"// &
