@@ -31,6 +31,7 @@ module gravier_run_log
     procedure :: open => run_log_open
     procedure :: line => run_log_line
     procedure :: write_start => run_log_write_start
+    procedure :: write_restart => run_log_write_restart
     procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
     procedure :: write_interface => run_log_write_interface
@@ -49,13 +50,19 @@ contains
   end subroutine run_log_init
 
   !> Open DIRECTORY/run.log and write into it what was said so far. Rank 0 may fail; the caller makes it known.
-  subroutine run_log_open(self, path, error)
+  subroutine run_log_open(self, path, continued, error)
     class(run_log_t), intent(inout) :: self
     character(len=*), intent(in) :: path
+    !> go on behind what the file holds
+    logical, intent(in) :: continued
     type(error_t), allocatable, intent(inout) :: error
 
     if (self%comm%rank /= 0) return
-    call self%file%create(path, error)
+    if (continued) then
+      call self%file%continue(path, error)
+    else
+      call self%file%create(path, error)
+    end if
     call self%file%append(self%early, error)
     self%early = ""
   end subroutine run_log_open
@@ -122,6 +129,19 @@ contains
       call write_lines(self, options, "  ", error)
     end associate
   end subroutine run_log_write_start
+
+  !> Where a run goes on from.
+  subroutine run_log_write_restart(self, simulation, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (simulation%restarted) then
+      call self%line("restart     from the checkpoint of step "//to_text(simulation%step), error)
+    else
+      call self%line("restart     no checkpoint in "//trim(simulation%config%output%directory)//": from the beginning", error)
+    end if
+  end subroutine run_log_write_restart
 
   !> Names of the columns of the step lines.
   subroutine run_log_write_head(self, error)
