@@ -93,16 +93,18 @@ contains
     character(len=64) :: name(size(simulation%decomposition%boundaries))
     character(len=16) :: shape(size(simulation%decomposition%boundaries))
     real(dp) :: normal(simulation%decomposition%nd, size(simulation%decomposition%boundaries))
+    integer(i8) :: id(size(simulation%decomposition%boundaries))
     integer :: b
 
     associate (boundaries => simulation%decomposition%boundaries)
       do b = 1, size(boundaries)
+        id(b) = boundaries(b)%id
         name(b) = boundaries(b)%name
         shape(b) = shape_name(boundaries(b)%shape)
         normal(:, b) = 0.0_dp
         if (boundaries(b)%shape == shape_plane) normal(:, b) = boundaries(b)%axis(1:size(normal, 1))
       end do
-      call self%results%write_boundaries(boundaries%id, name, shape, normal, error)
+      call self%results%write_boundaries(id, name, shape, normal, error)
     end associate
   end subroutine write_boundaries
 
