@@ -107,8 +107,8 @@ contains
     if (allocated(error)) return
     call log%write_start(simulation, error)
     call simulation%assemble(figures)
-    call log%write_interface(figures, error)
-    call log%write_memory(simulation, figures, error)
+    call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
+    call log%write_memory(simulation, error)
     call log%line("checked     no error found; nothing was run", error)
     call simulation%free()
   end subroutine check_case
@@ -189,7 +189,7 @@ contains
       call simulation%advance(figures, error)
       if (allocated(error)) exit
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
-      if (simulation%step == 1) call log%write_interface(figures, error)
+      if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call write_step(simulation, figures, MPI_Wtime() - step_start, output, error)
       call simulation%comm%agree(error)

@@ -13,6 +13,7 @@ module gravier_run_log
   use gravier_problem_builder, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_memory_report, only: memory_report_t, report_memory, peak_memory
   implicit none
   private
   public :: run_log_t, banner_text
@@ -179,9 +180,10 @@ contains
   end function effects_text
 
   !> Contacts and interface as the partition makes them now.
-  subroutine run_log_write_interface(self, figures, error)
+  subroutine run_log_write_interface(self, figures, subdomains, error)
     class(run_log_t), intent(inout) :: self
     type(step_figures_t), intent(in) :: figures
+    integer, intent(in) :: subdomains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
     integer :: m
@@ -197,27 +199,38 @@ contains
       if (sharing%bodies == 0) text = text//" 1 only"
     end associate
     call self%line(text, error)
+    if (figures%sharing%neighbours == 0) return
+    call self%line("exchange    "//exchange_text(figures%sharing, subdomains), error)
   end subroutine run_log_write_interface
 
-  !> Bytes of the arrays of a contact and of a grain in the solve.
-  subroutine run_log_write_memory(self, simulation, figures, error)
+  !> What an exchange of the interface costs a subdomain, whether its neighbours are on other ranks or on its own.
+  function exchange_text(sharing, subdomains) result(text)
+    type(interface_figures_t), intent(in) :: sharing
+    integer, intent(in) :: subdomains
+    character(len=:), allocatable :: text
+
+    text = "a subdomain sends "//to_text(real(sharing%neighbours, dp)/subdomains, 3)//" messages (at most "// &
+      & to_text(sharing%most_neighbours)//") with "//to_text(8.0_dp*sharing%values/subdomains, 3)//" bytes (at most "// &
+      & to_text(8*sharing%most_values)//") an iteration, and "//to_text(real(sharing%ghosts, dp)/subdomains, 3)//" ghosts a step"
+  end function exchange_text
+
+  !> What is kept in memory, array by array. Collective.
+  subroutine run_log_write_memory(self, simulation, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
-    type(step_figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: contact, body, home, total
+    type(memory_report_t) :: report
+    integer :: k
 
-    associate (kernels => simulation%problem%kernels)
-      ! pair, hot, impulse, gap
-      contact = 2*4 + 8*(kernels%nh + kernels%nc + 1)
-      ! v_free, velocity, v_global, reaction, two inverse masses; identifier, owner, multiplicity, position
-      body = 8*(4*kernels%nv + 4) + 8 + 4 + 4 + 8*kernels%nd
-      home = 8*(kernels%nd + kernels%nv + 4)
-    end associate
-    total = (contact*figures%contacts + (body + home)*simulation%n_grains)/1024 + 1
-    call self%line("memory      "//to_text(contact)//" bytes a contact, "//to_text(body)// &
-      & " bytes a grain in contact and subdomain, "//to_text(home)//" bytes a grain at home: about "//to_text(total)// &
-      & " KiB in all", error)
+    call report_memory(simulation, report)
+    call self%line("memory      bytes of each item", error)
+    do k = 1, size(report%items)
+      associate (item => report%items(k))
+        call self%line("  "//to_text(item%bytes)//" a "//item%name//", "//to_text(item%number)//" of them: "//item%arrays, error)
+      end associate
+    end do
+    call self%line("  "//to_text(report%total/1024 + 1)//" KiB in all, "//to_text(report%most/1024 + 1)// &
+      & " KiB on the rank with most", error)
   end subroutine run_log_write_memory
 
   !> One line a step.
@@ -236,6 +249,10 @@ contains
     write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3)") simulation%step, simulation%time, figures%contacts, &
       & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, seconds
     call self%line(trim(row), error)
+    if (figures%refused) call self%line("warning     the grains fill fewer cells than there are subdomains: "// &
+      & "the old partition stays", error)
+    if (figures%fast > 0 .and. simulation%fast == figures%fast) call self%line("warning     "//to_text(figures%fast)// &
+      & " grains move by more than their radius in a step (said once; history.csv counts them)", error)
     if (figures%solve%status /= solve_converged) call self%line("  *** "//failure_text(simulation, figures), error)
   end subroutine run_log_write_step
 
@@ -257,7 +274,7 @@ contains
     end associate
   end function failure_text
 
-  !> Closing table: time by phase over the ranks, and the work of the solver over all ranks. Collective.
+  !> Closing table: time by phase over the ranks, the work of the solver and the memory over all ranks. Collective.
   subroutine run_log_write_end(self, simulation, seconds, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -298,6 +315,8 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    call self%line("lists       made "//to_text(simulation%neighbourhoods%builds)//" times", error)
+    call self%line("memory      at most "//to_text(self%comm%highest(peak_memory()), 4)//" MiB on a rank", error)
     call self%line("messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB", error)
   end subroutine write_work
 

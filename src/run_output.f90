@@ -75,7 +75,7 @@ contains
   pure function history_header() result(header)
     character(len=:), allocatable :: header
     header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
-      & "converged,grains,left,fast,listed,divided,projected"
+      & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,ghosts"
   end function history_header
 
   pure function trace_header(simulation) result(header)
@@ -138,6 +138,9 @@ contains
       call self%history%add(merge(1, 0, figures%listed))
       call self%history%add(merge(1, 0, figures%divided))
       call self%history%add(merge(1, 0, figures%projected))
+      call self%history%add(figures%sharing%neighbours)
+      call self%history%add(figures%sharing%values)
+      call self%history%add(figures%sharing%ghosts)
       call self%history%end_row(error)
       if (self%trace%is_open()) call write_trace(self, simulation, figures, error)
     end if
