@@ -203,6 +203,8 @@ contains
         & trim(simulation%config%output%directory), unsaid)
       return
     end if
+    if (figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, &
+      & error)
     call log%write_end(simulation, MPI_Wtime() - interruption%start, error)
     if (simulation%failed > 0) status = status_unconverged
     if (interruption%stops) then

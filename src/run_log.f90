@@ -209,10 +209,20 @@ contains
     integer, intent(in) :: subdomains
     character(len=:), allocatable :: text
 
-    text = "a subdomain sends "//to_text(real(sharing%neighbours, dp)/subdomains, 3)//" messages (at most "// &
-      & to_text(sharing%most_neighbours)//") with "//to_text(8.0_dp*sharing%values/subdomains, 3)//" bytes (at most "// &
-      & to_text(8*sharing%most_values)//") an iteration, and "//to_text(real(sharing%ghosts, dp)/subdomains, 3)//" ghosts a step"
+    text = "a subdomain sends "//tenths(real(sharing%neighbours, dp)/subdomains)//" messages (at most "// &
+      & to_text(sharing%most_neighbours)//") with "//to_text(8*sharing%values/subdomains)//" bytes (at most "// &
+      & to_text(8*sharing%most_values)//") an iteration, and "//to_text(sharing%ghosts/subdomains)//" ghosts a step"
   end function exchange_text
+
+  !> A number of moderate size with one decimal.
+  function tenths(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=16) :: row
+
+    write (row, "(f16.1)") value
+    text = trim(adjustl(row))
+  end function tenths
 
   !> What is kept in memory, array by array. Collective.
   subroutine run_log_write_memory(self, simulation, error)
@@ -316,7 +326,7 @@ contains
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
     call self%line("lists       made "//to_text(simulation%neighbourhoods%builds)//" times", error)
-    call self%line("memory      at most "//to_text(self%comm%highest(peak_memory()), 4)//" MiB on a rank", error)
+    call self%line("memory      at most "//to_text(nint(self%comm%highest(peak_memory())))//" MiB on a rank", error)
     call self%line("messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB", error)
   end subroutine write_work
 
