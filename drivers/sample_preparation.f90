@@ -5,6 +5,7 @@ module gravier_sample_preparation
   use gravier_errors, only: error_t, status_ok, status_unconverged
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
+  use gravier_body_store, only: body_set_t
   use gravier_motion, only: grain_volume
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
@@ -37,6 +38,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: loads
     type(simulation_t) :: simulation
+    type(body_set_t) :: grains
     type(rest_t) :: rest
     logical :: keep
 
@@ -47,7 +49,8 @@ contains
       loads%scene%gravity_table = ""
       loads%scene%body_force(:) = 0.0_dp
     end if
-    call simulation%init(comm, loads, error)
+    call simulation%init(comm, loads, grains, error)
+    if (.not. allocated(error)) call simulation%start(grains, error)
     if (allocated(error)) return
     call open_log(config, log, error)
     call log%write_start(simulation, error)
@@ -77,7 +80,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     associate (file => config%sample%file)
-      call log%open(file(1:index(file, ".", back=.true.))//"log", error)
+      call log%open(file(1:index(file, ".", back=.true.))//"log", .false., error)
     end associate
     call log%comm%agree(error)
   end subroutine open_log
