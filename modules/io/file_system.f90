@@ -436,6 +436,7 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
 
+    if (allocated(error)) return
     call replace_file(self%path, path, error)
     if (.not. allocated(error)) self%path = path
   end subroutine text_file_replace
