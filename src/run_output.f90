@@ -4,9 +4,11 @@ module gravier_run_output
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, figures_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version
+  use gravier_contact_structure, only: bin_width
+  use gravier_diagnostics, only: diagnostics_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
   implicit none
@@ -43,12 +45,24 @@ contains
       & simulation%config%scene%dimension, error)
     if (self%comm%rank == 0) then
       call self%history%open(self%directory//"history.csv", "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,"// &
-        & "kinetic_energy,wall_seconds,interface_bodies,converged", error)
+        & "kinetic_energy,wall_seconds,interface_bodies,converged"//column_names(simulation%diagnostics), error)
       if (simulation%config%output%trace) call self%trace%open(self%directory//"trace.csv", "step,iteration,residual,jump"// &
         & trim(merge(",error", "      ", simulation%config%solver%criterion == "error")), error)
     end if
     call self%comm%agree(error)
   end subroutine run_output_open
+
+  !> The columns of the diagnostics in the head of the history, with a comma before each.
+  pure function column_names(diagnostics) result(names)
+    type(diagnostics_t), intent(in) :: diagnostics
+    character(len=:), allocatable :: names
+    integer :: k
+
+    names = ""
+    do k = 1, diagnostics%n_columns
+      names = names//","//trim(diagnostics%name(k))
+    end do
+  end function column_names
 
   !> A row of the history, and the trace of the step. Collective.
   subroutine run_output_write_row(self, simulation, figures, seconds, converged, error)
@@ -59,6 +73,7 @@ contains
     real(dp), intent(in) :: seconds
     logical, intent(in) :: converged
     type(error_t), allocatable, intent(inout) :: error
+    integer :: k
 
     call start_timer(phase_output)
     if (self%comm%rank == 0) then
@@ -74,6 +89,9 @@ contains
       call self%history%add(seconds)
       call self%history%add(figures%sharing%bodies)
       call self%history%add(merge(1, 0, converged))
+      do k = 1, simulation%diagnostics%n_columns
+        call self%history%add(simulation%diagnostics%value(k))
+      end do
       call self%history%end_row(error)
       if (self%trace%is_open()) call write_trace(self, simulation, figures, error)
     end if
@@ -105,19 +123,38 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(body_rows_t) :: bodies
     type(contact_rows_t) :: contacts
+    type(figures_t), allocatable :: figures
 
     if (self%last_written == simulation%step) return
     call start_timer(phase_output)
     call collect_bodies(simulation, bodies)
+    if (simulation%step > 0) call collect_figures(simulation%diagnostics, figures)
     if (simulation%config%output%contacts .and. simulation%step > 0) then
       call collect_contacts(simulation, contacts)
-      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, figures)
     else
-      call self%results%write_step(simulation%step, simulation%time, bodies, error)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, figures=figures)
     end if
     self%last_written = simulation%step
     call stop_timer(phase_output)
   end subroutine run_output_write_state
+
+  !> The diagnostics of the scene as a whole; not allocated where none are asked for.
+  subroutine collect_figures(diagnostics, figures)
+    type(diagnostics_t), intent(in) :: diagnostics
+    type(figures_t), allocatable, intent(out) :: figures
+
+    if (diagnostics%n_of_scene == 0) return
+    allocate (figures)
+    figures%name = diagnostics%name(1:diagnostics%n_of_scene)
+    figures%value = diagnostics%value(1:diagnostics%n_of_scene)
+    figures%bin_width = bin_width
+    if (allocated(diagnostics%structure)) then
+      figures%histogram = diagnostics%structure%histogram
+    else
+      allocate (figures%histogram(0))
+    end if
+  end subroutine collect_figures
 
   !> Grains of this rank; grains without spin are written with zeros for it.
   subroutine collect_bodies(simulation, rows)
