@@ -12,6 +12,7 @@ module gravier_command_line
   character(len=*), parameter :: nl = new_line("a")
   character(len=*), parameter :: usage = &
     & "usage: gravier CASE.nml            run a case (mpirun -n RANKS gravier CASE.nml)"//nl// &
+    & "       gravier --restart CASE.nml  go on from the checkpoint in its output directory, if there is one"//nl// &
     & "       gravier --check CASE.nml    read and check it, say what a run would do, run nothing"//nl// &
     & "       gravier --keys              reference of all input keys, in Markdown"//nl// &
     & "       gravier --version | --help"//nl// &
@@ -19,6 +20,8 @@ module gravier_command_line
 
   type :: arguments_t
     integer :: action = action_run
+    !> go on from a checkpoint
+    logical :: restart = .false.
     !> the input file
     character(len=:), allocatable :: file
     !> the whole command line
@@ -52,6 +55,8 @@ contains
       select case (word)
       case ("--check")
         arguments%action = action_check
+      case ("--restart")
+        arguments%restart = .true.
       case ("--help", "-h")
         arguments%action = action_help
       case ("--version")

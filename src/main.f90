@@ -21,7 +21,7 @@ program gravier
   if (.not. allocated(error)) then
     select case (arguments%action)
     case (action_run)
-      call run_case(comm, arguments%file, arguments%command, status, error)
+      call run_case(comm, arguments%file, arguments%command, arguments%restart, status, error)
     case (action_check)
       call check_case(comm, arguments%file, error)
     case (action_version)

@@ -2,35 +2,51 @@
 module gravier_run
   use, intrinsic :: iso_fortran_env, only: error_unit
   use mpi_f08, only: MPI_Wtime
-  use gravier_kinds, only: dp
-  use gravier_errors, only: error_t, raise, status_ok, status_input, status_unconverged
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_ok, status_input, status_unconverged, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
+  use gravier_signals, only: catch_signals, take_signal
   use gravier_timers, only: reset_timers
+  use gravier_body_store, only: body_set_t
   use gravier_file_system, only: make_directory, check_readable
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_checkpoint, only: load_checkpoint, checkpoint_name
   use gravier_run_log, only: run_log_t
   use gravier_run_output, only: run_output_t
   implicit none
   private
   public :: run_case, check_case, read_config, report_error
 
+  !> When a run began and what made it stop early.
+  type :: interruption_t
+    !> on the clock of this rank, of the run, of the last checkpoint and of the end of the last step [s]
+    real(dp) :: start = 0.0_dp, last_checkpoint = 0.0_dp, last_step = huge(1.0_dp)
+    !> longest step and longest checkpoint so far [s]
+    real(dp) :: longest = 0.0_dp, dearest = 0.0_dp
+    logical :: stops = .false.
+    character(len=:), allocatable :: reason
+  end type interruption_t
+
 contains
 
   !> Run a case. Everything that can be refused is refused before a file is touched. Collective.
-  subroutine run_case(comm, path, command, status, error)
+  subroutine run_case(comm, path, command, restart, status, error)
     type(communicator_t), target, intent(in) :: comm
     !> of the input file
     character(len=*), intent(in) :: path
     !> the command line, for the record
     character(len=*), intent(in) :: command
+    !> go on from the checkpoint in the output directory, if there is one
+    logical, intent(in) :: restart
     !> status_ok, or status_unconverged where a solve missed its tolerance
     integer, intent(out) :: status
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(simulation_t) :: simulation
+    type(body_set_t) :: grains
     type(run_log_t) :: log
     type(run_output_t) :: output
 
@@ -38,18 +54,40 @@ contains
     call reset_timers()
     call log%init(comm)
     call read_config(comm, path, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, error)
+    if (.not. allocated(error)) call simulation%init(comm, config, grains, error)
+    if (.not. allocated(error)) call start(simulation, grains, restart, error)
     if (.not. allocated(error)) call prepare_directory(comm, config, error)
     if (allocated(error)) return
+    call catch_signals()
     call log%write_start(simulation, error)
+    if (restart) call log%write_restart(simulation, error)
     call log%write_head(error)
-    call log%open(trim(config%output%directory)//"/run.log", error)
+    call log%open(trim(config%output%directory)//"/run.log", simulation%restarted, error)
     call comm%agree(error)
     call output%open(simulation, command, error)
     if (.not. allocated(error)) call run_steps(simulation, log, output, status, error)
     call log%close(error)
     call simulation%free()
   end subroutine run_case
+
+  !> Share the grains of the scene out, or take the state of the checkpoint that the output directory holds. Collective.
+  subroutine start(simulation, grains, restart, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(body_set_t), intent(in) :: grains
+    logical, intent(in) :: restart
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: path
+    logical :: exists
+
+    path = trim(simulation%config%output%directory)//"/"//checkpoint_name
+    exists = .false.
+    if (restart .and. simulation%comm%rank == 0) inquire (file=path, exist=exists)
+    if (simulation%comm%any_true(exists)) then
+      call load_checkpoint(simulation, path, error)
+    else
+      call simulation%start(grains, error)
+    end if
+  end subroutine start
 
   !> Read and check a case, and say what a run would do. Nothing is written to disk. Collective.
   subroutine check_case(comm, path, error)
@@ -58,17 +96,19 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(simulation_t) :: simulation
+    type(body_set_t) :: grains
     type(step_figures_t) :: figures
     type(run_log_t) :: log
 
     call log%init(comm)
     call read_config(comm, path, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, error)
+    if (.not. allocated(error)) call simulation%init(comm, config, grains, error)
+    if (.not. allocated(error)) call simulation%start(grains, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
     call simulation%assemble(figures)
-    call log%write_interface(figures, error)
-    call log%write_memory(simulation, figures, error)
+    call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
+    call log%write_memory(simulation, error)
     call log%line("checked     no error found; nothing was run", error)
     call simulation%free()
   end subroutine check_case
@@ -133,40 +173,101 @@ contains
     integer, intent(inout) :: status
     type(error_t), allocatable, intent(inout) :: error
     type(step_figures_t) :: figures
-    real(dp) :: start, step_start
+    type(interruption_t) :: interruption
+    real(dp) :: step_start
     !> of a last line that cannot be written after an error
     type(error_t), allocatable :: unsaid
-    integer :: failed
     logical :: keep_last, ends
 
-    start = MPI_Wtime()
-    failed = 0
+    interruption%start = MPI_Wtime()
+    interruption%last_checkpoint = interruption%start
     keep_last = .true.
     ends = .false.
-    if (simulation%config%output%every > 0) call output%write_state(simulation, error)
+    if (simulation%config%output%every > 0 .and. .not. simulation%restarted) call output%write_state(simulation, error)
     do while (simulation%step < simulation%config%time%steps .and. .not. ends .and. .not. allocated(error))
       step_start = MPI_Wtime()
       call simulation%advance(figures, error)
       if (allocated(error)) exit
-      if (figures%solve%status /= solve_converged) failed = failed + 1
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
-      if (simulation%step == 1) call log%write_interface(figures, error)
+      if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call write_step(simulation, figures, MPI_Wtime() - step_start, output, error)
       call simulation%comm%agree(error)
+      if (.not. ends .and. .not. allocated(error)) call attend(simulation, log, output, interruption, error)
+      if (interruption%stops) exit
     end do
     if (allocated(error)) keep_last = .false.
-    call output%finish(simulation, keep_last, error)
+    call output%finish(simulation, keep_last .and. .not. interruption%stops, error)
     if (allocated(error)) then
       call log%line("stopped     *** by an error after "//to_text(simulation%step)//" steps; results until then in "// &
         & trim(simulation%config%output%directory), unsaid)
       return
     end if
-    call log%write_end(simulation, MPI_Wtime() - start, error)
-    if (failed > 0) status = status_unconverged
-    call write_verdict(simulation, log, failed, keep_last, error)
+    if (figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, &
+      & error)
+    call log%write_end(simulation, MPI_Wtime() - interruption%start, error)
+    if (simulation%failed > 0) status = status_unconverged
+    if (interruption%stops) then
+      status = status_failure
+      call log%line("interrupted *** "//interruption%reason//" after step "//to_text(simulation%step)//" of "// &
+        & to_text(simulation%config%time%steps)//"; gravier --restart goes on from "// &
+        & trim(simulation%config%output%directory)//"/"//checkpoint_name, error)
+    else
+      call write_verdict(simulation, log, keep_last, error)
+    end if
     call simulation%comm%agree(error)
   end subroutine run_steps
+
+  !> Between two steps: write a checkpoint where one is due by steps, by time, by SIGUSR1, at the end, or because the run
+  !> has to stop by SIGTERM or for want of time. Collective.
+  subroutine attend(simulation, log, output, interruption, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(run_log_t), intent(inout) :: log
+    type(run_output_t), intent(inout) :: output
+    type(interruption_t), intent(inout) :: interruption
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: asked(3)
+    logical :: stops, due
+    real(dp) :: now
+
+    call take_signal(stops, due)
+    now = MPI_Wtime()
+    associate (config => simulation%config%output)
+      ! clocks of ranks differ: what one of them finds counts for all
+      asked(:) = 0
+      if (stops) asked(1) = 1
+      if (due) asked(2) = 1
+      if (config%checkpoint_seconds > 0.0_dp .and. now - interruption%last_checkpoint >= config%checkpoint_seconds) asked(2) = 1
+      interruption%longest = max(interruption%longest, now - interruption%last_step)
+      if (config%walltime > 0.0_dp .and. now - interruption%start + time_to_stop(interruption) >= config%walltime) asked(3) = 1
+      interruption%last_step = now
+      call simulation%comm%sum_counts(asked)
+      due = asked(2) > 0
+      if (config%checkpoint_every > 0) due = due .or. mod(simulation%step, config%checkpoint_every) == 0
+      if (simulation%step == simulation%config%time%steps) then
+        ! one that may be prolonged
+        due = due .or. config%checkpoint_every > 0 .or. config%checkpoint_seconds > 0.0_dp .or. config%walltime > 0.0_dp
+      else if (asked(1) > 0) then
+        interruption%reason = "by SIGTERM"
+      else if (asked(3) > 0) then
+        interruption%reason = "at the walltime of "//to_text(config%walltime, 4)//" s"
+      end if
+    end associate
+    interruption%stops = allocated(interruption%reason)
+    if (.not. (due .or. interruption%stops)) return
+    call output%write_checkpoint(simulation, error)
+    interruption%last_checkpoint = MPI_Wtime()
+    interruption%dearest = max(interruption%dearest, interruption%last_checkpoint - now)
+    if (.not. allocated(error)) call log%line("checkpoint  of step "//to_text(simulation%step)//" written in "// &
+      & to_text(interruption%last_checkpoint - now, 3)//" s", error)
+    interruption%last_step = MPI_Wtime()
+  end subroutine attend
+
+  !> Time that one more step, a checkpoint and the end of the run may take [s].
+  pure real(dp) function time_to_stop(interruption) result(seconds)
+    type(interruption_t), intent(in) :: interruption
+    seconds = 2.0_dp*interruption%longest + 2.0_dp*interruption%dearest + 1.0_dp
+  end function time_to_stop
 
   !> What a step that failed leads to, as on_failure says. A step that diverged is never kept.
   subroutine judge(simulation, figures, ends, keep)
@@ -194,16 +295,17 @@ contains
   end subroutine write_step
 
   !> The last word: did it converge, and where are the results.
-  subroutine write_verdict(simulation, log, failed, kept, error)
+  subroutine write_verdict(simulation, log, kept, error)
     type(simulation_t), intent(in) :: simulation
     type(run_log_t), intent(inout) :: log
-    integer, intent(in) :: failed
     logical, intent(in) :: kept
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
+    if (simulation%fast > 0) call log%line("warning     "//to_text(simulation%fast)//" times a grain moved by more than its "// &
+      & "radius in a step, and may have passed through others: use a smaller &time step", error)
     text = "finished    all "//to_text(simulation%step)//" steps reached the tolerance"
-    if (failed > 0) text = "finished    *** "//to_text(failed)//" of the steps did NOT reach the tolerance"
+    if (simulation%failed > 0) text = "finished    *** "//to_text(simulation%failed)//" of the steps did NOT reach the tolerance"
     if (.not. kept) text = text//"; the last one is not in the results"
     call log%line(text//"; results in "//trim(simulation%config%output%directory), error)
   end subroutine write_verdict

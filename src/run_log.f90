@@ -13,6 +13,7 @@ module gravier_run_log
   use gravier_problem_builder, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_memory_report, only: memory_report_t, report_memory, peak_memory
   implicit none
   private
   public :: run_log_t, banner_text
@@ -31,6 +32,7 @@ module gravier_run_log
     procedure :: open => run_log_open
     procedure :: line => run_log_line
     procedure :: write_start => run_log_write_start
+    procedure :: write_restart => run_log_write_restart
     procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
     procedure :: write_interface => run_log_write_interface
@@ -49,13 +51,19 @@ contains
   end subroutine run_log_init
 
   !> Open DIRECTORY/run.log and write into it what was said so far. Rank 0 may fail; the caller makes it known.
-  subroutine run_log_open(self, path, error)
+  subroutine run_log_open(self, path, continued, error)
     class(run_log_t), intent(inout) :: self
     character(len=*), intent(in) :: path
+    !> go on behind what the file holds
+    logical, intent(in) :: continued
     type(error_t), allocatable, intent(inout) :: error
 
     if (self%comm%rank /= 0) return
-    call self%file%create(path, error)
+    if (continued) then
+      call self%file%continue(path, error)
+    else
+      call self%file%create(path, error)
+    end if
     call self%file%append(self%early, error)
     self%early = ""
   end subroutine run_log_open
@@ -123,6 +131,19 @@ contains
     end associate
   end subroutine run_log_write_start
 
+  !> Where a run goes on from.
+  subroutine run_log_write_restart(self, simulation, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (simulation%restarted) then
+      call self%line("restart     from the checkpoint of step "//to_text(simulation%step), error)
+    else
+      call self%line("restart     no checkpoint in "//trim(simulation%config%output%directory)//": from the beginning", error)
+    end if
+  end subroutine run_log_write_restart
+
   !> Names of the columns of the step lines.
   subroutine run_log_write_head(self, error)
     class(run_log_t), intent(inout) :: self
@@ -159,9 +180,10 @@ contains
   end function effects_text
 
   !> Contacts and interface as the partition makes them now.
-  subroutine run_log_write_interface(self, figures, error)
+  subroutine run_log_write_interface(self, figures, subdomains, error)
     class(run_log_t), intent(inout) :: self
     type(step_figures_t), intent(in) :: figures
+    integer, intent(in) :: subdomains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
     integer :: m
@@ -177,27 +199,48 @@ contains
       if (sharing%bodies == 0) text = text//" 1 only"
     end associate
     call self%line(text, error)
+    if (figures%sharing%neighbours == 0) return
+    call self%line("exchange    "//exchange_text(figures%sharing, subdomains), error)
   end subroutine run_log_write_interface
 
-  !> Bytes of the arrays of a contact and of a grain in the solve.
-  subroutine run_log_write_memory(self, simulation, figures, error)
+  !> What an exchange of the interface costs a subdomain, whether its neighbours are on other ranks or on its own.
+  function exchange_text(sharing, subdomains) result(text)
+    type(interface_figures_t), intent(in) :: sharing
+    integer, intent(in) :: subdomains
+    character(len=:), allocatable :: text
+
+    text = "a subdomain sends "//tenths(real(sharing%neighbours, dp)/subdomains)//" messages (at most "// &
+      & to_text(sharing%most_neighbours)//") with "//to_text(8*sharing%values/subdomains)//" bytes (at most "// &
+      & to_text(8*sharing%most_values)//") an iteration, and "//to_text(sharing%ghosts/subdomains)//" ghosts a step"
+  end function exchange_text
+
+  !> A number of moderate size with one decimal.
+  function tenths(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=16) :: row
+
+    write (row, "(f16.1)") value
+    text = trim(adjustl(row))
+  end function tenths
+
+  !> What is kept in memory, array by array. Collective.
+  subroutine run_log_write_memory(self, simulation, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
-    type(step_figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: contact, body, home, total
+    type(memory_report_t) :: report
+    integer :: k
 
-    associate (kernels => simulation%problem%kernels)
-      ! pair, hot, impulse, gap
-      contact = 2*4 + 8*(kernels%nh + kernels%nc + 1)
-      ! v_free, velocity, v_global, reaction, two inverse masses; identifier, owner, multiplicity, position
-      body = 8*(4*kernels%nv + 4) + 8 + 4 + 4 + 8*kernels%nd
-      home = 8*(kernels%nd + kernels%nv + 4)
-    end associate
-    total = (contact*figures%contacts + (body + home)*simulation%n_grains)/1024 + 1
-    call self%line("memory      "//to_text(contact)//" bytes a contact, "//to_text(body)// &
-      & " bytes a grain in contact and subdomain, "//to_text(home)//" bytes a grain at home: about "//to_text(total)// &
-      & " KiB in all", error)
+    call report_memory(simulation, report)
+    call self%line("memory      bytes of each item", error)
+    do k = 1, size(report%items)
+      associate (item => report%items(k))
+        call self%line("  "//to_text(item%bytes)//" a "//item%name//", "//to_text(item%number)//" of them: "//item%arrays, error)
+      end associate
+    end do
+    call self%line("  "//to_text(report%total/1024 + 1)//" KiB in all, "//to_text(report%most/1024 + 1)// &
+      & " KiB on the rank with most", error)
   end subroutine run_log_write_memory
 
   !> One line a step.
@@ -216,6 +259,10 @@ contains
     write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3)") simulation%step, simulation%time, figures%contacts, &
       & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, seconds
     call self%line(trim(row), error)
+    if (figures%refused) call self%line("warning     the grains fill fewer cells than there are subdomains: "// &
+      & "the old partition stays", error)
+    if (figures%fast > 0 .and. simulation%fast == figures%fast) call self%line("warning     "//to_text(figures%fast)// &
+      & " grains move by more than their radius in a step (said once; history.csv counts them)", error)
     if (figures%solve%status /= solve_converged) call self%line("  *** "//failure_text(simulation, figures), error)
   end subroutine run_log_write_step
 
@@ -237,7 +284,7 @@ contains
     end associate
   end function failure_text
 
-  !> Closing table: time by phase over the ranks, and the work of the solver over all ranks. Collective.
+  !> Closing table: time by phase over the ranks, the work of the solver and the memory over all ranks. Collective.
   subroutine run_log_write_end(self, simulation, seconds, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -278,6 +325,8 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    call self%line("lists       made "//to_text(simulation%neighbourhoods%builds)//" times", error)
+    call self%line("memory      at most "//to_text(nint(self%comm%highest(peak_memory())))//" MiB on a rank", error)
     call self%line("messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB", error)
   end subroutine write_work
 

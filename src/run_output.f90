@@ -4,13 +4,15 @@ module gravier_run_output
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, figures_t
+  use gravier_boundary, only: shape_plane, shape_name
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version
   use gravier_contact_structure, only: bin_width
   use gravier_diagnostics, only: diagnostics_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
+  use gravier_checkpoint, only: save_checkpoint, checkpoint_name
   implicit none
   private
   public :: run_output_t
@@ -26,12 +28,14 @@ module gravier_run_output
     procedure :: open => run_output_open
     procedure :: write_row => run_output_write_row
     procedure :: write_state => run_output_write_state
+    procedure :: write_checkpoint => run_output_write_checkpoint
     procedure :: finish => run_output_finish
   end type run_output_t
 
 contains
 
-  !> Create the files in the output directory, which exists. Collective; errors are the same on all ranks.
+  !> Create the files in the output directory, which exists, or go on with those of a run that was interrupted: what they
+  !> hold of later steps goes. Collective; errors are the same on all ranks.
   subroutine run_output_open(self, simulation, command, error)
     class(run_output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -41,28 +45,77 @@ contains
 
     self%comm => simulation%comm
     self%directory = trim(simulation%config%output%directory)//"/"
-    call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
-      & simulation%config%scene%dimension, error)
+    if (simulation%restarted) then
+      call self%results%reopen(self%comm, self%directory//"results.h5", simulation%step, error)
+      self%last_written = simulation%last_written
+    else
+      call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
+        & simulation%config%scene%dimension, error)
+      call write_boundaries(self, simulation, error)
+    end if
     if (self%comm%rank == 0) then
-      call self%history%open(self%directory//"history.csv", "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,"// &
-        & "kinetic_energy,wall_seconds,interface_bodies,converged"//column_names(simulation%diagnostics), error)
-      if (simulation%config%output%trace) call self%trace%open(self%directory//"trace.csv", "step,iteration,residual,jump"// &
-        & trim(merge(",error", "      ", simulation%config%solver%criterion == "error")), error)
+      call open_table(self%history, self%directory//"history.csv", history_header(simulation%diagnostics), simulation, error)
+      if (simulation%config%output%trace) call open_table(self%trace, self%directory//"trace.csv", trace_header(simulation), &
+        & simulation, error)
     end if
     call self%comm%agree(error)
   end subroutine run_output_open
 
-  !> The columns of the diagnostics in the head of the history, with a comma before each.
-  pure function column_names(diagnostics) result(names)
+  subroutine open_table(table, path, header, simulation, error)
+    type(csv_writer_t), intent(inout) :: table
+    character(len=*), intent(in) :: path, header
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (simulation%restarted) then
+      call table%resume(path, header, simulation%step, error)
+    else
+      call table%open(path, header, error)
+    end if
+  end subroutine open_table
+
+  !> The columns, those of the diagnostics last.
+  pure function history_header(diagnostics) result(header)
     type(diagnostics_t), intent(in) :: diagnostics
-    character(len=:), allocatable :: names
+    character(len=:), allocatable :: header
     integer :: k
 
-    names = ""
+    header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
+      & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,ghosts"
     do k = 1, diagnostics%n_columns
-      names = names//","//trim(diagnostics%name(k))
+      header = header//","//trim(diagnostics%name(k))
     end do
-  end function column_names
+  end function history_header
+
+  pure function trace_header(simulation) result(header)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: header
+    header = "step,iteration,residual,jump"
+    if (simulation%config%solver%criterion == "error") header = header//",error"
+  end function trace_header
+
+  !> What the boundaries are, once.
+  subroutine write_boundaries(self, simulation, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=64) :: name(size(simulation%decomposition%boundaries))
+    character(len=16) :: shape(size(simulation%decomposition%boundaries))
+    real(dp) :: normal(simulation%decomposition%nd, size(simulation%decomposition%boundaries))
+    integer(i8) :: id(size(simulation%decomposition%boundaries))
+    integer :: b
+
+    associate (boundaries => simulation%decomposition%boundaries)
+      do b = 1, size(boundaries)
+        id(b) = boundaries(b)%id
+        name(b) = boundaries(b)%name
+        shape(b) = shape_name(boundaries(b)%shape)
+        normal(:, b) = 0.0_dp
+        if (boundaries(b)%shape == shape_plane) normal(:, b) = boundaries(b)%axis(1:size(normal, 1))
+      end do
+      call self%results%write_boundaries(id, name, shape, normal, error)
+    end associate
+  end subroutine write_boundaries
 
   !> A row of the history, and the trace of the step. Collective.
   subroutine run_output_write_row(self, simulation, figures, seconds, converged, error)
@@ -89,6 +142,15 @@ contains
       call self%history%add(seconds)
       call self%history%add(figures%sharing%bodies)
       call self%history%add(merge(1, 0, converged))
+      call self%history%add(simulation%n_grains)
+      call self%history%add(figures%left)
+      call self%history%add(figures%fast)
+      call self%history%add(merge(1, 0, figures%listed))
+      call self%history%add(merge(1, 0, figures%divided))
+      call self%history%add(merge(1, 0, figures%projected))
+      call self%history%add(figures%sharing%neighbours)
+      call self%history%add(figures%sharing%values)
+      call self%history%add(figures%sharing%ghosts)
       do k = 1, simulation%diagnostics%n_columns
         call self%history%add(simulation%diagnostics%value(k))
       end do
@@ -123,28 +185,31 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(body_rows_t) :: bodies
     type(contact_rows_t) :: contacts
+    type(boundary_rows_t) :: boundaries
     type(figures_t), allocatable :: figures
 
     if (self%last_written == simulation%step) return
     call start_timer(phase_output)
     call collect_bodies(simulation, bodies)
-    if (simulation%step > 0) call collect_figures(simulation%diagnostics, figures)
+    call collect_boundaries(simulation, boundaries)
+    call collect_figures(simulation%diagnostics, figures)
     if (simulation%config%output%contacts .and. simulation%step > 0) then
       call collect_contacts(simulation, contacts)
-      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, figures)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, boundaries, figures)
     else
-      call self%results%write_step(simulation%step, simulation%time, bodies, error, figures=figures)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, boundaries=boundaries, &
+        & figures=figures)
     end if
     self%last_written = simulation%step
     call stop_timer(phase_output)
   end subroutine run_output_write_state
 
-  !> The diagnostics of the scene as a whole; not allocated where none are asked for.
+  !> The diagnostics of the scene as a whole; not allocated where none are asked for, or no step was made.
   subroutine collect_figures(diagnostics, figures)
     type(diagnostics_t), intent(in) :: diagnostics
     type(figures_t), allocatable, intent(out) :: figures
 
-    if (diagnostics%n_of_scene == 0) return
+    if (diagnostics%n_of_scene == 0 .or. .not. diagnostics%measured) return
     allocate (figures)
     figures%name = diagnostics%name(1:diagnostics%n_of_scene)
     figures%value = diagnostics%value(1:diagnostics%n_of_scene)
@@ -155,6 +220,27 @@ contains
       allocate (figures%histogram(0))
     end if
   end subroutine collect_figures
+  !> Where the boundaries are, how they move and what the grains did to them in the last step.
+  subroutine collect_boundaries(simulation, rows)
+    type(simulation_t), intent(in) :: simulation
+    type(boundary_rows_t), intent(out) :: rows
+    integer :: b, nd, n
+
+    nd = simulation%decomposition%nd
+    associate (boundaries => simulation%decomposition%boundaries)
+      n = size(boundaries)
+      allocate (rows%id(n), rows%position(nd, n), rows%normal(nd, n), rows%velocity(3*nd - 3, n), rows%force(nd, n))
+      do b = 1, n
+        rows%id(b) = boundaries(b)%id
+        rows%position(:, b) = boundaries(b)%point(1:nd)
+        rows%normal(:, b) = 0.0_dp
+        if (boundaries(b)%shape == shape_plane) rows%normal(:, b) = boundaries(b)%axis(1:nd)
+        rows%velocity(1:nd, b) = boundaries(b)%velocity(1:nd)
+        rows%velocity(nd + 1:, b) = boundaries(b)%spin(merge(3, 1, nd == 2):)
+        rows%force(:, b) = simulation%boundary_impulses(:, b)/simulation%physics%h
+      end do
+    end associate
+  end subroutine collect_boundaries
 
   !> Grains of this rank; grains without spin are written with zeros for it.
   subroutine collect_bodies(simulation, rows)
@@ -169,6 +255,7 @@ contains
       n = n + simulation%decomposition%home(s)%n
     end do
     allocate (rows%id(n), rows%position(nd, n), rows%velocity(3*nd - 3, n), rows%radius(n))
+    if (simulation%decomposition%ni > 0) allocate (rows%image(nd, n))
     next = 0
     do s = 1, size(simulation%decomposition%home)
       associate (home => simulation%decomposition%home(s))
@@ -178,6 +265,7 @@ contains
         rows%velocity(1:nv, next + 1:next + n) = home%velocity
         rows%velocity(nv + 1:, next + 1:next + n) = 0.0_dp
         rows%radius(next + 1:next + n) = home%radius
+        if (home%ni > 0) rows%image(:, next + 1:next + n) = home%image
         next = next + n
       end associate
     end do
@@ -216,6 +304,18 @@ contains
       end associate
     end do
   end subroutine collect_contacts
+
+  !> Write checkpoint.h5. What the tables and the results hold by then is on the disk before it. Collective.
+  subroutine run_output_write_checkpoint(self, simulation, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    call start_timer(phase_output)
+    simulation%last_written = self%last_written
+    call save_checkpoint(simulation, self%directory//checkpoint_name, error)
+    call stop_timer(phase_output)
+  end subroutine run_output_write_checkpoint
 
   !> Write the last state and the final bodies, and close. Collective.
   subroutine run_output_finish(self, simulation, keep_last, error)

@@ -1,7 +1,7 @@
 !> From &boundary groups and the walls of a bodies file to boundaries.
 module gravier_scene_boundaries
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
+  use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_file, only: bodies_data_t
@@ -51,7 +51,11 @@ contains
     end do
     call comm%agree(error)
     do b = 1, size(boundaries)
-      if (.not. allocated(error)) call boundaries(b)%prescribe(nd, 0.0_dp)
+      if (allocated(error)) exit
+      call boundaries(b)%prescribe(nd, 0.0_dp)
+      if (boundaries(b)%is_driven() .and. boundaries(b)%turns()) call raise(error, status_input, &
+        & trim(config%boundaries(b - data%n_walls)%table)//": a rotation of the boundary '"//boundaries(b)%name// &
+        & "', which forces move: expected no column of a rotation rate where a component is free")
     end do
   end subroutine make_boundaries
 

@@ -11,7 +11,7 @@ module gravier_simulation
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_diverged
+  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged
   use gravier_partition, only: partition_t, choose_boxes, check_subdomains
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
@@ -68,6 +68,14 @@ module gravier_simulation
     integer :: step = 0
     !> [s]
     real(dp) :: time = 0.0_dp
+    !> grains of the scene at its start
+    integer(i8) :: n_first = 0
+    !> over all steps: solves that missed their tolerance, grains that left by outlets, grains too fast for the step
+    integer(i8) :: failed = 0, left = 0, fast = 0
+    !> step written last in results.h5, -1 for none
+    integer :: last_written = -1
+    !> the state comes from a checkpoint
+    logical :: restarted = .false.
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     !> largest over mean number of contacts of a subdomain in the last step
@@ -75,6 +83,9 @@ module gravier_simulation
   contains
     procedure :: init => simulation_init
     procedure :: assemble => simulation_assemble
+    procedure :: start => simulation_start
+    procedure :: make_subdomains => simulation_make_subdomains
+    procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
     procedure :: kinetic_energy => simulation_kinetic_energy
     procedure :: free => simulation_free
@@ -82,45 +93,76 @@ module gravier_simulation
 
 contains
 
-  !> Make the scene of a configuration and share it out. Errors are the same on all ranks. Collective.
-  subroutine simulation_init(self, comm, config, error)
+  !> Make the scene of a configuration; its grains wait for `start` or for a checkpoint. Errors are the same on all
+  !> ranks. Collective.
+  subroutine simulation_init(self, comm, config, grains, error)
     class(simulation_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
     type(config_t), intent(in) :: config
+    !> grains of this rank as they were made
+    type(body_set_t), intent(out) :: grains
     type(error_t), allocatable, intent(inout) :: error
     type(scene_t) :: scene
-    type(body_set_t) :: newcomers(1)
 
     call self%free()
     self%comm => comm
     self%config = config
-    self%step = 0
-    self%time = 0.0_dp
     if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
       & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), error)
     call comm%agree(error)
     if (allocated(error)) return
     call make_scene(comm, config, scene, error)
     if (allocated(error)) return
+    self%n_first = scene%n_grains
     self%n_grains = scene%n_grains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
     call set_physics(self, scene)
     call set_control(self)
     call choose_scheme(config, self%scheme)
-    ! one subdomain until it is known that the scene has room for so many
     self%decomposition%boundaries = scene%boundaries
+    ! one subdomain until it is known that the scene has room for so many
     call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
-    newcomers(1) = scene%grains
+    allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
+    grains = scene%grains
+  end subroutine simulation_init
+
+  !> Share the grains of a new scene out. Errors are the same on all ranks. Collective.
+  subroutine simulation_start(self, grains, error)
+    class(simulation_t), intent(inout) :: self
+    !> of this rank
+    type(body_set_t), intent(in) :: grains
+    type(error_t), allocatable, intent(inout) :: error
+    type(body_set_t) :: newcomers(1)
+
+    if (allocated(error)) return
+    newcomers(1) = grains
     call divide(self, newcomers, error)
     if (allocated(error)) return
-    call self%decomposition%init(comm, config%decomposition%subdomains, scene%grains%nd, scene%grains%nv, scene%period)
-    call self%decomposition%settle(scene%grains)
+    call self%make_subdomains()
+    call self%decomposition%settle(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
-    allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
-    call self%diagnostics%init(self%decomposition, config%output%energy, config%output%stress, config%output%structure, &
-      & config%output%boundary_forces)
-  end subroutine simulation_init
+    call self%start_diagnostics()
+  end subroutine simulation_start
+
+  !> Prepare the diagnostics that &output asks for, of the scene as it is. Collective.
+  subroutine simulation_start_diagnostics(self)
+    class(simulation_t), intent(inout) :: self
+
+    associate (output => self%config%output)
+      call self%diagnostics%init(self%decomposition, output%energy, output%stress, output%structure, output%boundary_forces)
+    end associate
+  end subroutine simulation_start_diagnostics
+
+  !> Make room for the subdomains that &decomposition asks for, without grains.
+  subroutine simulation_make_subdomains(self)
+    class(simulation_t), intent(inout) :: self
+
+    associate (decomposition => self%decomposition)
+      call decomposition%init(self%comm, self%config%decomposition%subdomains, decomposition%nd, decomposition%nv, &
+        & decomposition%period)
+    end associate
+  end subroutine simulation_make_subdomains
 
   subroutine set_physics(self, scene)
     class(simulation_t), intent(inout) :: self
@@ -215,17 +257,21 @@ contains
     end associate
   end subroutine cut
 
-  !> What a subdomain has to carry: grains, and as far as they are known contacts, at their candidates.
+  !> What a subdomain has to carry: grains, and as far as they are known near pairs, at their candidates.
   subroutine collect_weights(self, bodies, points, weights)
     class(simulation_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies(:)
     !> (nd, n) [m]; (n)
     real(dp), allocatable, intent(out) :: points(:, :)
     integer, allocatable, intent(out) :: weights(:)
-    integer :: s, c, k, n, n_points
+    integer :: s, p, k, n, n_points
 
     n_points = sum(bodies%n)
-    if (allocated(self%problem%sub)) n_points = n_points + sum(self%problem%sub%n_grains)
+    if (self%neighbourhoods%builds > 0) then
+      do s = 1, size(self%neighbourhoods%view)
+        n_points = n_points + self%neighbourhoods%view(s)%bodies%n
+      end do
+    end if
     allocate (points(self%decomposition%nd, n_points))
     allocate (weights(n_points), source=0)
     n = 0
@@ -236,15 +282,14 @@ contains
         weights(n) = 1
       end do
     end do
-    if (.not. allocated(self%problem%sub)) return
-    do s = 1, size(self%problem%sub)
-      associate (sub => self%problem%sub(s))
-        points(:, n + 1:n + sub%n_grains) = sub%position
-        do c = 1, sub%n_contacts
-          k = minval(sub%pair(:, c))
-          weights(n + k) = weights(n + k) + 1
+    if (self%neighbourhoods%builds == 0) return
+    do s = 1, size(self%neighbourhoods%view)
+      associate (view => self%neighbourhoods%view(s))
+        points(:, n + 1:n + view%bodies%n) = view%bodies%position
+        do p = 1, view%list%n
+          weights(n + view%list%candidate(p)) = weights(n + view%list%candidate(p)) + 1
         end do
-        n = n + sub%n_grains
+        n = n + view%bodies%n
       end associate
     end do
   end subroutine collect_weights
@@ -509,6 +554,9 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%kinetic_energy()
+    if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
+    self%left = self%left + figures%left
+    self%fast = self%fast + figures%fast
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
       & self%n_grains - self%n_glued)
   end subroutine simulation_advance
@@ -565,6 +613,14 @@ contains
     if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
     if (allocated(self%neighbourhoods%view)) deallocate (self%neighbourhoods%view)
     self%neighbourhoods%builds = 0
+    self%step = 0
+    self%time = 0.0_dp
+    self%failed = 0
+    self%left = 0
+    self%fast = 0
+    self%last_written = -1
+    self%restarted = .false.
+    self%imbalance = 1.0_dp
   end subroutine simulation_free
 
 end module gravier_simulation

@@ -40,7 +40,8 @@ contains
     self%n(:) = 1
     self%origin(:) = 0.0_dp
     self%origin(1:self%nd) = lower
-    self%edge = edge
+    ! an edge of 0 could be doubled for ever
+    self%edge = merge(edge, tiny(1.0_dp), abs(edge) > 0.0_dp)
     most = real(min(max(limit, 1_i8), huge(0_i4) - 1_i8), dp)
     do
       counts(:) = 1.0_dp
@@ -62,7 +63,7 @@ contains
     real(dp) :: half
 
     half = 0.5_dp*upper - 0.5_dp*lower
-    if (half/real(huge(0_i4) - 1, dp) > 0.5_dp*edge) then
+    if (edge > 0.0_dp .and. half/real(huge(0_i4) - 1, dp) > 0.5_dp*edge) then
       cells = real(huge(0_i4), dp)
     else
       cells = aint(2.0_dp*(half/edge)) + 1.0_dp

@@ -25,6 +25,8 @@ module gravier_diagnostics
     type(contact_structure_t), allocatable :: structure
     !> forces on boundaries and their places are asked for
     logical :: boundary_forces = .false.
+    !> values are those of a step
+    logical :: measured = .false.
     !> of the columns, and of them of those that hold for the scene as a whole: the first ones
     integer :: n_columns = 0, n_of_scene = 0
     !> (n_columns and more)
@@ -67,6 +69,7 @@ contains
       allocate (self%structure)
       allocate (self%structure%fabric(nd, nd), source=0.0_dp)
     end if
+    self%measured = .false.
     self%n_columns = 0
     if (.not. (energy .or. stress .or. structure .or. boundary_forces)) return
     room = most_of_scene + 2*nd*size(decomposition%boundaries)
@@ -110,6 +113,7 @@ contains
     if (allocated(self%stress)) call self%stress%measure(decomposition, problem, physics%h)
     if (allocated(self%structure)) call self%structure%measure(problem, n_free, physics%h)
     call self%fill(decomposition%boundaries, impulses, physics%h)
+    self%measured = .true.
   end subroutine diagnostics_measure
 
   !> Names and values of all columns.

@@ -47,6 +47,11 @@ module gravier_problem_builder
     integer(i8) :: multiplicity(n_multiplicities) = 0
     !> contacts in the fullest and the emptiest subdomain
     integer(i8) :: most_contacts = 0, least_contacts = 0
+    !> what one exchange takes, were every subdomain on a rank of its own: messages and numbers of all subdomains together,
+    !> and of those with most
+    integer(i8) :: neighbours = 0, values = 0, most_neighbours = 0, most_values = 0
+    !> ghosts of all subdomains
+    integer(i8) :: ghosts = 0
   end type interface_figures_t
 
   !> Gaps and normals of the pairs of a list that are contacts.
@@ -110,7 +115,7 @@ contains
     end do
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
-    call count_figures(decomposition, problem, figures)
+    call count_figures(decomposition, neighbourhoods, problem, figures)
     call find_scales(problem)
     call stop_timer(phase_interface)
   end subroutine build_problem
@@ -526,17 +531,18 @@ contains
   end subroutine fill_part
 
   !> Count the interface. Each grain is counted in the first of the subdomains that share it. Collective.
-  subroutine count_figures(decomposition, problem, figures)
+  subroutine count_figures(decomposition, neighbourhoods, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
     type(interface_figures_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 2)
-    real(dp) :: extremes(2)
+    integer(i8) :: counts(n_multiplicities + 5)
+    real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
     integer :: s, b, c, k, m
 
     counts(:) = 0
-    extremes(1) = 0.0_dp
+    extremes(:) = 0.0_dp
     extremes(2) = -huge(1.0_dp)
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), part => problem%shared%part(s))
@@ -556,6 +562,11 @@ contains
         counts(n_multiplicities + 2) = counts(n_multiplicities + 2) + sub%n_contacts
         extremes(1) = max(extremes(1), real(sub%n_contacts, dp))
         extremes(2) = max(extremes(2), -real(sub%n_contacts, dp))
+        counts(n_multiplicities + 3) = counts(n_multiplicities + 3) + size(part%neighbour)
+        counts(n_multiplicities + 4) = counts(n_multiplicities + 4) + int(part%n_slots, i8)*problem%shared%width
+        counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(neighbourhoods%view(s)%origin == 0)
+        extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
+        extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
         deallocate (counted_elsewhere)
       end associate
     end do
@@ -566,6 +577,11 @@ contains
     figures%interactions = counts(n_multiplicities + 1)
     figures%most_contacts = nint(extremes(1), i8)
     figures%least_contacts = nint(-extremes(2), i8)
+    figures%neighbours = counts(n_multiplicities + 3)
+    figures%values = counts(n_multiplicities + 4)
+    figures%ghosts = counts(n_multiplicities + 5)
+    figures%most_neighbours = nint(extremes(3), i8)
+    figures%most_values = nint(extremes(4), i8)
     problem%n_contacts = counts(n_multiplicities + 2)
   end subroutine count_figures
 

@@ -318,8 +318,9 @@ contains
     end if
   end subroutine check_box
 
-  !> Write the bodies of all ranks in the order of the ids, the walls, groups where a grain has one, and the box. The file appears under its name only when it
-  !> is complete. Failure: status_failure; what had that name before is left as it was. Collective.
+  !> Write the bodies of all ranks in the order of the ids, the walls, groups where a grain has one, and the box. The
+  !> file appears under its name only when it is complete. Failure: status_failure; what had that name before is left as
+  !> it was. Collective.
   subroutine write_bodies_hdf5(comm, path, bodies, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path

@@ -2,10 +2,10 @@
 !> writes, and what fails is to be made known to the others by the caller.
 module gravier_csv_writer
   use gravier_kinds, only: dp, i4, i8
-  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_finite, only: is_finite
-  use gravier_file_system, only: text_file_t
+  use gravier_file_system, only: text_file_t, check_readable, file_length, remove_file
   implicit none
   private
   public :: csv_writer_t
@@ -19,6 +19,7 @@ module gravier_csv_writer
     integer :: n_cells = 0
   contains
     procedure :: open => csv_open
+    procedure :: resume => csv_resume
     !> add(value): the next cell of the row; reals with 17 significant digits, NaN and infinity as nan, inf and -inf
     generic :: add => add_text, add_i4, add_i8, add_real, add_logical
     procedure, private :: add_text => csv_add_text
@@ -32,6 +33,8 @@ module gravier_csv_writer
     procedure, private :: append_cell
   end type csv_writer_t
 
+  integer, parameter :: block_length = 65536
+
 contains
 
   !> Create the table, replacing an older one, and write its first line. Failure: status_failure.
@@ -41,9 +44,49 @@ contains
     !> the names of the columns with commas between
     character(len=*), intent(in) :: header
     type(error_t), allocatable, intent(inout) :: error
-    integer :: i
 
     if (allocated(error)) return
+    call begin(self, path, header)
+    call self%file%create(path, error)
+    call self%file%append(header//new_line("a"), error)
+  end subroutine csv_open
+
+  !> Go on with a table whose first column counts steps: keep its rows up to step `last_step`, without a last line that
+  !> has no end, and append to them. A table that is missing or died within its header is begun anew. What is kept
+  !> replaces the older file in one indivisible operation; after a failure that file is as it was. Failure: status_input
+  !> for another header or a row without a step, status_failure where the system refuses.
+  subroutine csv_resume(self, path, header, last_step, error)
+    class(csv_writer_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    !> the names of the columns with commas between
+    character(len=*), intent(in) :: header
+    integer, intent(in) :: last_step
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: kept
+    logical :: exists
+
+    if (allocated(error)) return
+    call begin(self, path, header)
+    kept = 0
+    inquire (file=path, exist=exists)
+    if (exists) call find_kept(path, header//new_line("a"), last_step, kept, error)
+    call self%file%create(path//".part", error)
+    if (kept == 0) call self%file%append(header//new_line("a"), error)
+    call copy(path, kept, self%file, error)
+    call self%file%replace(path, error)
+    if (.not. allocated(error)) return
+    if (self%file%is_open()) then
+      call self%file%close(error)
+      call remove_file(path//".part")
+    end if
+  end subroutine csv_resume
+
+  !> No cells yet, and as many columns as the header has.
+  subroutine begin(self, path, header)
+    type(csv_writer_t), intent(inout) :: self
+    character(len=*), intent(in) :: path, header
+    integer :: i
+
     self%path = path
     self%row = ""
     self%n_cells = 0
@@ -51,9 +94,122 @@ contains
     do i = 1, len(header)
       if (header(i:i) == ",") self%n_columns = self%n_columns + 1
     end do
-    call self%file%create(path, error)
-    call self%file%append(header//new_line("a"), error)
-  end subroutine csv_open
+  end subroutine begin
+
+  !> Number of bytes up to the end of the last whole row of a step not above `last_step`; 0 for part of a header.
+  subroutine find_kept(path, first_line, last_step, kept, error)
+    character(len=*), intent(in) :: path
+    !> the header with its end
+    character(len=*), intent(in) :: first_line
+    integer, intent(in) :: last_step
+    integer(i8), intent(out) :: kept
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: text, cell
+    integer(i8) :: position, length, step
+    integer :: line, unit, i
+    logical :: in_cell
+
+    kept = 0
+    call open_old(path, unit, length, error)
+    if (allocated(error)) return
+    call read_text(path, unit, int(min(length, len(first_line, i8))), text, error)
+    if (text /= first_line(1:len(text))) then
+      call raise(error, status_input, path//": line 1: "//first_line(1:len(first_line) - 1)//" was expected")
+    end if
+    position = len(text)
+    if (position == len(first_line)) kept = position
+    line = 2
+    cell = ""
+    in_cell = .true.
+    rows: do while (position < length .and. .not. allocated(error))
+      call read_text(path, unit, int(min(length - position, int(block_length, i8))), text, error)
+      do i = 1, len(text)
+        select case (text(i:i))
+        case (",")
+          in_cell = .false.
+        case (new_line("a"))
+          call read_step(path, line, cell, step, error)
+          if (allocated(error) .or. step > last_step) exit rows
+          kept = position + i
+          line = line + 1
+          cell = ""
+          in_cell = .true.
+        case default
+          if (in_cell .and. len(cell) < 40) cell = cell//text(i:i)
+        end select
+      end do
+      position = position + len(text)
+    end do rows
+    close (unit)
+  end subroutine find_kept
+
+  !> The number of a step from the first cell of a row.
+  subroutine read_step(path, line, cell, step, error)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: line
+    character(len=*), intent(in) :: cell
+    integer(i8), intent(out) :: step
+    type(error_t), allocatable, intent(inout) :: error
+
+    step = 0
+    if (len(cell) > 0 .and. len(cell) <= 18 .and. verify(cell, "0123456789") == 0) then
+      read (cell, "(i18)") step
+    else
+      call raise(error, status_input, path//": line "//to_text(line)//': "'//cell//'", but the number of a step was expected')
+    end if
+  end subroutine read_step
+
+  !> Copy the first `n` bytes of the file at `path` to the end of another.
+  subroutine copy(path, n, file, error)
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: n
+    type(text_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: text
+    integer(i8) :: position, length
+    integer :: unit
+
+    if (allocated(error) .or. n == 0) return
+    call open_old(path, unit, length, error)
+    if (allocated(error)) return
+    position = 0
+    do while (position < n .and. .not. allocated(error))
+      call read_text(path, unit, int(min(n - position, int(block_length, i8))), text, error)
+      call file%append(text, error)
+      position = position + len(text)
+    end do
+    close (unit)
+  end subroutine copy
+
+  subroutine open_old(path, unit, length, error)
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: unit
+    integer(i8), intent(out) :: length
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=200) :: reason
+    integer :: stat
+
+    call check_readable(path, error)
+    if (allocated(error)) return
+    length = file_length(path)
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat, iomsg=reason)
+    if (stat /= 0) call raise(error, status_input, path//": cannot read this file: "//trim(reason))
+  end subroutine open_old
+
+  !> The next `n` bytes.
+  subroutine read_text(path, unit, n, text, error)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: unit, n
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=200) :: reason
+    integer :: stat
+
+    allocate (character(len=n) :: text)
+    if (n == 0) return
+    read (unit, iostat=stat, iomsg=reason) text
+    if (stat /= 0) call raise(error, status_input, path//": cannot read this file: "//trim(reason))
+  end subroutine read_text
 
   !> Text; in quotes where it holds a comma, a quote or the end of a line.
   subroutine csv_add_text(self, value)

@@ -8,7 +8,7 @@ module gravier_file_system
   implicit none
   private
   public :: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, sync_to_disk
+  public :: extend_file, replace_file
   public :: text_file_t, text_at
 
   !> A text file written piece by piece; after a failed write it ends with the last complete piece.
@@ -20,6 +20,7 @@ module gravier_file_system
     character(len=:), allocatable :: path
   contains
     procedure :: create => text_file_create
+    procedure :: continue => text_file_continue
     procedure :: append => text_file_append
     procedure :: replace => text_file_replace
     procedure :: close => text_file_close
@@ -300,24 +301,43 @@ contains
     if (number /= 0) call raise(error, status_failure, path//": cannot write to this file: "//reason(number))
   end subroutine extend_file
 
-  !> Bring a file, or the names in a directory, to the disk: they outlive a loss of power. Failure: status_failure, with
-  !> the system's reason.
-  subroutine sync_to_disk(path, error)
-    character(len=*), intent(in) :: path
+  !> Put a finished file in the place of another in one indivisible operation, once its content is on the disk: whatever
+  !> happens, a loss of power included, `to` is the older file or the new one whole. Failure: status_failure, with the
+  !> system's reason; `to` is as it was.
+  subroutine replace_file(from, to, error)
+    character(len=*), intent(in) :: from, to
     type(error_t), allocatable, intent(inout) :: error
-    integer(c_int) :: descriptor, number, ignored
+    integer(c_int) :: number
 
     if (allocated(error)) return
+    number = sync_to_disk(from)
+    if (number /= 0) call raise(error, status_failure, from//": cannot bring this file to the disk: "//reason(number))
+    call rename_file(from, to, error)
+    ! the new name itself; not every file system can, and the rename is done
+    if (.not. allocated(error)) number = sync_to_disk(directory_of(to))
+  end subroutine replace_file
+
+  pure function directory_of(path) result(directory)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: directory
+    directory = path(1:index(path, "/", back=.true.))
+    if (len(directory) == 0) directory = "."
+  end function directory_of
+
+  !> Bring a file, or the names in a directory, to the disk; the result is the system's error number, 0 for success.
+  integer(c_int) function sync_to_disk(path) result(number)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: descriptor, ignored
+
     number = 0
     descriptor = c_open(c_text(path), o_rdonly)
     if (descriptor < 0) then
       number = last_error()
-    else
-      if (c_fsync(descriptor) /= 0) number = last_error()
-      ignored = c_close(descriptor)
+      return
     end if
-    if (number /= 0) call raise(error, status_failure, path//": cannot bring this to the disk: "//reason(number))
-  end subroutine sync_to_disk
+    if (c_fsync(descriptor) /= 0) number = last_error()
+    ignored = c_close(descriptor)
+  end function sync_to_disk
 
   !> Reserve bytes [first, last) of an open file; the result is the system's error number, 0 for success.
   integer(c_int) function allocate_range(descriptor, first, last) result(number)
@@ -359,6 +379,30 @@ contains
     end if
   end subroutine text_file_create
 
+  !> Open a text file behind what it holds, creating it where there is none. Failure: status_failure, with the system's
+  !> reason.
+  subroutine text_file_continue(self, path, error)
+    class(text_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: exists
+
+    if (allocated(error)) return
+    inquire (file=path, exist=exists)
+    if (.not. exists) then
+      call self%create(path, error)
+      return
+    end if
+    call self%close(error)
+    self%path = path
+    self%descriptor = c_open(c_text(path), o_wronly)
+    if (self%descriptor < 0) then
+      call raise(error, status_failure, path//": cannot write to this file: "//reason(last_error()))
+      return
+    end if
+    self%length = c_lseek(self%descriptor, 0_c_int64_t, seek_end)
+  end subroutine text_file_continue
+
   !> Append text and hand it to the system at once. On failure the file is cut back to what it held before.
   subroutine text_file_append(self, text, error)
     class(text_file_t), intent(inout) :: self
@@ -386,16 +430,14 @@ contains
     self%length = self%length + done
   end subroutine text_file_append
 
-  !> Give the file the name `path`, in place of what had it, in one indivisible operation once its content is on the
-  !> disk. Failure: status_failure, with the system's reason; what had that name stays.
+  !> Give the file the name `path`, as replace_file does; it stays open.
   subroutine text_file_replace(self, path, error)
     class(text_file_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(error)) return
-    call sync_to_disk(self%path, error)
-    call rename_file(self%path, path, error)
+    call replace_file(self%path, path, error)
     if (.not. allocated(error)) self%path = path
   end subroutine text_file_replace
 

@@ -3,7 +3,8 @@
 !> n of the N rows. Every procedure with an `error` is collective and leaves the same error on all ranks. What is
 !> wrong with a file that is read ends in status_input, what fails while writing in status_failure.
 module gravier_hdf5_file
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr, c_char, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_loc, c_long, c_null_char, c_null_ptr, &
+    & c_ptr, c_size_t
   use mpi_f08, only: MPI_INFO_NULL
   use hdf5, only: h5aclose_f, h5acreate_f, h5aget_space_f, h5aget_type_f, h5aopen_by_name_f, h5aread_f, h5awrite_f, h5dclose_f, &
     & h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5dwrite_f, h5eset_auto_f, &
@@ -99,6 +100,50 @@ module gravier_hdf5_file
     procedure, private :: write_value
     procedure, private :: read_value
   end type h5_file_t
+
+  !> H5AC_cache_config_t of HDF5's C library, which its Fortran interface does not have
+  type, bind(C) :: cache_config_t
+    integer(c_int) :: version = 1
+    logical(c_bool) :: report, open_trace, close_trace
+    character(kind=c_char) :: trace_file(1025)
+    logical(c_bool) :: evictions, set_initial_size
+    integer(c_size_t) :: initial_size
+    real(c_double) :: min_clean_fraction
+    integer(c_size_t) :: max_size, min_size
+    integer(c_long) :: epoch_length
+    integer(c_int) :: increase_mode
+    real(c_double) :: lower_threshold, increment
+    logical(c_bool) :: limit_increment
+    integer(c_size_t) :: max_increment
+    integer(c_int) :: flash_mode
+    real(c_double) :: flash_multiple, flash_threshold
+    integer(c_int) :: decrease_mode
+    real(c_double) :: upper_threshold, decrement
+    logical(c_bool) :: limit_decrement
+    integer(c_size_t) :: max_decrement
+    integer(c_int) :: epochs_before_eviction
+    logical(c_bool) :: apply_empty_reserve
+    real(c_double) :: empty_reserve
+    integer(c_size_t) :: dirty_bytes_threshold
+    !> 0: rank 0 alone writes headers; 1: all ranks share them out
+    integer(c_int) :: write_strategy
+  end type cache_config_t
+
+  interface
+    integer(c_int) function c_get_cache_config(properties, config) bind(C, name="H5Pget_mdc_config")
+      import :: c_int, c_int64_t, cache_config_t
+      implicit none
+      integer(c_int64_t), value :: properties
+      type(cache_config_t), intent(inout) :: config
+    end function c_get_cache_config
+
+    integer(c_int) function c_set_cache_config(properties, config) bind(C, name="H5Pset_mdc_config")
+      import :: c_int, c_int64_t, cache_config_t
+      implicit none
+      integer(c_int64_t), value :: properties
+      type(cache_config_t), intent(in) :: config
+    end function c_set_cache_config
+  end interface
 
   !> the library is started at first use and ends with MPI
   logical :: library_started = .false.
@@ -219,9 +264,16 @@ contains
   !> Access by all ranks of `comm` together.
   integer(hid_t) function parallel_access(comm) result(access)
     type(communicator_t), intent(in) :: comm
+    type(cache_config_t) :: config
     integer :: stat
 
     call h5pcreate_f(H5P_FILE_ACCESS_F, access, stat)
+    ! headers change together or not at all, as nearly as can be: ranks that are killed one after the other would leave
+    ! some of a change written and some not
+    if (c_get_cache_config(access, config) == 0) then
+      config%write_strategy = 0
+      stat = c_set_cache_config(access, config)
+    end if
     ! HDF5 1.10 takes integer handles
     call h5pset_fapl_mpio_f(access, comm%mpi%mpi_val, MPI_INFO_NULL%mpi_val, stat)
     call h5pset_fclose_degree_f(access, H5F_CLOSE_STRONG_F, stat)

@@ -1,8 +1,9 @@
-!> The results of a run, results.h5: what was run, the walls, and at chosen steps the bodies and the contacts.
+!> The results of a run, results.h5: what was run, the boundaries, and at chosen steps the bodies, the boundaries and the
+!> contacts.
 !> Rows are in the order of the ids, and nothing in the file tells how many ranks wrote it or when.
 module gravier_results_file
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
@@ -10,9 +11,9 @@ module gravier_results_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: results_file_t, body_rows_t, contact_rows_t, figures_t
+  public :: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t
 
-  !> The bodies of this rank; SI units. Every array is allocated, without rows where the rank has none.
+  !> The bodies of this rank; SI units. Every array but `image` is allocated, without rows where the rank has none.
   type :: body_rows_t
     !> (n): global and stable, >= 1
     integer(i8), allocatable :: id(:)
@@ -22,11 +23,25 @@ module gravier_results_file
     real(dp), allocatable :: velocity(:, :)
     !> (n)
     real(dp), allocatable :: radius(:)
+    !> (dimension, n): how many periods the centre has gone along each axis; allocated on all ranks or on none
+    integer, allocatable :: image(:, :)
   end type body_rows_t
+
+  !> All boundaries, the same on all ranks.
+  type :: boundary_rows_t
+    !> (n)
+    integer(i8), allocatable :: id(:)
+    !> (dimension, n): its point, and for a plane the unit normal towards the free side (not allocated: not written)
+    real(dp), allocatable :: position(:, :), normal(:, :)
+    !> 2D (3, n), 3D (6, n), as those of bodies
+    real(dp), allocatable :: velocity(:, :)
+    !> (dimension, n), N: what the bodies exert on it
+    real(dp), allocatable :: force(:, :)
+  end type boundary_rows_t
 
   !> The contacts of this rank, each contact on one rank only.
   type :: contact_rows_t
-    !> (n): ids of the body that touches and of the body or wall that is touched
+    !> (n): ids of the body that touches and of the body or boundary that is touched
     integer(i8), allocatable :: candidate(:), antagonist(:)
     !> (dimension, n): unit vectors from the antagonist to the candidate
     real(dp), allocatable :: normal(:, :)
@@ -55,7 +70,8 @@ module gravier_results_file
     integer :: dimension = 3
   contains
     procedure :: open => results_open
-    procedure :: write_walls => results_write_walls
+    procedure :: reopen => results_reopen
+    procedure :: write_boundaries => results_write_boundaries
     procedure :: write_step => results_write_step
     procedure :: close => results_close
   end type results_file_t
@@ -98,33 +114,106 @@ contains
     call self%file%flush(error)
   end subroutine results_open
 
-  !> Write /walls, once. Collective.
-  subroutine results_write_walls(self, id, point, normal, error)
+  !> Go on with a file that a run left: steps above `last_step` are removed, and more can be written. Failure, with what
+  !> is there left alone: status_input for a file that is damaged or not the results of a run, status_failure for one that
+  !> cannot be written to. Collective.
+  subroutine results_reopen(self, comm, path, last_step, error)
     class(results_file_t), intent(inout) :: self
-    !> (walls), the same on all ranks
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: last_step
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: dimension
+    integer, allocatable :: later(:)
+    integer :: i, n_later
+
+    if (allocated(error)) return
+    self%comm = comm
+    self%path = path
+    call self%file%reopen(comm, path, error)
+    if (allocated(error)) return
+    call self%file%read_attribute("/run", "dimension", dimension, error)
+    call find_later_steps(self, last_step, later, n_later, error)
+    if (allocated(error)) then
+      error%status = status_input
+      call self%file%close(error)
+      return
+    end if
+    self%dimension = int(dimension)
+    call self%file%reserve(bytes_of_headers, error)
+    do i = 1, n_later
+      call self%file%remove_group("/steps/"//to_text(later(i)), error)
+    end do
+    call self%file%flush(error)
+  end subroutine results_reopen
+
+  !> Steps above `last_step`, once all that are to stay were found to be what they should.
+  subroutine find_later_steps(self, last_step, later, n_later, error)
+    type(results_file_t), intent(in) :: self
+    integer, intent(in) :: last_step
+    !> (n_later at least)
+    integer, allocatable, intent(out) :: later(:)
+    integer, intent(out) :: n_later
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name
+    integer(i8) :: step, n_bodies
+    integer :: i, number, stat
+
+    n_later = 0
+    if (allocated(error)) return
+    if (.not. self%file%exists("/steps")) then
+      call raise(error, status_input, self%path//": /steps: missing, but the results of a run were expected")
+      return
+    end if
+    allocate (later(self%file%member_count("/steps")))
+    do i = 1, size(later)
+      name = self%file%member("/steps", i)
+      stat = 1
+      if (len(name) > 0 .and. len(name) < 11 .and. verify(name, "0123456789") == 0) read (name, *, iostat=stat) number
+      if (stat /= 0) then
+        call raise(error, status_input, self%path//': /steps: a member "'//name//'", but numbers of steps were expected')
+      else if (number > last_step) then
+        n_later = n_later + 1
+        later(n_later) = number
+      else
+        call self%file%read_attribute("/steps/"//name, "step", step, error)
+        call self%file%row_count("/steps/"//name//"/bodies/radius", n_bodies, error)
+        if (allocated(error)) return
+        if (step /= number) call raise(error, status_input, self%path//": /steps/"//name//": step "//to_text(step)//" inside")
+      end if
+      if (allocated(error)) return
+    end do
+  end subroutine find_later_steps
+
+  !> Write /boundaries, once. Collective.
+  subroutine results_write_boundaries(self, id, name, shape, normal, error)
+    class(results_file_t), intent(inout) :: self
+    !> (boundaries), the same on all ranks
     integer(i8), intent(in), contiguous :: id(:)
-    !> (dimension, walls): a point of each plane, and unit vectors towards the free side
-    real(dp), intent(in), contiguous :: point(:, :), normal(:, :)
+    !> (boundaries): as in the input
+    character(len=*), intent(in), contiguous :: name(:), shape(:)
+    !> (dimension, boundaries): unit vectors towards the free side at the start, zero where a shape has none
+    real(dp), intent(in), contiguous :: normal(:, :)
     type(error_t), allocatable, intent(inout) :: error
     integer :: n
 
     if (allocated(error)) return
-    call check_finite(self, "/walls/point", self%dimension, point, id, error)
-    call check_finite(self, "/walls/normal", self%dimension, normal, id, error)
+    call check_finite(self, "/boundaries/normal", self%dimension, normal, id, error)
     call self%comm%agree(error)
     n = merge(size(id), 0, self%comm%rank == 0)
-    call self%file%reserve(bytes_of_headers + bytes_of_word*size(id, kind=i8)*(1 + 2*self%dimension), error)
-    call self%file%begin_group("/walls", error)
-    call self%file%write_rows("/walls/id", id(1:n), error)
-    call self%file%write_rows("/walls/point", point(:, 1:n), error)
-    call self%file%write_attribute("/walls/point", "unit", "m", error)
-    call self%file%write_rows("/walls/normal", normal(:, 1:n), error)
+    call self%file%reserve(bytes_of_headers + size(id, kind=i8)*(bytes_of_word*(1 + self%dimension) + len(name) + len(shape)), &
+      & error)
+    call self%file%begin_group("/boundaries", error)
+    call self%file%write_rows("/boundaries/id", id(1:n), error)
+    call self%file%write_rows("/boundaries/name", name(1:n), error)
+    call self%file%write_rows("/boundaries/shape", shape(1:n), error)
+    call self%file%write_rows("/boundaries/normal", normal(:, 1:n), error)
     call finish(self, error)
-  end subroutine results_write_walls
+  end subroutine results_write_boundaries
 
   !> Write /steps/<step>. Nothing of the step is in the file when this fails, and what was there stays readable.
   !> Failure (status_failure): a number that is not finite, a disk that is full, a step written before. Collective.
-  subroutine results_write_step(self, step, time, bodies, error, contacts, figures)
+  subroutine results_write_step(self, step, time, bodies, error, contacts, boundaries, figures)
     class(results_file_t), intent(inout) :: self
     integer, intent(in) :: step
     !> s
@@ -133,6 +222,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> present on all ranks or on none
     type(contact_rows_t), intent(in), optional :: contacts
+    type(boundary_rows_t), intent(in), optional :: boundaries
     type(figures_t), intent(in), optional :: figures
     type(body_rows_t) :: sorted_bodies
     type(contact_rows_t) :: sorted_contacts
@@ -144,11 +234,15 @@ contains
     if (.not. is_finite(time)) call raise_not_finite(self, group//", attribute time", "", error)
     call sort_bodies(self, bodies, sorted_bodies)
     call check_bodies(self, group//"/bodies", sorted_bodies, error)
-    words = self%comm%total(size(bodies%id, kind=i8))*(2 + size(bodies%position, 1) + size(bodies%velocity, 1))
+    words = self%comm%total(size(bodies%id, kind=i8))*(2 + 2*size(bodies%position, 1) + size(bodies%velocity, 1))
     if (present(contacts)) then
       call sort_contacts(self, contacts, sorted_contacts)
       call check_contacts(self, group//"/contacts", sorted_contacts, error)
       words = words + self%comm%total(size(contacts%gap, kind=i8))*(3 + 2*self%dimension)
+    end if
+    if (present(boundaries)) then
+      call check_boundaries(self, group//"/boundaries", boundaries, error)
+      words = words + size(boundaries%id)*6*self%dimension
     end if
     if (present(figures)) words = words + size(figures%histogram) + words_of_attribute*size(figures%value)
     call self%comm%agree(error)
@@ -158,6 +252,7 @@ contains
     call self%file%write_attribute(group, "step", step, error)
     call self%file%write_attribute(group, "time", time, error)
     call write_bodies(self%file, group//"/bodies", sorted_bodies, error)
+    if (present(boundaries)) call write_boundary_rows(self, group//"/boundaries", boundaries, error)
     if (present(contacts)) call write_contacts(self%file, group//"/contacts", sorted_contacts, error)
     if (present(figures)) call write_figures(self, group//"/diagnostics", figures, error)
     call finish(self, error)
@@ -187,6 +282,7 @@ contains
     character(len=*), intent(in) :: group
     type(body_rows_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: image(:, :)
 
     call file%make_group(group, error)
     call file%write_rows(group//"/id", bodies%id, error)
@@ -196,7 +292,31 @@ contains
     call file%write_attribute(group//"/velocity", "unit", "m/s, rad/s", error)
     call file%write_rows(group//"/radius", bodies%radius, error)
     call file%write_attribute(group//"/radius", "unit", "m", error)
+    if (allocated(bodies%image)) then
+      image = bodies%image
+      call file%write_rows(group//"/image", image, error)
+    end if
   end subroutine write_bodies
+
+  !> Rank 0 writes for all.
+  subroutine write_boundary_rows(self, group, boundaries, error)
+    type(results_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: group
+    type(boundary_rows_t), intent(in) :: boundaries
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    n = merge(size(boundaries%id), 0, self%comm%rank == 0)
+    call self%file%make_group(group, error)
+    call self%file%write_rows(group//"/id", boundaries%id(1:n), error)
+    call self%file%write_rows(group//"/position", boundaries%position(:, 1:n), error)
+    call self%file%write_attribute(group//"/position", "unit", "m", error)
+    if (allocated(boundaries%normal)) call self%file%write_rows(group//"/normal", boundaries%normal(:, 1:n), error)
+    call self%file%write_rows(group//"/velocity", boundaries%velocity(:, 1:n), error)
+    call self%file%write_attribute(group//"/velocity", "unit", "m/s, rad/s", error)
+    call self%file%write_rows(group//"/force", boundaries%force(:, 1:n), error)
+    call self%file%write_attribute(group//"/force", "unit", "N", error)
+  end subroutine write_boundary_rows
 
   subroutine write_contacts(file, group, contacts, error)
     type(h5_file_t), intent(inout) :: file
@@ -239,21 +359,25 @@ contains
     type(body_rows_t), intent(out) :: sorted
     integer(i8), allocatable :: records(:, :), ordered(:, :)
     real(dp), allocatable :: column(:, :)
-    integer :: nd, nv
+    integer :: nd, nv, ni
 
     nd = size(bodies%position, 1)
     nv = size(bodies%velocity, 1)
-    allocate (records(2 + nd + nv, size(bodies%id)))
+    ni = 0
+    if (allocated(bodies%image)) ni = nd
+    allocate (records(2 + nd + nv + ni, size(bodies%id)))
     records(1, :) = bodies%id
     call pack_reals(nd, bodies%position, 2, records)
     call pack_reals(nv, bodies%velocity, 2 + nd, records)
     call pack_reals(1, bodies%radius, 2 + nd + nv, records)
+    if (ni > 0) records(3 + nd + nv:, :) = bodies%image
     call order_rows(self%comm, 1, records, ordered)
     sorted%id = ordered(1, :)
     call unpack_reals(ordered, 2, nd, sorted%position)
     call unpack_reals(ordered, 2 + nd, nv, sorted%velocity)
     call unpack_reals(ordered, 2 + nd + nv, 1, column)
     sorted%radius = column(1, :)
+    if (ni > 0) sorted%image = int(ordered(3 + nd + nv:, :))
   end subroutine sort_bodies
 
   !> The contacts of all ranks in the order of candidate, then antagonist, cut into nearly equal blocks.
@@ -291,6 +415,20 @@ contains
     call check_finite(self, group//"/velocity", size(bodies%velocity, 1), bodies%velocity, bodies%id, error)
     call check_finite(self, group//"/radius", 1, bodies%radius, bodies%id, error)
   end subroutine check_bodies
+
+  subroutine check_boundaries(self, group, boundaries, error)
+    type(results_file_t), intent(in) :: self
+    character(len=*), intent(in) :: group
+    type(boundary_rows_t), intent(in) :: boundaries
+    type(error_t), allocatable, intent(inout) :: error
+
+    call check_finite(self, group//"/position", self%dimension, boundaries%position, boundaries%id, error)
+    if (allocated(boundaries%normal)) then
+      call check_finite(self, group//"/normal", self%dimension, boundaries%normal, boundaries%id, error)
+    end if
+    call check_finite(self, group//"/velocity", size(boundaries%velocity, 1), boundaries%velocity, boundaries%id, error)
+    call check_finite(self, group//"/force", self%dimension, boundaries%force, boundaries%id, error)
+  end subroutine check_boundaries
 
   subroutine check_contacts(self, group, contacts, error)
     type(results_file_t), intent(in) :: self

@@ -233,11 +233,15 @@ contains
   subroutine test_groups()
     type(bodies_data_t) :: bodies
     type(error_t), allocatable :: error
+    type(h5_file_t) :: file
     character(len=:), allocatable :: plain, free
 
     call make_bodies(2, 30, bodies)
     call write_made(base//".h5", 2, bodies, error)
     plain = content(base//".h5")
+    call file%open(comm, base//".h5", error)
+    call check(.not. file%exists("/bodies/group"), "no dataset where no grain is glued")
+    call file%close(error)
     allocate (bodies%group(bodies%n), source=0)
     call write_with(bodies, error)
     free = content(base//".h5")

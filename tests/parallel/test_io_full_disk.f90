@@ -10,6 +10,7 @@ program test_io_full_disk
   use gravier_hdf5_file, only: h5_file_t
   use gravier_results_file, only: results_file_t, body_rows_t
   use gravier_bodies_file, only: bodies_data_t, read_bodies, write_bodies
+  use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -28,7 +29,9 @@ program test_io_full_disk
     call test_without_reservation()
     call test_create()
     call test_bodies()
+    call test_checkpoint()
     call test_csv()
+    call test_resume()
     call unmount()
   else
     if (comm%rank == 0) write (output_unit, "(a)") "SKIPPED: no permission to mount a small file system; full disks are NOT tested"
@@ -105,23 +108,27 @@ contains
   !> Fill the disk but for `left` bytes (-1: empty it again).
   subroutine fill(left)
     integer, intent(in) :: left
+
+    call comm%barrier()
+    if (comm%rank == 0) call fill_alone(left)
+    call comm%barrier()
+  end subroutine fill
+
+  !> The same, by one rank and without the others.
+  subroutine fill_alone(left)
+    integer, intent(in) :: left
     character(len=1024) :: block
     integer :: unit, i
 
-    call comm%barrier()
-    if (comm%rank == 0) then
-      call remove_file(disk//"/filler")
-      if (left >= 0) then
-        block = "filler"
-        open (newunit=unit, file=disk//"/filler", access="stream", form="unformatted", action="write")
-        do i = 1, (free_bytes() - left)/len(block)
-          write (unit) block
-        end do
-        close (unit)
-      end if
-    end if
-    call comm%barrier()
-  end subroutine fill
+    call remove_file(disk//"/filler")
+    if (left < 0) return
+    block = "filler"
+    open (newunit=unit, file=disk//"/filler", access="stream", form="unformatted", action="write")
+    do i = 1, (free_bytes() - left)/len(block)
+      write (unit) block
+    end do
+    close (unit)
+  end subroutine fill_alone
 
   integer function free_bytes()
     integer :: unit
@@ -302,6 +309,91 @@ contains
     call write_bodies(comm, disk//"/bodies.h5", 3, bodies%id, bodies%position, bodies%velocity, bodies%radius, wall_id=no_id, &
       & wall_point=no_point, wall_normal=no_point, error=error)
   end subroutine write_some
+
+  !> The older checkpoint stays, whether it is the table or the commit that fails.
+  subroutine test_checkpoint()
+    type(checkpoint_file_t) :: file
+    type(error_t), allocatable :: error
+    integer(i8), allocatable :: records(:, :), counts(:)
+    integer(i8) :: step
+    logical :: exists
+
+    call write_checkpoint(1_i8, 10, error)
+    call expect_none(error, "a checkpoint on a disk with room")
+    call fill(100000)
+    call write_checkpoint(2_i8, 20000, error)
+    call expect(error, "checkpoint.h5.part: no space left on device: ", "a table on a full disk")
+    call fill(4096)
+    call write_checkpoint(2_i8, 10, error)
+    call expect(error, "checkpoint.h5.part: no space left on device: ", "a checkpoint on a full disk")
+    inquire (file=disk//"/checkpoint.h5.part", exist=exists)
+    call check(.not. exists, "no unfinished checkpoint is left")
+    call file%open(comm, disk//"/checkpoint.h5", error)
+    call file%read_scalar("step", step, error)
+    call check_equal(step, 1_i8, "the older checkpoint")
+    call file%read_table("grains", comm%size, records, counts, error)
+    call check_equal(size(records, 2), 10, "its records")
+    call file%close(error)
+    call expect_none(error, "reading the older checkpoint")
+    call fill(-1)
+    if (comm%rank == 0) call remove_file(disk//"/checkpoint.h5")
+  end subroutine test_checkpoint
+
+  !> n records on each rank.
+  subroutine write_checkpoint(step, n, error)
+    integer(i8), intent(in) :: step
+    integer, intent(in) :: n
+    type(error_t), allocatable, intent(inout) :: error
+    type(checkpoint_file_t) :: file
+    integer(i8), allocatable :: records(:, :)
+    integer(i8) :: counts(1)
+
+    counts = n
+    allocate (records(5, n), source=step)
+    call file%create(comm, disk//"/checkpoint.h5", error)
+    call file%write_scalar("step", step, error)
+    call file%write_table("grains", comm%size, records, counts, error)
+    call file%commit(error)
+  end subroutine write_checkpoint
+
+  !> A table that cannot be copied stays as it was.
+  subroutine test_resume()
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+    integer :: row, before, after
+    logical :: exists
+
+    call comm%barrier()
+    if (comm%rank > 0) return
+    call fill_alone(-1)
+    call table%open(disk//"/long.csv", "step,x", error)
+    do row = 1, 5000
+      call table%add(row)
+      call table%add("something")
+      call table%end_row(error)
+    end do
+    call table%close(error)
+    inquire (file=disk//"/long.csv", size=before)
+    call fill_alone(8192)
+    call table%resume(disk//"/long.csv", "step,x", 4000, error)
+    call check(allocated(error), "resuming on a full disk: an error")
+    if (allocated(error)) then
+      call check(index(error%message, disk//"/long.csv.part: cannot write to this file: no space left on device") == 1, &
+        & "resuming on a full disk: "//error%message)
+      deallocate (error)
+    end if
+    inquire (file=disk//"/long.csv", size=after)
+    call check_equal(after, before, "the table is as it was")
+    inquire (file=disk//"/long.csv.part", exist=exists)
+    call check(.not. exists, "no part of a table is left")
+    call check(.not. table%is_open(), "a table not resumed is not open")
+    call fill_alone(-1)
+    call table%resume(disk//"/long.csv", "step,x", 4000, error)
+    call table%close(error)
+    call expect_none(error, "resuming once there is room")
+    inquire (file=disk//"/long.csv", size=after)
+    call check(after < before, "later rows are gone")
+  end subroutine test_resume
 
   !> The table ends with the last complete row.
   subroutine test_csv()

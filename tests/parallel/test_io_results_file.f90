@@ -3,14 +3,16 @@ program test_io_results_file
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_negative_inf
   use mpi_f08, only: MPI_Comm, MPI_Comm_split, MPI_Comm_free, MPI_UNDEFINED, MPI_COMM_NULL, operator(/=)
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, status_failure
+  use gravier_errors, only: error_t, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_bodies = 23, n_contacts = 41
+  character(len=20), parameter :: names(2) = [character(len=20) :: "floor", "tambour étroit"]
+  character(len=9), parameter :: shapes(2) = [character(len=9) :: "plane", "circle"]
   character(len=*), parameter :: input_text = "&scene title = 'test' /"//new_line("a")//"&time step = 1e-3 /"//new_line("a")
   type(communicator_t) :: world
   character(len=:), allocatable :: path
@@ -22,6 +24,8 @@ program test_io_results_file
   call test_content(3)
   call test_any_rank_count()
   call test_refused()
+  call test_reopen()
+  call test_reopen_refused()
   call finish_checks()
   call world%free()
   call stop_parallel()
@@ -52,13 +56,18 @@ contains
     end if
   end subroutine expect_none
 
-  subroutine expect(error, message, name)
+  subroutine expect(error, message, name, status)
     type(error_t), allocatable, intent(inout) :: error
     character(len=*), intent(in) :: message, name
+    integer, intent(in), optional :: status
+    integer :: expected
+
+    expected = status_failure
+    if (present(status)) expected = status
 
     call check(allocated(error), name//": an error")
     if (.not. allocated(error)) return
-    call check_equal(error%status, status_failure, name//": status")
+    call check_equal(error%status, expected, name//": status")
     call check_equal(error%message, message, name//": message")
     deallocate (error)
   end subroutine expect
@@ -133,22 +142,50 @@ contains
     type(results_file_t) :: results
     type(body_rows_t) :: bodies
     type(contact_rows_t) :: contacts
-    real(dp) :: point(dimension, 2), normal(dimension, 2)
+    type(boundary_rows_t) :: boundaries
 
-    point = 0
-    point(1, 2) = 0.3_dp
-    normal = 0
-    normal(dimension, :) = 1
     call make_bodies(comm, dimension, bodies)
     call make_contacts(comm, dimension, contacts)
+    call make_boundaries(dimension, boundaries)
     call results%open(comm, name, "0.1.0", "gravier case.nml", input_text, dimension, error)
-    call results%write_walls([1_i8, 2_i8], point, normal, error)
+    call results%write_boundaries(boundaries%id, names, shapes, boundaries%normal, error)
     call results%write_step(0, 0.0_dp, bodies, error)
-    call results%write_step(10, 0.01_dp, bodies, error, contacts)
+    call results%write_step(10, 0.01_dp, bodies, error, contacts, boundaries)
     call empty_step(results, dimension, error)
-    call results%write_step(30, 0.03_dp, bodies, error)
+    call make_images(dimension, bodies)
+    deallocate (boundaries%normal)
+    call results%write_step(30, 0.03_dp, bodies, error, boundaries=boundaries)
     call results%close(error)
   end subroutine write_all
+
+  !> The body of id g has gone g - 110, 2 (g - 110), ... periods.
+  subroutine make_images(dimension, bodies)
+    integer, intent(in) :: dimension
+    type(body_rows_t), intent(inout) :: bodies
+    integer :: k
+
+    allocate (bodies%image(dimension, size(bodies%id)))
+    do k = 1, dimension
+      bodies%image(k, :) = k*int(bodies%id - 110)
+    end do
+  end subroutine make_images
+
+  !> Two boundaries of which only the first has a normal.
+  subroutine make_boundaries(dimension, boundaries)
+    integer, intent(in) :: dimension
+    type(boundary_rows_t), intent(out) :: boundaries
+    integer :: k
+
+    boundaries%id = [1_i8, 2_i8]
+    allocate (boundaries%normal(dimension, 2), source=0.0_dp)
+    boundaries%normal(dimension, 1) = 1
+    allocate (boundaries%position(dimension, 2), boundaries%velocity(3*(dimension - 1), 2), boundaries%force(dimension, 2))
+    do k = 1, 2
+      boundaries%position(:, k) = 0.1_dp*k
+      boundaries%velocity(:, k) = 0.2_dp*k
+      boundaries%force(:, k) = 0.3_dp*k
+    end do
+  end subroutine make_boundaries
 
   !> A step of no bodies and no contacts.
   subroutine empty_step(results, dimension, error)
@@ -194,11 +231,17 @@ contains
     call check_unit(file, "/steps/10/bodies/position", "m")
     call check_unit(file, "/steps/10/bodies/velocity", "m/s, rad/s")
     call check_unit(file, "/steps/10/bodies/radius", "m")
+    call check_unit(file, "/steps/10/boundaries/position", "m")
+    call check_unit(file, "/steps/10/boundaries/velocity", "m/s, rad/s")
+    call check_unit(file, "/steps/10/boundaries/force", "N")
     call check_unit(file, "/steps/10/contacts/gap", "m")
     call check_unit(file, "/steps/10/contacts/impulse", "N s")
     call expect_none(error, "reading attributes")
     call check_rows(file, dimension)
+    call check_boundaries(file, dimension)
+    call check_images(file, dimension)
     call file%close(error)
+    call check_texts()
     call expect_none(error, "closing")
   end subroutine test_content
 
@@ -217,13 +260,12 @@ contains
     type(h5_file_t), intent(in) :: file
     integer, intent(in) :: dimension
     type(error_t), allocatable :: error
-    integer(i8) :: id(n_bodies), candidate(n_contacts), antagonist(n_contacts), wall(2)
+    integer(i8) :: id(n_bodies), candidate(n_contacts), antagonist(n_contacts)
     real(dp) :: position(dimension, n_bodies), velocity(3*(dimension - 1), n_bodies), radius(n_bodies)
-    real(dp) :: normal(dimension, n_contacts), gap(n_contacts), impulse(dimension, n_contacts), point(dimension, 2)
+    real(dp) :: normal(dimension, n_contacts), gap(n_contacts), impulse(dimension, n_contacts)
     integer :: g, k
 
     id = 0
-    wall = 0
     candidate = 0
     antagonist = 0
     call file%read_rows("/steps/10/bodies/id", 0_i8, id, error)
@@ -235,10 +277,6 @@ contains
     call file%read_rows("/steps/10/contacts/normal", 0_i8, normal, error)
     call file%read_rows("/steps/10/contacts/gap", 0_i8, gap, error)
     call file%read_rows("/steps/10/contacts/impulse", 0_i8, impulse, error)
-    call file%read_rows("/walls/id", 0_i8, wall, error)
-    call file%read_rows("/walls/point", 0_i8, point, error)
-    call check(all(wall == [1, 2]), "walls")
-    call check_close(point(1, 2), 0.3_dp, 0.0_dp, "point of a wall")
     call expect_none(error, "reading rows")
     if (world%rank > 0) return
     do g = 1, n_bodies
@@ -257,6 +295,76 @@ contains
       end do
     end do
   end subroutine check_rows
+
+  subroutine check_boundaries(file, dimension, after)
+    type(h5_file_t), intent(in) :: file
+    integer, intent(in) :: dimension
+    !> present: the last step was written again
+    logical, intent(in), optional :: after
+    type(error_t), allocatable :: error
+    type(boundary_rows_t) :: expected, found
+
+    call make_boundaries(dimension, expected)
+    found = expected
+    found%id = 0
+    found%position = 0
+    found%normal = 0
+    found%velocity = 0
+    found%force = 0
+    call file%read_rows("/steps/10/boundaries/id", 0_i8, found%id, error)
+    call file%read_rows("/steps/10/boundaries/position", 0_i8, found%position, error)
+    call file%read_rows("/steps/10/boundaries/normal", 0_i8, found%normal, error)
+    call file%read_rows("/steps/10/boundaries/velocity", 0_i8, found%velocity, error)
+    call file%read_rows("/steps/10/boundaries/force", 0_i8, found%force, error)
+    call expect_none(error, "reading boundaries")
+    call check(all(found%id == expected%id), "ids of boundaries")
+    call check(all(abs(found%position - expected%position) <= 0), "positions of boundaries")
+    call check(all(abs(found%normal - expected%normal) <= 0), "normals of boundaries")
+    call check(all(abs(found%velocity - expected%velocity) <= 0), "velocities of boundaries")
+    call check(all(abs(found%force - expected%force) <= 0), "forces on boundaries")
+    found%id = 0
+    found%normal = 0
+    call file%read_rows("/boundaries/id", 0_i8, found%id, error)
+    call file%read_rows("/boundaries/normal", 0_i8, found%normal, error)
+    call expect_none(error, "reading what boundaries are")
+    call check(all(found%id == expected%id), "ids of all boundaries")
+    call check(all(abs(found%normal - expected%normal) <= 0), "normals of all boundaries")
+    call check(.not. file%exists("/steps/0/boundaries"), "no boundaries unless given")
+    if (present(after)) return
+    call check(file%exists("/steps/30/boundaries/force"), "boundaries without contacts")
+    call check(.not. file%exists("/steps/30/boundaries/normal"), "no normals unless given")
+  end subroutine check_boundaries
+
+  subroutine check_images(file, dimension)
+    type(h5_file_t), intent(in) :: file
+    integer, intent(in) :: dimension
+    type(error_t), allocatable :: error
+    integer(i8) :: image(dimension, n_bodies)
+    integer :: g, k
+
+    image = 0
+    call file%read_rows("/steps/30/bodies/image", 0_i8, image, error)
+    call expect_none(error, "reading images")
+    do g = 1, n_bodies
+      do k = 1, dimension
+        call check_equal(image(k, g), int(k*(3*g - 10), i8), "image")
+      end do
+    end do
+    call check(.not. file%exists("/steps/10/bodies/image"), "no images unless given")
+  end subroutine check_images
+
+  !> The texts as h5py shows them.
+  subroutine check_texts()
+    character(len=1000) :: python
+    integer :: stat
+
+    call get_environment_variable("GRAVIER_PYTHON", python)
+    if (world%rank > 0 .or. python == "") return
+    call execute_command_line(trim(python)//" -c ""import h5py; f = h5py.File('"//path//"')['boundaries']; "// &
+      & "assert list(f['name'].asstr()) == ['floor', 'tambour étroit'], list(f['name']); "// &
+      & "assert list(f['shape'].asstr()) == ['plane', 'circle'], list(f['shape'])""", exitstat=stat)
+    call check_equal(stat, 0, "names and shapes of boundaries in Python")
+  end subroutine check_texts
 
   !> The same scene written by 1, 2, ... ranks, more than a second apart, gives the same file byte by byte.
   subroutine test_any_rank_count()
@@ -333,6 +441,135 @@ contains
     call results%open(world, path//"/none.h5", "", "", "", 2, error)
     call expect(error, path//"/none.h5: cannot create this file: Not a directory", "no such directory")
   end subroutine test_refused
+
+  !> Later steps go, earlier ones stay as they were, and the run can go on, as often as it likes.
+  subroutine test_reopen()
+    type(results_file_t) :: results
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    type(body_rows_t) :: bodies
+    type(contact_rows_t) :: contacts
+    type(boundary_rows_t) :: boundaries
+    integer :: round, step
+
+    call make_bodies(world, 3, bodies)
+    call make_contacts(world, 3, contacts)
+    call make_boundaries(3, boundaries)
+    call write_all(world, path, 3, error)
+    call results%reopen(world, path, 30, error)
+    call results%close(error)
+    call expect_none(error, "reopened for nothing")
+    call check_steps([0, 10, 20, 30])
+    call file%open(world, path, error)
+    call check_images(file, 3)
+    call file%close(error)
+    do round = 1, 3
+      call results%reopen(world, path, 19, error)
+      call expect_none(error, "reopening")
+      do step = 20, 500, 20
+        call results%write_step(step, 0.001_dp*step, bodies, error, contacts, boundaries)
+      end do
+      call results%close(error)
+      call expect_none(error, "steps after reopening")
+      call check_steps([0, 10, (step, step=20, 500, 20)])
+      call file%open(world, path, error)
+      call check_rows(file, 3)
+      call check_boundaries(file, 3, after=.true.)
+      call check_equal(n_rows(file, "/steps/20/contacts/gap"), int(n_contacts, i8), "contacts of a step written again")
+      call file%close(error)
+    end do
+    call results%reopen(world, path, -1, error)
+    call results%write_step(0, 0.0_dp, bodies, error)
+    call results%close(error)
+    call expect_none(error, "reopening from the start")
+    call check_steps([0])
+  end subroutine test_reopen
+
+  integer(i8) function n_rows(file, dataset) result(n)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: dataset
+    type(error_t), allocatable :: error
+    call file%row_count(dataset, n, error)
+  end function n_rows
+
+  subroutine check_steps(steps)
+    integer, intent(in) :: steps(:)
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    integer :: i
+
+    call file%open(world, path, error)
+    call expect_none(error, "reading steps")
+    call check_equal(file%member_count("/steps"), size(steps), "number of steps")
+    do i = 1, size(steps)
+      call check_equal(n_rows(file, "/steps/"//to_text(steps(i))//"/bodies/radius"), int(n_bodies, i8)*merge(0, 1, &
+        & steps(i) == 20 .and. size(steps) == 4), "bodies of step "//to_text(steps(i)))
+    end do
+    call file%close(error)
+  end subroutine check_steps
+
+  !> What cannot be gone on with ends in one line, and is left as it is.
+  subroutine test_reopen_refused()
+    type(results_file_t) :: results
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: whole
+    integer :: i
+
+    call results%reopen(world, path//".none", 3, error)
+    call expect(error, path//".none: cannot read this file: No such file or directory", "no file", status_input)
+    call put("a text")
+    call results%reopen(world, path//".cut", 3, error)
+    call expect(error, path//".cut: not an HDF5 file", "a text file", status_input)
+    call write_all(world, path, 3, error)
+    whole = content(path)
+    do i = 1, 9
+      call put(whole(1:i*(len(whole) - 1)/9))
+      call results%reopen(world, path//".cut", 3, error)
+      call expect(error, path//".cut: truncated or damaged HDF5 file", "a file cut short", status_input)
+    end do
+    call file%create(world, path//".cut", error)
+    call file%close(error)
+    call results%reopen(world, path//".cut", 3, error)
+    call expect(error, path//".cut: /run: attribute dimension is missing or not one number of its kind", "another HDF5 file", &
+      & status_input)
+    call refuse_members("12x", '/steps: a member "12x", but numbers of steps were expected')
+    call refuse_members("7", "/steps/7: attribute step is missing or not one number of its kind")
+    call refuse_members("8", "/steps/8/bodies/radius: missing")
+    call results%close(error)
+    call expect_none(error, "closing what was refused")
+  end subroutine test_reopen_refused
+
+  !> A file with a group that is no step, or a step without its content.
+  subroutine refuse_members(name, message)
+    character(len=*), intent(in) :: name, message
+    type(results_file_t) :: results
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+
+    call file%create(world, path//".cut", error)
+    call file%make_group("/run", error)
+    call file%write_attribute("/run", "dimension", 2, error)
+    call file%make_group("/steps/"//name, error)
+    if (name == "8") call file%write_attribute("/steps/8", "step", 8, error)
+    call file%close(error)
+    call expect_none(error, "writing what is to be refused")
+    call results%reopen(world, path//".cut", 30, error)
+    call expect(error, path//".cut: "//message, "a strange step", status_input)
+  end subroutine refuse_members
+
+  subroutine put(text)
+    character(len=*), intent(in) :: text
+    integer :: unit
+
+    call world%barrier()
+    if (world%rank == 0) then
+      open (newunit=unit, file=path//".cut", access="stream", form="unformatted", action="write", status="replace")
+      write (unit) text
+      close (unit)
+    end if
+    call world%barrier()
+  end subroutine put
 
   function content(name) result(text)
     character(len=*), intent(in) :: name

@@ -71,6 +71,7 @@ contains
     type(body_set_t) :: newcomers(1)
     type(error_t), allocatable :: error
     real(dp) :: lower(nd), upper(nd)
+    integer, allocatable :: weights(:)
     integer :: boxes(3), g, d, nv
 
     nv = merge(3*nd - 3, nd, rotation)
@@ -89,7 +90,8 @@ contains
     call make_grains(truth, nv, newcomers(1))
     call decomposition%bounding_box(newcomers, lower, upper)
     if (by_cells) then
-      call decomposition%partition%init_graph(comm, lower, upper, 0.15_dp, newcomers, n_subdomains, error)
+      allocate (weights(newcomers(1)%n), source=1)
+      call decomposition%partition%init_graph(comm, lower, upper, 0.15_dp, newcomers(1)%position, weights, n_subdomains, error)
     else
       boxes(:) = choose_boxes(lower, upper, n_subdomains)
       call decomposition%partition%init_grid(lower, upper, boxes, 0.1_dp, error)

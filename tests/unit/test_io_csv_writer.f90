@@ -3,8 +3,9 @@ program test_io_csv_writer
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_negative_inf
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, status_failure
+  use gravier_errors, only: error_t, status_input, status_failure
   use gravier_finite, only: is_finite
+  use gravier_file_system, only: remove_file
   use gravier_csv_writer, only: csv_writer_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -17,6 +18,9 @@ program test_io_csv_writer
   call test_content()
   call test_exact_numbers()
   call test_errors()
+  call test_resume()
+  call test_resume_large()
+  call test_resume_refused()
   call finish_checks()
   call MPI_Finalize()
 
@@ -114,13 +118,125 @@ contains
     call check(.not. allocated(error), "close after an error")
   end subroutine test_errors
 
-  subroutine expect(error, part, name)
+  !> Rows of steps up to the last one stay, a torn line goes, and new rows follow.
+  subroutine test_resume()
+    character(len=*), parameter :: head = "step,x"//newline, rows = head//"1,a"//newline//"2,b"//newline//"2,c"//newline
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+
+    call remove_file(path)
+    call check_resumed(0, head, "a table that is missing")
+    call put("")
+    call check_resumed(5, head, "an empty file")
+    call put("ste")
+    call check_resumed(5, head, "a torn header")
+    call put("step,x")
+    call check_resumed(5, head, "a header without its end")
+    call put(head)
+    call check_resumed(5, head, "a header alone")
+    call put(rows)
+    call check_resumed(9, rows, "all rows")
+    call put(rows//"3,d"//newline//"4,e"//newline)
+    call check_resumed(2, rows, "rows of later steps")
+    call check_resumed(8, rows//"8,new"//newline, "resumed twice")
+    call put(rows//"3,d"//newline)
+    call check_resumed(0, head, "no row to keep")
+    call put(rows//"3,d")
+    call check_resumed(3, rows, "a torn last line")
+    call put(rows//"3")
+    call check_resumed(3, rows, "a last line torn within the step")
+    call put(rows//newline)
+    call table%resume(path, "step,x", 3, error)
+    call expect(error, 'line 5: "", but the number of a step was expected', "an empty line", status_input)
+    call check_equal(content(), rows//newline, "the file after a refusal")
+  end subroutine test_resume
+
+  !> Resume, expect `kept`, and append a row.
+  subroutine check_resumed(last_step, kept, name)
+    integer, intent(in) :: last_step
+    character(len=*), intent(in) :: kept, name
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+    logical :: exists
+
+    call table%resume(path, "step,x", last_step, error)
+    call check(.not. allocated(error), name//": no error")
+    call check(table%is_open(), name//": open")
+    call check_equal(content(), kept, name)
+    call check_equal(len(content()), len(kept), name//": length")
+    inquire (file=path//".part", exist=exists)
+    call check(.not. exists, name//": no part is left")
+    call table%add(8)
+    call table%add("new")
+    call table%end_row(error)
+    call check_equal(content(), kept//"8,new"//newline, name//": and a new row")
+    call table%close(error)
+    call check(.not. allocated(error), name//": no error at the end")
+  end subroutine check_resumed
+
+  !> Longer than the blocks it is read in, and rows longer than any number.
+  subroutine test_resume_large()
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: before, after
+    integer :: i
+
+    before = ""
+    call table%open(path, "step,x", error)
+    do i = 1, 3000
+      if (i == 2001) before = content()
+      call table%add(i)
+      call table%add(repeat("x", 97 + mod(7*i, 50)))
+      call table%end_row(error)
+    end do
+    call table%resume(path, "step,x", 2000, error)
+    call table%close(error)
+    call check(.not. allocated(error), "resuming a large table")
+    after = content()
+    call check(after == before .and. len(after) == len(before), "rows of a large table")
+  end subroutine test_resume_large
+
+  !> What is refused stays as it was, and so does what a full disk keeps from being copied.
+  subroutine test_resume_refused()
+    character(len=*), parameter :: rows = "step,x"//newline//"1,a"//newline//"two,b"//newline
+    type(csv_writer_t) :: table
+    type(error_t), allocatable :: error
+
+    call put(rows)
+    call table%resume(path, "step,x", 5, error)
+    call expect(error, 'csv_writer.csv: line 3: "two", but the number of a step was expected', "a row without a step", status_input)
+    call check(.not. table%is_open(), "not open after a refusal")
+    call table%resume(path, "step,y", 5, error)
+    call expect(error, "csv_writer.csv: line 1: step,y was expected", "another header", status_input)
+    call table%resume(path, "step,x,y", 5, error)
+    call expect(error, "csv_writer.csv: line 1: step,x,y was expected", "a shorter header", status_input)
+    call table%resume(path, "step", 5, error)
+    call expect(error, "csv_writer.csv: line 1: step was expected", "a longer header", status_input)
+    call check_equal(content(), rows, "the file after refusals")
+    call table%resume(path//"/none.csv", "step", 5, error)
+    call expect(error, "cannot create this file: Not a directory", "no such directory", status_failure)
+  end subroutine test_resume_refused
+
+  subroutine put(text)
+    character(len=*), intent(in) :: text
+    integer :: unit
+
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="write", status="replace")
+    write (unit) text
+    close (unit)
+  end subroutine put
+
+  subroutine expect(error, part, name, status)
     type(error_t), allocatable, intent(inout) :: error
     character(len=*), intent(in) :: part, name
+    integer, intent(in), optional :: status
+    integer :: expected
 
     call check(allocated(error), name//": an error")
     if (.not. allocated(error)) return
-    call check_equal(error%status, status_failure, name//": status")
+    expected = status_failure
+    if (present(status)) expected = status
+    call check_equal(error%status, expected, name//": status")
     call check(index(error%message, part) > 0, name//': "'//part//'" in: '//error%message)
     deallocate (error)
   end subroutine expect

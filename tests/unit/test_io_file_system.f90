@@ -3,8 +3,8 @@ program test_io_file_system
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, status_input, status_failure
-  use gravier_file_system, only: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, &
-    & text_file_t
+  use gravier_file_system, only: make_directory, rename_file, replace_file, remove_file, check_readable, check_creatable, &
+    & reserve_space, extend_file, text_file_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=:), allocatable :: here
@@ -14,6 +14,7 @@ program test_io_file_system
   call test_directories()
   call test_text_files()
   call test_renames()
+  call test_replacing()
   call test_reservation()
   call finish_checks()
   call MPI_Finalize()
@@ -129,6 +130,35 @@ contains
     call check_readable(here//"/old", error)
     call expect(error, status_input, "No such file", "removed")
   end subroutine test_renames
+
+  !> A file takes the place of another and can still be written to; a failure leaves both.
+  subroutine test_replacing()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file, other
+
+    call other%create(here//"/place", error)
+    call other%append("older", error)
+    call other%close(error)
+    call file%create(here//"/place.part", error)
+    call file%append("new", error)
+    call file%replace(here//"/place", error)
+    call file%append("er", error)
+    call expect_none(error, "a file in the place of another")
+    call check_equal(content(here//"/place"), "newer", "what is written after it took its place")
+    call file%close(error)
+    call replace_file(here//"/place.part", here//"/place", error)
+    call expect(error, status_failure, "place.part: cannot bring this file to the disk: No such file", "replacing by nothing")
+    call replace_file(here//"/place", here//"/a", error)
+    call expect(error, status_failure, "place: cannot rename to ", "replacing a directory")
+    call check_equal(content(here//"/place"), "newer", "the file after a failure")
+    call extend_file(here//"/place", 3_i8, error)
+    call check_equal(content(here//"/place"), "newer", "a file that is long enough")
+    call extend_file(here//"/place", 7_i8, error)
+    call expect_none(error, "a longer file")
+    call check_equal(content(here//"/place"), "newer"//char(0)//char(0), "zeros behind the end")
+    call extend_file(here//"/none", 7_i8, error)
+    call expect(error, status_failure, "none: cannot write to this file: No such file", "a longer file that is not there")
+  end subroutine test_replacing
 
   !> What a full disk does is tested on a small file system in test_io_full_disk.
   subroutine test_reservation()

@@ -1,0 +1,296 @@
+!> Checkpoints: everything that a run needs to go on, bit by bit, in one HDF5 file that any number of ranks can read. It
+!> takes its name only when it is complete and on the disk: whatever happens meanwhile, an older checkpoint stays.
+module gravier_checkpoint_file
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input, status_failure
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t
+  use gravier_file_system, only: replace_file, remove_file
+  use gravier_hdf5_file, only: h5_file_t
+  implicit none
+  private
+  public :: checkpoint_file_t
+
+  !> A checkpoint being written (create, write_..., commit) or read (open, read_..., close). All procedures are
+  !> collective and leave the same error on all ranks.
+  type :: checkpoint_file_t
+    private
+    type(communicator_t) :: comm
+    type(h5_file_t) :: file
+    character(len=:), allocatable :: path
+  contains
+    procedure :: create => checkpoint_create
+    procedure :: commit => checkpoint_commit
+    procedure :: open => checkpoint_open
+    procedure :: close => checkpoint_close
+    !> write_scalar(name, value, error): an integer(i8) or a real, the same on all ranks
+    generic :: write_scalar => write_integer, write_real
+    procedure, private :: write_integer => checkpoint_write_integer
+    procedure, private :: write_real => checkpoint_write_real
+    procedure :: write_text => checkpoint_write_text
+    procedure :: write_array => checkpoint_write_array
+    procedure :: write_table => checkpoint_write_table
+    !> read_scalar(name, value, error)
+    generic :: read_scalar => read_integer, read_real
+    procedure, private :: read_integer => checkpoint_read_integer
+    procedure, private :: read_real => checkpoint_read_real
+    procedure :: read_text => checkpoint_read_text
+    procedure :: read_array => checkpoint_read_array
+    procedure :: read_table => checkpoint_read_table
+    procedure, private :: refuse
+  end type checkpoint_file_t
+
+  !> what /format says of itself
+  character(len=*), parameter :: format_name = "gravier checkpoint"
+  integer(i8), parameter :: format_version = 1
+  !> room for the headers of the file, and of a table
+  integer(i8), parameter :: bytes_of_headers = 65536, bytes_of_table = 16384
+  integer, parameter :: bytes_of_word = 8
+
+contains
+
+  ! ------------------------------------------------------------------------------------------------ writing
+
+  !> Begin a checkpoint; it is written beside `path` until commit. Failure: status_failure.
+  subroutine checkpoint_create(self, comm, path, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    self%comm = comm
+    self%path = path
+    call self%file%create(comm, path//".part", error)
+    call self%file%reserve(bytes_of_headers, error)
+    call self%file%make_group("/format", error)
+    call self%file%write_attribute("/format", "name", format_name, error)
+    call self%file%write_attribute("/format", "version", format_version, error)
+    call self%file%make_group("/scalars", error)
+    call self%file%make_group("/texts", error)
+    call self%file%make_group("/arrays", error)
+    call self%file%make_group("/tables", error)
+    ! files of no checkpoint are not left behind
+    if (allocated(error)) call checkpoint_abandon(self)
+  end subroutine checkpoint_create
+
+  !> Put what was written in the place of an older checkpoint. To be called also when something failed before: the part
+  !> then goes and the older checkpoint stays.
+  subroutine checkpoint_commit(self, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. self%file%is_open()) return
+    call self%file%flush(error)
+    if (allocated(error)) then
+      call checkpoint_abandon(self)
+      return
+    end if
+    call self%file%close(error)
+    if (self%comm%rank == 0) then
+      call replace_file(self%path//".part", self%path, error)
+      if (allocated(error)) call remove_file(self%path//".part")
+    end if
+    call self%comm%agree(error)
+  end subroutine checkpoint_commit
+
+  !> Close and remove the part.
+  subroutine checkpoint_abandon(self)
+    type(checkpoint_file_t), intent(inout) :: self
+    type(error_t), allocatable :: ignored
+
+    call self%file%close(ignored)
+    if (self%comm%rank == 0) call remove_file(self%path//".part")
+  end subroutine checkpoint_abandon
+
+  subroutine checkpoint_write_integer(self, name, value, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(i8), intent(in) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%write_attribute("/scalars", name, value, error)
+  end subroutine checkpoint_write_integer
+
+  subroutine checkpoint_write_real(self, name, value, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(dp), intent(in) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%write_attribute("/scalars", name, value, error)
+  end subroutine checkpoint_write_real
+
+  !> A text of any length, the same on all ranks.
+  subroutine checkpoint_write_text(self, name, value, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name, value
+    type(error_t), allocatable, intent(inout) :: error
+
+    call self%file%reserve(bytes_of_table + len(value), error)
+    call self%file%write_attribute("/texts", name, value, error)
+  end subroutine checkpoint_write_text
+
+  !> Numbers that all ranks hold: those of rank 0 are written.
+  subroutine checkpoint_write_array(self, name, values, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer(i8), intent(in), contiguous :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    n = merge(size(values), 0, self%comm%rank == 0)
+    call self%file%reserve(bytes_of_table + bytes_of_word*size(values, kind=i8), error)
+    call self%file%write_rows("/arrays/"//name, values(1:n), error)
+  end subroutine checkpoint_write_array
+
+  !> Records of all subdomains, in the order of the subdomains.
+  subroutine checkpoint_write_table(self, name, n_subdomains, records, counts, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    !> of the whole scene
+    integer, intent(in) :: n_subdomains
+    !> (words of a record, n): those of the first subdomain of this rank, then those of the next; reals as 64-bit words
+    integer(i8), intent(in), contiguous :: records(:, :)
+    !> (subdomains of this rank): number of records of each
+    integer(i8), intent(in), contiguous :: counts(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: words
+
+    if (allocated(error)) return
+    if (size(counts) /= own_subdomains(self%comm, n_subdomains) .or. sum(counts) /= size(records, 2) .or. any(counts < 0)) then
+      call raise(error, status_failure, self%path//": table "//name//": the counts of rank "//to_text(self%comm%rank)// &
+        & " do not fit its subdomains and records")
+    end if
+    call self%comm%agree(error)
+    words = self%comm%total(size(records, kind=i8)) + n_subdomains
+    call self%file%reserve(bytes_of_table + bytes_of_word*words, error)
+    call self%file%make_group("/tables/"//name, error)
+    call self%file%write_rows("/tables/"//name//"/counts", counts, error)
+    call self%file%write_rows("/tables/"//name//"/records", records, error)
+  end subroutine checkpoint_write_table
+
+  !> Number of subdomains of this rank.
+  pure integer function own_subdomains(comm, n_subdomains) result(n)
+    type(communicator_t), intent(in) :: comm
+    integer, intent(in) :: n_subdomains
+    n = comm%first_subdomain(comm%rank + 1, n_subdomains) - comm%first_subdomain(comm%rank, n_subdomains)
+  end function own_subdomains
+
+  ! ------------------------------------------------------------------------------------------------ reading
+
+  !> Open a checkpoint. Failure (status_input): no such file, truncated, another kind of file, another version.
+  subroutine checkpoint_open(self, comm, path, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name
+    integer(i8) :: version
+
+    if (allocated(error)) return
+    self%comm = comm
+    self%path = path
+    call self%file%open(comm, path, error)
+    if (allocated(error)) return
+    if (.not. self%file%exists("/format")) call self%refuse("not a checkpoint", error)
+    call self%file%read_attribute("/format", "name", name, error)
+    if (name /= format_name) call self%refuse("not a checkpoint", error)
+    call self%file%read_attribute("/format", "version", version, error)
+    if (version /= format_version) then
+      call self%refuse("a checkpoint of version "//to_text(version)//", but version "//to_text(format_version)// &
+        & " was expected", error)
+    end if
+    if (allocated(error)) call self%file%close(error)
+  end subroutine checkpoint_open
+
+  !> Close what was opened for reading; without effect on a file not open.
+  subroutine checkpoint_close(self, error)
+    class(checkpoint_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%close(error)
+  end subroutine checkpoint_close
+
+  subroutine refuse(self, what, error)
+    class(checkpoint_file_t), intent(in) :: self
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    call raise(error, status_input, self%path//": "//what)
+  end subroutine refuse
+
+  subroutine checkpoint_read_integer(self, name, value, error)
+    class(checkpoint_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    integer(i8), intent(out) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%read_attribute("/scalars", name, value, error)
+  end subroutine checkpoint_read_integer
+
+  subroutine checkpoint_read_real(self, name, value, error)
+    class(checkpoint_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    real(dp), intent(out) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%read_attribute("/scalars", name, value, error)
+  end subroutine checkpoint_read_real
+
+  subroutine checkpoint_read_text(self, name, value, error)
+    class(checkpoint_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable, intent(out) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%read_attribute("/texts", name, value, error)
+  end subroutine checkpoint_read_text
+
+  !> The whole array on every rank.
+  subroutine checkpoint_read_array(self, name, values, error)
+    class(checkpoint_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    !> allocated in any case, empty after a failure
+    integer(i8), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: n
+
+    call self%file%row_count("/arrays/"//name, n, error)
+    allocate (values(n), source=0_i8)
+    call self%file%read_rows("/arrays/"//name, 0_i8, values, error)
+  end subroutine checkpoint_read_array
+
+  !> The records of the subdomains that this rank owns now, whatever rank wrote them. Failure: status_input, for a table
+  !> that is missing or damaged or of another number of subdomains.
+  subroutine checkpoint_read_table(self, name, n_subdomains, records, counts, error)
+    class(checkpoint_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    !> of the whole scene
+    integer, intent(in) :: n_subdomains
+    !> (words of a record, sum(counts)), as write_table has them; allocated in any case
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    !> (subdomains of this rank)
+    integer(i8), allocatable, intent(out) :: counts(:)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: group
+    integer(i8) :: n_counts, n_records, total, first
+    logical :: damaged
+
+    allocate (counts(own_subdomains(self%comm, n_subdomains)), source=0_i8)
+    if (allocated(error)) then
+      allocate (records(0, 0))
+      return
+    end if
+    group = "/tables/"//name
+    call self%file%row_count(group//"/records", n_records, error)
+    call self%file%row_count(group//"/counts", n_counts, error)
+    if (n_counts /= n_subdomains) then
+      call self%refuse(group//": "//to_text(n_counts)//" subdomains, but "//to_text(n_subdomains)//" were expected", error)
+    end if
+    call self%file%read_rows(group//"/counts", int(self%comm%first_subdomain(self%comm%rank, n_subdomains) - 1, i8), counts, error)
+    damaged = self%comm%any_true(any(counts < 0))
+    total = self%comm%total(sum(counts))
+    if (damaged .or. total /= n_records) then
+      call self%refuse(group//": the counts of records do not add up to the "//to_text(n_records)//" that are there", error)
+    end if
+    if (allocated(error)) counts(:) = 0
+    allocate (records(max(0, self%file%columns(group//"/records")), sum(counts)), source=0_i8)
+    first = self%comm%offset(sum(counts))
+    call self%file%read_rows(group//"/records", first, records, error)
+  end subroutine checkpoint_read_table
+
+end module gravier_checkpoint_file

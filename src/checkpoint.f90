@@ -1,0 +1,406 @@
+!> The state of a run between two steps, saved so that a run from it gives the bits of the run that was not interrupted, on
+!> any number of ranks.
+module gravier_checkpoint
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_checkpoint_file, only: checkpoint_file_t
+  use gravier_boundary, only: boundary_t, boundary_words
+  use gravier_impulse_memory, only: impulse_entries, list_impulses, match_impulses
+  use gravier_energy_balance, only: energy_words
+  use gravier_config, only: config_t, write_active
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: save_checkpoint, load_checkpoint, checkpoint_name
+
+  character(len=*), parameter :: checkpoint_name = "checkpoint.h5"
+  character(len=*), parameter :: newline = achar(10)
+  !> groups of the input that a run must go on with as it began
+  character(len=*), parameter :: fixed_groups = "&scene &boundary &sample"
+
+contains
+
+  !> Write a checkpoint, in the place of an older one when it is complete. Collective; errors are the same on all ranks.
+  subroutine save_checkpoint(simulation, path, error)
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    type(checkpoint_file_t) :: file
+    integer(i8), allocatable :: words(:)
+
+    if (allocated(error)) return
+    call file%create(simulation%comm, path, error)
+    call file%write_text("scene", fixed_options(simulation%config), error)
+    call file%write_scalar("subdomains", int(simulation%decomposition%n_subdomains, i8), error)
+    call file%write_scalar("time_step", simulation%physics%h, error)
+    call file%write_scalar("theta", simulation%config%time%theta, error)
+    call file%write_scalar("grains_at_start", simulation%n_first, error)
+    call file%write_scalar("mean_radius_at_start", simulation%decomposition%rule%mean_radius, error)
+    call file%write_scalar("step", int(simulation%step, i8), error)
+    call file%write_scalar("time", simulation%time, error)
+    call file%write_scalar("grains", simulation%n_grains, error)
+    call file%write_scalar("glued", simulation%n_glued, error)
+    call file%write_scalar("failed", simulation%failed, error)
+    call file%write_scalar("left", simulation%left, error)
+    call file%write_scalar("fast", simulation%fast, error)
+    call file%write_scalar("last_written", int(simulation%last_written, i8), error)
+    call file%write_scalar("lists_made", simulation%neighbourhoods%builds, error)
+    call file%write_scalar("imbalance", simulation%imbalance, error)
+    call pack_boundaries(simulation%decomposition%boundaries, words)
+    call file%write_array("boundaries", words, error)
+    if (simulation%neighbourhoods%builds > 0) then
+      call pack_boundaries(simulation%neighbourhoods%reference_boundaries, words)
+      call file%write_array("boundaries_when_listed", words, error)
+    end if
+    words = real_words(simulation%boundary_impulses, size(simulation%boundary_impulses))
+    call file%write_array("boundary_impulses", words, error)
+    deallocate (words)
+    allocate (words(merge(energy_words, 0, allocated(simulation%diagnostics%energy))))
+    if (size(words) > 0) call simulation%diagnostics%energy%get_state(words)
+    call file%write_array("energy_balance", words, error)
+    call simulation%decomposition%partition%get_head(words)
+    call file%write_array("partition", words, error)
+    call save_tables(simulation, file, error)
+    call file%commit(error)
+  end subroutine save_checkpoint
+
+  !> Take the state of a checkpoint into a simulation that was made from the same scene. Failure: status_input, with file
+  !> and what does not fit. Collective; errors are the same on all ranks.
+  subroutine load_checkpoint(simulation, path, error)
+    type(simulation_t), intent(inout) :: simulation
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    type(checkpoint_file_t) :: file
+    integer(i8) :: step, last_written, builds
+    integer(i8), allocatable :: words(:)
+
+    if (allocated(error)) return
+    call file%open(simulation%comm, path, error)
+    call check_scene(simulation, file, path, error)
+    call file%read_scalar("step", step, error)
+    call file%read_scalar("time", simulation%time, error)
+    call file%read_scalar("grains", simulation%n_grains, error)
+    call file%read_scalar("glued", simulation%n_glued, error)
+    call file%read_scalar("failed", simulation%failed, error)
+    call file%read_scalar("left", simulation%left, error)
+    call file%read_scalar("fast", simulation%fast, error)
+    call file%read_scalar("last_written", last_written, error)
+    call file%read_scalar("lists_made", builds, error)
+    call file%read_scalar("imbalance", simulation%imbalance, error)
+    call file%read_array("boundary_impulses", words, error)
+    if (.not. allocated(error)) call take_reals(words, simulation%boundary_impulses, size(simulation%boundary_impulses))
+    if (allocated(error)) return
+    simulation%step = int(step)
+    simulation%last_written = int(last_written)
+    simulation%restarted = .true.
+    call simulation%make_subdomains()
+    call load_partition(simulation, file, error)
+    call load_grains(simulation, file, builds, error)
+    call file%read_array("energy_balance", words, error)
+    if (.not. allocated(error)) then
+      ! a balance that begins now has no past
+      call simulation%start_diagnostics()
+      if (allocated(simulation%diagnostics%energy) .and. size(words) == energy_words) &
+        & call simulation%diagnostics%energy%set_state(words)
+    end if
+    call file%close(error)
+  end subroutine load_checkpoint
+
+  !> Refuse a checkpoint of another scene, naming the first option that differs.
+  subroutine check_scene(simulation, file, path, error)
+    type(simulation_t), intent(in) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: before
+    integer(i8) :: subdomains, grains
+    real(dp) :: h, theta, radius
+
+    call file%read_text("scene", before, error)
+    call file%read_scalar("subdomains", subdomains, error)
+    call file%read_scalar("time_step", h, error)
+    call file%read_scalar("theta", theta, error)
+    call file%read_scalar("grains_at_start", grains, error)
+    call file%read_scalar("mean_radius_at_start", radius, error)
+    if (allocated(error)) return
+    associate (config => simulation%config)
+      call expect(subdomains == config%decomposition%subdomains, "&decomposition subdomains", to_text(subdomains))
+      call expect(.not. abs(h - config%time%step) > 0.0_dp, "&time step", to_text(h))
+      call expect(.not. abs(theta - config%time%theta) > 0.0_dp, "&time theta", to_text(theta))
+      if (.not. allocated(error)) call compare_options(path, before, fixed_options(config), config%file, error)
+    end associate
+    if (allocated(error)) return
+    if (grains /= simulation%n_first .or. abs(radius - simulation%decomposition%rule%mean_radius) > 0.0_dp) call raise(error, &
+      & status_input, path//": the run began with "//to_text(grains)//" grains of mean radius "//to_text(radius)// &
+      & " m; expected the bodies that "//simulation%config%file//" makes now, "//to_text(simulation%n_first)// &
+      & " of mean radius "//to_text(simulation%decomposition%rule%mean_radius)//" m")
+
+  contains
+
+    subroutine expect(holds, option, value)
+      logical, intent(in) :: holds
+      character(len=*), intent(in) :: option, value
+
+      if (.not. holds) call raise(error, status_input, simulation%config%file//": "//option//": expected "//value// &
+        & ", with which "//path//" was written")
+    end subroutine expect
+
+  end subroutine check_scene
+
+  !> Fails at the first line that differs between the options of a checkpoint and those of now.
+  subroutine compare_options(path, before, now, input, error)
+    character(len=*), intent(in) :: path, before, now, input
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: line_before, line_now
+    integer :: at_before, at_now
+
+    at_before = 1
+    at_now = 1
+    do while (at_before <= len(before) .or. at_now <= len(now))
+      call next_line(before, at_before, line_before)
+      call next_line(now, at_now, line_now)
+      if (line_before == line_now) cycle
+      call raise(error, status_input, input//": the scene is not that of "//path//": "//trim(adjustl(line_now))// &
+        & ": expected "//trim(adjustl(line_before)))
+      return
+    end do
+  end subroutine compare_options
+
+  pure subroutine next_line(text, at, line)
+    character(len=*), intent(in) :: text
+    integer, intent(inout) :: at
+    character(len=:), allocatable, intent(out) :: line
+    integer :: length
+
+    if (at > len(text)) then
+      line = "(nothing)"
+      return
+    end if
+    length = index(text(at:)//newline, newline) - 1
+    line = text(at:at + length - 1)
+    at = at + length + 1
+  end subroutine next_line
+
+  !> The options in force that must not change, a line each.
+  function fixed_options(config) result(text)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: options, line
+    integer :: at
+    logical :: fixed
+
+    call write_active(options, config)
+    text = ""
+    fixed = .false.
+    at = 1
+    do while (at <= len(options))
+      call next_line(options, at, line)
+      if (line(1:min(1, len(line))) == "&") fixed = index(fixed_groups//" ", line//" ") > 0
+      if (fixed .and. index(line, "  title = ") /= 1) text = text//line//newline
+    end do
+  end function fixed_options
+
+  pure subroutine pack_boundaries(boundaries, words)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer(i8), allocatable, intent(out) :: words(:)
+    integer :: b
+
+    allocate (words(boundary_words*size(boundaries)))
+    do b = 1, size(boundaries)
+      call boundaries(b)%get_state(words((b - 1)*boundary_words + 1:b*boundary_words))
+    end do
+  end subroutine pack_boundaries
+
+  subroutine unpack_boundaries(words, boundaries, path, error)
+    integer(i8), intent(in), contiguous :: words(:)
+    type(boundary_t), intent(inout) :: boundaries(:)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: b
+
+    if (allocated(error)) return
+    if (size(words) /= boundary_words*size(boundaries)) then
+      call raise(error, status_input, path//": as many boundaries were expected as the input has, "//to_text(size(boundaries)))
+      return
+    end if
+    do b = 1, size(boundaries)
+      call boundaries(b)%set_state(words((b - 1)*boundary_words + 1:b*boundary_words))
+    end do
+  end subroutine unpack_boundaries
+
+  pure function real_words(values, n) result(words)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: values(n)
+    integer(i8) :: words(n)
+    integer :: k
+
+    do k = 1, n
+      words(k) = transfer(values(k), 0_i8)
+    end do
+  end function real_words
+
+  pure subroutine take_reals(words, values, n)
+    integer(i8), intent(in), contiguous :: words(:)
+    integer, intent(in) :: n
+    real(dp), intent(inout) :: values(n)
+    integer :: k
+
+    do k = 1, min(n, size(words))
+      values(k) = transfer(words(k), 0.0_dp)
+    end do
+  end subroutine take_reals
+
+  !> By subdomain: the grains where they were when the lists were made, each with its place now; the impulses; the cells.
+  subroutine save_tables(simulation, file, error)
+    type(simulation_t), intent(in) :: simulation
+    type(checkpoint_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), own(:, :), counts(:), map(:)
+    integer :: s, n, k, n_words, n_subdomains
+
+    n_subdomains = simulation%decomposition%n_subdomains
+    associate (home => simulation%decomposition%home)
+      allocate (counts(size(home)))
+      call pack_grains(simulation, records, counts)
+      call file%write_table("grains", n_subdomains, records, counts, error)
+      if (simulation%neighbourhoods%builds > 0) then
+        n_words = 2 + impulse_entries(simulation%problem%kernels)
+        do s = 1, size(home)
+          counts(s) = count(simulation%neighbourhoods%view(s)%list%impulse(1, :) > 0.0_dp)
+        end do
+        deallocate (records)
+        allocate (records(n_words, sum(counts)))
+        n = 0
+        do s = 1, size(home)
+          call list_impulses(simulation%neighbourhoods%view(s), 0, own)
+          records(:, n + 1:n + size(own, 2)) = own
+          n = n + size(own, 2)
+        end do
+        call file%write_table("impulses", n_subdomains, records, counts, error)
+      end if
+      deallocate (records)
+      do s = 1, size(home)
+        call simulation%decomposition%partition%get_map(simulation%decomposition%subdomain_of(s), map)
+        counts(s) = size(map)
+      end do
+      allocate (records(1, sum(counts)))
+      n = 0
+      do s = 1, size(home)
+        call simulation%decomposition%partition%get_map(simulation%decomposition%subdomain_of(s), map)
+        do k = 1, size(map)
+          records(1, n + k) = map(k)
+        end do
+        n = n + size(map)
+      end do
+      call file%write_table("cells", n_subdomains, records, counts, error)
+    end associate
+  end subroutine save_tables
+
+  subroutine pack_grains(simulation, records, counts)
+    type(simulation_t), intent(in) :: simulation
+    !> (words of a grain + nd, grains): its place is that of the lists, the last words are its place now
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    !> (subdomains of this rank)
+    integer(i8), intent(out) :: counts(:)
+    integer :: s, k, n, d, words, nd
+
+    nd = simulation%decomposition%nd
+    words = 5 + nd + simulation%decomposition%nv + simulation%decomposition%ni
+    associate (home => simulation%decomposition%home)
+      do s = 1, size(home)
+        counts(s) = home(s)%n
+      end do
+      allocate (records(words + nd, sum(counts)))
+      n = 0
+      do s = 1, size(home)
+        do k = 1, home(s)%n
+          n = n + 1
+          call home(s)%get_record(k, records(1:words, n))
+          do d = 1, nd
+            records(words + d, n) = transfer(home(s)%position(d, k), 0_i8)
+            if (simulation%neighbourhoods%builds > 0) records(5 + d, n) = &
+              & transfer(simulation%neighbourhoods%reference(s)%position(d, k), 0_i8)
+          end do
+        end do
+      end do
+    end associate
+  end subroutine pack_grains
+
+  subroutine load_partition(simulation, file, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: head(:), records(:, :), counts(:), words(:)
+    integer, allocatable :: lengths(:)
+
+    call file%read_array("partition", head, error)
+    call file%read_table("cells", simulation%decomposition%n_subdomains, records, counts, error)
+    if (allocated(error)) return
+    words = records(1, :)
+    lengths = int(counts)
+    call simulation%decomposition%partition%restore(simulation%comm, head, words, lengths)
+  end subroutine load_partition
+
+  !> Grains into their homes as when the lists were made, then the lists with their impulses, then everything to where it
+  !> was when the checkpoint was written.
+  subroutine load_grains(simulation, file, builds, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    integer(i8), intent(in) :: builds
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:)
+    integer :: s, k, n, d, nd, n_words
+
+    associate (decomposition => simulation%decomposition)
+      nd = decomposition%nd
+      n_words = 5 + nd + decomposition%nv + decomposition%ni
+      call file%read_table("grains", decomposition%n_subdomains, records, counts, error)
+      if (builds > 0) call file%read_array("boundaries_when_listed", words, error)
+      call file%read_array("boundaries", now, error)
+      if (allocated(error)) return
+      n = 0
+      do s = 1, size(decomposition%home)
+        call decomposition%home(s)%init(nd, decomposition%nv, decomposition%ni, int(counts(s)))
+        do k = 1, decomposition%home(s)%n
+          call decomposition%home(s)%set_record(k, records(1:n_words, n + k))
+        end do
+        n = n + decomposition%home(s)%n
+      end do
+      if (builds > 0) then
+        call unpack_boundaries(words, decomposition%boundaries, simulation%config%file, error)
+        if (allocated(error)) return
+        call simulation%neighbourhoods%build(decomposition, impulse_entries(simulation%problem%kernels))
+        simulation%neighbourhoods%builds = builds
+        call load_impulses(simulation, file, error)
+      end if
+      n = 0
+      do s = 1, size(decomposition%home)
+        do k = 1, decomposition%home(s)%n
+          do d = 1, nd
+            decomposition%home(s)%position(d, k) = transfer(records(n_words + d, n + k), 0.0_dp)
+          end do
+        end do
+        n = n + decomposition%home(s)%n
+      end do
+      call unpack_boundaries(now, decomposition%boundaries, simulation%config%file, error)
+    end associate
+  end subroutine load_grains
+
+  subroutine load_impulses(simulation, file, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), counts(:)
+    integer :: s, n
+
+    call file%read_table("impulses", simulation%decomposition%n_subdomains, records, counts, error)
+    if (allocated(error)) return
+    n = 0
+    do s = 1, size(simulation%neighbourhoods%view)
+      call match_impulses(records(:, n + 1:n + int(counts(s))), simulation%neighbourhoods%view(s))
+      n = n + int(counts(s))
+    end do
+  end subroutine load_impulses
+
+end module gravier_checkpoint

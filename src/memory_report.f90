@@ -1,0 +1,157 @@
+!> What a run keeps in memory, array by array.
+module gravier_memory_report
+  use gravier_kinds, only: dp, i8
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t
+  use gravier_impulse_memory, only: impulse_entries
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: memory_report_t, report_memory, peak_memory
+
+  !> A kind of item, the bytes of one, array by array, and how many all ranks keep.
+  type :: item_t
+    character(len=:), allocatable :: name, arrays
+    integer(i8) :: bytes = 0, number = 0
+  contains
+    procedure :: add => item_add
+  end type item_t
+
+  type :: memory_report_t
+    type(item_t) :: items(5)
+    !> bytes of all ranks, and of the rank with most
+    integer(i8) :: total = 0, most = 0
+  end type memory_report_t
+
+contains
+
+  !> Bytes of the arrays of an assembled simulation, counted from their shapes. Collective.
+  subroutine report_memory(simulation, report)
+    type(simulation_t), intent(in) :: simulation
+    type(memory_report_t), intent(out) :: report
+    integer(i8) :: counts(5), most
+    integer :: k
+
+    call describe(simulation, report%items)
+    call count_items(simulation, counts)
+    most = 0
+    do k = 1, size(counts)
+      most = most + counts(k)*report%items(k)%bytes
+    end do
+    report%most = simulation%comm%largest(most)
+    call simulation%comm%sum_counts(counts)
+    do k = 1, size(counts)
+      report%items(k)%number = counts(k)
+      report%total = report%total + counts(k)*report%items(k)%bytes
+    end do
+  end subroutine report_memory
+
+  subroutine describe(simulation, items)
+    type(simulation_t), intent(in) :: simulation
+    type(item_t), intent(inout) :: items(5)
+    integer :: nd, nv, nw, ni
+
+    associate (kernels => simulation%problem%kernels)
+      nd = kernels%nd
+      nv = kernels%nv
+      nw = kernels%nw
+      ni = simulation%decomposition%ni
+      items(1)%name = "contact"
+      call items(1)%add("pair", 4, 2)
+      call items(1)%add("hot", 8, kernels%nh)
+      call items(1)%add("impulse", 8, kernels%nc)
+      call items(1)%add("gap", 8, 1)
+      call items(1)%add("source", 4, 1)
+      items(2)%name = "near pair"
+      call items(2)%add("candidate", 4, 1)
+      call items(2)%add("antagonist", 4, 1)
+      call items(2)%add("shift", 4, merge(1, 0, ni > 0))
+      call items(2)%add("impulse", 8, impulse_entries(kernels))
+      items(3)%name = "body in contact, in each subdomain"
+      call items(3)%add("id", 8, 1)
+      call items(3)%add("home", 4, 1)
+      call items(3)%add("multiplicity", 4, 1)
+      call items(3)%add("position", 8, nd)
+      call items(3)%add("radius", 8, 1)
+      call items(3)%add("v_free", 8, nv)
+      call items(3)%add("velocity", 8, nv)
+      call items(3)%add("v_global", 8, nv)
+      call items(3)%add("reaction", 8, nv)
+      call items(3)%add("inverse_mass", 8, nw)
+      call items(3)%add("weight", 8, nw)
+      items(4)%name = "grain seen, ghosts included"
+      call add_grain(items(4))
+      call items(4)%add("owner", 4, 2)
+      items(5)%name = "grain at home"
+      call add_grain(items(5))
+      call items(5)%add("reference", 8, nd)
+    end associate
+
+  contains
+
+    subroutine add_grain(item)
+      type(item_t), intent(inout) :: item
+
+      call item%add("id", 8, 1)
+      call item%add("position", 8, nd)
+      call item%add("velocity", 8, nv)
+      call item%add("radius", 8, 1)
+      call item%add("mass", 8, 1)
+      call item%add("inertia", 8, 1)
+      call item%add("glued", 4, 1)
+      call item%add("image", 4, ni)
+    end subroutine add_grain
+
+  end subroutine describe
+
+  !> Add an array of so many entries an item; one without entries is not kept at all.
+  subroutine item_add(self, name, bytes, entries)
+    class(item_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: bytes, entries
+
+    if (.not. allocated(self%arrays)) self%arrays = ""
+    if (entries == 0) return
+    if (len(self%arrays) > 0) self%arrays = self%arrays//", "
+    self%arrays = self%arrays//name//" "//to_text(bytes*entries)
+    self%bytes = self%bytes + bytes*entries
+  end subroutine item_add
+
+  subroutine count_items(simulation, counts)
+    type(simulation_t), intent(in) :: simulation
+    !> of this rank
+    integer(i8), intent(out) :: counts(5)
+    integer :: s
+
+    counts(:) = 0
+    do s = 1, size(simulation%problem%sub)
+      associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+        counts(1) = counts(1) + sub%n_contacts
+        counts(2) = counts(2) + view%list%n
+        counts(3) = counts(3) + sub%n_columns
+        counts(4) = counts(4) + view%bodies%n
+        counts(5) = counts(5) + simulation%decomposition%home(s)%n
+      end associate
+    end do
+  end subroutine count_items
+
+  !> Most memory that this process has held so far [MiB], as Linux counts it; 0 where the system does not tell.
+  real(dp) function peak_memory() result(mebibytes)
+    character(len=120) :: line
+    integer :: unit, stat, kibibytes
+
+    mebibytes = 0.0_dp
+    open (newunit=unit, file="/proc/self/status", action="read", status="old", iostat=stat)
+    if (stat /= 0) return
+    do
+      read (unit, "(a)", iostat=stat) line
+      if (stat /= 0) exit
+      if (line(1:6) /= "VmHWM:") cycle
+      read (line(7:), *, iostat=stat) kibibytes
+      if (stat == 0) mebibytes = kibibytes/1024.0_dp
+      exit
+    end do
+    close (unit)
+  end function peak_memory
+
+end module gravier_memory_report
