@@ -6,7 +6,8 @@ module gravier_simulation
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
   use gravier_motion, only: predict_position, advance_position
-  use gravier_boundary, only: shape_outlet, shape_plane
+  use gravier_boundary, only: shape_outlet
+  use gravier_facing_planes, only: find_facing_planes
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
@@ -18,6 +19,7 @@ module gravier_simulation
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
   use gravier_overlap_projection, only: project_overlaps
+  use gravier_diagnostics, only: diagnostics_t
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -53,6 +55,8 @@ module gravier_simulation
     class(scheme_t), allocatable :: scheme
     type(solve_control_t) :: control
     type(column_solution_t) :: column
+    !> figures that the user asked for
+    type(diagnostics_t) :: diagnostics
     !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
     real(dp), allocatable :: boundary_impulses(:, :)
     !> grains of the scene now, and those of them that are glued to boundaries
@@ -81,6 +85,7 @@ module gravier_simulation
     procedure :: assemble => simulation_assemble
     procedure :: start => simulation_start
     procedure :: make_subdomains => simulation_make_subdomains
+    procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
     procedure :: kinetic_energy => simulation_kinetic_energy
     procedure :: facing_area => simulation_facing_area
@@ -138,7 +143,17 @@ contains
     call self%make_subdomains()
     call self%decomposition%settle(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
+    call self%start_diagnostics()
   end subroutine simulation_start
+
+  !> Prepare the diagnostics that &output asks for, of the scene as it is. Collective.
+  subroutine simulation_start_diagnostics(self)
+    class(simulation_t), intent(inout) :: self
+
+    associate (output => self%config%output)
+      call self%diagnostics%init(self%decomposition, output%energy, output%stress, output%structure, output%boundary_forces)
+    end associate
+  end subroutine simulation_start_diagnostics
 
   !> Make room for the subdomains that &decomposition asks for, without grains.
   subroutine simulation_make_subdomains(self)
@@ -440,41 +455,22 @@ contains
   pure real(dp) function simulation_facing_area(self, b) result(area)
     class(simulation_t), intent(in) :: self
     integer, intent(in) :: b
+    real(dp) :: low, high
     integer :: d, main
 
     area = 1.0_dp
-    associate (boundaries => self%decomposition%boundaries)
+    associate (boundaries => self%decomposition%boundaries, length => self%decomposition%period%length)
       main = maxloc(abs(boundaries(b)%axis), dim=1)
       do d = 1, self%decomposition%nd
         if (d == main) cycle
-        if (self%decomposition%period%length(d) > 0.0_dp) then
-          area = area*self%decomposition%period%length(d)
-        else
-          area = area*way_across(d)
+        call find_facing_planes(boundaries, d, low, high)
+        if (length(d) > 0.0_dp) then
+          area = area*length(d)
+        else if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) then
+          area = area*max(high - low, 0.0_dp)
         end if
       end do
     end associate
-
-  contains
-
-    pure real(dp) function way_across(d) result(way)
-      integer, intent(in) :: d
-      real(dp) :: low, high
-      integer :: k
-
-      low = -huge(1.0_dp)
-      high = huge(1.0_dp)
-      do k = 1, size(self%decomposition%boundaries)
-        associate (plane => self%decomposition%boundaries(k))
-          if (plane%shape /= shape_plane .or. .not. plane%present) cycle
-          if (plane%axis(d) > 0.99_dp) low = max(low, plane%point(d))
-          if (plane%axis(d) < -0.99_dp) high = min(high, plane%point(d))
-        end associate
-      end do
-      way = 1.0_dp
-      if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) way = max(high - low, 0.0_dp)
-    end function way_across
-
   end function simulation_facing_area
 
   !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
@@ -549,6 +545,8 @@ contains
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
+    call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
+      & self%time, figures%left > 0)
     call move_to_end(self)
     figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%overlap_allowed)
@@ -560,6 +558,8 @@ contains
     if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
+    call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
+      & self%n_grains - self%n_glued)
   end subroutine simulation_advance
 
   !> q_{i+1} of grains and boundaries.
