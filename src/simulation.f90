@@ -81,12 +81,14 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(scene_t) :: scene
     type(body_set_t) :: newcomers(1)
+    type(time_table_t) :: none
 
     call self%free()
     self%comm => comm
     self%config = config
     self%step = 0
     self%time = 0.0_dp
+    self%gravity_table = none
     if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
       & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), error)
     call comm%agree(error)
