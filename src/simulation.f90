@@ -104,10 +104,12 @@ contains
     type(body_set_t), intent(out) :: grains
     type(error_t), allocatable, intent(inout) :: error
     type(scene_t) :: scene
+    type(time_table_t) :: none
 
     call self%free()
     self%comm => comm
     self%config = config
+    self%gravity_table = none
     if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
       & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), error)
     call comm%agree(error)

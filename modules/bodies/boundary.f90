@@ -133,17 +133,17 @@ contains
       from(:) = from - sum(from*self%axis)*self%axis
       length = norm2(from)
       distance = self%radius - length
-      away(:) = 0.0_dp
       if (length > 0.0_dp) then
         away(:) = -from/length
       else
-        away(1) = 1.0_dp
+        away(:) = across(self%axis)
       end if
     case (shape_segment, shape_rectangle)
       away(:) = from - share_along(from, self%edge(:, 1))*self%edge(:, 1)
       if (self%shape == shape_rectangle) away(:) = away - share_along(from, self%edge(:, 2))*self%edge(:, 2)
       distance = norm2(away)
-      if (distance > 0.0_dp) then
+      ! less is rounding, and has no direction
+      if (distance > 8.0_dp*epsilon(1.0_dp)*norm2(from)) then
         away(:) = away/distance
       else
         away(:) = face_normal(self)
@@ -160,6 +160,18 @@ contains
     real(dp), intent(in) :: from(3), edge(3)
     share = min(max(sum(from*edge)/sum(edge*edge), 0.0_dp), 1.0_dp)
   end function share_along
+
+  !> A unit vector across a unit vector; the first one across zero.
+  pure function across(axis) result(normal)
+    real(dp), intent(in) :: axis(3)
+    real(dp) :: normal(3)
+    integer :: least
+
+    least = minloc(abs(axis), dim=1)
+    normal(:) = -axis(least)*axis
+    normal(least) = normal(least) + 1.0_dp
+    normal(:) = normal/norm2(normal)
+  end function across
 
   !> Unit normal of a segment or rectangle.
   pure function face_normal(self) result(normal)

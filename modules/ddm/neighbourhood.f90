@@ -35,6 +35,8 @@ module gravier_neighbourhood
     integer, allocatable :: sent(:, :), seer(:), destination(:)
     !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
     integer, allocatable :: arrival(:, :)
+    !> entries of an impulse kept with a pair
+    integer :: n_impulse = 0
     !> lists made so far
     integer(i8) :: builds = 0
   contains
@@ -69,6 +71,7 @@ contains
         & decomposition%partition, decomposition%subdomain_of(s), decomposition%rule, n_impulse, self%view(s)%list)
     end do
     self%reference_boundaries = decomposition%boundaries
+    self%n_impulse = n_impulse
     self%builds = self%builds + 1
   end subroutine neighbourhoods_build
 

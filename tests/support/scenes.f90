@@ -96,7 +96,7 @@ contains
     type(body_set_t), intent(inout) :: bodies
     integer :: g, d, n
 
-    call bodies%init(self%nd, nv, merge(self%nd, 0, self%period%on()), max(0, (self%n - first)/step + 1))
+    call bodies%init(self%nd, nv, merge(self%nd, 0, self%period%on()), max(0, (self%n - first + step)/step))
     bodies%glued(:) = 0
     bodies%image(:, :) = 0
     n = 0
