@@ -38,7 +38,6 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: loads
     type(simulation_t) :: simulation
-    type(body_set_t) :: grains
     type(rest_t) :: rest
     logical :: keep
 
@@ -49,8 +48,7 @@ contains
       loads%scene%gravity_table = ""
       loads%scene%body_force(:) = 0.0_dp
     end if
-    call simulation%init(comm, loads, grains, error)
-    if (.not. allocated(error)) call simulation%start(grains, error)
+    call simulation%init(comm, loads, error)
     if (allocated(error)) return
     call open_log(config, log, error)
     call log%write_start(simulation, error)

@@ -57,7 +57,7 @@ contains
     call reset_timers()
     call log%init(comm)
     call read_config(comm, path, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, grains, error)
+    if (.not. allocated(error)) call simulation%make(comm, config, grains, error)
     if (.not. allocated(error)) call start(simulation, grains, restart, error)
     if (.not. allocated(error)) call prepare_directory(comm, config, error)
     if (allocated(error)) return
@@ -98,14 +98,12 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(simulation_t) :: simulation
-    type(body_set_t) :: grains
     type(step_figures_t) :: figures
     type(run_log_t) :: log
 
     call log%init(comm)
     call read_config(comm, path, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, grains, error)
-    if (.not. allocated(error)) call simulation%start(grains, error)
+    if (.not. allocated(error)) call simulation%init(comm, config, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
     call simulation%assemble(figures)

@@ -82,6 +82,7 @@ module gravier_simulation
     real(dp) :: imbalance = 1.0_dp
   contains
     procedure :: init => simulation_init
+    procedure :: make => simulation_make
     procedure :: assemble => simulation_assemble
     procedure :: start => simulation_start
     procedure :: make_subdomains => simulation_make_subdomains
@@ -94,9 +95,21 @@ module gravier_simulation
 
 contains
 
+  !> Make the scene of a configuration and share it out. Errors are the same on all ranks. Collective.
+  subroutine simulation_init(self, comm, config, error)
+    class(simulation_t), intent(inout) :: self
+    type(communicator_t), target, intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    type(body_set_t) :: grains
+
+    call self%make(comm, config, grains, error)
+    call self%start(grains, error)
+  end subroutine simulation_init
+
   !> Make the scene of a configuration; its grains wait for `start` or for a checkpoint. Errors are the same on all
   !> ranks. Collective.
-  subroutine simulation_init(self, comm, config, grains, error)
+  subroutine simulation_make(self, comm, config, grains, error)
     class(simulation_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -128,7 +141,7 @@ contains
     call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
-  end subroutine simulation_init
+  end subroutine simulation_make
 
   !> Share the grains of a new scene out. Errors are the same on all ranks. Collective.
   subroutine simulation_start(self, grains, error)
