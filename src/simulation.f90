@@ -88,6 +88,7 @@ module gravier_simulation
     procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
     procedure :: kinetic_energy => simulation_kinetic_energy
+    procedure :: facing_area => simulation_facing_area
     procedure :: free => simulation_free
   end type simulation_t
 
@@ -441,7 +442,7 @@ contains
         boundary%last_velocity(:) = boundary%velocity
         call boundary%prescribe(nd, end_time)
         if (.not. boundary%is_driven()) cycle
-        call boundary%applied_force(nd, end_time, facing_area(self, b), force)
+        call boundary%applied_force(nd, end_time, self%facing_area(b), force)
         do d = 1, nd
           if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + self%physics%h*force(d)/boundary%mass
         end do
@@ -451,7 +452,7 @@ contains
 
   !> Area that a pressure on plane `b` works on: along every other axis, the way between the two planes that face each
   !> other across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
-  pure real(dp) function facing_area(self, b) result(area)
+  pure real(dp) function simulation_facing_area(self, b) result(area)
     class(simulation_t), intent(in) :: self
     integer, intent(in) :: b
     real(dp) :: low, high
@@ -470,7 +471,7 @@ contains
         end if
       end do
     end associate
-  end function facing_area
+  end function simulation_facing_area
 
   !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
   subroutine count_fast(self, figures)
