@@ -255,7 +255,7 @@ contains
     force(:) = 0.0_dp
     do d = 1, nd
       if (.not. self%free(d)) cycle
-      force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) - &
+      force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) + &
         & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*self%axis(d)
     end do
   end subroutine boundary_applied_force
