@@ -74,6 +74,7 @@ contains
     call file%open(simulation%comm, path, error)
     call check_scene(simulation, file, path, error)
     call file%read_scalar("step", step, error)
+    call check_steps(simulation, step, path, error)
     call file%read_scalar("time", simulation%time, error)
     call file%read_scalar("grains", simulation%n_grains, error)
     call file%read_scalar("glued", simulation%n_glued, error)
@@ -135,6 +136,18 @@ contains
     end subroutine expect
 
   end subroutine check_scene
+
+  !> Refuse a checkpoint that is beyond the last step of the input.
+  subroutine check_steps(simulation, step, path, error)
+    type(simulation_t), intent(in) :: simulation
+    integer(i8), intent(in) :: step
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error) .or. step <= simulation%config%time%steps) return
+    call raise(error, status_input, simulation%config%file//": &time steps = "//to_text(simulation%config%time%steps)// &
+      & ": expected "//to_text(step)//" at least, the step of "//path)
+  end subroutine check_steps
 
   !> Fails at the first line that differs between the options of a checkpoint and those of now.
   subroutine compare_options(path, before, now, input, error)

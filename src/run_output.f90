@@ -5,6 +5,7 @@ module gravier_run_output
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_boundary, only: shape_plane, shape_name
+  use gravier_file_system, only: remove_file
   use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version
@@ -47,6 +48,8 @@ contains
       call self%results%reopen(self%comm, self%directory//"results.h5", simulation%step, error)
       self%last_written = simulation%last_written
     else
+      ! what is begun now must not go on from the checkpoint of another run
+      if (self%comm%rank == 0) call remove_file(self%directory//checkpoint_name)
       call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
         & simulation%config%scene%dimension, error)
       call write_boundaries(self, simulation, error)
@@ -165,7 +168,8 @@ contains
     end do
   end subroutine write_trace
 
-  !> Write bodies, and contacts when asked for, as step `step` of results.h5; a step written before is left. Collective.
+  !> Write bodies, and contacts when asked for, as step `step` of results.h5; a step written before is left. The contacts of
+  !> a state that comes from a checkpoint are not known before the next step. Collective.
   subroutine run_output_write_state(self, simulation, error)
     class(run_output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -178,7 +182,7 @@ contains
     call start_timer(phase_output)
     call collect_bodies(simulation, bodies)
     call collect_boundaries(simulation, boundaries)
-    if (simulation%config%output%contacts .and. simulation%step > 0) then
+    if (simulation%config%output%contacts .and. allocated(simulation%problem%sub)) then
       call collect_contacts(simulation, contacts)
       call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, boundaries)
     else

@@ -7,6 +7,7 @@ module gravier_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
+  use gravier_file_system, only: replace_file, remove_file
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
   use gravier_hdf5_file, only: h5_file_t
   implicit none
@@ -69,10 +70,13 @@ module gravier_results_file
   !> room for the headers of the groups and datasets of one step
   integer(i8), parameter :: bytes_of_headers = 65536
   integer, parameter :: bytes_of_word = 8
+  !> steps for which /steps has room in one block: up to there a program that dies leaves the file whole
+  integer, parameter :: steps_in_block = 1000
 
 contains
 
-  !> Create the file with /run (what was run) and an empty /steps. Collective.
+  !> Create the file with /run (what was run) and an empty /steps. It takes its name, and the place of an older file, when
+  !> it is complete. Collective.
   subroutine results_open(self, comm, path, version, command, input_text, dimension, error)
     class(results_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
@@ -86,20 +90,29 @@ contains
     !> 2 or 3
     integer, intent(in) :: dimension
     type(error_t), allocatable, intent(inout) :: error
+    logical :: created
 
     if (allocated(error)) return
     self%comm = comm
     self%path = path
     self%dimension = dimension
-    call self%file%create(comm, path, error)
+    call self%file%create(comm, path//".part", error)
     call self%file%reserve(bytes_of_headers + len(version) + len(command) + len(input_text), error)
     call self%file%make_group("/run", error)
     call self%file%write_attribute("/run", "version", version, error)
     call self%file%write_attribute("/run", "command", command, error)
     call self%file%write_attribute("/run", "input_text", input_text, error)
     call self%file%write_attribute("/run", "dimension", dimension, error)
-    call self%file%make_group("/steps", error)
+    call self%file%make_group("/steps", error, members=steps_in_block)
     call self%file%flush(error)
+    created = self%file%is_open()
+    call self%file%close(error)
+    if (comm%rank == 0) then
+      call replace_file(path//".part", path, error)
+      if (allocated(error) .and. created) call remove_file(path//".part")
+    end if
+    call comm%agree(error)
+    call self%file%reopen(comm, path, error)
   end subroutine results_open
 
   !> Go on with a file that a run left: steps above `last_step` are removed, and more can be written. Failure, with what

@@ -94,27 +94,33 @@ def value_text(value):
 
 
 def namelist(groups):
-    """Text of an input file from {group: {key: value}}."""
+    """Text of an input file from {group: {key: value}}; of a group that stands several times, {group: [{key: value}, ...]}."""
     text = ""
-    for group, keys in groups.items():
-        text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
+    for group, several in groups.items():
+        for keys in several if isinstance(several, list) else [several]:
+            text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
     return text
 
 
 def merged(*parts):
-    """Input groups, later ones changing keys of earlier ones; a key of value None is left out."""
+    """Input groups, later ones changing keys of earlier ones; a key of value None is left out. A list of groups takes the
+    place of an earlier one."""
     groups = {}
     for part in parts:
         for group, keys in part.items():
-            groups.setdefault(group, {}).update(keys)
-    return {group: {key: value for key, value in keys.items() if value is not None} for group, keys in groups.items()}
+            if isinstance(keys, list):
+                groups[group] = keys
+            else:
+                groups.setdefault(group, {}).update(keys)
+    return {group: keys if isinstance(keys, list) else {key: value for key, value in keys.items() if value is not None}
+            for group, keys in groups.items()}
 
 
-def run_case(groups, ranks=1, directory=".", timeout=120):
+def run_case(groups, ranks=1, directory=".", timeout=120, options=()):
     """Write `groups` to case.nml in `directory` (made if need be) and run it there."""
     os.makedirs(directory, exist_ok=True)
     write(os.path.join(directory, "case.nml"), namelist(groups))
-    return gravier("case.nml", ranks=ranks, directory=directory, timeout=timeout)
+    return gravier(*options, "case.nml", ranks=ranks, directory=directory, timeout=timeout)
 
 
 def write(path, text):
