@@ -243,8 +243,8 @@ contains
   real(dp) function solid_fraction(simulation)
     type(simulation_t), intent(in) :: simulation
     real(dp), allocatable :: volume(:), moment(:)
-    real(dp) :: space, floor
-    integer :: s, k, n, b, nd
+    real(dp) :: floor
+    integer :: s, k, n, nd
 
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
@@ -260,25 +260,21 @@ contains
           end do
         end associate
       end do
-      ! the area of the floor; any plane across another axis would do for a closed box
-      b = 1
-      space = simulation%facing_area(b)
-      solid_fraction = simulation%comm%sum_real(volume)
-      space = space*height()
     end associate
-    solid_fraction = solid_fraction/space
+    ! the first plane is the floor, where there is one
+    solid_fraction = simulation%comm%sum_real(volume)/(simulation%facing_area(1)*height())
 
   contains
 
-    !> Of the space across plane `b`. Collective.
+    !> Of the space above the first plane. Collective.
     real(dp) function height()
       integer :: d, k
 
       associate (boundaries => simulation%decomposition%boundaries)
-        d = maxloc(abs(boundaries(b)%axis), dim=1)
+        d = maxloc(abs(boundaries(1)%axis), dim=1)
         height = 0.0_dp
         do k = 1, simulation%n_walls
-          if (boundaries(k)%axis(d) < 0.0_dp) height = boundaries(k)%point(d) - boundaries(b)%point(d)
+          if (boundaries(k)%axis(d) < 0.0_dp) height = boundaries(k)%point(d) - boundaries(1)%point(d)
         end do
         if (height > 0.0_dp) return
         height = 2.0_dp*simulation%comm%sum_real(moment)/simulation%comm%sum_real(volume)

@@ -20,6 +20,7 @@ contains
     call check_radii(report, config%sample, error)
     call check_box(report, config, error)
     call check_preparation(report, config, error)
+    call expect(report, config%sample%file /= "", "sample", "file", error)
     call expect(report, has_ending(config%sample%file, ".h5") .or. has_ending(config%sample%file, ".hdf5"), "sample", "file", &
                 error, "a name with the ending .h5 or .hdf5")
   end subroutine check_sample

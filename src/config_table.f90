@@ -214,7 +214,8 @@ module gravier_config_table
            chooser="preparation", chosen="settled compacted"), &
      key_t("sample", "max_steps", kind_integer, "100000", ">= 1", "steps after which the preparation gives up", &
            chooser="preparation", chosen="settled compacted"), &
-     key_t("sample", "file", kind_text, "'sample.h5'", "not empty", "the bodies file that `gravier_sample` writes")]
+     key_t("sample", "file", kind_text, "'sample.h5'", "not empty", &
+           "the bodies file that `gravier_sample` writes, with the ending .h5 or .hdf5")]
 
   type(key_t), parameter :: time_keys(*) = &
     [key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
