@@ -455,6 +455,7 @@ contains
     do b = 1, size(self%decomposition%boundaries)
       associate (boundary => self%decomposition%boundaries(b))
         boundary%last_velocity(:) = boundary%velocity
+        boundary%last_spin(:) = boundary%spin
         call boundary%prescribe(nd, end_time)
         if (.not. boundary%is_driven()) cycle
         call boundary%applied_force(nd, end_time, self%facing_area(b), force)

@@ -264,15 +264,18 @@ contains
     due = farthest + max(farthest, boundary) > decomposition%rule%skin
   end function neighbourhoods_are_due
 
-  !> How far the surface of a boundary has moved at most [m].
+  !> How far the surface of a boundary has moved at most [m]. The axis of a drum, which turns about it, picks up roundings,
+  !> which are no tilt.
   pure real(dp) function way_of(now, before) result(way)
     type(boundary_t), intent(in) :: now, before
     integer :: k
     real(dp) :: corner(3)
+    !> [rad]
+    real(dp), parameter :: tilt_of_roundings = 1.0e-11_dp
 
     way = 0.0_dp
     if (.not. now%present .or. now%shape == shape_grains .or. now%shape == shape_outlet) return
-    if (any(abs(now%axis - before%axis) > 0.0_dp)) then
+    if (norm2(now%axis - before%axis) > tilt_of_roundings) then
       ! a plane or a cylinder that tilts moves without bound
       way = huge(1.0_dp)
     else if (now%shape == shape_plane) then

@@ -217,6 +217,10 @@ contains
     b%spin(:) = [1.0_dp, 2.0_dp, 3.0_dp]
     call b%velocity_at([2.0_dp, 3.0_dp, -1.0_dp], v)
     call check_vector(v, [-10.5_dp, 4.25_dp, 3.0_dp], rounding, "velocity of a point in space")
+    b%last_velocity(:) = [1.0_dp, 0.0_dp, 0.0_dp]
+    b%last_spin(:) = [0.0_dp, 0.0_dp, 2.0_dp]
+    call b%last_velocity_at([2.0_dp, 3.0_dp, -1.0_dp], v)
+    call check_vector(v, [-5.0_dp, 2.0_dp, 0.0_dp], rounding, "velocity at the start of the step")
   end subroutine test_velocity
 
   !> A quarter turn in one step; points of the boundary and carried ones stay together.
@@ -382,6 +386,7 @@ contains
       b%velocity(k) = draw(1, k, 6)
       b%spin(k) = draw(1, k, 7)
       b%last_velocity(k) = draw(1, k, 8)
+      b%last_spin(k) = draw(1, k, 9)
     end do
     b%present = .false.
     call b%get_state(words)
@@ -397,6 +402,7 @@ contains
     call check_vector(back%velocity, b%velocity, 0.0_dp, "state: velocity")
     call check_vector(back%spin, b%spin, 0.0_dp, "state: spin")
     call check_vector(back%last_velocity, b%last_velocity, 0.0_dp, "state: velocity before")
+    call check_vector(back%last_spin, b%last_spin, 0.0_dp, "state: spin before")
     call check(.not. back%present, "state: removed")
     call check_close(back%friction, 0.5_dp, 0.0_dp, "properties stay")
   end subroutine test_state
