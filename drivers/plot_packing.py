@@ -35,8 +35,15 @@ def read_group(parent, name):
     return {key: value[()] for key, value in parent[name].items()} if name in parent else None
 
 
+def read_boundaries(group):
+    """Identifiers of all boundaries at a step, with points and normals of those that are planes."""
+    rows = read_group(group, "boundaries")
+    plane = numpy.linalg.norm(rows["normal"], axis=1) > 0.0
+    return {"id": rows["id"], "point": rows["position"][plane], "normal": rows["normal"][plane]}
+
+
 def read_state(path, step):
-    """Step, time, walls, bodies and contacts (None where they were not written) of results.h5."""
+    """Step, time, boundaries, bodies and contacts (None where they were not written) of results.h5."""
     try:
         file = h5py.File(path, "r")
     except OSError:
@@ -55,7 +62,7 @@ def read_state(path, step):
         bodies = read_group(group, "bodies")
         if len(bodies["id"]) == 0:
             refuse(f"{path}: no body in step {step}; expected one at least")
-        return step, float(group.attrs["time"]), read_group(file, "walls"), bodies, read_group(group, "contacts")
+        return step, float(group.attrs["time"]), read_boundaries(group), bodies, read_group(group, "contacts")
 
 
 def chains(bodies, walls, contacts):
@@ -66,7 +73,7 @@ def chains(bodies, walls, contacts):
     order = numpy.argsort(bodies["id"])
     row = order[numpy.searchsorted(bodies["id"], candidate, sorter=order)]
     reach = bodies["radius"][row] + contacts["gap"][loaded]
-    between = ~numpy.isin(antagonist, walls["id"] if walls else [])
+    between = ~numpy.isin(antagonist, walls["id"])
     reach[between] += bodies["radius"][order[numpy.searchsorted(bodies["id"], antagonist[between], sorter=order)]]
     start = bodies["position"][row]
     return numpy.stack([start, start - reach[:, None] * contacts["normal"][loaded]], axis=1), contacts["impulse"][loaded, 0]
@@ -76,7 +83,7 @@ def box_around(bodies, walls):
     """Corners of the box that holds the bodies and the feet of the walls, with a margin."""
     centre, radius = bodies["position"], bodies["radius"][:, None]
     low, high = (centre - radius).min(axis=0), (centre + radius).max(axis=0)
-    if walls:
+    if len(walls["point"]) > 0:
         # the point of a wall that is nearest to the middle of the bodies
         middle = 0.5 * (low + high)
         foot = middle - ((middle - walls["point"]) * walls["normal"]).sum(axis=1)[:, None] * walls["normal"]
@@ -123,8 +130,7 @@ def draw_packing(path, step, time, walls, bodies, contacts):
             axes.plot([], [], color=CHAINS, linewidth=WIDEST, label=f"normal impulse {impulse.max():.2g} N s")
             axes.legend(loc="lower right", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False)
         title += f", {len(contacts['gap'])} contacts"
-    if walls:
-        draw_walls(axes, walls, low, high)
+    draw_walls(axes, walls, low, high)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x [m]", ylabel="y [m]")
     axes.set_title(title, fontsize=9, loc="left")
     figure.colorbar(disks, cax=axes.inset_axes([1.02, 0.0, 0.025, 1.0]), label=f"speed [{unit}]", extend="max")

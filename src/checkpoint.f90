@@ -7,6 +7,7 @@ module gravier_checkpoint
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_boundary, only: boundary_t, boundary_words
   use gravier_impulse_memory, only: impulse_entries, list_impulses, match_impulses
+  use gravier_energy_balance, only: energy_words
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t
   implicit none
@@ -54,6 +55,10 @@ contains
     end if
     words = real_words(simulation%boundary_impulses, size(simulation%boundary_impulses))
     call file%write_array("boundary_impulses", words, error)
+    deallocate (words)
+    allocate (words(merge(energy_words, 0, allocated(simulation%diagnostics%energy))))
+    if (size(words) > 0) call simulation%diagnostics%energy%get_state(words)
+    call file%write_array("energy_balance", words, error)
     call simulation%decomposition%partition%get_head(words)
     call file%write_array("partition", words, error)
     call save_tables(simulation, file, error)
@@ -74,6 +79,7 @@ contains
     call file%open(simulation%comm, path, error)
     call check_scene(simulation, file, path, error)
     call file%read_scalar("step", step, error)
+    call check_steps(simulation, step, path, error)
     call file%read_scalar("time", simulation%time, error)
     call file%read_scalar("grains", simulation%n_grains, error)
     call file%read_scalar("glued", simulation%n_glued, error)
@@ -92,6 +98,13 @@ contains
     call simulation%make_subdomains()
     call load_partition(simulation, file, error)
     call load_grains(simulation, file, builds, error)
+    call file%read_array("energy_balance", words, error)
+    if (.not. allocated(error)) then
+      ! a balance that begins now has no past
+      call simulation%start_diagnostics()
+      if (allocated(simulation%diagnostics%energy) .and. size(words) == energy_words) &
+        & call simulation%diagnostics%energy%set_state(words)
+    end if
     call file%close(error)
   end subroutine load_checkpoint
 
@@ -135,6 +148,18 @@ contains
     end subroutine expect
 
   end subroutine check_scene
+
+  !> Refuse a checkpoint that is beyond the last step of the input.
+  subroutine check_steps(simulation, step, path, error)
+    type(simulation_t), intent(in) :: simulation
+    integer(i8), intent(in) :: step
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error) .or. step <= simulation%config%time%steps) return
+    call raise(error, status_input, simulation%config%file//": &time steps = "//to_text(simulation%config%time%steps)// &
+      & ": expected "//to_text(step)//" at least, the step of "//path)
+  end subroutine check_steps
 
   !> Fails at the first line that differs between the options of a checkpoint and those of now.
   subroutine compare_options(path, before, now, input, error)

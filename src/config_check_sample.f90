@@ -21,7 +21,17 @@ contains
     call check_box(report, config, error)
     call check_preparation(report, config, error)
     call expect(report, config%sample%file /= "", "sample", "file", error)
+    call expect(report, has_ending(config%sample%file, ".h5") .or. has_ending(config%sample%file, ".hdf5"), "sample", "file", &
+                error, "a name with the ending .h5 or .hdf5")
   end subroutine check_sample
+
+  pure logical function has_ending(file, ending)
+    character(len=*), intent(in) :: file, ending
+    integer :: n
+    n = len_trim(file)
+    has_ending = .false.
+    if (n > len(ending)) has_ending = file(n - len(ending) + 1:n) == ending
+  end function has_ending
 
   subroutine check_radii(report, sample, error)
     type(report_t), intent(in) :: report
@@ -82,6 +92,8 @@ contains
                   "sample", "preparation", error, "another one where gravity does not point down the last axis")
       call expect(report, sample%preparation /= "settled" .or. config%scene%period(nd) <= 0.0_dp, &
                   "sample", "preparation", error, "another one where the last axis is periodic")
+      call expect(report, sample%preparation /= "compacted" .or. any(config%scene%period(:nd) <= 0.0_dp), &
+                  "sample", "preparation", error, "another one where every axis is periodic")
       call expect(report, sample%preparation /= "compacted" .or. sample%pressure > 0.0_dp, "sample", "pressure", error)
       call expect(report, sample%rest_tolerance > 0.0_dp, "sample", "rest_tolerance", error)
       call expect(report, sample%max_steps >= 1, "sample", "max_steps", error)

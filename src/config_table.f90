@@ -214,7 +214,8 @@ module gravier_config_table
            chooser="preparation", chosen="settled compacted"), &
      key_t("sample", "max_steps", kind_integer, "100000", ">= 1", "steps after which the preparation gives up", &
            chooser="preparation", chosen="settled compacted"), &
-     key_t("sample", "file", kind_text, "'sample.h5'", "not empty", "the bodies file that `gravier_sample` writes")]
+     key_t("sample", "file", kind_text, "'sample.h5'", "not empty", &
+           "the bodies file that `gravier_sample` writes, with the ending .h5 or .hdf5")]
 
   type(key_t), parameter :: time_keys(*) = &
     [key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
@@ -277,9 +278,9 @@ module gravier_config_table
      key_t("output", "walltime", kind_real, "0.0", ">= 0", &
            "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s"), &
      key_t("output", "energy", kind_logical, ".false.", "", "write the energies and works of each step"), &
-     key_t("output", "stress", kind_logical, ".false.", "", "write the mean stress of the grains"), &
-     key_t("output", "structure", kind_logical, ".false.", "", "write coordination, fabric and solid fraction"), &
-     key_t("output", "boundary_forces", kind_logical, ".false.", "", "write the forces on each boundary")]
+     key_t("output", "stress", kind_logical, ".false.", "", "write the mean stress and the solid fraction"), &
+     key_t("output", "structure", kind_logical, ".false.", "", "write coordination, fabric, sliding and forces in contacts"), &
+     key_t("output", "boundary_forces", kind_logical, ".false.", "", "write force and place of each boundary")]
   !&>
 
   type(key_t), parameter :: keys(*) = [scene_keys, boundary_keys, sample_keys, time_keys, solver_keys, decomposition_keys, &

@@ -22,8 +22,8 @@ module gravier_run
 
   !> When a run began and what made it stop early.
   type :: interruption_t
-    !> on the clock of this rank, of the run, of the last checkpoint and of the end of the last step [s]
-    real(dp) :: start = 0.0_dp, last_checkpoint = 0.0_dp, last_step = huge(1.0_dp)
+    !> on the clock of this rank: of the program, of the first step, of the last checkpoint, of the end of the last step [s]
+    real(dp) :: start = 0.0_dp, first_step = 0.0_dp, last_checkpoint = 0.0_dp, last_step = huge(1.0_dp)
     !> longest step and longest checkpoint so far [s]
     real(dp) :: longest = 0.0_dp, dearest = 0.0_dp
     logical :: stops = .false.
@@ -49,23 +49,25 @@ contains
     type(body_set_t) :: grains
     type(run_log_t) :: log
     type(run_output_t) :: output
+    type(interruption_t) :: interruption
 
     status = status_ok
+    interruption%start = MPI_Wtime()
+    call catch_signals()
     call reset_timers()
     call log%init(comm)
     call read_config(comm, path, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, grains, error)
+    if (.not. allocated(error)) call simulation%make(comm, config, grains, error)
     if (.not. allocated(error)) call start(simulation, grains, restart, error)
     if (.not. allocated(error)) call prepare_directory(comm, config, error)
     if (allocated(error)) return
-    call catch_signals()
     call log%write_start(simulation, error)
     if (restart) call log%write_restart(simulation, error)
     call log%write_head(error)
     call log%open(trim(config%output%directory)//"/run.log", simulation%restarted, error)
     call comm%agree(error)
     call output%open(simulation, command, error)
-    if (.not. allocated(error)) call run_steps(simulation, log, output, status, error)
+    if (.not. allocated(error)) call run_steps(simulation, log, output, interruption, status, error)
     call log%close(error)
     call simulation%free()
   end subroutine run_case
@@ -96,14 +98,12 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(simulation_t) :: simulation
-    type(body_set_t) :: grains
     type(step_figures_t) :: figures
     type(run_log_t) :: log
 
     call log%init(comm)
     call read_config(comm, path, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, grains, error)
-    if (.not. allocated(error)) call simulation%start(grains, error)
+    if (.not. allocated(error)) call simulation%init(comm, config, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
     call simulation%assemble(figures)
@@ -166,21 +166,22 @@ contains
   end subroutine prepare_directory
 
   !> The time loop. Collective.
-  subroutine run_steps(simulation, log, output, status, error)
+  subroutine run_steps(simulation, log, output, interruption, status, error)
     type(simulation_t), intent(inout) :: simulation
     type(run_log_t), intent(inout) :: log
     type(run_output_t), intent(inout) :: output
+    !> its start is known
+    type(interruption_t), intent(inout) :: interruption
     integer, intent(inout) :: status
     type(error_t), allocatable, intent(inout) :: error
     type(step_figures_t) :: figures
-    type(interruption_t) :: interruption
     real(dp) :: step_start
     !> of a last line that cannot be written after an error
     type(error_t), allocatable :: unsaid
     logical :: keep_last, ends
 
-    interruption%start = MPI_Wtime()
-    interruption%last_checkpoint = interruption%start
+    interruption%first_step = MPI_Wtime()
+    interruption%last_checkpoint = interruption%first_step
     keep_last = .true.
     ends = .false.
     if (simulation%config%output%every > 0 .and. .not. simulation%restarted) call output%write_state(simulation, error)
@@ -205,7 +206,7 @@ contains
     end if
     if (figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, &
       & error)
-    call log%write_end(simulation, MPI_Wtime() - interruption%start, error)
+    call log%write_end(simulation, MPI_Wtime() - interruption%first_step, error)
     if (simulation%failed > 0) status = status_unconverged
     if (interruption%stops) then
       status = status_failure
@@ -289,9 +290,13 @@ contains
     type(run_output_t), intent(inout) :: output
     type(error_t), allocatable, intent(inout) :: error
 
+    logical :: wanted
+
     call output%write_row(simulation, figures, seconds, figures%solve%status == solve_converged, error)
-    if (simulation%config%output%every == 0) return
-    if (mod(simulation%step, simulation%config%output%every) == 0) call output%write_state(simulation, error)
+    ! the last state comes before the last checkpoint
+    wanted = simulation%step == simulation%config%time%steps
+    if (simulation%config%output%every > 0) wanted = wanted .or. mod(simulation%step, simulation%config%output%every) == 0
+    if (wanted) call output%write_state(simulation, error)
   end subroutine write_step
 
   !> The last word: did it converge, and where are the results.

@@ -5,9 +5,12 @@ module gravier_run_output
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_boundary, only: shape_plane, shape_name
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t
+  use gravier_file_system, only: remove_file
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version
+  use gravier_contact_structure, only: bin_width
+  use gravier_diagnostics, only: diagnostics_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
   use gravier_checkpoint, only: save_checkpoint, checkpoint_name
@@ -47,12 +50,14 @@ contains
       call self%results%reopen(self%comm, self%directory//"results.h5", simulation%step, error)
       self%last_written = simulation%last_written
     else
+      ! what is begun now must not go on from the checkpoint of another run
+      if (self%comm%rank == 0) call remove_file(self%directory//checkpoint_name)
       call self%results%open(self%comm, self%directory//"results.h5", version, command, simulation%config%text, &
         & simulation%config%scene%dimension, error)
       call write_boundaries(self, simulation, error)
     end if
     if (self%comm%rank == 0) then
-      call open_table(self%history, self%directory//"history.csv", history_header(), simulation, error)
+      call open_table(self%history, self%directory//"history.csv", history_header(simulation%diagnostics), simulation, error)
       if (simulation%config%output%trace) call open_table(self%trace, self%directory//"trace.csv", trace_header(simulation), &
         & simulation, error)
     end if
@@ -72,10 +77,17 @@ contains
     end if
   end subroutine open_table
 
-  pure function history_header() result(header)
+  !> The columns, those of the diagnostics last.
+  pure function history_header(diagnostics) result(header)
+    type(diagnostics_t), intent(in) :: diagnostics
     character(len=:), allocatable :: header
+    integer :: k
+
     header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
       & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,ghosts"
+    do k = 1, diagnostics%n_columns
+      header = header//","//trim(diagnostics%name(k))
+    end do
   end function history_header
 
   pure function trace_header(simulation) result(header)
@@ -117,6 +129,7 @@ contains
     real(dp), intent(in) :: seconds
     logical, intent(in) :: converged
     type(error_t), allocatable, intent(inout) :: error
+    integer :: k
 
     call start_timer(phase_output)
     if (self%comm%rank == 0) then
@@ -141,6 +154,9 @@ contains
       call self%history%add(figures%sharing%neighbours)
       call self%history%add(figures%sharing%values)
       call self%history%add(figures%sharing%ghosts)
+      do k = 1, simulation%diagnostics%n_columns
+        call self%history%add(simulation%diagnostics%value(k))
+      end do
       call self%history%end_row(error)
       if (self%trace%is_open()) call write_trace(self, simulation, figures, error)
     end if
@@ -165,7 +181,8 @@ contains
     end do
   end subroutine write_trace
 
-  !> Write bodies, and contacts when asked for, as step `step` of results.h5; a step written before is left. Collective.
+  !> Write bodies, and contacts when asked for, as step `step` of results.h5; a step written before is left. The contacts of
+  !> a state that comes from a checkpoint are not known before the next step. Collective.
   subroutine run_output_write_state(self, simulation, error)
     class(run_output_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -173,21 +190,40 @@ contains
     type(body_rows_t) :: bodies
     type(contact_rows_t) :: contacts
     type(boundary_rows_t) :: boundaries
+    type(figures_t), allocatable :: figures
 
     if (self%last_written == simulation%step) return
     call start_timer(phase_output)
     call collect_bodies(simulation, bodies)
     call collect_boundaries(simulation, boundaries)
-    if (simulation%config%output%contacts .and. simulation%step > 0) then
+    call collect_figures(simulation%diagnostics, figures)
+    if (simulation%config%output%contacts .and. allocated(simulation%problem%sub)) then
       call collect_contacts(simulation, contacts)
-      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, boundaries)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, boundaries, figures)
     else
-      call self%results%write_step(simulation%step, simulation%time, bodies, error, boundaries=boundaries)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, boundaries=boundaries, &
+        & figures=figures)
     end if
     self%last_written = simulation%step
     call stop_timer(phase_output)
   end subroutine run_output_write_state
 
+  !> The diagnostics of the scene as a whole; not allocated where none are asked for, or no step was made.
+  subroutine collect_figures(diagnostics, figures)
+    type(diagnostics_t), intent(in) :: diagnostics
+    type(figures_t), allocatable, intent(out) :: figures
+
+    if (diagnostics%n_of_scene == 0 .or. .not. diagnostics%measured) return
+    allocate (figures)
+    figures%name = diagnostics%name(1:diagnostics%n_of_scene)
+    figures%value = diagnostics%value(1:diagnostics%n_of_scene)
+    figures%bin_width = bin_width
+    if (allocated(diagnostics%structure)) then
+      figures%histogram = diagnostics%structure%histogram
+    else
+      allocate (figures%histogram(0))
+    end if
+  end subroutine collect_figures
   !> Where the boundaries are, how they move and what the grains did to them in the last step.
   subroutine collect_boundaries(simulation, rows)
     type(simulation_t), intent(in) :: simulation

@@ -3,21 +3,19 @@ module gravier_scene
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t
-  use gravier_bodies_file, only: bodies_data_t, read_bodies
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
+  use gravier_bodies_file, only: read_bodies
   use gravier_periodic, only: period_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_config_types, only: config_t, scene_config_t
+  use gravier_sample_bodies, only: make_lattice, make_sample
   use gravier_scene_boundaries, only: make_boundaries
   implicit none
   private
   public :: scene_t, make_scene
-
-  !> room around a grain of the largest radius in a lattice, relative to its diameter
-  real(dp), parameter :: lattice_room = 1.05_dp
 
   !> A scene as it starts. Grains are spread over the ranks in any way; boundaries are on all of them.
   type :: scene_t
@@ -49,6 +47,8 @@ contains
       call make_column(comm, config%scene, data)
     case ("lattice")
       call make_lattice(comm, config%scene, data)
+    case ("sample")
+      call make_sample(comm, config, data, error)
     case default
       call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error)
     end select
@@ -126,91 +126,30 @@ contains
       & "along its axis only; expected zeros, then a negative last component")
   end subroutine check_exact_solution
 
-  !> First and last of `total` bodies that this rank makes.
-  pure subroutine share_of_rank(comm, total, first, last)
-    type(communicator_t), intent(in) :: comm
-    integer(i8), intent(in) :: total
-    integer(i8), intent(out) :: first, last
-    first = (total*comm%rank)/comm%size + 1
-    last = (total*(comm%rank + 1))/comm%size
-  end subroutine share_of_rank
-
-  !> `total` bodies at rest, with room for those of this rank, and walls through the origin facing up each axis.
-  subroutine make_room(comm, dimension, total, n_walls, data)
-    type(communicator_t), intent(in) :: comm
-    integer, intent(in) :: dimension, n_walls
-    integer(i8), intent(in) :: total
-    type(bodies_data_t), intent(out) :: data
-    integer(i8) :: first, last
-    integer :: w
-
-    call share_of_rank(comm, total, first, last)
-    data%n = int(last - first + 1)
-    data%total = total
-    allocate (data%id(data%n), data%radius(data%n), data%mass(data%n))
-    allocate (data%position(dimension, data%n), source=0.0_dp)
-    allocate (data%velocity(3*dimension - 3, data%n), source=0.0_dp)
-    data%n_walls = n_walls
-    allocate (data%wall_id(n_walls))
-    allocate (data%wall_point(dimension, n_walls), data%wall_normal(dimension, n_walls), source=0.0_dp)
-    do w = 1, n_walls
-      data%wall_id(w) = total + w
-    end do
-    do w = 1, data%n
-      data%id(w) = first + w - 1
-    end do
-    allocate (data%group(data%n), source=0)
-  end subroutine make_room
-
   !> Equal grains, one upon the other on a ground: the columns of the paper.
   subroutine make_column(comm, scene, data)
     type(communicator_t), intent(in) :: comm
     type(scene_config_t), intent(in) :: scene
     type(bodies_data_t), intent(out) :: data
-    integer :: k
+    integer(i8) :: first
+    integer :: k, n
 
-    call make_room(comm, scene%dimension, int(scene%column_count, i8), 1, data)
+    data%total = scene%column_count
+    call find_own_rows(comm, data%total, first, n)
+    call allocate_bodies(data, scene%dimension, n)
+    allocate (data%mass(n), source=scene%mass)
     data%radius(:) = scene%radius
-    data%mass(:) = scene%mass
-    do k = 1, data%n
+    data%position(:, :) = 0.0_dp
+    do k = 1, n
+      data%id(k) = first + k
       data%position(scene%dimension, k) = (2*data%id(k) - 1)*scene%radius
     end do
+    call allocate_walls(data, scene%dimension, 1)
+    data%wall_id(1) = data%total + 1
+    data%wall_point(:, 1) = 0.0_dp
+    data%wall_normal(:, 1) = 0.0_dp
     data%wall_normal(scene%dimension, 1) = 1.0_dp
   end subroutine make_column
-
-  !> Grains of random radii, each somewhere in its own cell of a lattice, in a box without lid. What a grain gets
-  !> depends on its identifier and the seed alone.
-  subroutine make_lattice(comm, scene, data)
-    type(communicator_t), intent(in) :: comm
-    type(scene_config_t), intent(in) :: scene
-    type(bodies_data_t), intent(out) :: data
-    real(dp) :: edge, free
-    integer :: k, d, nd, count(3)
-    integer(i8) :: place
-
-    nd = scene%dimension
-    count(:) = 1
-    count(1:nd) = scene%lattice_count(1:nd)
-    edge = lattice_room*2.0_dp*scene%radius_max
-    call make_room(comm, nd, product(int(count, i8)), 2*nd - 1, data)
-    do k = 1, data%n
-      data%radius(k) = scene%radius_min + (scene%radius_max - scene%radius_min)*hash_uniform(scene%seed, data%id(k), 0)
-      data%mass(k) = grain_mass(nd, data%radius(k), scene%density)
-      free = edge - 2.0_dp*data%radius(k)
-      place = data%id(k) - 1
-      do d = 1, nd
-        data%position(d, k) = (mod(place, int(count(d), i8)) + 0.5_dp)*edge + &
-          & free*(hash_uniform(scene%seed, data%id(k), d) - 0.5_dp)
-        place = place/count(d)
-      end do
-    end do
-    data%wall_normal(nd, 1) = 1.0_dp
-    do d = 1, nd - 1
-      data%wall_normal(d, 2*d) = 1.0_dp
-      data%wall_normal(d, 2*d + 1) = -1.0_dp
-      data%wall_point(d, 2*d + 1) = count(d)*edge
-    end do
-  end subroutine make_lattice
 
   !> Turn the rows of a file, or made rows, into bodies; find out what the scene has. Collective.
   subroutine take_data(comm, scene_config, data, scene)

@@ -6,7 +6,8 @@ module gravier_simulation
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
   use gravier_motion, only: predict_position, advance_position
-  use gravier_boundary, only: shape_outlet, shape_plane
+  use gravier_boundary, only: shape_outlet
+  use gravier_facing_planes, only: find_facing_planes
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
@@ -18,6 +19,7 @@ module gravier_simulation
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
   use gravier_overlap_projection, only: project_overlaps
+  use gravier_diagnostics, only: diagnostics_t
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -53,6 +55,8 @@ module gravier_simulation
     class(scheme_t), allocatable :: scheme
     type(solve_control_t) :: control
     type(column_solution_t) :: column
+    !> figures that the user asked for
+    type(diagnostics_t) :: diagnostics
     !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
     real(dp), allocatable :: boundary_impulses(:, :)
     !> grains of the scene now, and those of them that are glued to boundaries
@@ -78,19 +82,34 @@ module gravier_simulation
     real(dp) :: imbalance = 1.0_dp
   contains
     procedure :: init => simulation_init
+    procedure :: make => simulation_make
     procedure :: assemble => simulation_assemble
     procedure :: start => simulation_start
     procedure :: make_subdomains => simulation_make_subdomains
+    procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
     procedure :: kinetic_energy => simulation_kinetic_energy
+    procedure :: facing_area => simulation_facing_area
     procedure :: free => simulation_free
   end type simulation_t
 
 contains
 
+  !> Make the scene of a configuration and share it out. Errors are the same on all ranks. Collective.
+  subroutine simulation_init(self, comm, config, error)
+    class(simulation_t), intent(inout) :: self
+    type(communicator_t), target, intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    type(body_set_t) :: grains
+
+    call self%make(comm, config, grains, error)
+    call self%start(grains, error)
+  end subroutine simulation_init
+
   !> Make the scene of a configuration; its grains wait for `start` or for a checkpoint. Errors are the same on all
   !> ranks. Collective.
-  subroutine simulation_init(self, comm, config, grains, error)
+  subroutine simulation_make(self, comm, config, grains, error)
     class(simulation_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -98,10 +117,12 @@ contains
     type(body_set_t), intent(out) :: grains
     type(error_t), allocatable, intent(inout) :: error
     type(scene_t) :: scene
+    type(time_table_t) :: none
 
     call self%free()
     self%comm => comm
     self%config = config
+    self%gravity_table = none
     if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
       & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), error)
     call comm%agree(error)
@@ -120,7 +141,7 @@ contains
     call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
-  end subroutine simulation_init
+  end subroutine simulation_make
 
   !> Share the grains of a new scene out. Errors are the same on all ranks. Collective.
   subroutine simulation_start(self, grains, error)
@@ -137,7 +158,17 @@ contains
     call self%make_subdomains()
     call self%decomposition%settle(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
+    call self%start_diagnostics()
   end subroutine simulation_start
+
+  !> Prepare the diagnostics that &output asks for, of the scene as it is. Collective.
+  subroutine simulation_start_diagnostics(self)
+    class(simulation_t), intent(inout) :: self
+
+    associate (output => self%config%output)
+      call self%diagnostics%init(self%decomposition, output%energy, output%stress, output%structure, output%boundary_forces)
+    end associate
+  end subroutine simulation_start_diagnostics
 
   !> Make room for the subdomains that &decomposition asks for, without grains.
   subroutine simulation_make_subdomains(self)
@@ -424,9 +455,10 @@ contains
     do b = 1, size(self%decomposition%boundaries)
       associate (boundary => self%decomposition%boundaries(b))
         boundary%last_velocity(:) = boundary%velocity
+        boundary%last_spin(:) = boundary%spin
         call boundary%prescribe(nd, end_time)
         if (.not. boundary%is_driven()) cycle
-        call boundary%applied_force(nd, end_time, facing_area(self, b), force)
+        call boundary%applied_force(nd, end_time, self%facing_area(b), force)
         do d = 1, nd
           if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + self%physics%h*force(d)/boundary%mass
         end do
@@ -436,45 +468,26 @@ contains
 
   !> Area that a pressure on plane `b` works on: along every other axis, the way between the two planes that face each
   !> other across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
-  pure real(dp) function facing_area(self, b) result(area)
+  pure real(dp) function simulation_facing_area(self, b) result(area)
     class(simulation_t), intent(in) :: self
     integer, intent(in) :: b
+    real(dp) :: low, high
     integer :: d, main
 
     area = 1.0_dp
-    associate (boundaries => self%decomposition%boundaries)
+    associate (boundaries => self%decomposition%boundaries, length => self%decomposition%period%length)
       main = maxloc(abs(boundaries(b)%axis), dim=1)
       do d = 1, self%decomposition%nd
         if (d == main) cycle
-        if (self%decomposition%period%length(d) > 0.0_dp) then
-          area = area*self%decomposition%period%length(d)
-        else
-          area = area*way_across(d)
+        call find_facing_planes(boundaries, d, low, high)
+        if (length(d) > 0.0_dp) then
+          area = area*length(d)
+        else if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) then
+          area = area*max(high - low, 0.0_dp)
         end if
       end do
     end associate
-
-  contains
-
-    pure real(dp) function way_across(d) result(way)
-      integer, intent(in) :: d
-      real(dp) :: low, high
-      integer :: k
-
-      low = -huge(1.0_dp)
-      high = huge(1.0_dp)
-      do k = 1, size(self%decomposition%boundaries)
-        associate (plane => self%decomposition%boundaries(k))
-          if (plane%shape /= shape_plane .or. .not. plane%present) cycle
-          if (plane%axis(d) > 0.99_dp) low = max(low, plane%point(d))
-          if (plane%axis(d) < -0.99_dp) high = min(high, plane%point(d))
-        end associate
-      end do
-      way = 1.0_dp
-      if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) way = max(high - low, 0.0_dp)
-    end function way_across
-
-  end function facing_area
+  end function simulation_facing_area
 
   !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
   subroutine count_fast(self, figures)
@@ -548,6 +561,8 @@ contains
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
+    call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
+      & self%time, figures%left > 0)
     call move_to_end(self)
     figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%overlap_allowed)
@@ -559,6 +574,8 @@ contains
     if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
+    call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
+      & self%n_grains - self%n_glued)
   end subroutine simulation_advance
 
   !> q_{i+1} of grains and boundaries.

@@ -39,8 +39,8 @@ module gravier_boundary
     real(dp) :: pivot(3) = 0.0_dp
     !> at the present time [m/s], [rad/s]
     real(dp) :: velocity(3) = 0.0_dp, spin(3) = 0.0_dp
-    !> at the start of the step [m/s]
-    real(dp) :: last_velocity(3) = 0.0_dp
+    !> at the start of the step [m/s], [rad/s]
+    real(dp) :: last_velocity(3) = 0.0_dp, last_spin(3) = 0.0_dp
     !> as prescribed, where no table says otherwise [m/s], [rad/s]
     real(dp) :: given_velocity(3) = 0.0_dp, given_spin(3) = 0.0_dp
     !> components of translation that forces move
@@ -61,6 +61,7 @@ module gravier_boundary
     procedure :: turns => boundary_turns
     procedure :: locate => boundary_locate
     procedure :: velocity_at => boundary_velocity_at
+    procedure :: last_velocity_at => boundary_last_velocity_at
     procedure :: prescribe => boundary_prescribe
     procedure :: applied_force => boundary_applied_force
     procedure :: move => boundary_move
@@ -70,7 +71,7 @@ module gravier_boundary
   end type boundary_t
 
   !> words of the state of a boundary
-  integer, parameter, public :: boundary_words = 25
+  integer, parameter, public :: boundary_words = 28
 
 contains
 
@@ -133,17 +134,17 @@ contains
       from(:) = from - sum(from*self%axis)*self%axis
       length = norm2(from)
       distance = self%radius - length
-      away(:) = 0.0_dp
       if (length > 0.0_dp) then
         away(:) = -from/length
       else
-        away(1) = 1.0_dp
+        away(:) = across(self%axis)
       end if
     case (shape_segment, shape_rectangle)
       away(:) = from - share_along(from, self%edge(:, 1))*self%edge(:, 1)
       if (self%shape == shape_rectangle) away(:) = away - share_along(from, self%edge(:, 2))*self%edge(:, 2)
       distance = norm2(away)
-      if (distance > 0.0_dp) then
+      ! less is rounding, and has no direction
+      if (distance > 8.0_dp*epsilon(1.0_dp)*norm2(from)) then
         away(:) = away/distance
       else
         away(:) = face_normal(self)
@@ -160,6 +161,18 @@ contains
     real(dp), intent(in) :: from(3), edge(3)
     share = min(max(sum(from*edge)/sum(edge*edge), 0.0_dp), 1.0_dp)
   end function share_along
+
+  !> A unit vector across a unit vector; the first one across zero.
+  pure function across(axis) result(normal)
+    real(dp), intent(in) :: axis(3)
+    real(dp) :: normal(3)
+    integer :: least
+
+    least = minloc(abs(axis), dim=1)
+    normal(:) = -axis(least)*axis
+    normal(least) = normal(least) + 1.0_dp
+    normal(:) = normal/norm2(normal)
+  end function across
 
   !> Unit normal of a segment or rectangle.
   pure function face_normal(self) result(normal)
@@ -191,13 +204,29 @@ contains
     real(dp), intent(in) :: x(:)
     !> (nd)
     real(dp), intent(out) :: velocity(:)
+    call rigid_velocity(x, self%pivot, self%velocity, self%spin, velocity)
+  end subroutine boundary_velocity_at
+
+  !> The same with velocity and spin at the start of the step.
+  pure subroutine boundary_last_velocity_at(self, x, velocity)
+    class(boundary_t), intent(in) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: x(:)
+    !> (nd)
+    real(dp), intent(out) :: velocity(:)
+    call rigid_velocity(x, self%pivot, self%last_velocity, self%last_spin, velocity)
+  end subroutine boundary_last_velocity_at
+
+  pure subroutine rigid_velocity(x, pivot, translation, spin, velocity)
+    real(dp), intent(in) :: x(:), pivot(3), translation(3), spin(3)
+    real(dp), intent(out) :: velocity(:)
     real(dp) :: arm(3), turned(3)
 
     arm(:) = 0.0_dp
-    arm(1:size(x)) = x - self%pivot(1:size(x))
-    turned(:) = cross(self%spin, arm)
-    velocity(:) = self%velocity(1:size(x)) + turned(1:size(x))
-  end subroutine boundary_velocity_at
+    arm(1:size(x)) = x - pivot(1:size(x))
+    turned(:) = cross(spin, arm)
+    velocity(:) = translation(1:size(x)) + turned(1:size(x))
+  end subroutine rigid_velocity
 
   !> Set the prescribed velocity and spin of a time; free components are left.
   pure subroutine boundary_prescribe(self, nd, time)
@@ -243,7 +272,7 @@ contains
     force(:) = 0.0_dp
     do d = 1, nd
       if (.not. self%free(d)) cycle
-      force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) - &
+      force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) + &
         & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*self%axis(d)
     end do
   end subroutine boundary_applied_force
@@ -348,6 +377,7 @@ contains
     state(16:18) = self%velocity
     state(19:21) = self%spin
     state(22:24) = self%last_velocity
+    state(25:27) = self%last_spin
     words(1) = merge(1_i8, 0_i8, self%present)
     do k = 1, size(state)
       words(1 + k) = transfer(state(k), 0_i8)
@@ -372,6 +402,7 @@ contains
     self%velocity(:) = state(16:18)
     self%spin(:) = state(19:21)
     self%last_velocity(:) = state(22:24)
+    self%last_spin(:) = state(25:27)
   end subroutine boundary_set_state
 
 end module gravier_boundary

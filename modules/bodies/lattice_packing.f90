@@ -7,7 +7,7 @@ module gravier_lattice_packing
   use gravier_placed_grains, only: sample_box_t
   implicit none
   private
-  public :: lattice_t
+  public :: lattice_t, cell_edge
 
   !> room around a grain of the largest radius, relative to its diameter
   real(dp), parameter :: room = 1.05_dp
@@ -46,7 +46,7 @@ contains
     if (allocated(error)) return
     self%nd = box%nd
     self%lower(:) = box%lower
-    self%edge = room*2.0_dp*largest
+    self%edge = cell_edge(largest)
     self%cells(:) = 1
     do d = 1, box%nd - 1
       width = box%upper(d) - box%lower(d)
@@ -65,6 +65,12 @@ contains
     if (width > 0.0_dp .and. self%height() > width*slack) call raise(error, status_input, "the box is "//to_text(width)// &
       & " m high, but a lattice of "//to_text(count)//" grains is "//to_text(self%height())//" m high")
   end subroutine lattice_init
+
+  !> Edge of the cells for grains of radii up to `largest` [m].
+  pure real(dp) function cell_edge(largest) result(edge)
+    real(dp), intent(in) :: largest
+    edge = room*2.0_dp*largest
+  end function cell_edge
 
   !> Height of the lattice above the lower corner of the box [m].
   pure real(dp) function lattice_height(self) result(height)

@@ -34,6 +34,8 @@ contains
     integer, allocatable :: column(:)
     integer :: time_column, k
 
+    if (allocated(self%time)) deallocate (self%time, self%value)
+    if (allocated(self%has)) deallocate (self%has)
     if (allocated(error)) return
     call table%open(path, error)
     if (allocated(error)) return

@@ -8,7 +8,7 @@ module gravier_cell_hash
 
   !> grids of edges halved from one level to the next
   integer, parameter :: n_levels = 16
-  !> cells along an axis; what lies beyond is counted to the last ones
+  !> numbers of cells along an axis, from 0 to last_cell
   integer, parameter :: bits = 19
   integer, parameter :: last_cell = 2**bits - 1
 

@@ -112,14 +112,19 @@ contains
     call argsort_rows(keys, order)
   end subroutine sweep_order
 
-  !> Cell of a point along each axis, from 0 at `lower`; what lies far out belongs to the last one.
+  !> Cell of a point along each axis, from 0 at `lower`. Far out the numbers begin again, so that cells stay small wherever
+  !> a grain has flown: what shares a number with cells far away is told from them by its distance.
   pure function place_of(point, lower, edge) result(place)
     real(dp), intent(in) :: point(:), lower(:), edge
     integer :: place(3), d
+    !> a number that i8 can hold
+    real(dp), parameter :: farthest = 2.0_dp**62
+    integer(i8) :: cell
 
     place(:) = 0
     do d = 1, size(point)
-      place(d) = int(min(max((point(d) - lower(d))/edge, 0.0_dp), real(last_cell, dp)))
+      cell = int(min(max((point(d) - lower(d))/edge, 0.0_dp), farthest), i8)
+      place(d) = int(iand(cell, int(last_cell, i8)))
     end do
   end function place_of
 
@@ -209,8 +214,7 @@ contains
           end do
         end do
         do k = 1, merge(4, 13, bodies%nd == 2)
-          near(:) = place + half_stencil(:, k)
-          if (any(near < 0) .or. any(near > last_cell)) cycle
+          near(:) = iand(place + half_stencil(:, k), last_cell)
           other = hash%find(cell_key(l, near))
           if (other == 0 .or. other == cell) cycle
           do a = hash%first(cell), hash%first(cell + 1) - 1
@@ -232,7 +236,7 @@ contains
                 near(1) = place(1) + x
                 near(2) = place(2) + y
                 near(3) = place(3) + z
-                if (any(near < 0) .or. any(near > last_cell)) cycle
+                near(:) = iand(near, last_cell)
                 other = hash%find(cell_key(l, near))
                 if (other == 0) cycle
                 do b = hash%first(other), hash%first(other + 1) - 1

@@ -114,11 +114,10 @@ contains
     integer(i8), allocatable :: own(:, :)
     integer :: s, n, words
 
-    words = 0
+    words = 3 + decomposition%nd + neighbourhoods%n_impulse
     n = 0
     do s = 1, size(neighbourhoods%view)
       associate (list => neighbourhoods%view(s)%list)
-        words = 3 + decomposition%nd + size(list%impulse, 1)
         n = n + count(list%impulse(1, :) > 0.0_dp)
       end associate
     end do

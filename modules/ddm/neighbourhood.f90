@@ -35,6 +35,8 @@ module gravier_neighbourhood
     integer, allocatable :: sent(:, :), seer(:), destination(:)
     !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
     integer, allocatable :: arrival(:, :)
+    !> entries of an impulse kept with a pair
+    integer :: n_impulse = 0
     !> lists made so far
     integer(i8) :: builds = 0
   contains
@@ -69,6 +71,7 @@ contains
         & decomposition%partition, decomposition%subdomain_of(s), decomposition%rule, n_impulse, self%view(s)%list)
     end do
     self%reference_boundaries = decomposition%boundaries
+    self%n_impulse = n_impulse
     self%builds = self%builds + 1
   end subroutine neighbourhoods_build
 
@@ -261,15 +264,18 @@ contains
     due = farthest + max(farthest, boundary) > decomposition%rule%skin
   end function neighbourhoods_are_due
 
-  !> How far the surface of a boundary has moved at most [m].
+  !> How far the surface of a boundary has moved at most [m]. The axis of a drum, which turns about it, picks up roundings,
+  !> which are no tilt.
   pure real(dp) function way_of(now, before) result(way)
     type(boundary_t), intent(in) :: now, before
     integer :: k
     real(dp) :: corner(3)
+    !> [rad]
+    real(dp), parameter :: tilt_of_roundings = 1.0e-11_dp
 
     way = 0.0_dp
     if (.not. now%present .or. now%shape == shape_grains .or. now%shape == shape_outlet) return
-    if (any(abs(now%axis - before%axis) > 0.0_dp)) then
+    if (norm2(now%axis - before%axis) > tilt_of_roundings) then
       ! a plane or a cylinder that tilts moves without bound
       way = huge(1.0_dp)
     else if (now%shape == shape_plane) then

@@ -377,7 +377,7 @@ contains
       sub%id(sub%n_columns) = boundaries(b)%id
       sub%boundary(sub%n_columns) = b
       if (j < 0) then
-        point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(c))*found%normal(:, c)
+        call find_surface_point(point)
       else if (view%bodies%glued(i) > 0) then
         point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*found%normal(:, c)
       else
@@ -386,15 +386,23 @@ contains
       call boundaries(b)%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
     end subroutine add_column
 
+    !> Point of the surface of a boundary that the candidate is nearest to.
+    pure subroutine find_surface_point(point)
+      real(dp), intent(out) :: point(nd)
+      point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(c))*found%normal(:, c)
+    end subroutine find_surface_point
+
     !> Normal velocity at the start of the step.
     real(dp) function approach()
-      real(dp) :: v(nd)
+      real(dp) :: v(nd), point(nd), surface(nd)
 
       v(:) = view%bodies%velocity(1:nd, i)
       if (j > 0) then
         v(:) = v - view%bodies%velocity(1:nd, j)
       else
-        v(:) = v - boundaries(b)%last_velocity(1:nd)
+        call find_surface_point(point)
+        call boundaries(b)%last_velocity_at(point, surface)
+        v(:) = v - surface
       end if
       approach = sum(v*found%normal(:, c))
     end function approach

@@ -9,15 +9,18 @@ module gravier_hdf5_file
   use hdf5, only: h5aclose_f, h5acreate_f, h5aget_space_f, h5aget_type_f, h5aopen_by_name_f, h5aread_f, h5awrite_f, h5dclose_f, &
     & h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5dwrite_f, h5eset_auto_f, &
     & h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, &
-    & h5gn_members_f, h5kind_to_type, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5olink_f, h5oopen_f, h5open_f, &
-    & h5pclose_f, h5pcreate_f, h5pset_create_inter_group_f, h5pset_dxpl_mpio_f, h5pset_fapl_mpio_f, &
+    & h5gn_members_f, h5kind_to_type, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5odecr_refcount_f, &
+    & h5oincr_refcount_f, h5olink_f, h5oopen_f, h5open_f, &
+    & h5pclose_f, h5pcreate_f, h5pset_create_inter_group_f, h5pset_dxpl_mpio_f, &
+    & h5pset_est_link_info_f, h5pset_fapl_mpio_f, h5pset_link_creation_order_f, h5pset_link_phase_change_f, &
     & h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_f, &
     & h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, &
     & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tcopy_f, h5tget_class_f, h5tget_size_f, &
     & h5tis_variable_str_f, h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, hsize_t, size_t, &
     & H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, &
     & H5F_CLOSE_STRONG_F, H5F_SCOPE_GLOBAL_F, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F, &
-    & H5P_FILE_ACCESS_F, H5P_LINK_CREATE_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_CSET_UTF8_F, H5T_C_S1, H5T_FLOAT_F, &
+    & H5P_CRT_ORDER_TRACKED_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, H5P_LINK_CREATE_F, &
+    & H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_CSET_UTF8_F, H5T_C_S1, H5T_FLOAT_F, &
     & H5T_IEEE_F64LE, H5T_INTEGER_F, H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING, H5T_STRING_F, H5T_STR_NULLPAD_F, &
     & H5_INDEX_NAME_F, H5_INTEGER_KIND, H5_ITER_INC_F, H5_REAL_KIND
   use gravier_kinds, only: dp, i4, i8
@@ -151,6 +154,10 @@ module gravier_hdf5_file
   integer, parameter :: longest_inline_text = 60000
   !> reserved for an empty file, and for the link of a hidden group or other headers
   integer(i8), parameter :: bytes_of_file = 65536, bytes_of_link = 16384
+  !> groups at the root that find room in its first block
+  integer, parameter :: members_of_root = 8
+  !> length of their names that this room is counted for
+  integer, parameter :: length_of_name = 10
 
 contains
 
@@ -162,7 +169,7 @@ contains
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: access
+    integer(hid_t) :: access, creation
     integer :: stat, ignored
 
     if (allocated(error)) return
@@ -175,7 +182,10 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     access = parallel_access(comm)
-    call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, stat, access_prp=access)
+    call h5pcreate_f(H5P_FILE_CREATE_F, creation, ignored)
+    call ask_for_one_block(creation, members_of_root)
+    call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, stat, creation_prp=creation, access_prp=access)
+    call h5pclose_f(creation, ignored)
     call h5pclose_f(access, ignored)
     if (stat < 0) call raise(error, status_failure, path//": cannot create this HDF5 file")
     self%writable = .true.
@@ -346,18 +356,23 @@ contains
   ! ------------------------------------------------------------------------------------------------ groups
 
   !> Make a group, and those above it that are missing.
-  subroutine h5_make_group(self, path, error)
+  subroutine h5_make_group(self, path, error, members)
     class(h5_file_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: place, group, links
+    !> keep room for so many members, 1500 at most, in one block: to show one more of them is then a single write
+    integer, intent(in), optional :: members
+    integer(hid_t) :: place, group, links, creation
     character(len=:), allocatable :: name
     integer :: stat, ignored
 
     if (allocated(error)) return
     call self%locate(path, place, name)
     links = with_groups_above()
-    call h5gcreate_f(place, name, group, stat, lcpl_id=links)
+    call h5pcreate_f(H5P_GROUP_CREATE_F, creation, ignored)
+    if (present(members)) call ask_for_one_block(creation, members)
+    call h5gcreate_f(place, name, group, stat, lcpl_id=links, gcpl_id=creation)
+    call h5pclose_f(creation, ignored)
     call h5pclose_f(links, ignored)
     if (stat < 0) then
       call self%fail(path, "cannot make this group", error)
@@ -366,6 +381,19 @@ contains
     end if
     call self%comm%agree(error)
   end subroutine h5_make_group
+
+  !> Let a group keep its links side by side in its header, with room for so many: HDF5 would share them out over a tree
+  !> and a heap, which a program that dies while it writes them leaves in contradiction.
+  subroutine ask_for_one_block(creation, members)
+    integer(hid_t), intent(in) :: creation
+    integer, intent(in) :: members
+    integer :: ignored
+
+    ! only groups with an order of their members can be kept like this
+    call h5pset_link_creation_order_f(creation, H5P_CRT_ORDER_TRACKED_F, ignored)
+    call h5pset_link_phase_change_f(creation, members, members, ignored)
+    call h5pset_est_link_info_f(creation, members, length_of_name, ignored)
+  end subroutine ask_for_one_block
 
   !> Start a group that appears in the file only with commit_group; until then every path at or below `path` leads
   !> into it. Should the program die meanwhile, the file is what it was before.
@@ -390,16 +418,20 @@ contains
     call self%comm%agree(error)
   end subroutine h5_begin_group
 
-  !> Show the group that begin_group started: first its content is brought to the disk, then its name.
+  !> Show the group that begin_group started: first its content is brought to the disk, then its name, which is one write
+  !> where the group above has room for it in one block. Whenever the program dies, a reader finds the group whole or not.
   subroutine h5_commit_group(self, error)
     class(h5_file_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
     integer(hid_t) :: links
     integer :: stat, ignored
 
+    ! counted as if it had its name, so that the name changes nothing in it
+    if (.not. allocated(error)) call h5oincr_refcount_f(self%hidden, ignored)
     call self%flush(error)
     call self%reserve(bytes_of_link, error)
     if (allocated(error)) then
+      if (self%hidden >= 0) call h5odecr_refcount_f(self%hidden, ignored)
       call self%abandon_group()
       return
     end if
@@ -407,6 +439,7 @@ contains
     call h5olink_f(self%hidden, self%id, self%hidden_path, stat, lcpl_id=links)
     call h5pclose_f(links, ignored)
     if (stat < 0) call self%fail(self%hidden_path, "cannot make this group", error)
+    call h5odecr_refcount_f(self%hidden, ignored)
     call self%comm%agree(error)
     call self%abandon_group()
     call self%flush(error)

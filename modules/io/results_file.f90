@@ -7,11 +7,12 @@ module gravier_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
+  use gravier_file_system, only: replace_file, remove_file
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t
+  public :: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t
 
   !> The bodies of this rank; SI units. Every array but `image` is allocated, without rows where the rank has none.
   type :: body_rows_t
@@ -51,6 +52,16 @@ module gravier_results_file
     real(dp), allocatable :: impulse(:, :)
   end type contact_rows_t
 
+  !> Figures of a step, the same on all ranks.
+  type :: figures_t
+    !> (n)
+    character(len=:), allocatable :: name(:)
+    real(dp), allocatable :: value(:)
+    !> counts of a histogram, of no size where there is none
+    integer(i8), allocatable :: histogram(:)
+    real(dp) :: bin_width = 0.0_dp
+  end type figures_t
+
   !> An open results file.
   type :: results_file_t
     private
@@ -69,10 +80,15 @@ module gravier_results_file
   !> room for the headers of the groups and datasets of one step
   integer(i8), parameter :: bytes_of_headers = 65536
   integer, parameter :: bytes_of_word = 8
+  !> steps for which /steps has room in one block: up to there a program that dies leaves the file whole
+  integer, parameter :: steps_in_block = 1000
+  !> that an attribute takes with its name
+  integer, parameter :: words_of_attribute = 32
 
 contains
 
-  !> Create the file with /run (what was run) and an empty /steps. Collective.
+  !> Create the file with /run (what was run) and an empty /steps. It takes its name, and the place of an older file, when
+  !> it is complete. Collective.
   subroutine results_open(self, comm, path, version, command, input_text, dimension, error)
     class(results_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
@@ -86,20 +102,29 @@ contains
     !> 2 or 3
     integer, intent(in) :: dimension
     type(error_t), allocatable, intent(inout) :: error
+    logical :: created
 
     if (allocated(error)) return
     self%comm = comm
     self%path = path
     self%dimension = dimension
-    call self%file%create(comm, path, error)
+    call self%file%create(comm, path//".part", error)
     call self%file%reserve(bytes_of_headers + len(version) + len(command) + len(input_text), error)
     call self%file%make_group("/run", error)
     call self%file%write_attribute("/run", "version", version, error)
     call self%file%write_attribute("/run", "command", command, error)
     call self%file%write_attribute("/run", "input_text", input_text, error)
     call self%file%write_attribute("/run", "dimension", dimension, error)
-    call self%file%make_group("/steps", error)
+    call self%file%make_group("/steps", error, members=steps_in_block)
     call self%file%flush(error)
+    created = self%file%is_open()
+    call self%file%close(error)
+    if (comm%rank == 0) then
+      call replace_file(path//".part", path, error)
+      if (allocated(error) .and. created) call remove_file(path//".part")
+    end if
+    call comm%agree(error)
+    call self%file%reopen(comm, path, error)
   end subroutine results_open
 
   !> Go on with a file that a run left: steps above `last_step` are removed, and more can be written. Failure, with what
@@ -201,7 +226,7 @@ contains
 
   !> Write /steps/<step>. Nothing of the step is in the file when this fails, and what was there stays readable.
   !> Failure (status_failure): a number that is not finite, a disk that is full, a step written before. Collective.
-  subroutine results_write_step(self, step, time, bodies, error, contacts, boundaries)
+  subroutine results_write_step(self, step, time, bodies, error, contacts, boundaries, figures)
     class(results_file_t), intent(inout) :: self
     integer, intent(in) :: step
     !> s
@@ -211,6 +236,7 @@ contains
     !> present on all ranks or on none
     type(contact_rows_t), intent(in), optional :: contacts
     type(boundary_rows_t), intent(in), optional :: boundaries
+    type(figures_t), intent(in), optional :: figures
     type(body_rows_t) :: sorted_bodies
     type(contact_rows_t) :: sorted_contacts
     character(len=:), allocatable :: group
@@ -231,6 +257,7 @@ contains
       call check_boundaries(self, group//"/boundaries", boundaries, error)
       words = words + size(boundaries%id)*6*self%dimension
     end if
+    if (present(figures)) words = words + size(figures%histogram) + words_of_attribute*size(figures%value)
     call self%comm%agree(error)
 
     call self%file%reserve(bytes_of_headers + bytes_of_word*words, error)
@@ -240,6 +267,7 @@ contains
     call write_bodies(self%file, group//"/bodies", sorted_bodies, error)
     if (present(boundaries)) call write_boundary_rows(self, group//"/boundaries", boundaries, error)
     if (present(contacts)) call write_contacts(self%file, group//"/contacts", sorted_contacts, error)
+    if (present(figures)) call write_figures(self, group//"/diagnostics", figures, error)
     call finish(self, error)
   end subroutine results_write_step
 
@@ -318,6 +346,24 @@ contains
     call file%write_rows(group//"/impulse", contacts%impulse, error)
     call file%write_attribute(group//"/impulse", "unit", "N s", error)
   end subroutine write_contacts
+
+  !> Figures as attributes of a group, and the histogram.
+  subroutine write_figures(self, group, figures, error)
+    type(results_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: group
+    type(figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k, n
+
+    call self%file%make_group(group, error)
+    do k = 1, size(figures%value)
+      call self%file%write_attribute(group, trim(figures%name(k)), figures%value(k), error)
+    end do
+    if (size(figures%histogram) == 0) return
+    n = merge(size(figures%histogram), 0, self%comm%rank == 0)
+    call self%file%write_rows(group//"/force_histogram", figures%histogram(1:n), error)
+    call self%file%write_attribute(group//"/force_histogram", "bin_width", figures%bin_width, error)
+  end subroutine write_figures
 
   !> The bodies of all ranks in the order of the ids, cut into equal blocks.
   subroutine sort_bodies(self, bodies, sorted)

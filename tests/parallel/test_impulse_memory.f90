@@ -1,5 +1,5 @@
 !> Impulses from one step to the next: contacts that persist start from what they had, in whatever subdomain they are now.
-!> All grains fly at one velocity, so that pairs persist while they cross subdomains.
+!> In scenes, all grains fly at one velocity, so that pairs persist while they cross subdomains.
 program test_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -7,18 +7,23 @@ program test_impulse_memory
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_motion, only: advance_position
-  use gravier_contact_kernels, only: tangents
-  use gravier_problem_builder, only: take_velocities
-  use gravier_impulse_memory, only: impulse_memory_t
+  use gravier_contact_kernels, only: kernels_t, tangents
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
+  use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_test_scenes, only: cloud_t, draw_number => draw, make_decomposition
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
   !> walls of a lattice have the identifiers that follow the grains'
   integer, parameter :: most_walls = 5
   type(communicator_t), target :: comm
-  integer :: dimension
+  integer :: dimension, axes
   !> contacts that moved to another subdomain
   integer(i8) :: moved
 
@@ -35,6 +40,14 @@ program test_impulse_memory
     call test_persistence(dimension, 7, 0.3_dp, "partition = 'metis', repartition_every = 1")
     call check(comm%total(moved) > 20, "contacts move to other subdomains")
   end do
+  do dimension = 2, 3
+    do axes = 0, 2**dimension - 1
+      call test_new_partition(dimension, axes, rule_dual)
+    end do
+    call test_new_partition(dimension, 0, rule_primal)
+    call test_new_partition(dimension, 3, rule_primal)
+  end do
+  call test_turned_frames()
   call test_nothing_kept()
   call finish_checks()
   call comm%free()
@@ -70,8 +83,8 @@ contains
     end do
   end subroutine make
 
-  !> What the pair (i, j) is given: the normal impulse, none for every fourth pair, and a force along the contact of which
-  !> the tangential part is taken. In the plane the tangential impulse is `along(1)`.
+  !> What the pair (i, j) is given: the normal impulse and a force along the contact of which the tangential part is taken,
+  !> none for every fourth pair. In the plane the tangential impulse is `along(1)`.
   pure subroutine draw(i, j, normal, along)
     integer, intent(in) :: i, j
     real(dp), intent(out) :: normal, along(3)
@@ -80,10 +93,12 @@ contains
 
     pair = 10000_i8*i + j
     normal = hash_uniform(5, pair, 1)
-    if (mod(i + j, 4) == 0) normal = 0.0_dp
     do d = 1, 3
       along(d) = hash_uniform(5, pair, 1 + d) - 0.5_dp
     end do
+    if (mod(i + j, 4) > 0) return
+    normal = 0.0_dp
+    along(:) = 0.0_dp
   end subroutine draw
 
   !> Give every contact its impulse, and note who owns it.
@@ -133,7 +148,7 @@ contains
     call give_impulses(sim, owner)
     call check(count(owner > 0) > 50, "enough contacts to tell")
     ! what a step does after its solve
-    call sim%memory%keep(sim%problem, sim%decomposition%walls, sim%decomposition%rule%kind, sim%physics%h, 0.6_dp)
+    call keep_impulses(sim%problem, sim%neighbourhoods)
     call take_velocities(sim%decomposition, sim%physics, sim%problem)
     do s = 1, size(sim%decomposition%home)
       associate (home => sim%decomposition%home(s))
@@ -188,27 +203,220 @@ contains
     call check(comm%total(fresh) > 0, "some contacts are new")
   end subroutine check_recalled
 
-  !> Nothing kept yet: nothing is recalled, and a memory that was emptied gives nothing.
+  !> Impulses kept with the pairs of lists, gathered, and spread over a new partition after all grains have moved on: every
+  !> pair that is still near has its own, and none is lost.
+  subroutine test_new_partition(nd, axes, kind)
+    integer, intent(in) :: nd, axes, kind
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition, other
+    type(neighbourhoods_t) :: before, after
+    integer(i8), allocatable :: records(:, :), owner(:, :)
+    integer(i8) :: counts(3)
+    integer :: s, k
+
+    call cloud%init(nd, 220, 0.03_dp, 0.1_dp, 80 + nd)
+    call cloud%make_periodic(axes)
+    decomposition%rule = cloud%rule(0.02_dp, 0.04_dp, kind)
+    call make_decomposition(comm, cloud, 7, nd, .false., decomposition)
+    call before%build(decomposition, 4)
+    allocate (owner(cloud%n, cloud%n), source=0_i8)
+    call fill_lists(before, owner)
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          home%position(1, k) = home%position(1, k) + 0.3_dp
+        end do
+      end associate
+    end do
+    call before%refresh(decomposition)
+    call gather_impulses(decomposition, before, records)
+    call make_decomposition(comm, cloud, 7, nd, .true., other)
+    decomposition%partition = other%partition
+    call decomposition%settle()
+    call after%build(decomposition, 4)
+    call spread_impulses(decomposition, records, after)
+    call count_pairs(decomposition, after, owner, counts)
+    call check(count(owner > 0) > 60, "new partition: enough pairs to tell")
+    call check_equal(counts(1), 0_i8, "new partition: pairs with another impulse than theirs")
+    call check_equal(counts(2), int(count(owner > 0), i8), "new partition: pairs that are still there")
+    call check(counts(3) > 20, "new partition: pairs that belong to another subdomain now")
+  end subroutine test_new_partition
+
+  !> Give every pair of the lists its impulse, and note who owns it.
+  subroutine fill_lists(neighbourhoods, owner)
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    integer(i8), intent(inout), contiguous :: owner(:, :)
+    integer :: s, p, e, i, j
+
+    do s = 1, size(neighbourhoods%view)
+      associate (list => neighbourhoods%view(s)%list, id => neighbourhoods%view(s)%bodies%id)
+        do p = 1, list%n
+          i = int(id(list%candidate(p)))
+          j = int(id(list%antagonist(p)))
+          owner(i, j) = 100*(comm%rank + 1) + s
+          do e = 1, 4
+            list%impulse(e, p) = given(i, j, e)
+          end do
+        end do
+      end associate
+    end do
+    do j = 1, size(owner, 2)
+      call comm%sum_counts(owner(:, j))
+    end do
+  end subroutine fill_lists
+
+  pure real(dp) function given(i, j, entry)
+    integer, intent(in) :: i, j, entry
+    given = draw_number(6, 1000*i + j, entry)
+    if (entry > 1) given = given - 0.5_dp
+  end function given
+
+  !> Pairs whose impulse is wrong, that were there before, and of these the ones of another subdomain than before.
+  subroutine count_pairs(decomposition, neighbourhoods, owner, counts)
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    integer(i8), intent(in) :: owner(:, :)
+    integer(i8), intent(out) :: counts(3)
+    integer :: s, p, e, i, j
+    logical :: right
+
+    counts(:) = 0
+    do s = 1, size(neighbourhoods%view)
+      associate (list => neighbourhoods%view(s)%list, id => neighbourhoods%view(s)%bodies%id)
+        do p = 1, list%n
+          i = int(id(list%candidate(p)))
+          j = int(id(list%antagonist(p)))
+          right = .true.
+          do e = 1, 4
+            right = right .and. abs(list%impulse(e, p) - merge(given(i, j, e), 0.0_dp, owner(i, j) > 0)) <= 0.0_dp
+          end do
+          if (.not. right) counts(1) = counts(1) + 1
+          if (owner(i, j) == 0) cycle
+          counts(2) = counts(2) + 1
+          if (owner(i, j) /= 100*(comm%rank + 1) + s) counts(3) = counts(3) + 1
+        end do
+      end associate
+    end do
+    call decomposition%comm%sum_counts(counts)
+  end subroutine count_pairs
+
+  !> While lists last, normals turn: what is recalled is the tangential vector that was kept, projected on the tangent plane
+  !> of now. Contacts that were not there start from zero.
+  subroutine test_turned_frames()
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: seen
+    type(kernels_t) :: kernels
+    type(physics_t) :: physics
+    type(contact_problem_t) :: problem
+    type(interface_figures_t) :: figures
+    real(dp), allocatable :: kept(:, :, :)
+    integer :: s, k, d
+
+    call cloud%init(3, 220, 0.03_dp, 0.1_dp, 91)
+    decomposition%rule = cloud%rule(0.02_dp, 0.04_dp, rule_dual)
+    call make_decomposition(comm, cloud, 5, 6, .false., decomposition)
+    call kernels%choose(3, .true., .true.)
+    call check_equal(impulse_entries(kernels), 4, "entries of an impulse in space with friction")
+    call seen%build(decomposition, 4)
+    call build_problem(decomposition, seen, kernels, physics, problem, figures)
+    ! the tangential vector of each pair (3, candidate, antagonist)
+    allocate (kept(3, cloud%n, cloud%n), source=0.0_dp)
+    call set_tangential(problem, kept)
+    call keep_impulses(problem, seen)
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          do d = 1, 3
+            home%position(d, k) = home%position(d, k) + 0.02_dp*(draw_number(8, int(home%id(k)), d) - 0.5_dp)
+          end do
+        end do
+      end associate
+    end do
+    call check(.not. seen%are_due(decomposition), "turned frames: the lists last")
+    call seen%refresh(decomposition)
+    call build_problem(decomposition, seen, kernels, physics, problem, figures)
+    call recall_impulses(seen, problem)
+    call check_projected(problem, kept)
+  end subroutine test_turned_frames
+
+  subroutine set_tangential(problem, kept)
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp), intent(inout) :: kept(:, :, :)
+    real(dp) :: t(3), u(3)
+    integer :: s, c, i, j, e
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          i = int(sub%id(sub%pair(1, c)))
+          j = int(sub%id(sub%pair(2, c)))
+          do e = 1, 3
+            sub%impulse(e, c) = given(i, j, e)
+          end do
+          call tangents(sub%hot(1:3, c), t, u)
+          kept(:, i, j) = sub%impulse(2, c)*t + sub%impulse(3, c)*u
+        end do
+      end associate
+    end do
+  end subroutine set_tangential
+
+  !> A few roundings of numbers of size 1.
+  subroutine check_projected(problem, kept)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(in) :: kept(:, :, :)
+    real(dp) :: t(3), u(3), expected(3), found(3)
+    integer(i8) :: turned, fresh
+    integer :: s, c, i, j
+    logical :: right
+
+    right = .true.
+    turned = 0
+    fresh = 0
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          i = int(sub%id(sub%pair(1, c)))
+          j = int(sub%id(sub%pair(2, c)))
+          if (.not. any(abs(kept(:, i, j)) > 0.0_dp)) then
+            right = right .and. all(abs(sub%impulse(:, c)) <= 0.0_dp)
+            fresh = fresh + 1
+            cycle
+          end if
+          call tangents(sub%hot(1:3, c), t, u)
+          found(:) = sub%impulse(2, c)*t + sub%impulse(3, c)*u
+          expected(:) = kept(:, i, j) - sum(kept(:, i, j)*sub%hot(1:3, c))*sub%hot(1:3, c)
+          right = right .and. norm2(found - expected) <= 32*epsilon(1.0_dp)
+          right = right .and. abs(sub%impulse(1, c) - given(i, j, 1)) <= 0.0_dp
+          if (norm2(expected - kept(:, i, j)) > 1.0e-3_dp) turned = turned + 1
+        end do
+      end associate
+    end do
+    call check(right, "turned frames: tangential vectors projected, new contacts at zero")
+    call check(comm%total(turned) > 20, "turned frames: enough contacts have turned")
+    call check(comm%total(fresh) > 0, "turned frames: some contacts are new")
+  end subroutine check_projected
+
+  !> Nothing kept yet: nothing is recalled, nothing gathered; zeros are not gathered either, all others are.
   subroutine test_nothing_kept()
     type(simulation_t) :: sim
-    type(impulse_memory_t) :: memory
     type(step_figures_t) :: figures
+    integer(i8), allocatable :: records(:, :)
     integer :: s
 
     call make(2, 3, 0.3_dp, "partition = 'grid'", sim)
     call sim%assemble(figures)
-    call memory%recall(sim%decomposition, sim%problem)
+    call recall_impulses(sim%neighbourhoods, sim%problem)
     call check(.not. sim%problem%any_impulse(), "nothing kept, nothing recalled")
-    call memory%keep(sim%problem, sim%decomposition%walls, sim%decomposition%rule%kind, 0.5_dp, 0.6_dp)
-    call check_equal(size(memory%records, 2), 0, "zero impulses are not kept")
-    call memory%recall(sim%decomposition, sim%problem)
-    call check(.not. sim%problem%any_impulse(), "zeros kept, zeros recalled")
+    call gather_impulses(sim%decomposition, sim%neighbourhoods, records)
+    call check_equal(size(records, 2), 0, "zero impulses are not gathered")
     do s = 1, size(sim%problem%sub)
       sim%problem%sub(s)%impulse(1, :) = 1.0_dp
-      sim%problem%sub(s)%v_global(:, :) = 0.0_dp
     end do
-    call memory%keep(sim%problem, sim%decomposition%walls, sim%decomposition%rule%kind, 0.5_dp, 0.6_dp)
-    call check_equal(comm%total(size(memory%records, 2, kind=i8)), sim%problem%n_contacts, "all impulses are kept")
+    call keep_impulses(sim%problem, sim%neighbourhoods)
+    call gather_impulses(sim%decomposition, sim%neighbourhoods, records)
+    call check_equal(comm%total(size(records, 2, kind=i8)), sim%problem%n_contacts, "all impulses are gathered")
+    call check_equal(size(records, 1), 7, "words of a record")
     call sim%free()
   end subroutine test_nothing_kept
 

@@ -2,34 +2,35 @@
 !> places and velocities following from identifiers.
 program test_problem_builder
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
-  use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_set_t
-  use gravier_detection, only: owner_point, rule_dual, rule_primal
+  use gravier_boundary, only: boundary_t, shape_grains
+  use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_partition, only: choose_boxes
   use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities, n_multiplicities
+  use gravier_test_scenes, only: cloud_t, near_pair_t, draw_number => draw, plane, make_decomposition
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_grains = 130, n_walls = 2
-  real(dp), parameter :: alert = 0.03_dp, h = 0.125_dp
+  real(dp), parameter :: alert = 0.03_dp, skin = 0.02_dp, h = 0.125_dp
   real(dp), parameter :: gravity(3) = [0.5_dp, -3.0_dp, -7.0_dp]
 
   !> What brute force knows of a scene.
   type :: truth_t
     integer :: nd = 2
-    real(dp) :: radius(n_grains) = 0.0_dp
-    !> (nd, n_grains)
-    real(dp), allocatable :: place(:, :)
+    type(cloud_t) :: cloud
     !> subdomain of the centre of each grain
     integer :: home(n_grains) = 0
     !> owner of the contact of grain i (lower) and grain j, or wall j - n_grains; 0 where there is none
     integer, allocatable :: owner(:, :)
     !> whether grain i carries a contact in subdomain s (n_grains, n_subdomains)
     logical, allocatable :: touches(:, :)
+    !> gap and branch of grain i and grain j, or unit normal of wall j - n_grains
+    real(dp), allocatable :: gap(:, :), branch(:, :, :)
   end type truth_t
 
   type(communicator_t), target :: comm
@@ -42,15 +43,23 @@ program test_problem_builder
   manifold = 0
   do nd = 2, 3
     do k = 1, size(counts)
-      call test_problem(nd, counts(k), .true., rule_dual, .false.)
-      call test_problem(nd, counts(k), .true., rule_dual, .true.)
-      call test_problem(nd, counts(k), .false., rule_dual, .false.)
-      call test_problem(nd, counts(k), .true., rule_primal, .true.)
+      call test_problem(nd, 0, counts(k), .true., rule_dual, .false.)
+      call test_problem(nd, 0, counts(k), .true., rule_dual, .true.)
+      call test_problem(nd, 0, counts(k), .false., rule_dual, .false.)
+      call test_problem(nd, 0, counts(k), .true., rule_primal, .true.)
     end do
+    ! across periods along the walls
+    call test_problem(nd, 2**(nd - 2), 7, .true., rule_dual, .true.)
+    call test_problem(nd, 2**(nd - 2), 7, .true., rule_primal, .false.)
   end do
   call check(manifold > 0, "some grains are in three subdomains and more")
   call check(visitors > 0, "some shared grains carry no contact at home")
   call test_free_flight()
+  do k = 1, 2
+    call test_boundaries(k, .false.)
+    call test_boundaries(k, .true.)
+    call test_restitution_gap(k)
+  end do
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -60,116 +69,88 @@ contains
   !> Component `i` of what grain `g` has.
   pure real(dp) function draw(g, i)
     integer, intent(in) :: g, i
-    draw = hash_uniform(4, int(g, i8), i)
+    draw = draw_number(4, g, i)
   end function draw
 
-  subroutine make_scene(nd, n_subdomains, rotation, kind, by_cells, decomposition, truth)
-    integer, intent(in) :: nd, n_subdomains, kind
+  subroutine make_scene(nd, axes, n_subdomains, rotation, kind, by_cells, decomposition, truth)
+    integer, intent(in) :: nd, axes, n_subdomains, kind
     logical, intent(in) :: rotation, by_cells
-    type(decomposition_t), intent(out) :: decomposition
+    type(decomposition_t), intent(inout) :: decomposition
     type(truth_t), intent(out) :: truth
-    type(body_set_t) :: newcomers(1)
-    type(error_t), allocatable :: error
-    real(dp) :: lower(nd), upper(nd)
-    integer, allocatable :: weights(:)
-    integer :: boxes(3), g, d, nv
+    real(dp) :: origin(nd), axis(nd)
+    integer :: w
 
-    nv = merge(3*nd - 3, nd, rotation)
     truth%nd = nd
-    allocate (truth%place(nd, n_grains))
-    do g = 1, n_grains
-      truth%radius(g) = 0.03_dp + 0.09_dp*draw(g, 1)**2
-      do d = 1, nd
-        truth%place(d, g) = draw(g, 1 + d)
-      end do
+    call truth%cloud%init(nd, n_grains, 0.03_dp, 0.11_dp, 4)
+    call truth%cloud%make_periodic(axes)
+    decomposition%rule = truth%cloud%rule(alert, skin, kind)
+    allocate (decomposition%boundaries(n_walls))
+    origin(:) = 0.0_dp
+    axis(:) = 0.0_dp
+    axis(nd) = 1.0_dp
+    decomposition%boundaries(1) = plane(n_grains + 1, origin, axis)
+    origin(1) = 1.0_dp
+    axis(1) = -1.0_dp
+    axis(nd) = 0.0_dp
+    decomposition%boundaries(2) = plane(n_grains + 2, origin, axis)
+    do w = 1, n_walls
+      decomposition%boundaries(w)%friction = 0.75_dp
     end do
-    call decomposition%init(comm, n_subdomains, nd, nv)
-    decomposition%rule%alert_distance = alert
-    decomposition%rule%largest_radius = maxval(truth%radius)
-    decomposition%rule%kind = kind
-    call make_grains(truth, nv, newcomers(1))
-    call decomposition%bounding_box(newcomers, lower, upper)
-    if (by_cells) then
-      allocate (weights(newcomers(1)%n), source=1)
-      call decomposition%partition%init_graph(comm, lower, upper, 0.15_dp, newcomers(1)%position, weights, n_subdomains, error)
-    else
-      boxes(:) = choose_boxes(lower, upper, n_subdomains)
-      call decomposition%partition%init_grid(lower, upper, boxes, 0.1_dp, error)
-    end if
-    call check(.not. allocated(error), "partition")
-    associate (walls => decomposition%walls)
-      walls%n = n_walls
-      allocate (walls%id(n_walls))
-      allocate (walls%point(nd, n_walls), walls%normal(nd, n_walls), source=0.0_dp)
-      walls%id(1) = n_grains + 1
-      walls%id(2) = n_grains + 2
-      walls%normal(nd, 1) = 1.0_dp
-      walls%normal(1, 2) = -1.0_dp
-      walls%point(1, 2) = 1.0_dp
-    end associate
-    call decomposition%settle(newcomers(1))
+    call make_decomposition(comm, truth%cloud, n_subdomains, merge(3*nd - 3, nd, rotation), by_cells, decomposition)
     call find_truth(decomposition, truth)
   end subroutine make_scene
-
-  !> The grains that this rank brings.
-  subroutine make_grains(truth, nv, bodies)
-    type(truth_t), intent(in) :: truth
-    integer, intent(in) :: nv
-    type(body_set_t), intent(inout) :: bodies
-    integer :: g, d, n
-
-    call bodies%init(truth%nd, nv, (n_grains + comm%size - 1 - comm%rank)/comm%size)
-    n = 0
-    do g = comm%rank + 1, n_grains, comm%size
-      n = n + 1
-      bodies%id(n) = g
-      bodies%position(:, n) = truth%place(:, g)
-      bodies%radius(n) = truth%radius(g)
-      bodies%mass(n) = 1.0_dp + draw(g, 5)
-      bodies%inertia(n) = 0.1_dp + draw(g, 6)
-      do d = 1, nv
-        bodies%velocity(d, n) = draw(g, 6 + d) - 0.5_dp
-      end do
-    end do
-  end subroutine make_grains
 
   subroutine find_truth(decomposition, truth)
     type(decomposition_t), intent(in) :: decomposition
     type(truth_t), intent(inout) :: truth
-    integer :: i, j
-    real(dp), dimension(truth%nd) :: foot, point
-    real(dp) :: reach
-    logical :: near
+    type(near_pair_t), allocatable :: pairs(:)
+    real(dp) :: other(truth%nd), point(truth%nd), branch(truth%nd), gap
+    integer :: i, p, w, nd
 
+    nd = truth%nd
     allocate (truth%owner(n_grains, n_grains + n_walls), source=0)
     allocate (truth%touches(n_grains, decomposition%n_subdomains), source=.false.)
-    do i = 1, n_grains
-      truth%home(i) = decomposition%partition%owner(truth%place(:, i))
-      do j = i + 1, n_grains + n_walls
-        reach = truth%radius(i) + alert
-        foot(:) = truth%place(:, i)
-        if (j == n_grains + 1) then
-          foot(truth%nd) = 0.0_dp
-        else if (j == n_grains + 2) then
-          foot(1) = 1.0_dp
-        else
-          reach = reach + truth%radius(min(j, n_grains))
-          foot(:) = truth%place(:, min(j, n_grains))
-        end if
-        near = norm2(truth%place(:, i) - foot) <= reach
-        if (.not. near) cycle
-        point(:) = owner_point(decomposition%rule%kind, truth%place(:, i), foot, j > n_grains)
-        truth%owner(i, j) = decomposition%partition%owner(point)
-        truth%touches(i, truth%owner(i, j)) = .true.
-        if (j <= n_grains) truth%touches(j, truth%owner(i, j)) = .true.
+    allocate (truth%gap(n_grains, n_grains + n_walls), truth%branch(nd, n_grains, n_grains + n_walls), source=0.0_dp)
+    associate (place => truth%cloud%place, boundaries => decomposition%boundaries)
+      call truth%cloud%near_pairs(alert, pairs)
+      do p = 1, size(pairs)
+        call truth%cloud%find_antagonist(pairs(p), other)
+        point(:) = place(:, pairs(p)%i)
+        if (decomposition%rule%kind == rule_dual) point(:) = (point + other)/2
+        branch(:) = place(:, pairs(p)%i) - other
+        call note(truth, pairs(p)%i, pairs(p)%j, decomposition%partition%owner(point), pairs(p)%gap, branch)
       end do
-    end do
+      do i = 1, n_grains
+        truth%home(i) = decomposition%partition%owner(place(:, i))
+        point(:) = place(:, i)
+        do w = 1, n_walls
+          branch(:) = boundaries(w)%axis(1:nd)
+          gap = sum((point - boundaries(w)%point(1:nd))*branch) - truth%cloud%radius(i)
+          call note(truth, i, n_grains + w, truth%home(i), gap, branch)
+        end do
+      end do
+    end associate
   end subroutine find_truth
 
-  subroutine test_problem(nd, n_subdomains, friction, kind, by_cells)
-    integer, intent(in) :: nd, n_subdomains, kind
+  !> Note a contact, unless the gap is too large.
+  subroutine note(truth, i, j, owner, gap, branch)
+    type(truth_t), intent(inout) :: truth
+    integer, intent(in) :: i, j, owner
+    real(dp), intent(in) :: gap, branch(:)
+
+    if (gap > alert) return
+    truth%owner(i, j) = owner
+    truth%touches(i, owner) = .true.
+    if (j <= n_grains) truth%touches(j, owner) = .true.
+    truth%gap(i, j) = gap
+    truth%branch(:, i, j) = branch
+  end subroutine note
+
+  subroutine test_problem(nd, axes, n_subdomains, friction, kind, by_cells)
+    integer, intent(in) :: nd, axes, n_subdomains, kind
     logical, intent(in) :: friction, by_cells
-    type(decomposition_t), target :: decomposition
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
     type(truth_t) :: truth
     type(kernels_t) :: kernels
     type(physics_t) :: physics
@@ -177,18 +158,18 @@ contains
     type(interface_figures_t) :: figures
     integer :: s
 
-    call make_scene(nd, n_subdomains, friction, kind, by_cells, decomposition, truth)
+    call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
     call kernels%choose(nd, friction, friction)
     physics%gravity(:) = gravity
     physics%friction = 0.25_dp
-    physics%wall_friction = 0.75_dp
     physics%h = h
-    call build_problem(decomposition, kernels, physics, problem, figures)
+    call neighbourhoods%build(decomposition, 4)
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(size(problem%sub), size(decomposition%home), "one problem for each subdomain")
     call check_equal(problem%n_subdomains, n_subdomains, "subdomains of the scene")
     do s = 1, size(problem%sub)
       call check_bodies(problem, s, decomposition, truth)
-      call check_contacts(problem, s, decomposition, truth)
+      call check_contacts(problem, s, truth)
       call check_sharers(problem, s, truth)
     end do
     call check_figures(problem, figures, truth)
@@ -214,14 +195,24 @@ contains
     associate (sub => problem%sub(s), kernels => problem%kernels)
       call check_equal(sub%subdomain, decomposition%first + s - 1, "number of the subdomain")
       call check_equal(sub%n_bodies, count(truth%touches(:, sub%subdomain)), "grains in contact")
-      call check_equal(sub%n_columns, sub%n_bodies + n_walls, "grains and walls")
-      right = all(sub%id(sub%n_bodies + 1:) == decomposition%walls%id)
+      call check_equal(sub%n_grains, sub%n_bodies, "no boundary is moved by forces")
+      right = size(sub%id) == sub%n_columns
+      do b = sub%n_bodies + 1, sub%n_columns
+        right = right .and. sub%id(b) == decomposition%boundaries(sub%boundary(b))%id
+        if (b > sub%n_bodies + 1) right = right .and. sub%boundary(b) > sub%boundary(b - 1)
+      end do
+      g = 0
+      do d = 1, n_walls
+        if (any(truth%owner(:, n_grains + d) == sub%subdomain)) g = g + 1
+      end do
+      call check_equal(sub%n_columns - sub%n_bodies, g, "walls in contact")
       do b = 1, sub%n_bodies
         g = int(sub%id(b))
         right = right .and. truth%touches(g, sub%subdomain) .and. count(sub%id == g) == 1
         right = right .and. sub%home(b) == truth%home(g)
         right = right .and. sub%multiplicity(b) == count(truth%touches(g, :))
-        right = right .and. all(abs(sub%position(:, b) - truth%place(:, g)) <= 0.0_dp)
+        right = right .and. all(abs(sub%position(:, b) - truth%cloud%place(:, g)) <= 0.0_dp)
+        right = right .and. abs(sub%radius(b) - truth%cloud%radius(g)) <= 0.0_dp
         ! one rounding of numbers of size 1
         right = right .and. all(abs(sub%inverse_mass(1:kernels%nd, b)*(1.0_dp + draw(g, 5)) - 1.0_dp) <= 2*epsilon(1.0_dp))
         if (kernels%nv > kernels%nd) right = right .and. &
@@ -230,18 +221,17 @@ contains
           right = right .and. abs(sub%v_free(d, b) - free_velocity(g, d, kernels%nd)) <= 4*epsilon(1.0_dp)
         end do
       end do
-      right = right .and. maxval(abs(sub%v_free(:, sub%n_bodies + 1:))) <= 0.0_dp
-      right = right .and. maxval(abs(sub%inverse_mass(:, sub%n_bodies + 1:))) <= 0.0_dp
+      right = right .and. all(abs(sub%v_free(:, sub%n_bodies + 1:)) <= 0.0_dp)
+      right = right .and. all(abs(sub%inverse_mass(:, sub%n_bodies + 1:)) <= 0.0_dp)
       right = right .and. size(sub%inverse_mass, 1) == kernels%nw .and. size(sub%weight, 1) == kernels%nw
       call check(right, "bodies of a subdomain")
     end associate
   end subroutine check_bodies
 
   !> The contacts of a subdomain are those that it owns, each once, packed as the kernels want them.
-  subroutine check_contacts(problem, s, decomposition, truth)
+  subroutine check_contacts(problem, s, truth)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
-    type(decomposition_t), intent(in) :: decomposition
     type(truth_t), intent(in) :: truth
     logical, allocatable :: met(:, :)
     logical :: right
@@ -256,7 +246,7 @@ contains
         j = int(sub%id(sub%pair(2, c)))
         right = right .and. i < j .and. .not. met(i, j) .and. truth%owner(i, j) == sub%subdomain
         met(i, j) = .true.
-        right = right .and. right_contact(problem, s, c, i, j, decomposition, truth)
+        right = right .and. right_contact(problem, s, c, i, j, truth)
       end do
       right = right .and. maxval(abs(sub%impulse)) <= 0.0_dp .or. sub%n_contacts == 0
     end associate
@@ -264,10 +254,9 @@ contains
   end subroutine check_contacts
 
   !> Normal, gap, shift, levers and friction; a few roundings of numbers of size 1, of size 1/h for the shift.
-  pure logical function right_contact(problem, s, c, i, j, decomposition, truth) result(right)
+  pure logical function right_contact(problem, s, c, i, j, truth) result(right)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c, i, j
-    type(decomposition_t), intent(in) :: decomposition
     type(truth_t), intent(in) :: truth
     real(dp), parameter :: rounding = 32*epsilon(1.0_dp)
     real(dp) :: branch(truth%nd), gap, lever
@@ -275,21 +264,15 @@ contains
 
     nd = truth%nd
     associate (sub => problem%sub(s))
-      if (j > n_grains) then
-        branch(:) = decomposition%walls%normal(:, j - n_grains)
-        gap = dot_product(truth%place(:, i) - decomposition%walls%point(:, j - n_grains), branch) - truth%radius(i)
-        right = all(abs(sub%hot(1:nd, c) - branch) <= 0.0_dp)
-        lever = 0.0_dp
-      else
-        branch(:) = truth%place(:, i) - truth%place(:, j)
-        gap = norm2(branch) - truth%radius(i) - truth%radius(j)
-        right = all(abs(sub%hot(1:nd, c)*norm2(branch) - branch) <= rounding)
-        lever = truth%radius(j)
-      end if
+      branch(:) = truth%branch(:, i, j)
+      gap = truth%gap(i, j)
+      lever = 0.0_dp
+      if (j <= n_grains) lever = truth%cloud%radius(j)
+      right = all(abs(sub%hot(1:nd, c)*norm2(branch) - branch) <= rounding)
       right = right .and. abs(sub%gap(c) - gap) <= rounding
       right = right .and. abs(sub%hot(nd + 1, c) - max(gap, 0.0_dp)/h) <= rounding/h
       if (problem%kernels%nc == 1) return
-      right = right .and. abs(sub%hot(nd + 4, c) - truth%radius(i)) <= 0.0_dp
+      right = right .and. abs(sub%hot(nd + 4, c) - truth%cloud%radius(i)) <= 0.0_dp
       right = right .and. abs(sub%hot(nd + 5, c) - lever) <= 0.0_dp
       right = right .and. abs(sub%hot(nd + 6, c) - merge(0.75_dp, 0.25_dp, j > n_grains)) <= 0.0_dp
     end associate
@@ -413,7 +396,8 @@ contains
 
   !> Without contacts: no bodies in the problem, figures of nothing, free velocities.
   subroutine test_free_flight()
-    type(decomposition_t), target :: decomposition
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
     type(truth_t) :: truth
     type(kernels_t) :: kernels
     type(physics_t) :: physics
@@ -421,15 +405,17 @@ contains
     type(interface_figures_t) :: figures
     integer :: s, k
 
-    call make_scene(2, 3, .false., rule_dual, .false., decomposition, truth)
+    call make_scene(2, 0, 3, .false., rule_dual, .false., decomposition, truth)
     decomposition%rule%alert_distance = -1.0_dp
+    decomposition%rule%skin = 0.0_dp
     do s = 1, size(decomposition%home)
       decomposition%home(s)%radius(:) = 1.0e-6_dp
     end do
     call kernels%choose(2, .false., .false.)
     physics%gravity(:) = gravity
     physics%h = h
-    call build_problem(decomposition, kernels, physics, problem, figures)
+    call neighbourhoods%build(decomposition, 4)
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 0_i8, "flight: no contacts")
     call check(figures%bodies == 0 .and. all(figures%multiplicity == 0) .and. figures%most_contacts == 0 .and. &
       & figures%least_contacts == 0 .and. figures%interactions == 0, "flight: figures")
@@ -442,5 +428,208 @@ contains
       end do
     end do
   end subroutine test_free_flight
+
+  !> A grain on a turning floor with restitution, one glued to a moving boundary, one upon it, one under a lid that forces
+  !> move.
+  subroutine make_boundary_scene(n_subdomains, height, turning, decomposition)
+    integer, intent(in) :: n_subdomains
+    !> of the first grain over the floor [m]
+    real(dp), intent(in) :: height
+    !> the boundary of the glued grain turns too
+    logical, intent(in) :: turning
+    type(decomposition_t), intent(inout) :: decomposition
+    type(cloud_t) :: cloud
+    type(boundary_t) :: glue
+    integer :: s
+
+    call cloud%init(2, 4, 0.1_dp, 0.1_dp, 1)
+    cloud%place(1, :) = [0.2_dp, 0.8_dp, 0.8_dp, 0.5_dp]
+    cloud%place(2, :) = [0.1_dp, 0.1_dp, 0.29_dp, 0.85_dp]
+    cloud%place(2, 1) = cloud%place(2, 1) + height
+    decomposition%rule = cloud%rule(alert, skin, rule_dual)
+    allocate (decomposition%boundaries(3))
+    associate (floor => decomposition%boundaries(1), lid => decomposition%boundaries(2))
+      floor = plane(11, [0.0_dp, 0.0_dp], [0.0_dp, 1.0_dp])
+      floor%given_spin(3) = 2.0_dp
+      floor%spin(3) = 2.0_dp
+      floor%velocity(1) = 0.5_dp
+      floor%last_velocity(2) = 0.3_dp
+      floor%last_spin(3) = 1.0_dp
+      floor%restitution = 0.5_dp
+      lid = plane(12, [0.0_dp, 0.95_dp], [0.0_dp, -1.0_dp])
+      lid%free(2) = .true.
+      lid%mass = 4.0_dp
+      lid%velocity(2) = -0.25_dp
+    end associate
+    glue%id = 13
+    glue%shape = shape_grains
+    glue%velocity(1:2) = [0.125_dp, 0.5_dp]
+    glue%friction = 0.3_dp
+    glue%pivot(1) = 0.8_dp
+    if (turning) glue%given_spin(3) = 1.0_dp
+    if (turning) glue%spin(3) = 1.0_dp
+    decomposition%boundaries(3) = glue
+    call make_decomposition(comm, cloud, n_subdomains, 3, .false., decomposition)
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        where (home%id == 2) home%glued = 3
+        where (home%id == 1) home%velocity(2, :) = -0.7_dp
+      end associate
+    end do
+    call set_glued_velocities(decomposition)
+  end subroutine make_boundary_scene
+
+  subroutine test_boundaries(n_subdomains, turning)
+    integer, intent(in) :: n_subdomains
+    logical, intent(in) :: turning
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
+    type(kernels_t) :: kernels
+    type(physics_t) :: physics
+    type(contact_problem_t) :: problem
+    type(interface_figures_t) :: figures
+    integer :: s, c
+    integer(i8) :: id
+
+    call make_boundary_scene(n_subdomains, 0.0_dp, turning, decomposition)
+    call kernels%choose(2, .true., .true.)
+    physics%friction = 0.1_dp
+    physics%h = h
+    call neighbourhoods%build(decomposition, 2)
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call check_equal(problem%n_contacts, 3_i8, "boundaries: contacts")
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          id = max(sub%id(sub%pair(1, c)), sub%id(sub%pair(2, c)))
+          select case (int(id))
+          case (11)
+            call check_floor(problem, s, c)
+          case (12)
+            call check_lid(problem, s, c)
+          case (13)
+            call check_glued(problem, s, c, turning)
+          end select
+          ! impulses of 2, 3, 4
+          sub%impulse(1, c) = id - 9
+        end do
+      end associate
+    end do
+    call check_loads(decomposition, problem, physics, turning)
+  end subroutine test_boundaries
+
+  !> Number 1 touches the point (0.2, 0) of the floor.
+  subroutine check_floor(problem, s, c)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s, c
+    integer :: j
+
+    associate (sub => problem%sub(s))
+      j = sub%pair(2, c)
+      call check(j > sub%n_bodies, "floor: moves as prescribed")
+      call check_equal(sub%boundary(j), 1, "floor: its number")
+      call check_close(sub%v_free(1, j), 0.5_dp, 8*epsilon(1.0_dp), "floor: velocity along")
+      call check_close(sub%v_free(2, j), 0.4_dp, 8*epsilon(1.0_dp), "floor: velocity of the point touched")
+      call check_close(maxval(abs(sub%inverse_mass(:, j))), 0.0_dp, 0.0_dp, "floor: cannot be moved")
+      ! e (v - v of the floor before) = 0.5 (-0.7 - 0.3 - 0.2)
+      call check_close(sub%hot(3, c), -0.6_dp, 8*epsilon(1.0_dp), "floor: shift of the law by restitution")
+      call check_close(sub%hot(6, c), 0.1_dp, 0.0_dp, "floor: lever of the grain")
+      call check_close(sub%hot(7, c), 0.0_dp, 0.0_dp, "floor: no lever")
+    end associate
+  end subroutine check_floor
+
+  subroutine check_lid(problem, s, c)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s, c
+    integer :: j
+
+    associate (sub => problem%sub(s))
+      j = sub%pair(2, c)
+      call check(j > sub%n_grains .and. j <= sub%n_bodies, "lid: a body")
+      call check_equal(sub%boundary(j), 2, "lid: its number")
+      call check_close(sub%v_free(2, j), -0.25_dp, 0.0_dp, "lid: free velocity")
+      call check_close(sub%inverse_mass(2, j), 0.25_dp, 0.0_dp, "lid: inertia of the free component")
+      call check(all(abs(sub%inverse_mass([1, 3], j)) <= 0.0_dp), "lid: other components cannot move")
+      call check_equal(sub%home(j), mod(1, problem%n_subdomains) + 1, "lid: one subdomain keeps account of it")
+      call check(.not. sub%moves(1, j) .and. sub%moves(2, j) .and. .not. sub%moves(3, j), "lid: what moves")
+    end associate
+  end subroutine check_lid
+
+  !> The glued grain 2 is the candidate, 3 the antagonist upon it; they touch at (0.8, 0.2).
+  subroutine check_glued(problem, s, c, turning)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s, c
+    logical, intent(in) :: turning
+    integer :: i
+
+    associate (sub => problem%sub(s))
+      i = sub%pair(1, c)
+      call check(i > sub%n_bodies .and. sub%id(sub%pair(2, c)) == 3, "glued: its boundary is the candidate")
+      call check_close(sub%hot(2, c), -1.0_dp, 8*epsilon(1.0_dp), "glued: normal towards the candidate")
+      call check_close(sub%gap(c), -0.01_dp, 8*epsilon(1.0_dp), "glued: gap")
+      call check_close(sub%v_free(1, i), merge(-0.075_dp, 0.125_dp, turning), 8*epsilon(1.0_dp), "glued: velocity along")
+      call check_close(sub%v_free(2, i), 0.5_dp, 8*epsilon(1.0_dp), "glued: velocity")
+      call check_close(sub%hot(6, c), 0.0_dp, 0.0_dp, "glued: no lever")
+      call check_close(sub%hot(7, c), 0.1_dp, 0.0_dp, "glued: lever of the free grain")
+      call check_close(sub%hot(8, c), 0.3_dp, 0.0_dp, "glued: friction of the boundary")
+    end associate
+  end subroutine check_glued
+
+  !> Impulses on boundaries, the velocity that one takes from them; glued grains keep and follow their boundary.
+  subroutine check_loads(decomposition, problem, physics, turning)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(contact_problem_t), intent(inout) :: problem
+    type(physics_t), intent(in) :: physics
+    logical, intent(in) :: turning
+    real(dp), allocatable :: impulses(:, :)
+    real(dp), parameter :: rounding = 32*epsilon(1.0_dp)
+    integer :: s, k
+
+    call problem%evaluate()
+    call sum_boundary_impulses(decomposition, problem, impulses)
+    call check_close(impulses(2, 1), -2.0_dp, rounding, "impulse on the floor")
+    call check_close(impulses(2, 2), 3.0_dp, rounding, "impulse on the lid")
+    call check_close(impulses(2, 3), -4.0_dp, rounding, "impulse on a glued grain")
+    call check_close(maxval(abs(impulses(1, :))), 0.0_dp, rounding, "no impulse along")
+    call take_velocities(decomposition, physics, problem)
+    call take_boundary_velocities(decomposition, impulses)
+    call check_close(decomposition%boundaries(2)%velocity(2), 0.5_dp, rounding, "velocity of the lid")
+    call check_close(decomposition%boundaries(1)%velocity(2), 0.0_dp, 0.0_dp, "velocity of the floor")
+    call carry_glued(decomposition, 0.5_dp)
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%id(k) /= 2) cycle
+          call check_close(home%velocity(1, k), merge(0.025_dp, 0.125_dp, turning), rounding, "a glued grain keeps its velocity")
+          ! an arm of 0.1 m that turns by half a radian
+          call check_close(home%position(1, k), 0.8625_dp - merge(0.1_dp*sin(0.5_dp), 0.0_dp, turning), rounding, "carried, x")
+          call check_close(home%position(2, k), 0.25_dp + merge(0.1_dp*cos(0.5_dp), 0.1_dp, turning), rounding, "carried, y")
+        end do
+      end associate
+    end do
+  end subroutine check_loads
+
+  !> With restitution a grain that does not touch yet has no contact; without it has.
+  subroutine test_restitution_gap(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
+    type(kernels_t) :: kernels
+    type(physics_t) :: physics
+    type(contact_problem_t) :: problem
+    type(interface_figures_t) :: figures
+
+    call make_boundary_scene(n_subdomains, 0.01_dp, .false., decomposition)
+    call kernels%choose(2, .true., .true.)
+    call neighbourhoods%build(decomposition, 2)
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")
+    decomposition%boundaries(1)%restitution = 0.0_dp
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call check_equal(problem%n_contacts, 3_i8, "no restitution: contacts within the alert distance")
+    decomposition%boundaries(1)%present = .false.
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call check_equal(problem%n_contacts, 2_i8, "a boundary that was removed has no contact")
+  end subroutine test_restitution_gap
 
 end program test_problem_builder

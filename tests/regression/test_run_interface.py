@@ -56,7 +56,7 @@ class Commands(RunTestCase):
             run = gravier("--check", "case.nml", ranks=ranks, directory=directory)
             self.assert_status(run, 0)
             self.assertEqual(run.stderr, "")
-            for expected in ("a few disks", "30 grains, 3 walls", "subdomains 3", "2D, friction on", "rotation on", "gravity on",
+            for expected in ("a few disks", "30 grains, 3 boundaries", "subdomains 3", "2D, friction on", "rotation on", "gravity on",
                              "contacts", "interface", "multiplicity", "bytes a contact", "nothing was run", "tolerance = 0.001"):
                 self.assertIn(expected, run.stdout)
             outputs.append([line for line in run.stdout.splitlines() if not line.startswith("ranks")])
@@ -154,19 +154,25 @@ class Results(RunTestCase):
             steps = [0, 15, 30, 40]
             self.assertEqual(steps_of(results), steps)
             with h5py.File(run.path("results", "results.h5")) as file:
-                self.assertEqual(sorted(file), ["run", "steps", "walls"])
+                self.assertEqual(sorted(file), ["boundaries", "run", "steps"])
                 self.assertEqual(sorted(file["run"].attrs), ["command", "dimension", "input_text", "version"])
                 text = file["run"].attrs["input_text"]
                 with open(run.path("case.nml"), encoding="utf-8") as case:
                     self.assertEqual(text.decode() if isinstance(text, bytes) else text, case.read())
                 self.assertEqual(file["run"].attrs["dimension"], dimension)
-                self.assert_datasets(file["walls"], {"id": ("<i8", (walls,)), "point": ("<f8", (walls, dimension)),
-                                                     "normal": ("<f8", (walls, dimension))})
+                self.assertEqual(sorted(file["boundaries"]), ["id", "name", "normal", "shape"])
+                self.assertEqual(list(file["boundaries/shape"].asstr()), ["plane"] * walls)
+                self.assertEqual(list(file["boundaries/name"].asstr()), [f"wall {k}" for k in file["boundaries/id"]])
+                self.assertEqual(file["boundaries/normal"].shape, (walls, dimension))
                 for step in steps:
                     group = file[f"steps/{step}"]
                     self.assertEqual(group.attrs["step"], step)
                     self.assertAlmostEqual(group.attrs["time"], 2e-3 * step, delta=1e-15)
-                    self.assertEqual(sorted(group), ["bodies", "contacts"] if step > 0 else ["bodies"])
+                    self.assertEqual(sorted(group), ["bodies", "boundaries"] + (["contacts"] if step > 0 else []))
+                    self.assert_datasets(group["boundaries"], {
+                        "id": ("<i8", (walls,)), "position": ("<f8", (walls, dimension)),
+                        "normal": ("<f8", (walls, dimension)), "velocity": ("<f8", (walls, 3 * dimension - 3)),
+                        "force": ("<f8", (walls, dimension))})
                     self.assert_datasets(group["bodies"], {
                         "id": ("<i8", (n,)), "position": ("<f8", (n, dimension)), "velocity": ("<f8", (n, 3 * dimension - 3)),
                         "radius": ("<f8", (n,))})

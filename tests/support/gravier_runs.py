@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
-GRAVIER = os.path.join(os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin"))), "gravier")
+PROGRAMS = os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin")))
 MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
 ENVIRONMENT = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
@@ -50,13 +50,13 @@ class Run:
                           self.launcher[-3000:]])
 
 
-def gravier(*arguments, ranks=1, directory=".", timeout=120):
-    """Run `gravier ARGUMENTS` on so many ranks. A run that is not over after `timeout` seconds is ended and is an error:
+def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
+    """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run that is not over after `timeout` seconds is ended and is an error:
     one rank waits for another that has left, or a loop does not end."""
     # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure
     before = set(glob.glob(os.path.join(directory, "rank.*")))
     rank = '"$0" "$@" 2>rank.$$.stderr; status=$?; echo $status >rank.$$.status; exit $status'
-    process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", rank, GRAVIER, *arguments], cwd=directory,
+    process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", rank, os.path.join(PROGRAMS, program), *arguments], cwd=directory,
                                env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE)
     try:
@@ -69,7 +69,7 @@ def gravier(*arguments, ranks=1, directory=".", timeout=120):
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
-        raise AssertionError(f"gravier {' '.join(arguments)} on {ranks} ranks did not end in {timeout} s") from None
+        raise AssertionError(f"{program} {' '.join(arguments)} on {ranks} ranks did not end in {timeout} s") from None
     said = {}
     for name in sorted(set(glob.glob(os.path.join(directory, "rank.*"))) - before):
         with open(name, "rb") as file:
@@ -94,27 +94,33 @@ def value_text(value):
 
 
 def namelist(groups):
-    """Text of an input file from {group: {key: value}}."""
+    """Text of an input file from {group: {key: value}}; of a group that stands several times, {group: [{key: value}, ...]}."""
     text = ""
-    for group, keys in groups.items():
-        text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
+    for group, several in groups.items():
+        for keys in several if isinstance(several, list) else [several]:
+            text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
     return text
 
 
 def merged(*parts):
-    """Input groups, later ones changing keys of earlier ones; a key of value None is left out."""
+    """Input groups, later ones changing keys of earlier ones; a key of value None is left out. A list of groups takes the
+    place of an earlier one."""
     groups = {}
     for part in parts:
         for group, keys in part.items():
-            groups.setdefault(group, {}).update(keys)
-    return {group: {key: value for key, value in keys.items() if value is not None} for group, keys in groups.items()}
+            if isinstance(keys, list):
+                groups[group] = keys
+            else:
+                groups.setdefault(group, {}).update(keys)
+    return {group: keys if isinstance(keys, list) else {key: value for key, value in keys.items() if value is not None}
+            for group, keys in groups.items()}
 
 
-def run_case(groups, ranks=1, directory=".", timeout=120):
+def run_case(groups, ranks=1, directory=".", timeout=120, options=()):
     """Write `groups` to case.nml in `directory` (made if need be) and run it there."""
     os.makedirs(directory, exist_ok=True)
     write(os.path.join(directory, "case.nml"), namelist(groups))
-    return gravier("case.nml", ranks=ranks, directory=directory, timeout=timeout)
+    return gravier(*options, "case.nml", ranks=ranks, directory=directory, timeout=timeout)
 
 
 def write(path, text):

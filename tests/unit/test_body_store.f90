@@ -3,19 +3,19 @@ program test_body_store
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_body_store, only: body_set_t, append_bodies
+  use gravier_body_store, only: body_set_t, append_bodies, place_word
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
-  !> space dimensions and degrees of freedom, with and without spin
-  integer, parameter :: kinds(2, 4) = reshape([2, 2, 2, 3, 3, 3, 3, 6], [2, 4])
+  !> space dimensions, degrees of freedom with and without spin, entries of an image with and without periods
+  integer, parameter :: kinds(3, 6) = reshape([2, 2, 0, 2, 3, 0, 3, 3, 0, 3, 6, 0, 2, 3, 2, 3, 6, 3], [3, 6])
   integer :: k
 
   call MPI_Init()
   do k = 1, size(kinds, 2)
-    call test_records(kinds(1, k), kinds(2, k))
-    call test_reorder(kinds(1, k), kinds(2, k))
-    call test_keep_only(kinds(1, k), kinds(2, k))
-    call test_append(kinds(1, k), kinds(2, k))
+    call test_records(kinds(:, k))
+    call test_reorder(kinds(:, k))
+    call test_keep_only(kinds(:, k))
+    call test_append(kinds(:, k))
   end do
   call finish_checks()
   call MPI_Finalize()
@@ -23,22 +23,26 @@ program test_body_store
 contains
 
   !> `n` grains, of which every number follows from the identifier first + place - 1.
-  subroutine fill(bodies, nd, nv, n, first)
+  subroutine fill(bodies, sizes, n, first)
     type(body_set_t), intent(inout) :: bodies
-    integer, intent(in) :: nd, nv, n, first
+    integer, intent(in) :: sizes(3), n, first
     integer :: b, d
 
-    call bodies%init(nd, nv, n)
+    call bodies%init(sizes(1), sizes(2), sizes(3), n)
     do b = 1, n
       bodies%id(b) = first + b - 1
       bodies%radius(b) = number(bodies%id(b), 1)
       bodies%mass(b) = number(bodies%id(b), 2)
       bodies%inertia(b) = number(bodies%id(b), 3)
-      do d = 1, nd
+      bodies%glued(b) = image_of(bodies%id(b), 1)
+      do d = 1, sizes(1)
         bodies%position(d, b) = number(bodies%id(b), 3 + d)
       end do
-      do d = 1, nv
+      do d = 1, sizes(2)
         bodies%velocity(d, b) = number(bodies%id(b), 6 + d)
+      end do
+      do d = 1, sizes(3)
+        bodies%image(d, b) = image_of(bodies%id(b), 1 + d)
       end do
     end do
   end subroutine fill
@@ -48,6 +52,13 @@ contains
     integer, intent(in) :: stream
     number = scale(hash_uniform(1, id, stream) - 0.5_dp, int(id)/3)
   end function number
+
+  !> A whole number of either sign.
+  pure integer function image_of(id, stream)
+    integer(i8), intent(in) :: id
+    integer, intent(in) :: stream
+    image_of = int(2.0e9_dp*(hash_uniform(2, id, stream) - 0.5_dp))
+  end function image_of
 
   pure logical function same(a, b)
     real(dp), intent(in) :: a, b
@@ -68,21 +79,26 @@ contains
     do d = 1, bodies%nv
       is_grain = is_grain .and. same(bodies%velocity(d, b), number(int(id, i8), 6 + d))
     end do
+    is_grain = is_grain .and. bodies%glued(b) == image_of(int(id, i8), 1)
+    do d = 1, bodies%ni
+      is_grain = is_grain .and. bodies%image(d, b) == image_of(int(id, i8), 1 + d)
+    end do
   end function is_grain
 
   !> Whether the set holds just the grains of `id`, in this order, in arrays of its size.
-  subroutine check_grains(bodies, nd, nv, id, name)
+  subroutine check_grains(bodies, sizes, id, name)
     type(body_set_t), intent(in) :: bodies
-    integer, intent(in) :: nd, nv, id(:)
+    integer, intent(in) :: sizes(3), id(:)
     character(len=*), intent(in) :: name
     integer :: b
     logical :: right
 
-    right = bodies%n == size(id) .and. bodies%nd == nd .and. bodies%nv == nv
+    right = bodies%n == size(id) .and. bodies%nd == sizes(1) .and. bodies%nv == sizes(2) .and. bodies%ni == sizes(3)
     right = right .and. size(bodies%id) == size(id) .and. size(bodies%radius) == size(id) .and. size(bodies%mass) == size(id)
     right = right .and. size(bodies%inertia) == size(id) .and. size(bodies%position, 2) == size(id)
-    right = right .and. size(bodies%velocity, 2) == size(id) .and. size(bodies%position, 1) == nd
-    right = right .and. size(bodies%velocity, 1) == nv
+    right = right .and. size(bodies%velocity, 2) == size(id) .and. size(bodies%position, 1) == sizes(1)
+    right = right .and. size(bodies%velocity, 1) == sizes(2) .and. size(bodies%glued) == size(id)
+    right = right .and. size(bodies%image, 1) == sizes(3) .and. size(bodies%image, 2) == size(id)
     call check(right, name//": sizes")
     if (.not. right) return
     do b = 1, size(id)
@@ -92,87 +108,95 @@ contains
   end subroutine check_grains
 
   !> From a set to records and back, in the reverse order; numbers at the ends of their ranges too.
-  subroutine test_records(nd, nv)
-    integer, intent(in) :: nd, nv
+  subroutine test_records(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
     type(body_set_t) :: bodies, back
     integer(i8), allocatable :: records(:, :)
     integer, parameter :: reverse(*) = [7, 6, 5, 4, 3, 2, 1]
     integer :: b
 
-    call fill(bodies, nd, nv, 7, 1)
-    call check_equal(bodies%record_words(), 4 + nd + nv, "words of a record")
+    call fill(bodies, sizes, 7, 1)
+    call check_equal(bodies%record_words(), 5 + sum(sizes), "words of a record")
     allocate (records(bodies%record_words(), 7))
     do b = 1, 7
       call bodies%get_record(b, records(:, b))
     end do
-    call back%init(nd, nv, 7)
+    call back%init(sizes(1), sizes(2), sizes(3), 7)
     do b = 1, 7
       call back%set_record(8 - b, records(:, b))
     end do
-    call check_grains(back, nd, nv, reverse, "records")
+    call check_grains(back, sizes, reverse, "records")
     bodies%id(1) = huge(1_i8)
     bodies%radius(1) = transfer(1_i8, 0.0_dp)
     bodies%mass(1) = huge(1.0_dp)
-    bodies%velocity(nv, 1) = -0.0_dp
-    bodies%position(nd, 1) = -tiny(1.0_dp)
+    bodies%velocity(sizes(2), 1) = -0.0_dp
+    bodies%position(sizes(1), 1) = -tiny(1.0_dp)
+    bodies%glued(1) = huge(1)
+    bodies%image(:, 1) = -huge(1)
     call bodies%get_record(1, records(:, 1))
     call back%set_record(2, records(:, 1))
     call check(back%id(2) == huge(1_i8) .and. same(back%radius(2), transfer(1_i8, 0.0_dp)) .and. &
-      & same(back%mass(2), huge(1.0_dp)) .and. same(back%velocity(nv, 2), -0.0_dp) .and. &
-      & same(back%position(nd, 2), -tiny(1.0_dp)), "records keep every bit")
+      & same(back%mass(2), huge(1.0_dp)) .and. same(back%velocity(sizes(2), 2), -0.0_dp) .and. &
+      & same(back%position(sizes(1), 2), -tiny(1.0_dp)) .and. back%glued(2) == huge(1) .and. &
+      & all(back%image(:, 2) == -huge(1)), "records keep every bit")
+    call check(same(transfer(records(place_word, 1), 0.0_dp), bodies%position(1, 1)), "where a record holds the place")
     call check(is_grain(back, 1, 7) .and. is_grain(back, 3, 5), "other grains stay")
   end subroutine test_records
 
-  subroutine test_reorder(nd, nv)
-    integer, intent(in) :: nd, nv
+  subroutine test_reorder(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
     type(body_set_t) :: bodies
     integer, parameter :: order(*) = [5, 1, 4, 2, 3], some(*) = [4, 2], nobody(0) = 0
 
-    call fill(bodies, nd, nv, 5, 1)
+    call fill(bodies, sizes, 5, 1)
     call bodies%reorder(order)
-    call check_grains(bodies, nd, nv, order, "a permutation")
-    call fill(bodies, nd, nv, 5, 1)
+    call check_grains(bodies, sizes, order, "a permutation")
+    call fill(bodies, sizes, 5, 1)
     call bodies%reorder(some)
-    call check_grains(bodies, nd, nv, some, "some left out")
+    call check_grains(bodies, sizes, some, "some left out")
     call bodies%reorder(nobody)
-    call check_grains(bodies, nd, nv, nobody, "all left out")
+    call check_grains(bodies, sizes, nobody, "all left out")
   end subroutine test_reorder
 
-  subroutine test_keep_only(nd, nv)
-    integer, intent(in) :: nd, nv
+  subroutine test_keep_only(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
     type(body_set_t) :: bodies
     logical, parameter :: mask(*) = [.false., .true., .true., .false., .true.]
     integer, parameter :: kept(*) = [12, 13, 15], nobody(0) = 0
     logical :: all_of_them(3)
 
-    call fill(bodies, nd, nv, 5, 11)
+    call fill(bodies, sizes, 5, 11)
     call bodies%keep_only(mask)
-    call check_grains(bodies, nd, nv, kept, "masked grains go, the others keep their order")
+    call check_grains(bodies, sizes, kept, "masked grains go, the others keep their order")
     all_of_them(:) = .true.
     call bodies%keep_only(all_of_them)
-    call check_grains(bodies, nd, nv, kept, "all stay")
+    call check_grains(bodies, sizes, kept, "all stay")
     all_of_them(:) = .false.
     call bodies%keep_only(all_of_them)
-    call check_grains(bodies, nd, nv, nobody, "all go")
+    call check_grains(bodies, sizes, nobody, "all go")
   end subroutine test_keep_only
 
-  subroutine test_append(nd, nv)
-    integer, intent(in) :: nd, nv
+  subroutine test_append(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
     type(body_set_t) :: bodies, more, none, fresh
     integer, parameter :: both(*) = [1, 2, 3, 21, 22], behind(*) = [21, 22], front(*) = [1, 2, 3]
 
-    call fill(bodies, nd, nv, 3, 1)
-    call fill(more, nd, nv, 2, 21)
-    call fill(none, nd, nv, 0, 1)
+    call fill(bodies, sizes, 3, 1)
+    call fill(more, sizes, 2, 21)
+    call fill(none, sizes, 0, 1)
     call append_bodies(bodies, none)
-    call check_grains(bodies, nd, nv, front, "nobody more")
+    call check_grains(bodies, sizes, front, "nobody more")
     call append_bodies(bodies, more)
-    call check_grains(bodies, nd, nv, both, "behind those that were there")
-    call check_grains(more, nd, nv, behind, "what was added stays")
+    call check_grains(bodies, sizes, both, "behind those that were there")
+    call check_grains(more, sizes, behind, "what was added stays")
     call append_bodies(none, more)
-    call check_grains(none, nd, nv, behind, "to an empty set")
+    call check_grains(none, sizes, behind, "to an empty set")
     call append_bodies(fresh, more)
-    call check_grains(fresh, nd, nv, behind, "to a set not made yet")
+    call check_grains(fresh, sizes, behind, "to a set not made yet")
   end subroutine test_append
 
 end program test_body_store

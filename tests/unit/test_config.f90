@@ -1190,6 +1190,7 @@ contains
       // "expected another one where the last axis is periodic")
     call refuse(sample(made // "file = ''"), &
       "&sample file = '': expected a text in quotes, not empty, at most 4096 characters")
+    call refuse(sample(made // "file = 'a.csv'"), "&sample file = 'a.csv': expected a name with the ending .h5 or .hdf5")
     call refuse(sample(made // "arrangement = 'dense'"), "&sample arrangement = 'dense': expected 'lattice' or 'loose'")
     call refuse(sample(made // "preparation = 'shaken'"), &
       "&sample preparation = 'shaken': expected 'none', 'settled' or 'compacted'")

@@ -95,7 +95,7 @@ class MethodInvariance(RunTestCase):
         impulse = results["/steps/1/contacts/impulse"]
         tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
         force = impulse[:, :1] * normal + impulse[:, 1:] * tangent
-        walls = set(results["/walls/id"])
+        walls = set(results["/boundaries/id"])
         on_wall = np.array([identifier in walls for identifier in antagonist])
         momentum = np.zeros((len(mass), 3))
         momentum[:, :2] = mass[:, None] * (start[:, :2] + STEP * GRAVITY)

@@ -108,7 +108,7 @@ class Packing(RunTestCase):
         change = np.sum(mass * (results["/steps/1/bodies/velocity"][:, 1] - before))
         weight = np.sum(mass) * GRAVITY * STEP
         normal, impulse = results["/steps/1/contacts/normal"], results["/steps/1/contacts/impulse"]
-        on_wall = np.isin(results["/steps/1/contacts/antagonist"], results["/walls/id"])
+        on_wall = np.isin(results["/steps/1/contacts/antagonist"], results["/boundaries/id"])
         # t = (-ny, nx)
         upward = normal[:, 1] * impulse[:, 0] + normal[:, 0] * impulse[:, 1]
         self.assertLess(abs(np.sum(upward[on_wall]) - weight - change), 1e-11 * weight)

@@ -1,0 +1,190 @@
+!> How grains hold each other: coordination, fabric, sliding, distribution of forces, overlaps.
+module gravier_contact_structure
+  use gravier_kinds, only: dp, i8
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  implicit none
+  private
+  public :: contact_structure_t, n_bins, bin_width
+
+  !> bins of the histogram of normal forces over their mean; one more counts what lies beyond
+  integer, parameter :: n_bins = 100
+  real(dp), parameter :: bin_width = 0.1_dp
+  !> a contact slides whose friction is used but for this part
+  real(dp), parameter :: unused = 1.0e-6_dp
+
+  !> The same on every rank. A contact carries where its normal impulse is not zero.
+  type :: contact_structure_t
+    !> carrying contacts of a free grain on average: of all, and of those that two or more contacts hold
+    real(dp) :: coordination = 0.0_dp, mechanical_coordination = 0.0_dp
+    !> free grains with less than two carrying contacts
+    integer(i8) :: rattlers = 0
+    !> mean of n n^T over the carrying contacts between free grains (nd, nd)
+    real(dp), allocatable :: fabric(:, :)
+    !> part of the contacts that carries; part of the carrying contacts with friction that slides
+    real(dp) :: carrying_fraction = 0.0_dp, sliding_fraction = 0.0_dp
+    !> normal force of the carrying contacts: mean, largest [N]; standard deviation over mean
+    real(dp) :: force_mean = 0.0_dp, force_max = 0.0_dp, force_deviation = 0.0_dp
+    !> over the contacts with overlap [m]
+    real(dp) :: overlap_mean = 0.0_dp
+    !> carrying contacts by normal force over mean (n_bins + 1)
+    integer(i8) :: histogram(n_bins + 1) = 0
+  contains
+    procedure :: measure => structure_measure
+  end type contact_structure_t
+
+  !> places among the counts of contacts and grains
+  integer, parameter :: carrying = 1, carrying_grains = 2, with_friction = 3, sliding = 4, overlapping = 5, &
+    & ends = 6, held = 7, held_ends = 8, n_counts = 8
+
+contains
+
+  !> Measure the contacts of a step as it was solved. Collective.
+  subroutine structure_measure(self, problem, n_free, h)
+    class(contact_structure_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    !> free grains of the scene
+    integer(i8), intent(in) :: n_free
+    !> [s]
+    real(dp), intent(in) :: h
+    real(dp) :: parts(problem%kernels%nd**2 + 2, size(problem%sub)), sums(problem%kernels%nd**2 + 2), largest
+    integer(i8) :: counts(n_counts)
+    integer :: s, nd
+
+    nd = problem%kernels%nd
+    parts(:, :) = 0.0_dp
+    counts(:) = 0
+    largest = 0.0_dp
+    do s = 1, size(problem%sub)
+      call count_contacts(problem%sub(s), nd, problem%kernels%nc, counts, parts(:, s))
+      if (problem%sub(s)%n_contacts > 0) largest = max(largest, maxval(problem%sub(s)%impulse(1, :)))
+    end do
+    call count_ends(problem, counts)
+    call problem%comm%sum_counts(counts)
+    call problem%comm%sum_parts(parts, sums)
+    self%force_max = problem%comm%highest(largest)/h
+    self%coordination = ratio(real(counts(ends), dp), n_free)
+    self%mechanical_coordination = ratio(real(counts(held_ends), dp), counts(held))
+    self%rattlers = n_free - counts(held)
+    do s = 1, nd
+      self%fabric(:, s) = sums((s - 1)*nd + 1:s*nd)
+    end do
+    if (counts(carrying_grains) > 0) self%fabric(:, :) = self%fabric/real(counts(carrying_grains), dp)
+    self%carrying_fraction = ratio(real(counts(carrying), dp), problem%n_contacts)
+    self%sliding_fraction = ratio(real(counts(sliding), dp), counts(with_friction))
+    self%force_mean = ratio(sums(nd**2 + 1), counts(carrying))/h
+    self%overlap_mean = ratio(sums(nd**2 + 2), counts(overlapping))
+    call distribute(self, problem, counts(carrying), h)
+  end subroutine structure_measure
+
+  !> 0 where there is nothing to divide by.
+  pure real(dp) function ratio(part, whole)
+    real(dp), intent(in) :: part
+    integer(i8), intent(in) :: whole
+
+    ratio = 0.0_dp
+    if (whole > 0) ratio = part/real(whole, dp)
+  end function ratio
+
+  !> Counts and sums (fabric, normal impulse, overlap) over the contacts of a subdomain.
+  pure subroutine count_contacts(sub, nd, nc, counts, part)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: nd, nc
+    integer(i8), intent(inout) :: counts(n_counts)
+    !> (nd**2 + 2)
+    real(dp), intent(inout) :: part(:)
+    real(dp) :: bound
+    integer :: c, d
+
+    do c = 1, sub%n_contacts
+      if (sub%gap(c) < 0.0_dp) then
+        counts(overlapping) = counts(overlapping) + 1
+        part(nd**2 + 2) = part(nd**2 + 2) - sub%gap(c)
+      end if
+      if (.not. sub%impulse(1, c) > 0.0_dp) cycle
+      counts(carrying) = counts(carrying) + 1
+      part(nd**2 + 1) = part(nd**2 + 1) + sub%impulse(1, c)
+      if (nc > 1) then
+        bound = sub%hot(nd + 6, c)*sub%impulse(1, c)
+        if (bound > 0.0_dp) then
+          counts(with_friction) = counts(with_friction) + 1
+          if (norm2(sub%impulse(2:, c)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
+        end if
+      end if
+      if (any(sub%pair(:, c) > sub%n_grains)) cycle
+      counts(carrying_grains) = counts(carrying_grains) + 1
+      do d = 1, nd
+        part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + sub%hot(1:nd, c)*sub%hot(d, c)
+      end do
+    end do
+  end subroutine count_contacts
+
+  !> Count the ends of carrying contacts on free grains, and those on grains that two or more of them hold. A shared grain is
+  !> counted in the first of its subdomains. Collective.
+  subroutine count_ends(problem, counts)
+    type(contact_problem_t), intent(inout) :: problem
+    integer(i8), intent(inout) :: counts(n_counts)
+    logical, allocatable :: counted_elsewhere(:)
+    integer :: s, b, c, k, n
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        ! the first row of `reaction` serves as number of contacts
+        sub%reaction(:, :) = 0.0_dp
+        do c = 1, sub%n_contacts
+          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
+          do k = 1, 2
+            sub%reaction(1, sub%pair(k, c)) = sub%reaction(1, sub%pair(k, c)) + 1.0_dp
+          end do
+        end do
+        call problem%shared%load(s, sub%reaction)
+      end associate
+    end do
+    call problem%shared%pass()
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), part => problem%shared%part(s))
+        allocate (counted_elsewhere(sub%n_bodies), source=.false.)
+        do k = 1, part%n_shared
+          counted_elsewhere(part%body(k)) = part%rung(k) > 1
+          call problem%shared%add_copies(s, k, sub%reaction(:, part%body(k)))
+        end do
+        do b = 1, sub%n_grains
+          n = nint(sub%reaction(1, b))
+          if (counted_elsewhere(b)) cycle
+          counts(ends) = counts(ends) + n
+          if (n < 2) cycle
+          counts(held) = counts(held) + 1
+          counts(held_ends) = counts(held_ends) + n
+        end do
+        deallocate (counted_elsewhere)
+      end associate
+    end do
+  end subroutine count_ends
+
+  !> Standard deviation and histogram of the normal forces over their mean. Collective.
+  subroutine distribute(self, problem, n_carrying, h)
+    class(contact_structure_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer(i8), intent(in) :: n_carrying
+    real(dp), intent(in) :: h
+    real(dp) :: part(size(problem%sub)), force
+    integer :: s, c, bin
+
+    part(:) = 0.0_dp
+    self%histogram(:) = 0
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
+          force = sub%impulse(1, c)/(h*self%force_mean)
+          part(s) = part(s) + (force - 1.0_dp)**2
+          bin = n_bins + 1
+          if (force < n_bins*bin_width) bin = min(int(force/bin_width) + 1, n_bins)
+          self%histogram(bin) = self%histogram(bin) + 1
+        end do
+      end associate
+    end do
+    call problem%comm%sum_counts(self%histogram)
+    self%force_deviation = sqrt(ratio(problem%comm%sum_real(part), n_carrying))
+  end subroutine distribute
+
+end module gravier_contact_structure

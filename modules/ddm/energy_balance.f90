@@ -1,0 +1,340 @@
+!> The energy of a scene and where it comes from and goes to, step by step. The balance is an identity of the velocities
+!> and impulses of each step: it closes to rounding whatever the tolerance of the solve.
+module gravier_energy_balance
+  use gravier_kinds, only: dp, i8
+  use gravier_boundary, only: boundary_t
+  use gravier_motion, only: grain_volume
+  use gravier_body_store, only: body_set_t
+  use gravier_contact_kernels, only: global_impulse
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_problem_builder, only: physics_t
+  implicit none
+  private
+  public :: energy_balance_t, energy_words
+
+  !> Energies at the end of a step, and what was done since the start; the same on every rank [J].
+  type :: energy_balance_t
+    !> of the free grains, and of the free components of boundaries that forces move
+    real(dp) :: translation = 0.0_dp, rotation = 0.0_dp, boundaries = 0.0_dp
+    !> of the free grains in the loads of the present time, from the origin, unwrapped in periodic scenes
+    real(dp) :: potential = 0.0_dp
+    !> kinetic energy at the start
+    real(dp) :: start = 0.0_dp
+    !> done by gravity and body force on the grains; by boundaries on grains where they move as prescribed, and by the
+    !> forces of the user on the others
+    real(dp) :: load_work = 0.0_dp, boundary_work = 0.0_dp
+    !> in contacts, by the normal and by the tangential impulses
+    real(dp) :: dissipated_normal = 0.0_dp, dissipated_friction = 0.0_dp
+    !> kinetic energy of grains and boundaries that were taken out of the scene
+    real(dp) :: carried_away = 0.0_dp
+  contains
+    procedure :: begin => energy_begin
+    procedure :: take_step => energy_take_step
+    procedure :: take_places => energy_take_places
+    procedure :: error => energy_error
+    procedure :: get_state => energy_get_state
+    procedure :: set_state => energy_set_state
+  end type energy_balance_t
+
+  !> words of the state of a balance
+  integer, parameter :: energy_words = 10
+  !> places among the sums of a step
+  integer, parameter :: in_translation = 1, in_rotation = 2, in_start = 3, in_load = 4, in_normal = 5, in_friction = 6, &
+    & in_boundary = 7, n_sums = 7
+
+contains
+
+  !> Begin with the scene as it is. Collective.
+  subroutine energy_begin(self, decomposition)
+    class(energy_balance_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    real(dp) :: parts(2, size(decomposition%home)), sums(2)
+    integer :: s, k, b
+
+    self%load_work = 0.0_dp
+    self%boundary_work = 0.0_dp
+    self%dissipated_normal = 0.0_dp
+    self%dissipated_friction = 0.0_dp
+    self%carried_away = 0.0_dp
+    parts(:, :) = 0.0_dp
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) call add_kinetic(home, k, home%velocity(:, k), parts(1, s), parts(2, s))
+        end do
+      end associate
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    self%translation = sums(1)
+    self%rotation = sums(2)
+    self%boundaries = 0.0_dp
+    do b = 1, size(decomposition%boundaries)
+      self%boundaries = self%boundaries + kinetic_of(decomposition%boundaries(b), decomposition%boundaries(b)%velocity)
+    end do
+    self%start = self%translation + self%rotation + self%boundaries
+  end subroutine energy_begin
+
+  !> Add the kinetic energies of grain `k` at a velocity.
+  pure subroutine add_kinetic(bodies, k, velocity, translation, rotation)
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (nv)
+    real(dp), intent(in) :: velocity(:)
+    real(dp), intent(inout) :: translation, rotation
+
+    translation = translation + 0.5_dp*bodies%mass(k)*sum(velocity(1:bodies%nd)**2)
+    rotation = rotation + 0.5_dp*bodies%inertia(k)*sum(velocity(bodies%nd + 1:)**2)
+  end subroutine add_kinetic
+
+  !> Kinetic energy of the free components of a boundary; 0 once it is removed.
+  pure real(dp) function kinetic_of(boundary, velocity) result(energy)
+    type(boundary_t), intent(in) :: boundary
+    real(dp), intent(in) :: velocity(3)
+
+    energy = 0.0_dp
+    if (boundary%present) energy = 0.5_dp*boundary%mass*sum(velocity**2, mask=boundary%free)
+  end function kinetic_of
+
+  !> Take the works of a step into account. Grains and boundaries have the velocities of its end and the places of its
+  !> middle, the views still the velocities of its start. Collective.
+  subroutine energy_take_step(self, decomposition, neighbourhoods, physics, problem, impulses, time, some_left)
+    class(energy_balance_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(physics_t), intent(in) :: physics
+    type(contact_problem_t), intent(in) :: problem
+    !> of the contacts on each boundary (nd, boundaries) [N s]
+    real(dp), intent(in), contiguous :: impulses(:, :)
+    !> start of the step [s]
+    real(dp), intent(in) :: time
+    !> grains were taken out of the scene in this step
+    logical, intent(in) :: some_left
+    type(boundary_t) :: earlier(size(decomposition%boundaries))
+    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums)
+    integer :: s, b
+
+    do b = 1, size(earlier)
+      earlier(b) = decomposition%boundaries(b)
+      call earlier(b)%prescribe(decomposition%nd, time)
+      earlier(b)%velocity(:) = earlier(b)%last_velocity
+    end do
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      call add_grains(neighbourhoods%view(s), decomposition%home(s), physics, parts(:, s))
+      call add_contacts(neighbourhoods%view(s), earlier, problem, s, parts(:, s))
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    if (some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
+    self%translation = sums(in_translation)
+    self%rotation = sums(in_rotation)
+    self%load_work = self%load_work + sums(in_load)
+    self%dissipated_normal = self%dissipated_normal + sums(in_normal)
+    self%dissipated_friction = self%dissipated_friction + sums(in_friction)
+    self%boundary_work = self%boundary_work + sums(in_boundary)
+    call take_boundaries(self, decomposition%boundaries, impulses)
+  end subroutine energy_take_step
+
+  !> Energies of the grains of a subdomain, and the work of the loads on them, h F . (V_i + V_{i+1})/2.
+  pure subroutine add_grains(view, home, physics, part)
+    type(neighbourhood_t), intent(in) :: view
+    type(body_set_t), intent(in) :: home
+    type(physics_t), intent(in) :: physics
+    real(dp), intent(inout) :: part(n_sums)
+    real(dp) :: fall(home%nv), rotation
+    integer :: k
+
+    rotation = 0.0_dp
+    do k = 1, view%bodies%n
+      if (view%origin(k) == 0 .or. view%bodies%glued(k) > 0) cycle
+      associate (before => view%bodies%velocity(:, k), after => home%velocity(:, view%origin(k)))
+        call add_kinetic(view%bodies, k, after, part(in_translation), part(in_rotation))
+        call add_kinetic(view%bodies, k, before, part(in_start), rotation)
+        fall(:) = 0.0_dp
+        call physics%accelerate(view%bodies, k, fall)
+        part(in_load) = part(in_load) + view%bodies%mass(k)*sum(fall*(0.5_dp*(before + after)))
+      end associate
+    end do
+    part(in_start) = part(in_start) + rotation
+  end subroutine add_grains
+
+  !> Dissipation in the contacts of a subdomain, -r . (v_i + v_{i+1})/2 with the H of q_m, and the work of boundaries at
+  !> them.
+  subroutine add_contacts(view, earlier, problem, s, part)
+    type(neighbourhood_t), intent(in) :: view
+    !> boundaries with the velocities of the start of the step
+    type(boundary_t), intent(in) :: earlier(:)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    real(dp), intent(inout) :: part(n_sums)
+    real(dp), allocatable :: mean(:, :), v(:, :)
+    integer :: c
+
+    associate (sub => problem%sub(s), kernels => problem%kernels)
+      allocate (mean(kernels%nv, sub%n_columns), v(kernels%nc, sub%n_contacts))
+      call find_start(view, earlier, kernels%nd, sub, mean)
+      mean(:, :) = 0.5_dp*(mean + sub%v_global)
+      call kernels%contact_velocity(sub%pair, sub%hot, mean, v)
+      do c = 1, sub%n_contacts
+        part(in_normal) = part(in_normal) - sub%impulse(1, c)*v(1, c)
+        part(in_friction) = part(in_friction) - sum(sub%impulse(2:, c)*v(2:, c))
+        if (any(sub%pair(:, c) > sub%n_grains)) call add_boundary_work(c)
+      end do
+    end associate
+
+  contains
+
+    subroutine add_boundary_work(c)
+      integer, intent(in) :: c
+      real(dp) :: p(problem%kernels%nd)
+      integer :: column, d
+
+      associate (sub => problem%sub(s))
+        call global_impulse(problem%kernels, sub%hot(:, c), sub%impulse(:, c), p)
+        column = sub%pair(2, c)
+        if (sub%pair(1, c) > sub%n_grains) then
+          column = sub%pair(1, c)
+          p(:) = -p
+        end if
+        do d = 1, size(p)
+          if (.not. earlier(sub%boundary(column))%free(d)) part(in_boundary) = part(in_boundary) + p(d)*mean(d, column)
+        end do
+      end associate
+    end subroutine add_boundary_work
+
+  end subroutine add_contacts
+
+  !> Velocities of the columns of a subproblem at the start of the step.
+  subroutine find_start(view, earlier, nd, sub, start)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: earlier(:)
+    integer, intent(in) :: nd
+    type(subproblem_t), intent(in) :: sub
+    !> (nv, n_columns)
+    real(dp), intent(out) :: start(:, :)
+    integer :: c, i, j
+
+    start(:, :) = 0.0_dp
+    do c = 1, sub%n_contacts
+      i = view%list%candidate(sub%source(c))
+      j = view%list%antagonist(sub%source(c))
+      call fill(sub%pair(1, c), i)
+      call fill(sub%pair(2, c), j)
+    end do
+
+  contains
+
+    !> A column that stands for grain `k` of the view, or for a boundary.
+    subroutine fill(column, k)
+      integer, intent(in) :: column, k
+      real(dp) :: point(nd)
+
+      if (column <= sub%n_grains) then
+        start(:, column) = view%bodies%velocity(:, k)
+        return
+      end if
+      ! where the free grain touches it
+      if (k < 0) then
+        point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + sub%gap(c))*sub%hot(1:nd, c)
+      else if (k == i) then
+        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*sub%hot(1:nd, c)
+      else
+        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*sub%hot(1:nd, c)
+      end if
+      call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
+    end subroutine fill
+
+  end subroutine find_start
+
+  !> Energies of the boundaries that forces move, and the work of these forces.
+  pure subroutine take_boundaries(self, boundaries, impulses)
+    class(energy_balance_t), intent(inout) :: self
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> (nd, boundaries)
+    real(dp), intent(in), contiguous :: impulses(:, :)
+    real(dp) :: before, after, applied
+    integer :: b, d
+
+    before = 0.0_dp
+    after = 0.0_dp
+    do b = 1, size(boundaries)
+      associate (boundary => boundaries(b))
+        before = before + kinetic_of(boundary, boundary%last_velocity)
+        after = after + kinetic_of(boundary, boundary%velocity)
+        do d = 1, size(impulses, 1)
+          if (.not. boundary%free(d) .or. .not. boundary%present) cycle
+          applied = boundary%mass*(boundary%velocity(d) - boundary%last_velocity(d)) - impulses(d, b)
+          self%boundary_work = self%boundary_work + applied*0.5_dp*(boundary%velocity(d) + boundary%last_velocity(d))
+        end do
+      end associate
+    end do
+    self%carried_away = self%carried_away + (self%boundaries - before)
+    self%boundaries = after
+  end subroutine take_boundaries
+
+  !> Potential energy in the places that grains have now, -(m g + f V) . x. Collective.
+  subroutine energy_take_places(self, decomposition, physics)
+    class(energy_balance_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    real(dp) :: part(size(decomposition%home)), x
+    integer :: s, k, d
+
+    part(:) = 0.0_dp
+    do s = 1, size(part)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) > 0) cycle
+          do d = 1, home%nd
+            x = home%position(d, k)
+            if (home%ni > 0) x = x + home%image(d, k)*decomposition%period%length(d)
+            part(s) = part(s) - (home%mass(k)*physics%gravity(d) + grain_volume(home%nd, home%radius(k))*physics%body_force(d))*x
+          end do
+        end do
+      end associate
+    end do
+    self%potential = decomposition%comm%sum_real(part)
+  end subroutine energy_take_places
+
+  !> What the balance lacks since the start [J]: rounding.
+  pure real(dp) function energy_error(self) result(error)
+    class(energy_balance_t), intent(in) :: self
+    error = ((self%translation + self%rotation + self%boundaries) - self%start) - self%load_work - self%boundary_work + &
+      & self%dissipated_normal + self%dissipated_friction + self%carried_away
+  end function energy_error
+
+  !> All of the balance, bit for bit.
+  pure subroutine energy_get_state(self, words)
+    class(energy_balance_t), intent(in) :: self
+    integer(i8), intent(out) :: words(energy_words)
+
+    words(1) = transfer(self%translation, 0_i8)
+    words(2) = transfer(self%rotation, 0_i8)
+    words(3) = transfer(self%boundaries, 0_i8)
+    words(4) = transfer(self%potential, 0_i8)
+    words(5) = transfer(self%start, 0_i8)
+    words(6) = transfer(self%load_work, 0_i8)
+    words(7) = transfer(self%boundary_work, 0_i8)
+    words(8) = transfer(self%dissipated_normal, 0_i8)
+    words(9) = transfer(self%dissipated_friction, 0_i8)
+    words(10) = transfer(self%carried_away, 0_i8)
+  end subroutine energy_get_state
+
+  pure subroutine energy_set_state(self, words)
+    class(energy_balance_t), intent(inout) :: self
+    integer(i8), intent(in) :: words(energy_words)
+
+    self%translation = transfer(words(1), 0.0_dp)
+    self%rotation = transfer(words(2), 0.0_dp)
+    self%boundaries = transfer(words(3), 0.0_dp)
+    self%potential = transfer(words(4), 0.0_dp)
+    self%start = transfer(words(5), 0.0_dp)
+    self%load_work = transfer(words(6), 0.0_dp)
+    self%boundary_work = transfer(words(7), 0.0_dp)
+    self%dissipated_normal = transfer(words(8), 0.0_dp)
+    self%dissipated_friction = transfer(words(9), 0.0_dp)
+    self%carried_away = transfer(words(10), 0.0_dp)
+  end subroutine energy_set_state
+
+end module gravier_energy_balance

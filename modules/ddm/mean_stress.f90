@@ -1,0 +1,134 @@
+!> The mean stress of a scene and the share of space that grains fill.
+module gravier_mean_stress
+  use gravier_kinds, only: dp
+  use gravier_facing_planes, only: find_facing_planes
+  use gravier_motion, only: grain_volume
+  use gravier_contact_kernels, only: global_impulse
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_decomposition, only: decomposition_t
+  implicit none
+  private
+  public :: mean_stress_t
+
+  !> The same on every rank.
+  type :: mean_stress_t
+    !> of the contact forces, compression positive; row: force, column: branch (nd, nd) [Pa, N/m in 2D]
+    real(dp), allocatable :: stress(:, :)
+    !> of the space that the scene takes [m^3, m^2 in 2D]
+    real(dp) :: volume = 0.0_dp
+    real(dp) :: solid_fraction = 0.0_dp
+  contains
+    procedure :: measure => mean_stress_measure
+    procedure :: pressure => mean_stress_pressure
+  end type mean_stress_t
+
+contains
+
+  !> Stress of the impulses of a step (Weber 1966), sigma = (1/(h V)) sum over the contacts of p l^T: p the impulse on the
+  !> candidate, l the branch from the antagonist to the candidate at q_m, or from the place of contact to the grain where
+  !> a boundary takes part. Places are those of the end of the step. Collective.
+  subroutine mean_stress_measure(self, decomposition, problem, h)
+    class(mean_stress_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    !> [s]
+    real(dp), intent(in) :: h
+    real(dp) :: parts(decomposition%nd**2 + 1, size(problem%sub)), sums(decomposition%nd**2 + 1)
+    integer :: s, k, nd
+
+    nd = decomposition%nd
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      call add_contacts(problem, s, parts(1:nd**2, s))
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          parts(nd**2 + 1, s) = parts(nd**2 + 1, s) + grain_volume(nd, home%radius(k))
+        end do
+      end associate
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    self%volume = volume_of(decomposition)
+    do k = 1, nd
+      self%stress(:, k) = sums((k - 1)*nd + 1:k*nd)
+    end do
+    self%solid_fraction = sums(nd**2 + 1)
+    if (.not. self%volume > 0.0_dp) return
+    self%stress(:, :) = self%stress/(h*self%volume)
+    self%solid_fraction = self%solid_fraction/self%volume
+  end subroutine mean_stress_measure
+
+  !> Add p l^T of the contacts of a subdomain, column by column.
+  pure subroutine add_contacts(problem, s, part)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (nd**2) [N m s]
+    real(dp), intent(inout) :: part(:)
+    real(dp) :: p(problem%kernels%nd)
+    integer :: c, d, nd
+
+    nd = problem%kernels%nd
+    associate (sub => problem%sub(s))
+      do c = 1, sub%n_contacts
+        call global_impulse(problem%kernels, sub%hot(:, c), sub%impulse(:, c), p)
+        do d = 1, nd
+          part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + p*(branch_length(sub, c)*sub%hot(d, c))
+        end do
+      end do
+    end associate
+  end subroutine add_contacts
+
+  !> Length of the branch of contact `c`, along its normal: that part of it which lies outside boundaries [m].
+  pure real(dp) function branch_length(sub, c) result(length)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    integer :: k
+
+    length = sub%gap(c)
+    do k = 1, 2
+      if (sub%pair(k, c) <= sub%n_grains) length = length + sub%radius(sub%pair(k, c))
+    end do
+  end function branch_length
+
+  !> Volume that the scene takes: along each axis the period, or else the way between the planes that shut it in, with the
+  !> outermost points of the grains in the place of planes that are not there. Collective.
+  real(dp) function volume_of(decomposition) result(volume)
+    type(decomposition_t), intent(in) :: decomposition
+    real(dp) :: extremes(2*decomposition%nd), low, high
+    integer :: s, k, d, nd
+
+    nd = decomposition%nd
+    extremes(:) = -huge(1.0_dp)
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          extremes(1:nd) = max(extremes(1:nd), home%radius(k) - home%position(:, k))
+          extremes(nd + 1:) = max(extremes(nd + 1:), home%radius(k) + home%position(:, k))
+        end do
+      end associate
+    end do
+    call decomposition%comm%highest_of(extremes)
+    volume = 1.0_dp
+    do d = 1, nd
+      if (decomposition%period%length(d) > 0.0_dp) then
+        volume = volume*decomposition%period%length(d)
+        cycle
+      end if
+      call find_facing_planes(decomposition%boundaries, d, low, high)
+      if (.not. low > -huge(1.0_dp)) low = -extremes(d)
+      if (.not. high < huge(1.0_dp)) high = extremes(nd + d)
+      volume = volume*max(high - low, 0.0_dp)
+    end do
+  end function volume_of
+
+  !> Mean of the diagonal [Pa, N/m in 2D].
+  pure real(dp) function mean_stress_pressure(self) result(pressure)
+    class(mean_stress_t), intent(in) :: self
+    integer :: d
+
+    pressure = 0.0_dp
+    do d = 1, size(self%stress, 1)
+      pressure = pressure + self%stress(d, d)/size(self%stress, 1)
+    end do
+  end function mean_stress_pressure
+
+end module gravier_mean_stress

@@ -1,0 +1,187 @@
+!> Grains that are generated, and the planes around them: lattices of &scene, and the samples of &sample.
+module gravier_sample_bodies
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_communicator, only: communicator_t
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
+  use gravier_motion, only: grain_mass
+  use gravier_placed_grains, only: sample_box_t
+  use gravier_radius_distribution, only: radius_distribution_t
+  use gravier_lattice_packing, only: lattice_t, cell_edge
+  use gravier_loose_packing, only: place_loosely
+  use gravier_config_types, only: config_t, scene_config_t
+  implicit none
+  private
+  public :: make_lattice, make_sample
+
+contains
+
+  !> The lattice of &scene: random radii, as many cells along each axis as it says, a box without lid with its lower
+  !> corner at the origin. What a grain gets depends on its identifier and the seed alone.
+  subroutine make_lattice(comm, scene, data)
+    type(communicator_t), intent(in) :: comm
+    type(scene_config_t), intent(in) :: scene
+    type(bodies_data_t), intent(out) :: data
+    type(radius_distribution_t) :: radii
+    type(sample_box_t) :: box
+    type(lattice_t) :: lattice
+    ! the box is made for the cells
+    type(error_t), allocatable :: never
+
+    box%nd = scene%dimension
+    box%upper(1:box%nd) = scene%lattice_count(1:box%nd)*cell_edge(scene%radius_max)
+    radii%kind = "uniform"
+    radii%nd = box%nd
+    radii%radius_min = scene%radius_min
+    radii%radius_max = scene%radius_max
+    data%total = product(int(scene%lattice_count(1:box%nd), i8))
+    call draw_grains(comm, radii, scene%density, scene%seed, data)
+    call lattice%init(box, scene%radius_max, data%total, never)
+    call lattice%place(scene%seed, data%id, data%radius, data%position)
+    call make_planes(box, .false., data)
+  end subroutine make_lattice
+
+  !> The sample of &sample before any preparation: grains at rest with identifiers from 1, a plane on each side of the box
+  !> that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period. Failure
+  !> (status_input): a table of radii that cannot be read, grains that find no place in the box. Errors are the same on all
+  !> ranks. Collective.
+  subroutine make_sample(comm, config, data, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(out) :: data
+    type(error_t), allocatable, intent(inout) :: error
+    type(radius_distribution_t) :: radii
+    type(sample_box_t) :: box
+
+    call set_radii(comm, config, radii, error)
+    if (allocated(error)) return
+    data%total = config%sample%count
+    call draw_grains(comm, radii, config%scene%density, config%sample%seed, data)
+    box%nd = config%scene%dimension
+    box%lower(:) = config%scene%period_origin
+    box%upper(:) = box%lower + config%sample%box
+    box%periodic(:) = config%scene%period > 0.0_dp
+    if (config%sample%arrangement == "lattice") then
+      call place_in_lattice(config%sample%seed, radii%largest(), box, data, error)
+    else
+      if (.not. config%sample%box(box%nd) > 0.0_dp) call set_height(comm, config, data, box)
+      call place_loosely(comm, box, config%sample%seed, data%id, data%radius, data%position, error)
+    end if
+    if (allocated(error)) then
+      error%message = config%file//": &sample box: "//error%message
+      return
+    end if
+    call make_planes(box, config%sample%preparation == "compacted", data)
+    data%has_box = any(box%periodic)
+    data%origin(:) = config%scene%period_origin
+    data%period(:) = config%scene%period
+  end subroutine make_sample
+
+  !> The distribution of radii that &sample asks for. Collective.
+  subroutine set_radii(comm, config, radii, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(radius_distribution_t), intent(out) :: radii
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (sample => config%sample)
+      radii%nd = config%scene%dimension
+      radii%kind = sample%radii
+      radii%radius = sample%radius
+      radii%radius_min = sample%radius_min
+      radii%radius_max = sample%radius_max
+      radii%radius_mean = sample%radius_mean
+      radii%radius_deviation = sample%radius_deviation
+      if (sample%radii == "table") call radii%read_table(comm, trim(sample%radius_table), error)
+    end associate
+  end subroutine set_radii
+
+  !> Identifiers, radii and masses of the grains of this rank, of `data%total` in all, at rest.
+  subroutine draw_grains(comm, radii, density, seed, data)
+    type(communicator_t), intent(in) :: comm
+    type(radius_distribution_t), intent(in) :: radii
+    !> [kg/m^nd]
+    real(dp), intent(in) :: density
+    integer, intent(in) :: seed
+    type(bodies_data_t), intent(inout) :: data
+    integer(i8) :: first
+    integer :: k, n
+
+    call find_own_rows(comm, data%total, first, n)
+    call allocate_bodies(data, radii%nd, n)
+    allocate (data%mass(n))
+    do k = 1, n
+      data%id(k) = first + k
+      data%radius(k) = radii%draw(data%id(k), seed)
+      data%mass(k) = grain_mass(radii%nd, data%radius(k), density)
+    end do
+  end subroutine draw_grains
+
+  !> Put the grains into the cells of a lattice; a box without height becomes as high as the lattice.
+  subroutine place_in_lattice(seed, largest, box, data, error)
+    integer, intent(in) :: seed
+    !> [m]
+    real(dp), intent(in) :: largest
+    type(sample_box_t), intent(inout) :: box
+    type(bodies_data_t), intent(inout) :: data
+    type(error_t), allocatable, intent(inout) :: error
+    type(lattice_t) :: lattice
+
+    call lattice%init(box, largest, data%total, error)
+    if (allocated(error)) return
+    call lattice%place(seed, data%id, data%radius, data%position)
+    if (.not. box%upper(box%nd) > box%lower(box%nd)) box%upper(box%nd) = box%lower(box%nd) + lattice%height()
+  end subroutine place_in_lattice
+
+  !> The height at which the grains fill the share of the box that is asked for. Collective.
+  subroutine set_height(comm, config, data, box)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(sample_box_t), intent(inout) :: box
+    integer :: nd
+
+    nd = box%nd
+    box%upper(nd) = box%lower(nd) + comm%sum_real(data%mass)/config%scene%density/ &
+      & (config%sample%solid_fraction*product(config%sample%box(1:nd - 1)))
+  end subroutine set_height
+
+  !> Planes on the sides of the box that are not periodic, facing inwards: the floor, the two sides across each other axis,
+  !> and the lid.
+  subroutine make_planes(box, lid, data)
+    type(sample_box_t), intent(in) :: box
+    logical, intent(in) :: lid
+    type(bodies_data_t), intent(inout) :: data
+    integer :: d, n, nd
+
+    nd = box%nd
+    n = 2*count(.not. box%periodic(1:nd))
+    if (.not. (lid .or. box%periodic(nd))) n = n - 1
+    call allocate_walls(data, nd, n)
+    data%wall_normal(:, :) = 0.0_dp
+    n = 0
+    if (.not. box%periodic(nd)) call add_plane(nd, 1.0_dp)
+    do d = 1, nd - 1
+      if (box%periodic(d)) cycle
+      call add_plane(d, 1.0_dp)
+      call add_plane(d, -1.0_dp)
+    end do
+    if (lid .and. .not. box%periodic(nd)) call add_plane(nd, -1.0_dp)
+
+  contains
+
+    !> The plane across axis `d` with the normal `sense` along it.
+    subroutine add_plane(d, sense)
+      integer, intent(in) :: d
+      real(dp), intent(in) :: sense
+
+      n = n + 1
+      data%wall_id(n) = data%total + n
+      data%wall_point(:, n) = box%lower(1:nd)
+      if (sense < 0.0_dp) data%wall_point(d, n) = box%upper(d)
+      data%wall_normal(d, n) = sense
+    end subroutine add_plane
+
+  end subroutine make_planes
+
+end module gravier_sample_bodies

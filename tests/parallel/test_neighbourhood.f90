@@ -1,0 +1,305 @@
+!> What each subdomain sees: its grains and the ghosts that its pairs need, current after each move; contacts found in the
+!> lists while grains move by less than half the skin are those between all grains; lists are made anew when they must be.
+program test_neighbourhood
+  use gravier_kinds, only: dp, i8
+  use gravier_periodic, only: no_shift, shift_code, shift_of_code
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_boundary, only: boundary_t, shape_segment, shape_circle, shape_cylinder, shape_grains, shape_outlet
+  use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, make_decomposition
+  use gravier_check, only: check, check_equal, finish_checks
+  implicit none
+  integer, parameter :: n_grains = 220, counts(*) = [1, 2, 7, 12]
+  real(dp), parameter :: alert = 0.02_dp, skin = 0.04_dp
+  type(communicator_t), target :: comm
+  integer :: nd, k, axes
+
+  call start_parallel()
+  call comm%init()
+  do nd = 2, 3
+    do k = 1, size(counts)
+      call test_views(nd, 0, counts(k), .false., rule_dual)
+      call test_views(nd, 0, counts(k), .true., rule_dual)
+      call test_views(nd, 0, counts(k), .true., rule_primal)
+    end do
+    do axes = 1, 2**nd - 1
+      call test_views(nd, axes, 7, .true., rule_dual)
+      call test_views(nd, axes, 7, .false., rule_primal)
+    end do
+  end do
+  call test_due_grains()
+  call test_due_boundaries()
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> Build, move by nearly half the skin, refresh, move on, build again.
+  subroutine test_views(nd, axes, n_subdomains, by_cells, kind)
+    integer, intent(in) :: nd, axes, n_subdomains, kind
+    logical, intent(in) :: by_cells
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: seen
+    integer :: t, g, home_of(n_grains)
+
+    call cloud%init(nd, n_grains, 0.03_dp, 0.1_dp, 50 + nd)
+    call cloud%make_periodic(axes)
+    decomposition%rule = cloud%rule(alert, skin, kind)
+    call make_decomposition(comm, cloud, n_subdomains, nd, by_cells, decomposition)
+    call check(seen%are_due(decomposition), "lists are due before the first")
+    do t = 0, 1
+      call wrap(cloud)
+      do g = 1, n_grains
+        home_of(g) = decomposition%partition%owner(cloud%place(:, g))
+      end do
+      call decomposition%settle()
+      call seen%build(decomposition, 2)
+      call check_equal(seen%builds, int(t + 1, i8), "lists made")
+      call check(.not. seen%are_due(decomposition), "lists are not due when made")
+      call check_views(decomposition, seen, cloud, home_of)
+      call check_pairs(decomposition, seen, cloud, alert + skin, .true.)
+      call move(decomposition, cloud, t, 0.499_dp*skin)
+      call check(.not. seen%are_due(decomposition), "lists are not due while grains move by less than half the skin")
+      call seen%refresh(decomposition)
+      call check_views(decomposition, seen, cloud, home_of)
+      call check_pairs(decomposition, seen, cloud, alert, .false.)
+      call move(decomposition, cloud, 10 + t, skin)
+    end do
+  end subroutine test_views
+
+  subroutine wrap(cloud)
+    type(cloud_t), intent(inout) :: cloud
+    integer :: g, turns(cloud%nd)
+
+    do g = 1, cloud%n
+      call cloud%period%wrap(cloud%place(:, g), turns)
+    end do
+  end subroutine wrap
+
+  !> Move every grain by `way`, somewhere, and give it a velocity that tells its place.
+  subroutine move(decomposition, cloud, t, way)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(cloud_t), intent(inout) :: cloud
+    integer, intent(in) :: t
+    real(dp), intent(in) :: way
+    real(dp) :: direction(cloud%nd)
+    integer :: g, d, s, k
+
+    do g = 1, cloud%n
+      do d = 1, cloud%nd
+        direction(d) = draw(60 + t, g, d) - 0.5_dp
+      end do
+      cloud%place(:, g) = cloud%place(:, g) + way*direction/norm2(direction)
+    end do
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          home%position(:, k) = cloud%place(:, home%id(k))
+          home%velocity(:, k) = 2*home%position(:, k)
+        end do
+      end associate
+    end do
+  end subroutine move
+
+  !> Own grains as they stand in `home`, and ghosts, once each, where they are, with their owners.
+  subroutine check_views(decomposition, seen, cloud, home_of)
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: seen
+    type(cloud_t), intent(in) :: cloud
+    !> subdomain of each grain when the lists were made
+    integer, intent(in) :: home_of(:)
+    integer :: s, k, times(n_grains)
+    logical :: own, ghosts, placed
+    real(dp) :: velocity(cloud%nd)
+
+    call check_equal(size(seen%view), size(decomposition%home), "one view for each subdomain")
+    own = .true.
+    ghosts = .true.
+    placed = .true.
+    do s = 1, size(seen%view)
+      associate (bodies => seen%view(s)%bodies, home => decomposition%home(s), view => seen%view(s))
+        own = own .and. size(view%home) == bodies%n .and. size(view%origin) == bodies%n
+        if (.not. own) exit
+        times(:) = 0
+        own = own .and. count(view%origin > 0) == home%n
+        do k = 1, bodies%n
+          times(bodies%id(k)) = times(bodies%id(k)) + 1
+          placed = placed .and. all(abs(bodies%position(:, k) - cloud%place(:, bodies%id(k))) <= 0.0_dp)
+          if (view%origin(k) > 0) then
+            own = own .and. home%id(view%origin(k)) == bodies%id(k) .and. view%home(k) == decomposition%subdomain_of(s)
+            velocity(:) = home%velocity(:, view%origin(k))
+            placed = placed .and. all(abs(bodies%velocity(:, k) - velocity) <= 0.0_dp)
+          else
+            ghosts = ghosts .and. view%home(k) /= decomposition%subdomain_of(s)
+            ghosts = ghosts .and. view%home(k) == home_of(bodies%id(k))
+          end if
+        end do
+        ghosts = ghosts .and. all(times <= 1)
+      end associate
+    end do
+    call check(own, "own grains")
+    call check(ghosts, "ghosts once each, with their owners")
+    call check(placed, "places and velocities are current")
+  end subroutine check_views
+
+  !> The listed pairs within `range` are those between all grains, each in one subdomain: that of its owner point, where
+  !> the lists have just been made.
+  subroutine check_pairs(decomposition, seen, cloud, range, fresh)
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: seen
+    type(cloud_t), intent(in) :: cloud
+    real(dp), intent(in) :: range
+    logical, intent(in) :: fresh
+    type(near_pair_t), allocatable :: pairs(:)
+    type(near_pair_t) :: pair
+    !> times that a pair was found, 27 owner + code of its shift
+    integer(i8), allocatable :: times(:, :), owner(:, :), expected(:, :), right(:, :)
+    real(dp) :: place(cloud%nd)
+    integer :: s, p, code, shift(3)
+
+    allocate (times(n_grains, n_grains), owner(n_grains, n_grains), expected(n_grains, n_grains), right(n_grains, n_grains), &
+      & source=0_i8)
+    do s = 1, size(seen%view)
+      associate (list => seen%view(s)%list, bodies => seen%view(s)%bodies)
+        do p = 1, list%n
+          pair%i = int(bodies%id(list%candidate(p)))
+          pair%j = int(bodies%id(list%antagonist(p)))
+          code = no_shift
+          if (cloud%period%on()) code = list%shift(p)
+          shift(:) = shift_of_code(code)
+          pair%shift(:) = shift
+          call cloud%find_antagonist(pair, place)
+          if (norm2(cloud%place(:, pair%i) - place) - cloud%radius(pair%i) - cloud%radius(pair%j) > range) cycle
+          times(pair%i, pair%j) = times(pair%i, pair%j) + 1
+          owner(pair%i, pair%j) = 27*decomposition%subdomain_of(s) + code
+        end do
+      end associate
+    end do
+    do p = 1, n_grains
+      call comm%sum_counts(times(:, p))
+      call comm%sum_counts(owner(:, p))
+    end do
+    call cloud%near_pairs(range, pairs)
+    do p = 1, size(pairs)
+      call cloud%find_antagonist(pairs(p), place)
+      if (decomposition%rule%kind == rule_dual) then
+        place(:) = (cloud%place(:, pairs(p)%i) + place)/2
+      else
+        place(:) = cloud%place(:, pairs(p)%i)
+      end if
+      expected(pairs(p)%i, pairs(p)%j) = 1
+      right(pairs(p)%i, pairs(p)%j) = 27*decomposition%partition%owner(place) + shift_code(pairs(p)%shift)
+    end do
+    call check(size(pairs) > 60, "enough pairs to tell")
+    call check(all(times == expected), "pairs of all subdomains are those between all grains")
+    if (fresh) call check(all(owner == right), "pairs in the subdomains of their owner points")
+  end subroutine check_pairs
+
+  !> One grain, whichever it is, that moves by more than half the skin makes the lists due on all ranks.
+  subroutine test_due_grains()
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: seen
+    integer :: g
+
+    call cloud%init(2, n_grains, 0.03_dp, 0.1_dp, 70)
+    decomposition%rule = cloud%rule(alert, skin, rule_dual)
+    call make_decomposition(comm, cloud, 5, 2, .false., decomposition)
+    call seen%build(decomposition, 2)
+    do g = 1, n_grains, 23
+      call shift_grain(decomposition, g, 0.49_dp*skin)
+      call check(.not. seen%are_due(decomposition), "a grain within half the skin")
+      call shift_grain(decomposition, g, 0.02_dp*skin)
+      call check(seen%are_due(decomposition), "a grain beyond half the skin")
+      call shift_grain(decomposition, g, -0.51_dp*skin)
+      call check(.not. seen%are_due(decomposition), "a grain that came back")
+    end do
+  end subroutine test_due_grains
+
+  subroutine shift_grain(decomposition, g, way)
+    type(decomposition_t), intent(inout) :: decomposition
+    integer, intent(in) :: g
+    real(dp), intent(in) :: way
+    integer :: s
+
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        where (home%id == g) home%position(2, :) = home%position(2, :) - way
+      end associate
+    end do
+  end subroutine shift_grain
+
+  !> The way of a boundary adds to that of the grains; what its surface does not feel does not count.
+  subroutine test_due_boundaries()
+    type(boundary_t) :: b
+    real(dp), parameter :: floor(3) = [0.0_dp, 0.0_dp, -5.0_dp], up(3) = [0.0_dp, 0.0_dp, 1.0_dp]
+
+    b = plane(1000, floor, up)
+    b%velocity(:) = [5.0_dp, 0.0_dp, 0.9_dp]
+    call check(.not. due_after(b, 0.0_dp), "a plane that slides and rises by less than the skin")
+    b%velocity(:) = [5.0_dp, 0.0_dp, 1.1_dp]
+    call check(due_after(b, 0.0_dp), "a plane that rises by more")
+    b%velocity(:) = [0.0_dp, 0.0_dp, -0.6_dp]
+    call check(.not. due_after(b, 0.39_dp), "a plane and grains, less than the skin")
+    call check(due_after(b, 0.41_dp), "a plane and grains, more than the skin")
+    b%shape = shape_outlet
+    call check(.not. due_after(b, 0.41_dp), "an outlet has no surface")
+    b%shape = shape_grains
+    call check(.not. due_after(b, 0.41_dp), "nor has a boundary of grains")
+    b = plane(1000, floor, up)
+    b%velocity(3) = 8.0_dp
+    b%present = .false.
+    call check(.not. due_after(b, 0.41_dp), "a boundary that was removed")
+    b = plane(1000, floor, up)
+    b%spin(1) = 1.0e-3_dp
+    call check(due_after(b, 0.0_dp), "a plane that tilts")
+    b = plane(1000, floor, [0.0_dp, 0.0_dp, 0.0_dp])
+    b%shape = shape_segment
+    b%edge(1, 1) = 2.0_dp
+    b%spin(3) = 0.45_dp
+    call check(.not. due_after(b, 0.0_dp), "a segment whose end goes less far than the skin")
+    b%spin(3) = 0.55_dp
+    call check(due_after(b, 0.0_dp), "a segment whose end goes farther")
+    b = plane(1000, floor, [0.0_dp, 0.0_dp, 0.0_dp])
+    b%shape = shape_circle
+    b%spin(3) = 10.0_dp
+    call check(.not. due_after(b, 0.0_dp), "a circle that turns about its centre")
+    b%velocity(2) = 1.1_dp
+    call check(due_after(b, 0.0_dp), "a circle that moves")
+    b = plane(1000, floor, [0.48_dp, 0.6_dp, 0.64_dp])
+    b%shape = shape_cylinder
+    b%spin(:) = 1000.0_dp*b%axis
+    call check(.not. due_after(b, 0.0_dp), "a drum that turns about its axis")
+    b%spin(1) = -10.0_dp
+    call check(due_after(b, 0.0_dp), "a drum that tilts")
+  end subroutine test_due_boundaries
+
+  !> Whether lists are due when a boundary has moved for a time equal to the skin, and grains by a part of the skin.
+  logical function due_after(boundary, part) result(due)
+    type(boundary_t), intent(in) :: boundary
+    real(dp), intent(in) :: part
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: seen
+    integer :: k
+
+    call cloud%init(3, 20, 0.03_dp, 0.1_dp, 70)
+    decomposition%rule = cloud%rule(alert, skin, rule_dual)
+    allocate (decomposition%boundaries(2))
+    decomposition%boundaries(1) = plane(999, [0.0_dp, 0.0_dp, -9.0_dp], [0.0_dp, 0.0_dp, 1.0_dp])
+    decomposition%boundaries(2) = boundary
+    call make_decomposition(comm, cloud, 3, 3, .false., decomposition)
+    call seen%build(decomposition, 2)
+    ! in several steps, as the axis of a drum picks up roundings
+    do k = 1, 300
+      call decomposition%boundaries(2)%move(skin/300.0_dp)
+    end do
+    call move(decomposition, cloud, 1, part*skin)
+    due = seen%are_due(decomposition)
+  end function due_after
+
+end program test_neighbourhood

@@ -1,0 +1,120 @@
+!> Tables of quantities against time: values at, between, before and after the rows; what a file must be.
+program test_time_table
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, status_input
+  use gravier_time_table, only: time_table_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+  character(len=*), parameter :: file = "table.csv", newline = new_line("a"), names = "vx vy omega"
+  type(time_table_t) :: table
+
+  call MPI_Init()
+  call test_values()
+  call test_one_row()
+  call test_many_rows()
+  call test_refusals()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  subroutine write_file(text)
+    character(len=*), intent(in) :: text
+    integer :: unit
+
+    open (newunit=unit, file=file, access="stream", status="replace", action="write")
+    write (unit) text
+    close (unit)
+  end subroutine write_file
+
+  subroutine read_table(text, error)
+    character(len=*), intent(in) :: text
+    type(error_t), allocatable, intent(out) :: error
+
+    call write_file(text)
+    call table%read(file, names, error)
+  end subroutine read_table
+
+  !> Columns in another order than the names; numbers that are exact.
+  subroutine test_values()
+    type(error_t), allocatable :: error
+
+    call read_table("omega,time,vx"//newline//"8,1,-1"//newline//"4,3,-1"//newline//"12,3.5,-2"//newline, error)
+    call check(.not. allocated(error), "a table")
+    if (allocated(error)) return
+    call check(table%has(1) .and. .not. table%has(2) .and. table%has(3), "columns of the file")
+    call check_equal(size(table%time), 3, "rows")
+    call check_close(table%at(3, -7.0_dp), 8.0_dp, 0.0_dp, "before the first row")
+    call check_close(table%at(3, 1.0_dp), 8.0_dp, 0.0_dp, "at the first row")
+    call check_close(table%at(3, 1.5_dp), 7.0_dp, 0.0_dp, "between rows")
+    call check_close(table%at(3, 3.0_dp), 4.0_dp, 0.0_dp, "at a row")
+    call check_close(table%at(3, 3.25_dp), 8.0_dp, 0.0_dp, "between the last rows")
+    call check_close(table%at(3, 3.5_dp), 12.0_dp, 0.0_dp, "at the last row")
+    call check_close(table%at(3, 1.0e9_dp), 12.0_dp, 0.0_dp, "after the last row")
+    call check_close(table%at(1, 2.0_dp), -1.0_dp, 0.0_dp, "a constant stretch of another column")
+  end subroutine test_values
+
+  subroutine test_one_row()
+    type(error_t), allocatable :: error
+
+    call read_table("time,vy"//newline//"2,5"//newline, error)
+    call check(.not. allocated(error), "one row")
+    if (allocated(error)) return
+    call check_close(table%at(2, 0.0_dp), 5.0_dp, 0.0_dp, "one row, before")
+    call check_close(table%at(2, 2.0_dp), 5.0_dp, 0.0_dp, "one row, then")
+    call check_close(table%at(2, 9.0_dp), 5.0_dp, 0.0_dp, "one row, after")
+  end subroutine test_one_row
+
+  !> More rows than there is room for at first: a square of the time, exact at rows, off by 1/4 between them.
+  subroutine test_many_rows()
+    type(error_t), allocatable :: error
+    character(len=24) :: row
+    character(len=:), allocatable :: text
+    logical :: right
+    integer :: k
+
+    text = "time,vx"//newline
+    do k = 0, 999
+      write (row, "(i0, a, i0)") k, ",", k*k
+      text = text//trim(row)//newline
+    end do
+    call read_table(text, error)
+    call check(.not. allocated(error), "many rows")
+    if (allocated(error)) return
+    right = .true.
+    do k = 0, 998
+      right = right .and. abs(table%at(1, real(k, dp)) - k*k) <= 0.0_dp
+      right = right .and. abs(table%at(1, k + 0.5_dp) - (k*(k + 1) + 0.5_dp)) <= 0.0_dp
+    end do
+    call check(right, "values of a long table")
+    call check_equal(size(table%time), 1000, "a long table: rows")
+  end subroutine test_many_rows
+
+  subroutine test_refusals()
+    call refuse("vx,vy"//newline//"1,2"//newline, "table.csv: column time is missing; known are time vx vy omega")
+    call refuse("time,vz"//newline//"1,2"//newline, "table.csv: column vz is unknown here; known are time vx vy omega")
+    call refuse("time"//newline//"1"//newline, "table.csv: no column besides time; known are vx vy omega")
+    call refuse("time,vx"//newline, "table.csv: no rows; at least one was expected")
+    call refuse("time,vx"//newline//"1,2"//newline//"1,3"//newline, &
+      & "table.csv: line 3: column time: ""1"", but a time later than that of the row above")
+    call refuse("time,vx"//newline//"1,2"//newline//"0,3"//newline, &
+      & "table.csv: line 3: column time: ""0"", but a time later than that of the row above")
+    call refuse("time,vx"//newline//"1,fast"//newline, "table.csv: line 2: column vx: ""fast"", but a")
+    call refuse("time,vx"//newline//"1"//newline, "table.csv: line 2: ")
+    call refuse("", "table.csv: empty")
+  end subroutine test_refusals
+
+  subroutine refuse(text, expected)
+    !> of the file; how the message begins
+    character(len=*), intent(in) :: text, expected
+    type(error_t), allocatable :: error
+
+    call read_table(text, error)
+    call check(allocated(error), "refused: "//expected)
+    if (.not. allocated(error)) return
+    call check_equal(error%message(1:min(len(expected), len(error%message))), expected, "message")
+    call check_equal(error%status, status_input, "status of "//expected)
+  end subroutine refuse
+
+end program test_time_table
