@@ -351,6 +351,9 @@ class Restart(RunTestCase):
             status, said = run.end()
             self.assertNotIn(status, (0, 1, 2, 3), f"not killed at write {count}: {said}")
             self.check_readable(directory)
+            # and killed again while the restart takes states out of the file
+            Going(case, ranks, directory, ["--restart"], shim=(library, 0, 1 + count % 4)).end()
+            self.check_readable(directory)
             again = restart(directory, 3 - ranks)
             self.assert_status(again, 0)
             self.assert_same(straight, directory, f"killed on {ranks} ranks before write {count}")
