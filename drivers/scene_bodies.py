@@ -33,7 +33,7 @@ def compact(centres, radii, size, pressure, steps):
         normal = np.eye(d)[k]
         planes.append({"name": f"low {AXES[k]}", "shape": "plane", "normal": normal})
         planes.append({"name": f"high {AXES[k]}", "shape": "plane", "point": size[k] * normal, "normal": -normal,
-                       "free": list(normal > 0.5), "pressure": -pressure, "mass": mass})
+                       "free": list(normal > 0.5), "pressure": pressure, "mass": mass})
     with tempfile.TemporaryDirectory() as scratch:
         write_hdf5(Path(scratch) / "loose.h5", centres, radii)
         run(scratch, {

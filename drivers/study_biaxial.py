@@ -30,7 +30,7 @@ def walls(size, mass, lid):
         {"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
         {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
         {"name": "right", "shape": "plane", "point": [size[0], 0.0], "normal": [-1.0, 0.0], "free": [True, False],
-         "pressure": -PRESSURE, "mass": mass},
+         "pressure": PRESSURE, "mass": mass},
         {"name": "lid", "shape": "plane", "point": [0.0, size[1]], "normal": [0.0, -1.0], **lid}]
 
 
@@ -94,7 +94,7 @@ def coordination(state, n, layer):
 
 def compact(options, size, mass):
     """Press the loose disks of OUT/loose.h5 together, then let them come to rest with exact solves."""
-    free_lid = {"free": [False, True], "pressure": -PRESSURE, "mass": mass}
+    free_lid = {"free": [False, True], "pressure": PRESSURE, "mass": mass}
     run(options.out / "compaction", {
         "scene": scene("../loose.h5", 0.0, 0.4 * SMALLEST),
         "time": {"step": STEP, "steps": options.compaction_steps},

@@ -18,12 +18,8 @@ STEP = 5.0e-4  # s
 SETTLING = 0.4  # s
 
 
-def collapse(folder, aspect, grains, rng):
-    """Settle a column of about that ratio, take the gate away: width and height before, length after, last state."""
-    # the lattice comes down by about a seventh when it settles
-    cell = 2.05 * LARGEST
-    width = cell * max(round(np.sqrt(grains / (1.17 * aspect))), 6)
-    centres, radii = lattice([0.0, 0.0], [width, cell * round(grains / (width / cell))], SMALLEST, LARGEST, rng)
+def fall(folder, width, centres, radii):
+    """The run itself."""
     folder.mkdir(parents=True, exist_ok=True)
     write_hdf5(folder / "column.h5", centres, radii)
     height = centres[:, 1].max()
@@ -38,6 +34,17 @@ def collapse(folder, aspect, grains, rng):
             {"name": "left", "shape": "plane", "normal": [1.0, 0.0], "friction": 0.0},
             {"name": "gate", "shape": "plane", "point": [width, 0.0], "normal": [-1.0, 0.0], "friction": 0.0,
              "remove_at": SETTLING}])
+
+
+def collapse(folder, aspect, grains, rng, measure):
+    """Settle a column of about that ratio, take the gate away: width and height before, length after, last state. With
+    `measure`, the run was made before."""
+    # the lattice comes down by about a seventh when it settles
+    cell = 2.05 * LARGEST
+    width = cell * max(round(np.sqrt(grains / (1.17 * aspect))), 6)
+    centres, radii = lattice([0.0, 0.0], [width, cell * round(grains / (width / cell))], SMALLEST, LARGEST, rng)
+    if not measure:
+        fall(folder, width, centres, radii)
     settled = [state["bodies/position"][:] for number, _, state in states(folder / "results.h5")
                if number == int(SETTLING / STEP)][0]
     # as high as a box of the same width and mean height of its centre
@@ -47,22 +54,22 @@ def collapse(folder, aspect, grains, rng):
 
 
 def length_of(centres, radii):
-    """How far the heap reaches from the left: up to the first gap of two diameters, beyond which lie single disks."""
-    order = np.argsort(centres[:, 0])
-    right = np.maximum.accumulate((centres[:, 0] + radii)[order])
-    gaps = np.flatnonzero((centres[:, 0] - radii)[order][1:] - right[:-1] > 4.0 * radii.mean())
-    return right[gaps[0]] if len(gaps) else right[-1]
+    """Where the heap ends: the disks beyond are fewer than one full row, pi/4 diameters high, over two diameters."""
+    bins = np.arange(0.0, centres[:, 0].max() + 8.0 * radii.mean(), 4.0 * radii.mean())
+    thickness = np.histogram(centres[:, 0], bins, weights=np.pi * radii**2)[0] / np.diff(bins)
+    return bins[np.flatnonzero(thickness < 0.5 * np.pi * radii.mean())[0]]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", metavar="OUT", type=Path)
     parser.add_argument("--grains", type=int, default=1000)
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
     options = parser.parse_args()
     rng = np.random.default_rng(2005)
     rows, heaps = [], []
     for aspect in ASPECTS:
-        width, height, length, heap = collapse(options.out / f"a{aspect}", aspect, options.grains, rng)
+        width, height, length, heap = collapse(options.out / f"a{aspect}", aspect, options.grains, rng, options.measure)
         rows.append((height / width, len(heap[1]), width, height, length, length / width - 1.0))
         heaps.append((width, *heap))
     ratio, number, width, height, length, out = np.array(rows).T
