@@ -163,7 +163,8 @@ def main():
     smooth = np.convolve(sine, np.ones(9) / 9.0, "valid")
     overlap = read_history(options.out / "shear")["max_overlap"].max() / radii.mean()
     late = strain > 0.6 * options.strain
-    summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(), largest_overlap_over_radius=overlap,
+    summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(),
+                   largest_overlap_over_radius=overlap,
                    inertial_number=options.rate * 2.0 * radii.mean() * np.sqrt(DENSITY / PRESSURE))
     write_csv(options.out / "biaxial_summary.csv", {"quantity": list(summary), "value": [float(v) for v in summary.values()]})
     print(summary)

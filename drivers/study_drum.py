@@ -11,7 +11,7 @@ import numpy as np
 from study_support import SOURCE, draw_disks, plt, run, states, write_csv
 
 RADIUS, RATE = 0.2, 1.0  # m, rad/s
-START = 1.5  # s, when the flow has become steady
+START = 2.0  # s, when the flow has become steady
 
 
 def surface_angle(centres):
@@ -31,9 +31,9 @@ def main():
     run(options.out / "drum", {
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/drum.csv"), "density": 2500.0,
                   "friction": 0.5, "alert_distance": 1.5e-3},
-        "time": {"step": 5.0e-4, "steps": 12000},
-        "solver": {"tolerance": 1.0e-3, "max_iterations": 5000},
-        "output": {"directory": ".", "every": 40, "contacts": False}},
+        "time": {"step": 1.0e-3, "steps": 14000},
+        "solver": {"tolerance": 1.0e-3, "max_iterations": 1000},
+        "output": {"directory": ".", "every": 20, "contacts": False}},
         [{"name": "drum", "shape": "circle", "radius": RADIUS, "rotation": RATE, "friction": 0.8}])
     rows, last = [], None
     for _, time, state in states(options.out / "drum/results.h5"):
