@@ -3,7 +3,6 @@ module gravier_columns_study
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_body_store, only: body_set_t
   use gravier_solve, only: solve_report_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -96,14 +95,12 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(simulation_t) :: simulation
-    type(body_set_t) :: grains
     type(step_figures_t) :: figures
 
     call parse_config("column of "//to_text(column%disks)//" disks", text, config, error)
     call comm%agree(error)
     if (allocated(error)) return
-    call simulation%init(comm, config, grains, error)
-    if (.not. allocated(error)) call simulation%start(grains, error)
+    call simulation%init(comm, config, error)
     if (.not. allocated(error)) call simulation%advance(figures, error)
     if (.not. allocated(error)) report = figures%solve
     call simulation%free()

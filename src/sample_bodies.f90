@@ -1,7 +1,8 @@
 !> Grains that are generated, and the planes around them: lattices of &scene, and the samples of &sample.
 module gravier_sample_bodies
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
   use gravier_motion, only: grain_mass
@@ -9,7 +10,7 @@ module gravier_sample_bodies
   use gravier_radius_distribution, only: radius_distribution_t
   use gravier_lattice_packing, only: lattice_t, cell_edge
   use gravier_loose_packing, only: place_loosely
-  use gravier_config_types, only: config_t, scene_config_t
+  use gravier_config_types, only: config_t
   implicit none
   private
   public :: make_lattice, make_sample
@@ -17,29 +18,53 @@ module gravier_sample_bodies
 contains
 
   !> The lattice of &scene: random radii, as many cells along each axis as it says, a box without lid with its lower
-  !> corner at the origin. What a grain gets depends on its identifier and the seed alone.
-  subroutine make_lattice(comm, scene, data)
+  !> corner at the origin (that of the period), without planes along periodic axes. What a grain gets depends on its
+  !> identifier and the seed alone. Errors are the same on all ranks.
+  subroutine make_lattice(comm, config, data, error)
     type(communicator_t), intent(in) :: comm
-    type(scene_config_t), intent(in) :: scene
+    type(config_t), intent(in) :: config
     type(bodies_data_t), intent(out) :: data
+    type(error_t), allocatable, intent(inout) :: error
     type(radius_distribution_t) :: radii
     type(sample_box_t) :: box
     type(lattice_t) :: lattice
     ! the box is made for the cells
     type(error_t), allocatable :: never
 
-    box%nd = scene%dimension
-    box%upper(1:box%nd) = scene%lattice_count(1:box%nd)*cell_edge(scene%radius_max)
+    call make_lattice_box(config, box, error)
+    if (allocated(error)) return
     radii%kind = "uniform"
     radii%nd = box%nd
-    radii%radius_min = scene%radius_min
-    radii%radius_max = scene%radius_max
-    data%total = product(int(scene%lattice_count(1:box%nd), i8))
-    call draw_grains(comm, radii, scene%density, scene%seed, data)
-    call lattice%init(box, scene%radius_max, data%total, never)
-    call lattice%place(scene%seed, data%id, data%radius, data%position)
+    radii%radius_min = config%scene%radius_min
+    radii%radius_max = config%scene%radius_max
+    data%total = product(int(config%scene%lattice_count(1:box%nd), i8))
+    call draw_grains(comm, radii, config%scene%density, config%scene%seed, data)
+    call lattice%init(box, config%scene%radius_max, data%total, never)
+    call lattice%place(config%scene%seed, data%id, data%radius, data%position)
     call make_planes(box, .false., data)
   end subroutine make_lattice
+
+  !> The box of the lattice, which the period must have room for.
+  subroutine make_lattice_box(config, box, error)
+    type(config_t), intent(in) :: config
+    type(sample_box_t), intent(out) :: box
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: width
+    integer :: d
+
+    associate (scene => config%scene)
+      box%nd = scene%dimension
+      box%lower(:) = scene%period_origin
+      box%periodic(:) = scene%period > 0.0_dp
+      do d = 1, box%nd
+        width = scene%lattice_count(d)*cell_edge(scene%radius_max)
+        box%upper(d) = box%lower(d) + width
+        if (.not. box%periodic(d) .or. scene%period(d) >= (1.0_dp - 1.0e-9_dp)*width) cycle
+        call raise(error, status_input, config%file//": &scene period: expected at least "//to_text(width, 6)// &
+          & " m along axis "//to_text(d)//", the width of the lattice")
+      end do
+    end associate
+  end subroutine make_lattice_box
 
   !> The sample of &sample before any preparation: grains at rest with identifiers from 1, a plane on each side of the box
   !> that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period. Failure

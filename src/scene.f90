@@ -46,7 +46,7 @@ contains
     case ("column")
       call make_column(comm, config%scene, data)
     case ("lattice")
-      call make_lattice(comm, config%scene, data)
+      call make_lattice(comm, config, data, error)
     case ("sample")
       call make_sample(comm, config, data, error)
     case default
@@ -60,7 +60,6 @@ contains
     call set_period(config%scene, data, scene)
     call take_data(comm, config%scene, data, scene)
     call glue(comm, config, data, scene, error)
-    call check_period(config, scene, error)
   end subroutine make_scene
 
   !> The period of the input file, else that of the bodies file.
@@ -75,19 +74,6 @@ contains
     scene%period%length(:) = data%period
     scene%period%origin(:) = data%origin
   end subroutine set_period
-
-  !> A pair of grains must not be able to meet across both sides of a period.
-  subroutine check_period(config, scene, error)
-    type(config_t), intent(in) :: config
-    type(scene_t), intent(in) :: scene
-    type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: least
-
-    least = 8.0_dp*scene%largest_radius
-    if (.not. any(scene%period%length > 0.0_dp .and. scene%period%length <= least)) return
-    call raise(error, status_input, config%file//": &scene period: expected more than four diameters of the largest grain, "// &
-      & to_text(least, 4)//" m, along each periodic axis")
-  end subroutine check_period
 
   !> Glue the grains of a group to the boundary of that group. Errors are the same on all ranks. Collective.
   subroutine glue(comm, config, data, scene, error)

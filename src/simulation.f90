@@ -1,7 +1,8 @@
 !> A scene in time: what it takes to make one step after the other, without output.
 module gravier_simulation
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
@@ -134,6 +135,8 @@ contains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
     call set_physics(self, scene)
+    call check_period(self, scene, error)
+    if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%scheme)
     self%decomposition%boundaries = scene%boundaries
@@ -202,6 +205,19 @@ contains
       rule%kind = merge(rule_primal, rule_dual, self%config%decomposition%kind == "primal")
     end associate
   end subroutine set_physics
+
+  !> A pair of grains must not be listed across both sides of a period.
+  subroutine check_period(self, scene, error)
+    type(simulation_t), intent(in) :: self
+    type(scene_t), intent(in) :: scene
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: least
+
+    least = 2.0_dp*(2.0_dp*scene%largest_radius + self%decomposition%rule%range())
+    if (.not. any(scene%period%length > 0.0_dp .and. scene%period%length <= least)) return
+    call raise(error, status_input, self%config%file//": &scene period: expected more than "//to_text(least, 4)// &
+      & " m along each periodic axis: two diameters of the largest grain and twice the alert distance and the skin")
+  end subroutine check_period
 
   subroutine set_control(self)
     class(simulation_t), intent(inout) :: self

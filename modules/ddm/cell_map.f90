@@ -133,7 +133,8 @@ contains
     real(dp) :: y
     integer :: cell
 
-    y = (x - self%origin(d))/self%unit(d)*self%scale(d)
+    ! by halves: the whole way may have no number
+    y = 2.0_dp*((0.5_dp*x - 0.5_dp*self%origin(d))/self%unit(d)*self%scale(d))
     cell = int(min(max(y, 0.0_dp), real(self%n(d) - 1, dp)))
     place = cell
     if (self%split == 1) return

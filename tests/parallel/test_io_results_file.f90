@@ -439,7 +439,7 @@ contains
     call file%close(error)
     call expect_none(error, "reading after refusals")
     call results%open(world, path//"/none.h5", "", "", "", 2, error)
-    call expect(error, path//"/none.h5: cannot create this file: Not a directory", "no such directory")
+    call expect(error, path//"/none.h5.part: cannot create this file: Not a directory", "no such directory")
   end subroutine test_refused
 
   !> Later steps go, earlier ones stay as they were, and the run can go on, as often as it likes.

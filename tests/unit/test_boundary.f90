@@ -337,7 +337,7 @@ contains
       found(n - nd:n - 1) = force(1:nd)
       call b%applied_force(nd, 1.0_dp, 2.0_dp, force(1:nd))
       ! the axis is the first one
-      found(n) = (found(n - nd) - force(1))/2.0_dp
+      found(n) = (force(1) - found(n - nd))/2.0_dp
       call check_vector(found(1:n), expected(1:n), 100*rounding, "driven by "//names)
     end do
   end subroutine test_drives
@@ -363,7 +363,7 @@ contains
     call b%prescribe(3, 0.0_dp)
     call check_vector(b%velocity, [11.0_dp, 0.0_dp, 13.0_dp], 0.0_dp, "prescribed components")
     call b%applied_force(3, 0.0_dp, 0.5_dp, force)
-    call check_vector(force, [0.0_dp, 12.0_dp, 0.0_dp], 100*rounding, "force on the free component")
+    call check_vector(force, [0.0_dp, 24.0_dp, 0.0_dp], 100*rounding, "force on the free component")
     b%free(:) = .false.
     b%given_spin(:) = 0.0_dp
     call check(.not. b%turns() .and. .not. b%is_driven(), "neither turning nor free")

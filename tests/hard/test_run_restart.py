@@ -1,0 +1,435 @@
+"""Checkpoints and restarts: a run that was stopped, killed or had no more steps to do, and gravier --restart on any number of
+ranks, give bit by bit what the run gives that nothing stops: states, history but for wall times, trace, and the checkpoint.
+
+What a kill in the middle of a write leaves is looked for in two ways: kills at random times, and, with a shim between the
+program and the system that is compiled here, a kill before one write after the other of results.h5."""
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+import h5py
+import numpy as np
+
+from gravier_runs import (ENVIRONMENT, GRAVIER, MPIEXEC, RunTestCase, contents, differences, each, gravier, merged, namelist,
+                          read_csv, run_case, steps_of, write)
+
+# what moves grains in every way: periods, a belt, a lid moved by a force, an outlet, a boundary that goes, tables, glued
+# grains that turn, METIS by schedule and by imbalance
+DRUM = {
+    "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "friction": 0.3, "period": [0.504, 0.0, 0.0],
+              "gravity_table": "gravity.csv", "skin": 0.008},
+    "boundary": [
+        {"shape": "plane", "name": "belt", "point": [0.0, -0.01], "normal": [0.0, 1.0], "velocity": [0.3, 0.0]},
+        {"shape": "plane", "name": "lid", "point": [0.0, 0.31], "normal": [0.0, -1.0], "free": [False, True], "mass": 2.0,
+         "force": [0.0, -50.0]},
+        {"shape": "circle", "name": "bubble", "point": [0.25, 0.1], "radius": 0.6, "table": "drive.csv"},
+        {"shape": "segment", "name": "blade", "point": [0.1, 0.05], "end": [0.15, 0.12], "remove_at": 0.065},
+        {"shape": "grains", "name": "stirrer", "group": 1, "rotation": [3.0], "pivot": [0.3, 0.1]},
+        {"shape": "outlet", "name": "hole", "point": [0.0, 0.27], "normal": [0.0, -1.0]},
+    ],
+    "time": {"step": 2e-3, "steps": 60},
+    "solver": {"tolerance": 2e-2, "method": "nscdd", "max_iterations": 1000},
+    "decomposition": {"partition": "metis", "subdomains": 6, "repartition_every": 13, "repartition_imbalance": 1.3},
+    "output": {"every": 6, "trace": True, "checkpoint_every": 1},
+}
+
+BOX = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [10, 8], "radius_min": 0.008, "radius_max": 0.012,
+              "friction": 0.3},
+    "time": {"step": 1e-3, "steps": 40},
+    "solver": {"tolerance": 1e-2, "method": "nscdd"},
+    "decomposition": {"subdomains": 2},
+    "output": {"every": 1, "checkpoint_every": 1},
+}
+
+BOX_3D = merged(BOX, {"scene": {"dimension": 3, "lattice_count": [5, 4, 4], "wall_friction": 0.5},
+                      "time": {"steps": 24}, "decomposition": {"subdomains": 4}})
+
+# a process that dies just before its n-th write to results.h5
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/types.h>
+#include <unistd.h>
+static void count(int fd) {
+  static long n = 0;
+  char link[64], path[4096];
+  snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+  ssize_t length = readlink(link, path, sizeof path - 1);
+  if (length < 0) return;
+  path[length] = 0;
+  if (strstr(path, "results.h5") && ++n == atol(getenv("DIES_AT"))) kill(getpid(), SIGKILL);
+}
+#define WRITES_AT(name) ssize_t name(int fd, const void *buffer, size_t n, off_t at) { \
+  static ssize_t (*next)(int, const void *, size_t, off_t); \
+  if (!next) next = (ssize_t (*)(int, const void *, size_t, off_t))dlsym(RTLD_NEXT, #name); \
+  count(fd); return next(fd, buffer, n, at); }
+WRITES_AT(pwrite)
+WRITES_AT(pwrite64)
+"""
+
+
+def write_drum(directory):
+    """The files that DRUM reads: 200 grains, of which five are glued."""
+    os.makedirs(directory, exist_ok=True)
+    draw = random.Random(1)
+    rows = []
+    for k in range(200):
+        i, j = k % 20, k // 20
+        glued = 1 if j == 3 and 8 <= i < 13 else 0
+        rows.append(f"{k + 1},{0.012 + 0.0252 * i:.6f},{0.012 + 0.0252 * j:.6f},{draw.uniform(0.011, 0.0125):.6f},{glued},"
+                    f"{draw.uniform(-0.5, 0.5):.6f},{1.5 * (j - 4.5) / 4.5:.6f},0")
+    write(os.path.join(directory, "grains.csv"), "id,x,y,radius,group,vx,vy,omega\n" + "\n".join(rows) + "\n")
+    write(os.path.join(directory, "drive.csv"), "time,vx,omega\n0,0,0\n0.05,0.2,1\n0.12,-0.2,2\n")
+    write(os.path.join(directory, "gravity.csv"), "time,gx,gy\n0,0,-9.81\n0.06,2,-9\n0.12,-2,-9.81\n")
+
+
+def content(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def restart(directory, ranks=1, **changes):
+    return gravier("--restart", "case.nml", ranks=ranks, directory=directory, **changes)
+
+
+class Going:
+    """A run that goes on while it is looked at; its ranks are this process's grandchildren, each known by its id."""
+
+    def __init__(self, groups, ranks, directory, options=(), shim=None):
+        os.makedirs(directory, exist_ok=True)
+        write(os.path.join(directory, "case.nml"), namelist(groups))
+        self.directory, self.ranks = directory, ranks
+        for name in os.listdir(directory):
+            if name.startswith("pid."):
+                os.remove(os.path.join(directory, name))
+        script = 'echo $$ >pid.$$.part; mv pid.$$.part pid.$$; '
+        if shim:
+            library, rank, count = shim
+            script += f'if [ "${{OMPI_COMM_WORLD_RANK:-$PMI_RANK}}" = {rank} ]; then export LD_PRELOAD={library} DIES_AT={count}; fi; '
+        environment = {**ENVIRONMENT, **os.environ}
+        self.process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", script + 'exec "$0" "$@"', GRAVIER, *options,
+                                         "case.nml"], cwd=directory, env=environment, stdin=subprocess.DEVNULL,
+                                        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    def wait_for(self, condition, what, timeout=30):
+        end = time.monotonic() + timeout
+        while not condition():
+            if self.process.poll() is not None or time.monotonic() > end:
+                self.process.terminate()
+                raise AssertionError(f"{self.directory}: {what} did not come: {self.process.communicate()[0]}")
+            time.sleep(0.002)
+
+    def pids(self):
+        names = [name for name in os.listdir(self.directory) if name.startswith("pid.") and name.count(".") == 1]
+        return [int(name[4:]) for name in names]
+
+    def rows(self):
+        try:
+            with open(os.path.join(self.directory, "results", "history.csv"), encoding="ascii") as file:
+                return file.read().count("\n") - 1
+        except FileNotFoundError:
+            return -1
+
+    def wait_for_rows(self, n):
+        self.wait_for(lambda: len(self.pids()) == self.ranks and self.rows() >= n, f"step {n}")
+
+    def send(self, number, ranks=None):
+        for pid in self.pids()[:ranks]:
+            try:
+                os.kill(pid, number)
+            except ProcessLookupError:
+                pass
+
+    def end(self, timeout=60):
+        """Status and what was said."""
+        try:
+            said = self.process.communicate(timeout=timeout)[0]
+        except subprocess.TimeoutExpired:
+            self.send(signal.SIGKILL)
+            self.process.kill()
+            raise AssertionError(f"{self.directory}: did not end in {timeout} s: {self.process.communicate()[0]}") from None
+        return self.process.returncode, said
+
+
+class Restart(RunTestCase):
+
+    def state(self, directory, results="results"):
+        """All that a run leaves and that is not a time on the clock, or the history of its file."""
+        path = os.path.join(directory, results)
+        found = {f"results{name}": value for name, value in contents(os.path.join(path, "results.h5")).items()
+                 if not name.startswith("/run@")}
+        for table in ("history", "trace"):
+            if os.path.exists(os.path.join(path, f"{table}.csv")):
+                rows = read_csv(os.path.join(path, f"{table}.csv"))
+                found.update({f"{table} {name}": value for name, value in rows.items() if name != "wall_seconds"})
+        found.update({f"checkpoint{name}": value for name, value in
+                      contents(os.path.join(path, "checkpoint.h5")).items()})
+        return found
+
+    def assert_same(self, straight, other, what=""):
+        self.assertEqual(differences(self.state(straight), self.state(other)), [], what)
+
+    def assert_refused(self, run, pattern):
+        self.assert_status(run, 2)
+        self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
+        self.assertRegex(run.stderr, pattern)
+
+    def one_restart(self, case, stop, before, after, straight, prepare=None):
+        """Run to step `stop` on `before` ranks and then to the end on `after`: the bits of `straight`."""
+        directory = self.here(f"{os.path.basename(straight)} {stop} {before} {after}")
+        if prepare:
+            prepare(directory)
+        steps = case["time"]["steps"]
+        self.assert_status(run_case(merged(case, {"time": {"steps": stop}}), before, directory), 0)
+        # the run that nothing stops writes no state at `stop`, unless it is due
+        every = case["output"]["every"]
+        write(os.path.join(directory, "case.nml"), namelist(case))
+        run = restart(directory, after)
+        self.assert_status(run, 0)
+        self.assertIn(f"from the checkpoint of step {stop}\n", run.stdout)
+        found = self.state(directory)
+        if stop % every != 0:
+            prefix = f"results/steps/{stop}"
+            found = {name: value for name, value in found.items() if name.split("@")[0] != prefix
+                     and not name.startswith(prefix + "/")}
+        different = differences(self.state(straight), found)
+        self.assertEqual(different, [], f"{straight}: stopped at {stop} of {steps}, {before} ranks, then {after}")
+        shutil.rmtree(directory)
+
+    def straight(self, name, case, prepare=None):
+        directory = self.here(name)
+        if prepare:
+            prepare(directory)
+        self.assert_status(run_case(case, 2, directory), 0)
+        return directory
+
+    def test_drum(self):
+        """Stops right after a list was made, long after, just before a partition, and before and after a boundary goes."""
+        straight = self.straight("drum", DRUM, write_drum)
+        history = read_csv(os.path.join(straight, "results", "history.csv"))
+        # it is as busy as it is meant to be
+        listed, divided = np.flatnonzero(history["listed"]) + 1, np.flatnonzero(history["divided"]) + 1
+        self.assertTrue({14, 27, 40, 53} < set(divided), "by schedule and by imbalance")
+        ages = [step - listed[listed <= step].max() for step in range(1, 60)]
+        self.assertGreater(max(ages), 2)
+        self.assertGreater(history["left"].sum(), 0)
+        images = self.state(straight)["results/steps/60/bodies/image"]
+        self.assertTrue(np.any(images != 0))
+        oldest = 1 + int(np.argmax(ages))
+        stops = sorted({1, int(listed[len(listed) // 2]), oldest, int(divided[1]) - 1, 32, 33, 34, 59})
+        ranks = [(1, 2), (2, 4), (4, 1), (2, 1), (1, 4), (4, 2), (1, 1), (2, 2)]
+        each(lambda stop, number: self.one_restart(DRUM, stop, *number, straight, write_drum), list(zip(stops, ranks)))
+
+    def test_methods(self):
+        """Every method, and without a warm start; in 3D with walls of another friction."""
+        cases = {
+            "nlgs": merged(BOX, {"solver": {"method": "nlgs"}, "decomposition": {"subdomains": 1}}),
+            "schwarz": merged(BOX_3D, {"solver": {"method": "schwarz", "relaxation": 0.7}}),
+            "nscdd_ep": merged(BOX, {"solver": {"method": "nscdd_ep", "max_iterations": 100}}),
+            "cold": merged(BOX_3D, {"solver": {"warm_start": False}}),
+        }
+        for number, (name, case) in enumerate(cases.items()):
+            case = merged(case, {"output": {"every": 4, "trace": True}})
+            self.one_restart(case, 10 + number, 1 + number % 2, 2 - number % 2, self.straight(name, case))
+
+    def test_signals(self):
+        """SIGTERM, to one rank or to all, stops with status 4; SIGUSR1, to the launcher, writes a checkpoint and goes on."""
+        straight = self.straight("signals", merged(BOX, {"time": {"steps": 400}, "output": {"every": 50, "checkpoint_every": 0,
+                                                                                          "walltime": 1000.0}}))
+        case = merged(BOX, {"time": {"steps": 400}, "output": {"every": 50, "checkpoint_every": 0, "walltime": 1000.0}})
+        draw = random.Random(2)
+        for number, (ranks, send) in enumerate([(1, lambda run: run.send(signal.SIGTERM)),
+                                                (2, lambda run: run.send(signal.SIGTERM, 1)),
+                                                (2, lambda run: run.send(signal.SIGTERM))]):
+            directory = self.here(f"term {number}")
+            run = Going(case, ranks, directory)
+            run.wait_for_rows(draw.randrange(1, 100))
+            send(run)
+            status, said = run.end()
+            self.assertEqual(status, 4, said)
+            self.assertIn("interrupted *** by SIGTERM after step", said)
+            self.assertNotIn("reached the tolerance", said)
+            again = restart(directory, 3 - ranks)
+            self.assert_status(again, 0)
+            self.assertNotIn("from the checkpoint of step 400\n", again.stdout)
+            self.assert_same(straight, directory)
+        directory = self.here("usr1")
+        run = Going(case, 2, directory)
+        run.wait_for_rows(draw.randrange(1, 50))
+        run.process.send_signal(signal.SIGUSR1)
+        run.wait_for(lambda: os.path.exists(os.path.join(directory, "results", "checkpoint.h5")), "the checkpoint of SIGUSR1")
+        status, said = run.end()
+        self.assertEqual(status, 0, said)
+        self.assertEqual(said.count("checkpoint  of step"), 2, said)
+        self.assert_same(straight, directory)
+
+    def test_walltime(self):
+        """The run stops before its time is over, and goes on."""
+        case = merged(BOX, {"time": {"steps": 100000}, "output": {"every": 0, "checkpoint_every": 0, "walltime": 2.5}})
+        directory = self.here("walltime")
+        run = run_case(case, 2, directory)
+        self.assert_status(run, 4)
+        self.assertRegex(run.stdout, r"interrupted \*\*\* at the walltime of \S+ s after step \d+ of 100000")
+        self.assertLess(run.history()["wall_seconds"].sum(), 2.5)
+        n = len(run.history()["step"])
+        self.assertGreater(n, 3)
+        again = run_case(merged(case, {"time": {"steps": n + 5}, "output": {"walltime": 0.0}}), 1, directory,
+                         options=["--restart"])
+        self.assert_status(again, 0)
+        self.assertIn(f"from the checkpoint of step {n}\n", again.stdout)
+
+    def test_checkpoint_seconds(self):
+        case = merged(BOX, {"time": {"steps": 400}, "output": {"every": 0, "checkpoint_every": 0, "checkpoint_seconds": 0.1}})
+        run = run_case(case, 1, self.here("seconds"))
+        self.assert_status(run, 0)
+        self.assertGreater(run.stdout.count("checkpoint  of step"), 1)
+
+    def check_readable(self, directory):
+        """results.h5 is not there yet, or holds whole steps one after the other."""
+        path = os.path.join(directory, "results", "results.h5")
+        if not os.path.exists(path):
+            return
+        found = contents(path)
+        steps = steps_of(found)
+        self.assertEqual(steps, list(range(len(steps))))
+        for step in steps:
+            wanted = ["bodies/id", "bodies/position", "bodies/velocity", "bodies/radius", "boundaries/force"]
+            for name in wanted + (["contacts/impulse"] if step > 0 else []):
+                self.assertIn(f"/steps/{step}/{name}", found)
+
+    def test_kills_at_random(self):
+        """Killed again and again while it writes a state and a checkpoint each step, on 1 and 2 ranks in turn."""
+        case = merged(BOX, {"time": {"steps": 300}, "output": {"trace": True}})
+        straight = self.straight("not killed", case)
+        directory = self.here("killed")
+        draw = random.Random(3)
+        reached = kills = 0
+        for kills in range(15):
+            run = Going(case, 1 + kills % 2, directory, ["--restart"])
+            run.wait_for_rows(reached)
+            reached += draw.randrange(5, 25)
+            run.wait_for_rows(min(reached, 290))
+            time.sleep(draw.random() * 0.01)
+            run.send(signal.SIGKILL)
+            status, said = run.end()
+            self.assertNotEqual(status, 0, said)
+            self.check_readable(directory)
+        # a row that the system had half on the disk
+        history = os.path.join(directory, "results", "history.csv")
+        with open(history, "rb+") as file:
+            file.truncate(os.path.getsize(history) - 1)
+            file.seek(0, os.SEEK_END)
+            file.write(b"\n299,0.2")
+        run = restart(directory, 2)
+        self.assert_status(run, 0)
+        self.assertIn("from the checkpoint of step", run.stdout)
+        self.assert_same(straight, directory, f"after {kills + 1} kills")
+
+    def test_kill_before_each_write(self):
+        """Killed just before one write to results.h5 or another, of rank 0, which writes all headers: the file is whole."""
+        library = self.here("shim.so")
+        write(self.here("shim.c"), SHIM)
+        compiler = shutil.which("cc") or shutil.which("gcc")
+        self.assertTrue(compiler, "a C compiler is needed for this test")
+        subprocess.run([compiler, "-shared", "-fPIC", "-o", library, self.here("shim.c"), "-ldl"], check=True)
+        case = merged(BOX, {"time": {"steps": 6}, "solver": {"max_iterations": 10, "tolerance": 0.1},
+                            "output": {"checkpoint_every": 2}})
+        straight = self.straight("all written", case)
+
+        def killed(ranks, count):
+            directory = self.here(f"write {count} of {ranks}")
+            run = Going(case, ranks, directory, shim=(library, 0, count))
+            status, said = run.end()
+            self.assertNotIn(status, (0, 1, 2, 3), f"not killed at write {count}: {said}")
+            self.check_readable(directory)
+            again = restart(directory, 3 - ranks)
+            self.assert_status(again, 0)
+            self.assert_same(straight, directory, f"killed on {ranks} ranks before write {count}")
+            shutil.rmtree(directory)
+
+        # a state takes 45 writes, of which the last three show it
+        each(killed, [(1 + count % 2, count) for count in [*range(10, 60, 12), *range(100, 150, 3), 230]])
+
+    def test_refusals(self):
+        """Another scene, a damaged checkpoint, results that are gone: one line, status 2, and all files as they were."""
+        directory = self.here("refused")
+        os.makedirs(directory)
+        write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.012\n")
+        case = merged(BOX, {"scene": {"bodies": "file", "bodies_file": "grains.csv", "lattice_count": None, "radius_min": None,
+                                      "radius_max": None},
+                            "boundary": [{"shape": "plane", "normal": [0.0, 1.0]}],
+                            "time": {"steps": 4}, "decomposition": {"subdomains": 1}, "output": {"every": 1}})
+        self.assert_status(run_case(case, 1, directory), 0)
+        results = os.path.join(directory, "results")
+
+        def files():
+            return {name: content(os.path.join(results, name)) for name in sorted(os.listdir(results))}
+
+        before = files()
+        longer = merged(case, {"time": {"steps": 8}})
+
+        def refused(groups, pattern, ranks=1):
+            run = run_case(groups, ranks, directory, options=["--restart"])
+            self.assert_refused(run, pattern)
+            self.assertEqual(files(), now)
+
+        now = before
+        refused(merged(longer, {"scene": {"friction": 0.4}}), r"case\.nml: .*friction = 0\.4.*: expected friction = 0\.3")
+        refused(merged(longer, {"boundary": [{"shape": "plane", "normal": [0.0, 1.0], "velocity": [0.1, 0.0]}]}),
+                r"case\.nml: .*velocity")
+        refused(merged(longer, {"decomposition": {"subdomains": 2}}), r"case\.nml: &decomposition subdomains: expected 1", 2)
+        refused(merged(longer, {"time": {"step": 2e-3}}), r"case\.nml: &time step: expected 0?\.?0?1?.*E?-?")
+        refused(merged(longer, {"time": {"theta": 0.6}}), r"case\.nml: &time theta: expected")
+        refused(merged(case, {"time": {"steps": 3}}), r"case\.nml: &time steps = 3: expected 4 at least")
+        write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.011\n")
+        refused(longer, r"checkpoint\.h5: the run began with 2 grains")
+        write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.012\n")
+        checkpoint = os.path.join(results, "checkpoint.h5")
+        whole = before["checkpoint.h5"]
+        for text in (b"", whole[:len(whole) // 2], b"no HDF5 file", before["results.h5"], whole[:-100]):
+            write(checkpoint, text)
+            now = files()
+            for ranks in (1, 2):
+                refused(longer, r"results/checkpoint\.h5", ranks)
+        write(checkpoint, whole)
+        os.remove(os.path.join(results, "results.h5"))
+        run = run_case(longer, 2, directory, options=["--restart"])
+        self.assert_refused(run, r"results/results\.h5: .*[Nn]o such file")
+        self.assertEqual(content(checkpoint), whole)
+        write(os.path.join(results, "results.h5"), before["results.h5"])
+        self.assert_status(run_case(longer, 1, directory, options=["--restart"]), 0)
+
+    def test_beginning_and_end(self):
+        """Without a checkpoint it begins; with nothing left to do it changes nothing; a new run forgets an old checkpoint."""
+        case = merged(BOX, {"time": {"steps": 7}, "output": {"every": 3, "checkpoint_every": 2, "final_bodies": True}})
+        straight = self.straight("end", case)
+        directory = self.here("beginning")
+        run = run_case(case, 1, directory, options=["--restart"])
+        self.assert_status(run, 0)
+        self.assertIn("restart     no checkpoint in results: from the beginning\n", run.stdout)
+        self.assert_same(straight, directory)
+        final = content(run.path("results", "final_bodies.h5"))
+        for ranks in (1, 2):
+            self.assert_status(restart(directory, ranks), 0)
+            self.assert_same(straight, directory, "nothing to do")
+            self.assertEqual(content(run.path("results", "final_bodies.h5")), final)
+        # a checkpoint in the middle becomes the end: bodies and boundaries of the last state are there
+        shorter = self.here("shorter")
+        self.assert_status(run_case(merged(case, {"time": {"steps": 5}}), 1, shorter), 0)
+        self.assert_status(run_case(merged(case, {"time": {"steps": 5}}), 1, shorter, options=["--restart"]), 0)
+        self.assertEqual(steps_of(contents(os.path.join(shorter, "results", "results.h5"))), [0, 3, 5])
+        self.assert_status(run_case(merged(case, {"output": {"checkpoint_every": 0}}), 1, directory), 0)
+        self.assertFalse(os.path.exists(run.path("results", "checkpoint.h5")))
+
+
+if __name__ == "__main__":
+    unittest.main()
