@@ -4,7 +4,7 @@ and like a^(2/3) for tall ones.
 
     python3 drivers/study_collapse.py OUT       about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/collapse.csv, OUT/collapse_summary.csv and OUT/collapse.png."""
+leaves OUT/study_collapse.csv, OUT/study_collapse_summary.csv and OUT/study_collapse.png."""
 import argparse
 from pathlib import Path
 
@@ -73,12 +73,12 @@ def main():
         rows.append((height / width, len(heap[1]), width, height, length, length / width - 1.0))
         heaps.append((width, *heap))
     ratio, number, width, height, length, out = np.array(rows).T
-    write_csv(options.out / "collapse.csv", {"aspect": ratio, "grains": number, "width": width, "height": height,
+    write_csv(options.out / "study_collapse.csv", {"aspect": ratio, "grains": number, "width": width, "height": height,
                                              "length": length, "run_out": out})
     slopes = {}
     for name, chosen in (("flat", ratio < FLAT), ("tall", ratio > TALL)):
         slopes[name] = np.polyfit(np.log(ratio[chosen]), np.log(out[chosen]), 1)
-    write_csv(options.out / "collapse_summary.csv", {"quantity": ["exponent_flat", "exponent_tall"],
+    write_csv(options.out / "study_collapse_summary.csv", {"quantity": ["exponent_flat", "exponent_tall"],
                                                      "value": [float(slopes[name][0]) for name in ("flat", "tall")]})
     print({name: slope[0] for name, slope in slopes.items()})
     draw(options.out, ratio, out, slopes, heaps)
@@ -100,7 +100,7 @@ def draw(out, ratio, run_out, slopes, heaps):
         axes[panel].axvline(1.0, color="#b2182b", linewidth=0.8)
         axes[panel].set_title(f"$a$ = {ratio[k]:.2g}", fontsize=10)
         axes[panel].set_xlabel("$x/r_0$")
-    figure.savefig(out / "collapse.png", dpi=130)
+    figure.savefig(out / "study_collapse.png", dpi=130)
 
 
 if __name__ == "__main__":

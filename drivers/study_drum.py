@@ -3,7 +3,7 @@
 
     python3 drivers/study_drum.py OUT           about 2 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/drum.csv, OUT/drum_summary.csv and OUT/drum.png."""
+leaves OUT/study_drum.csv, OUT/study_drum_summary.csv and OUT/study_drum.png."""
 import argparse
 from pathlib import Path
 
@@ -46,8 +46,9 @@ def main():
     summary = {"angle": angle[steady].mean(), "deviation": angle[steady].std(), "angle_first_half": first.mean(),
                "angle_second_half": second.mean(), "froude": RATE**2 * RADIUS / 9.81}
     print(summary)
-    write_csv(options.out / "drum.csv", {"time": time, "angle": angle})
-    write_csv(options.out / "drum_summary.csv", {"quantity": list(summary), "value": [float(v) for v in summary.values()]})
+    write_csv(options.out / "study_drum.csv", {"time": time, "angle": angle})
+    write_csv(options.out / "study_drum_summary.csv", {"quantity": list(summary),
+              "value": [float(value) for value in summary.values()]})
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.4), layout="constrained")
     left.plot(time, angle, color="#08519c", linewidth=0.9)
     left.plot([START, time[-1]], [summary["angle"]] * 2, "--", color="#b2182b", label=f"mean {summary['angle']:.1f} degrees")
@@ -59,7 +60,7 @@ def main():
     right.set_xlim(-1.03 * RADIUS, 1.03 * RADIUS)
     right.set_ylim(-1.03 * RADIUS, 1.03 * RADIUS)
     figure.colorbar(disks, ax=right, label="speed [m/s]", shrink=0.8)
-    figure.savefig(options.out / "drum.png", dpi=130)
+    figure.savefig(options.out / "study_drum.png", dpi=130)
 
 
 if __name__ == "__main__":
