@@ -288,7 +288,7 @@ class Restart(RunTestCase):
         self.assertIn(f"from the checkpoint of step {n}\n", again.stdout)
 
     def test_checkpoint_seconds(self):
-        case = merged(BOX, {"time": {"steps": 400}, "output": {"every": 0, "checkpoint_every": 0, "checkpoint_seconds": 0.1}})
+        case = merged(BOX, {"time": {"steps": 400}, "output": {"every": 0, "checkpoint_every": 0, "checkpoint_seconds": 0.01}})
         run = run_case(case, 1, self.here("seconds"))
         self.assert_status(run, 0)
         self.assertGreater(run.stdout.count("checkpoint  of step"), 1)
@@ -351,13 +351,16 @@ class Restart(RunTestCase):
             status, said = run.end()
             self.assertNotIn(status, (0, 1, 2, 3), f"not killed at write {count}: {said}")
             self.check_readable(directory)
+            # and killed again while the restart takes states out of the file
+            Going(case, ranks, directory, ["--restart"], shim=(library, 0, 1 + count % 4)).end()
+            self.check_readable(directory)
             again = restart(directory, 3 - ranks)
             self.assert_status(again, 0)
             self.assert_same(straight, directory, f"killed on {ranks} ranks before write {count}")
             shutil.rmtree(directory)
 
         # a state takes 45 writes, of which the last three show it
-        each(killed, [(1 + count % 2, count) for count in [*range(10, 60, 12), *range(100, 150, 3), 230]])
+        each(killed, [(1 + count % 2, count) for count in [*range(10, 60, 12), *range(100, 150, 5), 230]])
 
     def test_refusals(self):
         """Another scene, a damaged checkpoint, results that are gone: one line, status 2, and all files as they were."""
