@@ -33,7 +33,7 @@ def compact(centres, radii, size, pressure, steps):
         normal = np.eye(d)[k]
         planes.append({"name": f"low {AXES[k]}", "shape": "plane", "normal": normal})
         planes.append({"name": f"high {AXES[k]}", "shape": "plane", "point": size[k] * normal, "normal": -normal,
-                       "free": list(normal > 0.5), "pressure": -pressure, "mass": mass})
+                       "free": list(normal > 0.5), "pressure": pressure, "mass": mass})
     with tempfile.TemporaryDirectory() as scratch:
         write_hdf5(Path(scratch) / "loose.h5", centres, radii)
         run(scratch, {
@@ -68,8 +68,8 @@ def shear(folder, rng):
     centres, radii = lattice([0.0, 0.02], [0.8, 0.52], 0.008, 0.011, rng)
     top = centres[:, 1].max() + 0.022
     bottom_row, top_row = np.column_stack([row, 0.0 * row]), np.column_stack([row, 0.0 * row + top])
-    write_bodies(folder / "shear.csv", "group 1: the bottom row, group 2: the top row", np.concatenate([bottom_row, top_row, centres]),
-                 np.concatenate([np.full(80, 0.01), radii]), [1] * 40 + [2] * 40 + [0] * len(radii))
+    write_bodies(folder / "shear.csv", "group 1: the bottom row, group 2: the top row",
+                 np.concatenate([bottom_row, top_row, centres]), np.concatenate([np.full(80, 0.01), radii]), [1] * 40 + [2] * 40 + [0] * len(radii))
 
 
 def main():

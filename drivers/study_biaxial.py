@@ -2,9 +2,9 @@
 """Biaxial compression of 5000 disks, Rmax/Rmin = 3 (CEGEO benchmark, 2012): isotropic compaction without friction between
 smooth walls, then compression at constant lateral pressure with friction 0.5.
 
-    python3 drivers/study_biaxial.py OUT        about 10 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    python3 drivers/study_biaxial.py OUT        about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/biaxial.csv (the stress-strain curve), OUT/biaxial_summary.csv and OUT/biaxial.png."""
+leaves OUT/study_biaxial.csv (the stress-strain curve), OUT/study_biaxial_summary.csv and OUT/study_biaxial.png."""
 import argparse
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def walls(size, mass, lid):
         {"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
         {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
         {"name": "right", "shape": "plane", "point": [size[0], 0.0], "normal": [-1.0, 0.0], "free": [True, False],
-         "pressure": -PRESSURE, "mass": mass},
+         "pressure": PRESSURE, "mass": mass},
         {"name": "lid", "shape": "plane", "point": [0.0, size[1]], "normal": [0.0, -1.0], **lid}]
 
 
@@ -89,12 +89,14 @@ def coordination(state, n, layer):
             break
         alive[lost] = False
     held = alive[1:n + 1] & inner
+    if not held.any():
+        return everyone, 0.0, 1.0
     return everyone, number[1:n + 1][held].mean(), 1.0 - held.sum() / inner.sum()
 
 
 def compact(options, size, mass):
     """Press the loose disks of OUT/loose.h5 together, then let them come to rest with exact solves."""
-    free_lid = {"free": [False, True], "pressure": -PRESSURE, "mass": mass}
+    free_lid = {"free": [False, True], "pressure": PRESSURE, "mass": mass}
     run(options.out / "compaction", {
         "scene": scene("../loose.h5", 0.0, 0.4 * SMALLEST),
         "time": {"step": STEP, "steps": options.compaction_steps},
@@ -108,12 +110,26 @@ def compact(options, size, mass):
         "output": {"directory": ".", "every": 0, "final_bodies": True}}, walls(size, mass, free_lid))
 
 
+def compress(options, centres, radii, size, mass):
+    """Bring the lid down at constant lateral pressure."""
+    write_hdf5(options.out / "compact.h5", centres, radii)
+    speed = options.rate * size[1]
+    steps = int(options.strain / options.rate / SLOW_STEP)
+    run(options.out / "shear", {
+        "scene": scene("../compact.h5", 0.5, 0.2 * SMALLEST),
+        "time": {"step": SLOW_STEP, "steps": steps},
+        "solver": {**SOLVER, "tolerance": 3.0e-5, "max_iterations": 1000},
+        "output": {"directory": ".", "every": max(1, steps // 250), "final_bodies": True}},
+        walls(size, mass, {"velocity": [0.0, -speed]}))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", metavar="OUT", type=Path)
     parser.add_argument("--grains", type=int, default=5000)
     parser.add_argument("--compaction-steps", type=int, default=1500)
-    parser.add_argument("--compacted", action="store_true", help="start from the disks that a run before left in OUT/rest")
+    parser.add_argument("--compacted", action="store_true", help="start from the disks that an earlier run left in OUT/rest")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
     parser.add_argument("--rate", type=float, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
     parser.add_argument("--strain", type=float, default=0.15, help="vertical strain at the end")
     options = parser.parse_args()
@@ -123,11 +139,9 @@ def main():
     radii = radii_by_volume(n, SMALLEST, 3.0 * SMALLEST, 2, rng)
     volume = np.pi * (radii**2).sum()
     size = np.full(2, np.sqrt(volume / 0.58))
-    if not options.compacted:
-        write_hdf5(options.out / "loose.h5", loose(radii, [0.0, 0.0], size, rng), radii)
     mass = 10.0 * DENSITY * size[0] * 2.0 * radii.mean()
-
-    if not options.compacted:
+    if not (options.compacted or options.measure):
+        write_hdf5(options.out / "loose.h5", loose(radii, [0.0, 0.0], size, rng), radii)
         compact(options, size, mass)
     for _, _, state in states(options.out / "rest/results.h5"):
         if "contacts" in state:
@@ -141,31 +155,28 @@ def main():
                "pressure_right": last["pressure"][0] / PRESSURE, "pressure_lid": last["pressure"][1] / PRESSURE}
     print(summary, flush=True)
 
-    write_hdf5(options.out / "compact.h5", centres, radii)
-    speed = options.rate * size[1]
-    steps = int(options.strain / options.rate / SLOW_STEP)
-    run(options.out / "shear", {
-        "scene": scene("../compact.h5", 0.5, 0.2 * SMALLEST),
-        "time": {"step": SLOW_STEP, "steps": steps},
-        "solver": {**SOLVER, "tolerance": 3.0e-5, "max_iterations": 1000},
-        "output": {"directory": ".", "every": max(1, steps // 250), "final_bodies": True}},
-        walls(size, mass, {"velocity": [0.0, -speed]}))
+    if not options.measure:
+        compress(options, centres, radii, size, mass)
     rows = []
     for _, _, state in states(options.out / "shear/results.h5"):
         box = size_of(state)
-        if "contacts" in state:
+        if "contacts" in state and len(state["contacts/impulse"]) > 0:
             side, top = pressures(state)
             rows.append((1.0 - box[1] / size[1], box[0] / size[0] - 1.0, top / PRESSURE, side / PRESSURE,
                          (top - side) / (top + side), volume / box.prod(), coordination(state, n, LAYER)[1]))
     strain, lateral, top, side, sine, fraction, number = np.array(rows).T
-    write_csv(options.out / "biaxial.csv", {"axial_strain": strain, "lateral_strain": lateral, "axial_stress": top,
+    write_csv(options.out / "study_biaxial.csv", {"axial_strain": strain, "lateral_strain": lateral, "axial_stress": top,
         "lateral_stress": side, "sin_phi": sine, "solid_fraction": fraction, "coordination": number})
     smooth = np.convolve(sine, np.ones(9) / 9.0, "valid")
     overlap = read_history(options.out / "shear")["max_overlap"].max() / radii.mean()
-    late = strain > 0.6 * options.strain
-    summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(), largest_overlap_over_radius=overlap,
+    # the volume has become constant
+    late = strain > 0.75 * options.strain
+    mean_top, mean_side = top[late].mean(), side[late].mean()
+    summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(),
+                   sin_phi_mean_stresses=(mean_top - mean_side) / (mean_top + mean_side), largest_overlap_over_radius=overlap,
                    inertial_number=options.rate * 2.0 * radii.mean() * np.sqrt(DENSITY / PRESSURE))
-    write_csv(options.out / "biaxial_summary.csv", {"quantity": list(summary), "value": [float(v) for v in summary.values()]})
+    write_csv(options.out / "study_biaxial_summary.csv", {"quantity": list(summary),
+              "value": [float(value) for value in summary.values()]})
     print(summary)
     draw(options.out, strain, sine, fraction, centres, radii)
 
@@ -191,7 +202,7 @@ def draw(out, strain, sine, fraction, start, radii):
     figure.colorbar(disks, ax=right, label="way besides the mean strain / mean radius", shrink=0.8)
     right.set_xlabel("x [m]")
     right.set_ylabel("y [m]")
-    figure.savefig(out / "biaxial.png", dpi=130)
+    figure.savefig(out / "study_biaxial.png", dpi=130)
 
 
 if __name__ == "__main__":

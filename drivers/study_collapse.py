@@ -4,7 +4,7 @@ and like a^(2/3) for tall ones.
 
     python3 drivers/study_collapse.py OUT       about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/collapse.csv, OUT/collapse_summary.csv and OUT/collapse.png."""
+leaves OUT/study_collapse.csv, OUT/study_collapse_summary.csv and OUT/study_collapse.png."""
 import argparse
 from pathlib import Path
 
@@ -18,12 +18,8 @@ STEP = 5.0e-4  # s
 SETTLING = 0.4  # s
 
 
-def collapse(folder, aspect, grains, rng):
-    """Settle a column of about that ratio, take the gate away: width and height before, length after, last state."""
-    # the lattice comes down by about a seventh when it settles
-    cell = 2.05 * LARGEST
-    width = cell * max(round(np.sqrt(grains / (1.17 * aspect))), 6)
-    centres, radii = lattice([0.0, 0.0], [width, cell * round(grains / (width / cell))], SMALLEST, LARGEST, rng)
+def fall(folder, width, centres, radii):
+    """The run itself."""
     folder.mkdir(parents=True, exist_ok=True)
     write_hdf5(folder / "column.h5", centres, radii)
     height = centres[:, 1].max()
@@ -38,6 +34,17 @@ def collapse(folder, aspect, grains, rng):
             {"name": "left", "shape": "plane", "normal": [1.0, 0.0], "friction": 0.0},
             {"name": "gate", "shape": "plane", "point": [width, 0.0], "normal": [-1.0, 0.0], "friction": 0.0,
              "remove_at": SETTLING}])
+
+
+def collapse(folder, aspect, grains, rng, measure):
+    """Settle a column of about that ratio, take the gate away: width and height before, length after, last state. With
+    `measure`, the run was made before."""
+    # the lattice comes down by about a seventh when it settles
+    cell = 2.05 * LARGEST
+    width = cell * max(round(np.sqrt(grains / (1.17 * aspect))), 6)
+    centres, radii = lattice([0.0, 0.0], [width, cell * round(grains / (width / cell))], SMALLEST, LARGEST, rng)
+    if not measure:
+        fall(folder, width, centres, radii)
     settled = [state["bodies/position"][:] for number, _, state in states(folder / "results.h5")
                if number == int(SETTLING / STEP)][0]
     # as high as a box of the same width and mean height of its centre
@@ -47,31 +54,31 @@ def collapse(folder, aspect, grains, rng):
 
 
 def length_of(centres, radii):
-    """How far the heap reaches from the left: up to the first gap of two diameters, beyond which lie single disks."""
-    order = np.argsort(centres[:, 0])
-    right = np.maximum.accumulate((centres[:, 0] + radii)[order])
-    gaps = np.flatnonzero((centres[:, 0] - radii)[order][1:] - right[:-1] > 4.0 * radii.mean())
-    return right[gaps[0]] if len(gaps) else right[-1]
+    """Where the heap ends: the disks beyond are fewer than one full row, pi/4 diameters high, over two diameters."""
+    bins = np.arange(0.0, centres[:, 0].max() + 8.0 * radii.mean(), 4.0 * radii.mean())
+    thickness = np.histogram(centres[:, 0], bins, weights=np.pi * radii**2)[0] / np.diff(bins)
+    return bins[np.flatnonzero(thickness < 0.5 * np.pi * radii.mean())[0]]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", metavar="OUT", type=Path)
     parser.add_argument("--grains", type=int, default=1000)
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
     options = parser.parse_args()
     rng = np.random.default_rng(2005)
     rows, heaps = [], []
     for aspect in ASPECTS:
-        width, height, length, heap = collapse(options.out / f"a{aspect}", aspect, options.grains, rng)
+        width, height, length, heap = collapse(options.out / f"a{aspect}", aspect, options.grains, rng, options.measure)
         rows.append((height / width, len(heap[1]), width, height, length, length / width - 1.0))
         heaps.append((width, *heap))
     ratio, number, width, height, length, out = np.array(rows).T
-    write_csv(options.out / "collapse.csv", {"aspect": ratio, "grains": number, "width": width, "height": height,
+    write_csv(options.out / "study_collapse.csv", {"aspect": ratio, "grains": number, "width": width, "height": height,
                                              "length": length, "run_out": out})
     slopes = {}
     for name, chosen in (("flat", ratio < FLAT), ("tall", ratio > TALL)):
         slopes[name] = np.polyfit(np.log(ratio[chosen]), np.log(out[chosen]), 1)
-    write_csv(options.out / "collapse_summary.csv", {"quantity": ["exponent_flat", "exponent_tall"],
+    write_csv(options.out / "study_collapse_summary.csv", {"quantity": ["exponent_flat", "exponent_tall"],
                                                      "value": [float(slopes[name][0]) for name in ("flat", "tall")]})
     print({name: slope[0] for name, slope in slopes.items()})
     draw(options.out, ratio, out, slopes, heaps)
@@ -93,7 +100,7 @@ def draw(out, ratio, run_out, slopes, heaps):
         axes[panel].axvline(1.0, color="#b2182b", linewidth=0.8)
         axes[panel].set_title(f"$a$ = {ratio[k]:.2g}", fontsize=10)
         axes[panel].set_xlabel("$x/r_0$")
-    figure.savefig(out / "collapse.png", dpi=130)
+    figure.savefig(out / "study_collapse.png", dpi=130)
 
 
 if __name__ == "__main__":

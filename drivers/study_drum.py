@@ -3,7 +3,7 @@
 
     python3 drivers/study_drum.py OUT           about 2 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/drum.csv, OUT/drum_summary.csv and OUT/drum.png."""
+leaves OUT/study_drum.csv, OUT/study_drum_summary.csv and OUT/study_drum.png."""
 import argparse
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from study_support import SOURCE, draw_disks, plt, run, states, write_csv
 
 RADIUS, RATE = 0.2, 1.0  # m, rad/s
-START = 1.5  # s, when the flow has become steady
+START = 2.0  # s, when the flow has become steady
 
 
 def surface_angle(centres):
@@ -31,9 +31,9 @@ def main():
     run(options.out / "drum", {
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/drum.csv"), "density": 2500.0,
                   "friction": 0.5, "alert_distance": 1.5e-3},
-        "time": {"step": 5.0e-4, "steps": 12000},
-        "solver": {"tolerance": 1.0e-3, "max_iterations": 5000},
-        "output": {"directory": ".", "every": 40, "contacts": False}},
+        "time": {"step": 1.0e-3, "steps": 14000},
+        "solver": {"tolerance": 1.0e-3, "max_iterations": 1000},
+        "output": {"directory": ".", "every": 20, "contacts": False}},
         [{"name": "drum", "shape": "circle", "radius": RADIUS, "rotation": RATE, "friction": 0.8}])
     rows, last = [], None
     for _, time, state in states(options.out / "drum/results.h5"):
@@ -46,8 +46,9 @@ def main():
     summary = {"angle": angle[steady].mean(), "deviation": angle[steady].std(), "angle_first_half": first.mean(),
                "angle_second_half": second.mean(), "froude": RATE**2 * RADIUS / 9.81}
     print(summary)
-    write_csv(options.out / "drum.csv", {"time": time, "angle": angle})
-    write_csv(options.out / "drum_summary.csv", {"quantity": list(summary), "value": [float(v) for v in summary.values()]})
+    write_csv(options.out / "study_drum.csv", {"time": time, "angle": angle})
+    write_csv(options.out / "study_drum_summary.csv", {"quantity": list(summary),
+              "value": [float(value) for value in summary.values()]})
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.4), layout="constrained")
     left.plot(time, angle, color="#08519c", linewidth=0.9)
     left.plot([START, time[-1]], [summary["angle"]] * 2, "--", color="#b2182b", label=f"mean {summary['angle']:.1f} degrees")
@@ -59,7 +60,7 @@ def main():
     right.set_xlim(-1.03 * RADIUS, 1.03 * RADIUS)
     right.set_ylim(-1.03 * RADIUS, 1.03 * RADIUS)
     figure.colorbar(disks, ax=right, label="speed [m/s]", shrink=0.8)
-    figure.savefig(options.out / "drum.png", dpi=130)
+    figure.savefig(options.out / "study_drum.png", dpi=130)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 
     python3 drivers/study_hopper.py OUT         about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/hopper.csv, OUT/hopper_summary.csv and OUT/hopper.png."""
+leaves OUT/study_hopper.csv, OUT/study_hopper_summary.csv and OUT/study_hopper.png."""
 import argparse
 from pathlib import Path
 
@@ -65,8 +65,8 @@ def main():
     slope, shift = np.polyfit(width, rates**(2.0 / 3.0), 1)
     fitted = -shift / slope / DIAMETER
     constant = slope**1.5 / (0.8 * DENSITY * np.sqrt(9.81))
-    write_csv(options.out / "hopper.csv", {"opening_diameters": OPENINGS, "opening": width, "mass_rate": rates})
-    write_csv(options.out / "hopper_summary.csv", {"quantity": ["exponent", "k", "C"],
+    write_csv(options.out / "study_hopper.csv", {"opening_diameters": OPENINGS, "opening": width, "mass_rate": rates})
+    write_csv(options.out / "study_hopper_summary.csv", {"quantity": ["exponent", "k", "C"],
                                                    "value": [float(exponent), float(fitted), float(constant)]})
     print(exponent, fitted, constant)
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13.0, 4.2), layout="constrained")
@@ -89,7 +89,7 @@ def main():
             disks = draw_disks(right, state["bodies/position"][:], state["bodies/radius"][:], speed, "viridis", (0.0, 0.6))
             figure.colorbar(disks, ax=right, label="speed [m/s]", shrink=0.8)
     right.set_title(f"$D/d$ = {OPENINGS[2]:g}, 0.35 s", fontsize=10)
-    figure.savefig(options.out / "hopper.png", dpi=130)
+    figure.savefig(options.out / "study_hopper.png", dpi=130)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ sigma = rho g lambda (1 - exp(-z/lambda)), lambda = width / (2 mu K).
 
     python3 drivers/study_silo.py OUT           about 3 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/silo.csv, OUT/silo_summary.csv and OUT/silo.png."""
+leaves OUT/study_silo.csv, OUT/study_silo_summary.csv and OUT/study_silo.png."""
 import argparse
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 from study_support import draw_disks, lattice, plt, run, states, write_csv, write_hdf5
 
 SMALLEST, LARGEST = 0.004, 0.006  # m
-CELLS = 20  # grains across
+CELLS = 12  # grains across
 WIDTH = CELLS * 2.05 * LARGEST
 DENSITY = 2500.0  # kg/m^2
 FRICTION = 0.5
@@ -34,7 +34,7 @@ def main():
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": "../loose.h5", "density": DENSITY, "friction": FRICTION,
                   "alert_distance": 1.5e-3, "skin": 2.5e-3},
         "time": {"step": STEP, "steps": SETTLING + WARMING + SAMPLING},
-        "solver": {"tolerance": 1.0e-3, "max_iterations": 1000},
+        "solver": {"tolerance": 1.0e-4, "max_iterations": 1000},
         "output": {"directory": ".", "every": 10}}, [
             {"name": "floor", "shape": "plane", "normal": [0.0, 1.0], "table": "../floor.csv"},
             {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
@@ -66,7 +66,7 @@ def main():
     depth, vertical, lateral, hydrostatic, held = np.array(samples).mean(axis=0)
     rho_g = np.polyfit(depth[3:], hydrostatic[3:], 1)[0]
     # least squares over lambda, for the depth that the grains fill
-    lengths = np.linspace(0.2, 6.0, 2000) * WIDTH
+    lengths = np.linspace(0.2, 8.0, 2000) * WIDTH
     error = [((rho_g * x * (1.0 - np.exp(-depth / x)) - vertical)**2).sum() for x in lengths]
     length = lengths[int(np.argmin(error))]
     mobilised = held[3:].sum() / (lateral[3:].sum() * 2.0 * np.diff(depth)[0])
@@ -76,9 +76,10 @@ def main():
                "friction_mobilised": mobilised, "bottom_stress_over_hydrostatic": float(np.mean(bottom) / hydrostatic[-1]),
                "bottom_stress_over_saturation": float(np.mean(bottom) / (rho_g * length))}
     print(summary)
-    write_csv(options.out / "silo.csv", {"depth": depth, "vertical_stress": vertical, "lateral_stress": lateral,
+    write_csv(options.out / "study_silo.csv", {"depth": depth, "vertical_stress": vertical, "lateral_stress": lateral,
                                          "hydrostatic": hydrostatic})
-    write_csv(options.out / "silo_summary.csv", {"quantity": list(summary), "value": [float(v) for v in summary.values()]})
+    write_csv(options.out / "study_silo_summary.csv", {"quantity": list(summary),
+              "value": [float(value) for value in summary.values()]})
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.0, 4.8), width_ratios=(3, 1), layout="constrained")
     left.plot(depth / WIDTH, hydrostatic / 1e3, "--", color="0.6", label=r"$\rho g z$")
     left.plot(depth / WIDTH, vertical / 1e3, "o", color="#08519c", label=r"$\sigma_{zz}$")
@@ -90,7 +91,7 @@ def main():
     left.legend(frameon=False)
     draw_disks(right, position, radii)
     right.set_xlabel("x [m]")
-    figure.savefig(options.out / "silo.png", dpi=130)
+    figure.savefig(options.out / "study_silo.png", dpi=130)
 
 
 if __name__ == "__main__":
