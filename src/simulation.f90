@@ -570,6 +570,7 @@ contains
     else
       call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error)
     end if
+    if (.not. allocated(error) .and. figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
@@ -587,7 +588,6 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%kinetic_energy()
-    if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
