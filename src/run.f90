@@ -20,6 +20,9 @@ module gravier_run
   private
   public :: run_case, check_case, read_config, report_error
 
+  !> times overlap_allowed: an overlap that is no longer one of rounding and tolerance
+  real(dp), parameter :: worth_a_warning = 5.0_dp
+
   !> When a run began and what made it stop early.
   type :: interruption_t
     !> on the clock of this rank: of the program, of the first step, of the last checkpoint, of the end of the last step [s]
@@ -309,6 +312,9 @@ contains
 
     if (simulation%fast > 0) call log%line("warning     "//to_text(simulation%fast)//" times a grain moved by more than its "// &
       & "radius in a step, and may have passed through others: use a smaller &time step", error)
+    if (simulation%largest_overlap/worth_a_warning > simulation%overlap_allowed) call log%line("warning     overlaps of up to "// &
+      & to_text(simulation%largest_overlap, 3)//" m, far beyond the overlap_allowed of "//to_text(simulation%overlap_allowed, 3)// &
+      & " m: the solves leave errors that add up; use a smaller &solver tolerance", error)
     text = "finished    all "//to_text(simulation%step)//" steps reached the tolerance"
     if (simulation%failed > 0) text = "finished    *** "//to_text(simulation%failed)//" of the steps did NOT reach the tolerance"
     if (.not. kept) text = text//"; the last one is not in the results"

@@ -77,6 +77,8 @@ module gravier_simulation
     integer :: last_written = -1
     !> the state comes from a checkpoint
     logical :: restarted = .false.
+    !> of the last step [m]
+    real(dp) :: largest_overlap = 0.0_dp
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     !> largest over mean number of contacts of a subdomain in the last step
@@ -356,6 +358,7 @@ contains
       if (self%problem%sub(s)%n_contacts > 0) figures%max_overlap = max(figures%max_overlap, -minval(self%problem%sub(s)%gap))
     end do
     figures%max_overlap = self%comm%highest(figures%max_overlap)
+    self%largest_overlap = figures%max_overlap
     if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
   end subroutine simulation_assemble
