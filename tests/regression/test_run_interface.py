@@ -57,7 +57,7 @@ class Commands(RunTestCase):
             self.assert_status(run, 0)
             self.assertEqual(run.stderr, "")
             for expected in ("a few disks", "30 grains, 3 boundaries", "subdomains 3", "2D, friction on", "rotation on", "gravity on",
-                             "contacts", "interface", "multiplicity", "bytes a contact", "nothing was run", "tolerance = 0.001"):
+                             "contacts", "interface", "multiplicity", "bytes of each item", " a contact, ", "nothing was run", "tolerance = 0.001"):
                 self.assertIn(expected, run.stdout)
             outputs.append([line for line in run.stdout.splitlines() if not line.startswith("ranks")])
         self.assertEqual(*outputs)
