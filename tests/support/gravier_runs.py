@@ -16,6 +16,7 @@ import numpy as np
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
 PROGRAMS = os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin")))
+GRAVIER = os.path.join(PROGRAMS, "gravier")
 MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
 ENVIRONMENT = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
@@ -51,7 +52,7 @@ class Run:
 
 
 def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
-    """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run that is not over after `timeout` seconds is ended and is an error:
+    """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run not over after `timeout` seconds is ended and is an error:
     one rank waits for another that has left, or a loop does not end."""
     # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure
     before = set(glob.glob(os.path.join(directory, "rank.*")))
