@@ -32,6 +32,8 @@ contains
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
         list%impulse(:, :) = 0.0_dp
         do c = 1, sub%n_contacts
+          ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart
+          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
           if (problem%kernels%nc < 3) then
             list%impulse(:, sub%source(c)) = sub%impulse(:, c)
           else
