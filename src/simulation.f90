@@ -572,7 +572,9 @@ contains
     end if
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
-    if (allocated(error) .or. figures%solve%status == solve_diverged) return
+    if (allocated(error)) return
+    if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
+    if (figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
@@ -587,7 +589,6 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%kinetic_energy()
-    if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
