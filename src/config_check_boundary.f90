@@ -28,6 +28,7 @@ contains
     do i = 1, size(config%boundaries)
       report%instance = i
       call check_name(report, config%boundaries(:i), error)
+      call check_group(report, config%boundaries(:i), error)
       call check_shape(report, config, config%boundaries(i), error)
       call check_size(report, config%boundaries(i), error)
       call check_free(report, config%boundaries(i), error)
@@ -52,6 +53,22 @@ contains
                   "a name of its own, but the "//ordinal(i)//" has it too")
     end do
   end subroutine check_name
+
+  !> The last of some boundaries has a group of grains of its own.
+  subroutine check_group(report, boundaries, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundaries(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n, i
+
+    n = size(boundaries)
+    if (boundaries(n)%shape /= "grains") return
+    do i = 1, n - 1
+      if (boundaries(i)%shape /= "grains") cycle
+      call expect(report, boundaries(i)%group /= boundaries(n)%group, "boundary", "group", error, &
+                  "a group of its own, but the "//ordinal(i)//" has it too")
+    end do
+  end subroutine check_group
 
   subroutine check_shape(report, config, boundary, error)
     type(report_t), intent(in) :: report

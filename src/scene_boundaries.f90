@@ -53,11 +53,52 @@ contains
     do b = 1, size(boundaries)
       if (allocated(error)) exit
       call boundaries(b)%prescribe(nd, 0.0_dp)
-      if (boundaries(b)%is_driven() .and. boundaries(b)%turns()) call raise(error, status_input, &
-        & trim(config%boundaries(b - data%n_walls)%table)//": a rotation of the boundary '"//boundaries(b)%name// &
-        & "', which forces move: expected no column of a rotation rate where a component is free")
+      if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
     end do
   end subroutine make_boundaries
+
+  !> Refuse a table with a column that would do nothing, or that turns what forces move.
+  subroutine check_table(boundary, nd, path, error)
+    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: nd
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+    integer :: d, force
+    logical :: pressed
+
+    if (.not. allocated(boundary%table%has)) return
+    force = merge(3, 6, nd == 2)
+    do d = 1, nd
+      if (boundary%table%has(d) .and. boundary%free(d)) call refuse("v"//axes(d), "no such column where this component is free")
+      if (boundary%table%has(force + d) .and. .not. boundary%free(d)) call refuse("f"//axes(d), &
+        & "no such column where this component is not free")
+    end do
+    if (boundary%is_driven() .and. boundary%turns()) call refuse("of a rotation rate", &
+      & "no such column where a component of the translation is free")
+    pressed = boundary%shape == shape_plane .and. any(boundary%free .and. abs(boundary%axis) > 0.0_dp)
+    if (boundary%table%has(merge(6, 10, nd == 2)) .and. .not. pressed) call refuse("pressure", &
+      & "no such column but for a plane of which a component along normal is free")
+
+  contains
+
+    subroutine refuse(column, expected)
+      character(len=*), intent(in) :: column, expected
+
+      call raise(error, status_input, path//": column "//column//": boundary '"//boundary%name//"': expected "//expected)
+    end subroutine refuse
+
+  end subroutine check_table
+
+  !> A vector of length 1, whatever its length was: squares of very large or small components would be lost.
+  pure subroutine set_direction(vector, unit)
+    !> not 0
+    real(dp), intent(in) :: vector(3)
+    real(dp), intent(out) :: unit(3)
+
+    unit(:) = vector/maxval(abs(vector))
+    unit(:) = unit/norm2(unit)
+  end subroutine set_direction
 
   subroutine set_boundary(config, nd, boundary)
     type(boundary_config_t), intent(in) :: config
@@ -72,10 +113,10 @@ contains
     select case (config%shape)
     case ("plane")
       boundary%shape = shape_plane
-      boundary%axis(:) = config%normal/norm2(config%normal)
+      call set_direction(config%normal, boundary%axis)
     case ("outlet")
       boundary%shape = shape_outlet
-      boundary%axis(:) = config%normal/norm2(config%normal)
+      call set_direction(config%normal, boundary%axis)
     case ("segment")
       boundary%shape = shape_segment
       boundary%edge(:, 1) = config%end_point - config%point
@@ -87,7 +128,7 @@ contains
       boundary%shape = shape_circle
     case ("cylinder")
       boundary%shape = shape_cylinder
-      boundary%axis(:) = config%axis/norm2(config%axis)
+      call set_direction(config%axis, boundary%axis)
     case ("grains")
       boundary%shape = shape_grains
     end select

@@ -576,7 +576,9 @@ contains
     if (.not. allocated(error) .and. figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
-    if (allocated(error) .or. figures%solve%status == solve_diverged) return
+    if (allocated(error)) return
+    if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
+    if (figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
