@@ -12,8 +12,8 @@ module gravier_overlap_projection
   public :: project_overlaps
 
   !> sweeps between two looks at what is left, and at most in one projection: what they leave is for the next steps
-  integer, parameter :: check_every = 10, max_sweeps = 500
-  !> excess that sweeps may leave, as a part of the overlap allowed
+  integer, parameter :: check_every = 10, max_sweeps = 200
+  !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
   real(dp), parameter :: remainder = 0.1_dp
 
   !> What a projection borrows of a subproblem, and its work space.
@@ -35,13 +35,14 @@ contains
     !> [s], [m]
     real(dp), intent(in) :: h, allowed
     type(borrowed_t) :: borrowed(size(problem%sub))
-    real(dp) :: factor
+    real(dp) :: enough, factor
     integer :: s, k
 
     call start_timer(phase_bodies)
     do s = 1, size(problem%sub)
       call lend(problem, s, h, allowed, borrowed(s))
     end do
+    enough = remainder*max(allowed, excess(problem, borrowed))
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
@@ -50,7 +51,7 @@ contains
       end do
       call average_copies(problem)
       if (mod(k, check_every) > 0) cycle
-      if (excess(problem, borrowed) <= remainder*allowed) exit
+      if (excess(problem, borrowed) <= enough) exit
     end do
     factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
     do s = 1, size(problem%sub)
@@ -103,8 +104,7 @@ contains
   end function reduction
 
   !> Make a subproblem one of displacements: frictionless, from rest, with the gaps that the next step would find in the
-  !> place of velocities. No contact is asked to give back more than `allowed` at once: many deep overlaps undone in one
-  !> projection, which sees only the contacts of now, would press grains into others.
+  !> place of velocities.
   subroutine lend(problem, s, h, allowed, borrowed)
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
@@ -119,7 +119,7 @@ contains
       allocate (borrowed%work(problem%kernels%nc, sub%n_contacts))
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
       do c = 1, sub%n_contacts
-        sub%hot(nd + 1, c) = max(sub%gap(c) + h*borrowed%work(1, c) + allowed, -allowed)
+        sub%hot(nd + 1, c) = sub%gap(c) + h*borrowed%work(1, c) + allowed
         ! no friction
         if (problem%kernels%nc > 1) sub%hot(nd + 6, c) = 0.0_dp
       end do
