@@ -106,7 +106,7 @@ def value_text(value):
     return repr(value.item() if isinstance(value, np.generic) else value)
 
 
-def run(directory, groups, boundaries=(), ranks=1):
+def run(directory, groups, boundaries=(), ranks=1, program=BINARIES / "gravier"):
     """Run the program in `directory` on the groups {name: {key: value}} and boundaries [{key: value}]; seconds it took."""
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
@@ -116,7 +116,7 @@ def run(directory, groups, boundaries=(), ranks=1):
         for name, keys in all_groups))
     start = time.time()
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:
-        done = subprocess.run([os.environ.get("MPIEXEC", "mpiexec"), "-n", str(ranks), str(BINARIES / "gravier"), "case.nml"],
+        done = subprocess.run([os.environ.get("MPIEXEC", "mpiexec"), "-n", str(ranks), str(Path(program).resolve()), "case.nml"],
                               cwd=directory, env={**ENVIRONMENT, **os.environ}, stdout=log, stderr=subprocess.STDOUT,
                               stdin=subprocess.DEVNULL, check=False)
     # 3: some solve missed its tolerance, which history.csv tells

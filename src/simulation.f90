@@ -587,7 +587,7 @@ contains
       & self%time, figures%left > 0)
     call move_to_end(self)
     figures%projected = figures%max_overlap > self%overlap_allowed
-    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%overlap_allowed)
+    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
     if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     call stop_timer(phase_bodies)
     self%step = self%step + 1

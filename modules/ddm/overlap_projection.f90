@@ -11,44 +11,52 @@ module gravier_overlap_projection
   private
   public :: project_overlaps
 
-  !> sweeps of one projection: what they leave is for the next steps
-  integer, parameter :: sweeps = 10
+  !> sweeps between two looks at what is left, and at most in one projection: what they leave is for the next steps
+  integer, parameter :: check_every = 10, max_sweeps = 200
+  !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
+  real(dp), parameter :: remainder = 0.1_dp
 
-  !> What a projection borrows of a subproblem.
+  !> What a projection borrows of a subproblem, and its work space.
   type :: borrowed_t
-    real(dp), allocatable :: hot(:, :), impulse(:, :)
+    real(dp), allocatable :: hot(:, :), impulse(:, :), work(:, :)
   end type borrowed_t
 
 contains
 
-  !> Move grains so that no overlap exceeds `allowed`, as far as some sweeps of nonlinear Gauss-Seidel lead there:
+  !> Move grains so that no overlap exceeds `allowed`, as far as sweeps of nonlinear Gauss-Seidel lead there:
   !> displacements in the metric of the masses, M d = H p with p >= 0 orthogonal to n.(d_i - d_j) + gap + allowed >= 0, in all
-  !> subdomains with shared masses as in NSCDD. Boundaries stay where they are. The problem comes back as it was but for the
-  !> velocities in it. Collective.
-  subroutine project_overlaps(decomposition, problem, allowed)
+  !> subdomains with shared masses as in NSCDD. They are scaled down together so that no grain moves by more than half the
+  !> alert distance (or `allowed`): two grains that are no contact now cannot come to overlap. Boundaries stay where they are.
+  !> The problem comes back as it was but for the velocities in it. Collective.
+  subroutine project_overlaps(decomposition, problem, h, allowed)
     type(decomposition_t), intent(inout) :: decomposition
-    !> of a step that is over; gaps at its q_m
+    !> of a step that is over; gaps at its q_m, velocities at its end
     type(contact_problem_t), intent(inout) :: problem
-    !> [m]
-    real(dp), intent(in) :: allowed
+    !> [s], [m]
+    real(dp), intent(in) :: h, allowed
     type(borrowed_t) :: borrowed(size(problem%sub))
+    real(dp) :: enough, factor
     integer :: s, k
 
     call start_timer(phase_bodies)
     do s = 1, size(problem%sub)
-      call lend(problem, s, allowed, borrowed(s))
+      call lend(problem, s, h, allowed, borrowed(s))
     end do
-    do k = 1, sweeps
+    enough = remainder*max(allowed, excess(problem, borrowed))
+    do k = 1, max_sweeps
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
           call problem%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
         end associate
       end do
       call average_copies(problem)
+      if (mod(k, check_every) > 0) cycle
+      if (excess(problem, borrowed) <= enough) exit
     end do
+    factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
-        sub%v_global(:, :) = sub%velocity
+        sub%v_global(:, :) = factor*sub%velocity
         call move_alloc(borrowed(s)%hot, sub%hot)
         call move_alloc(borrowed(s)%impulse, sub%impulse)
       end associate
@@ -57,11 +65,50 @@ contains
     call stop_timer(phase_bodies)
   end subroutine project_overlaps
 
-  !> Make a subproblem one of displacements: frictionless, from rest, with gaps in the place of velocities.
-  subroutine lend(problem, s, allowed, borrowed)
+  !> Largest overlap beyond what is allowed under the displacements of now [m]. Collective.
+  real(dp) function excess(problem, borrowed)
+    type(contact_problem_t), intent(in) :: problem
+    type(borrowed_t), intent(inout) :: borrowed(:)
+    integer :: s, c, nd
+
+    nd = problem%kernels%nd
+    excess = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), work => borrowed(s)%work)
+        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
+        do c = 1, sub%n_contacts
+          excess = max(excess, -(work(1, c) + sub%hot(nd + 1, c)))
+        end do
+      end associate
+    end do
+    excess = problem%comm%highest(excess)
+  end function excess
+
+  !> Factor that brings all displacements of grains within `limit` [m]. Collective.
+  real(dp) function reduction(problem, limit)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(in) :: limit
+    real(dp) :: longest
+    integer :: s, b, nd
+
+    nd = problem%kernels%nd
+    longest = 0.0_dp
+    do s = 1, size(problem%sub)
+      do b = 1, problem%sub(s)%n_grains
+        longest = max(longest, norm2(problem%sub(s)%velocity(1:nd, b)))
+      end do
+    end do
+    longest = problem%comm%highest(longest)
+    reduction = 1.0_dp
+    if (longest > limit) reduction = limit/longest
+  end function reduction
+
+  !> Make a subproblem one of displacements: frictionless, from rest, with the gaps that the next step would find in the
+  !> place of velocities.
+  subroutine lend(problem, s, h, allowed, borrowed)
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
-    real(dp), intent(in) :: allowed
+    real(dp), intent(in) :: h, allowed
     type(borrowed_t), intent(out) :: borrowed
     integer :: c, nd
 
@@ -69,13 +116,15 @@ contains
     associate (sub => problem%sub(s))
       borrowed%hot = sub%hot
       borrowed%impulse = sub%impulse
-      sub%velocity(:, :) = 0.0_dp
-      sub%impulse(:, :) = 0.0_dp
+      allocate (borrowed%work(problem%kernels%nc, sub%n_contacts))
+      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
       do c = 1, sub%n_contacts
-        sub%hot(nd + 1, c) = sub%gap(c) + allowed
+        sub%hot(nd + 1, c) = sub%gap(c) + h*borrowed%work(1, c) + allowed
         ! no friction
         if (problem%kernels%nc > 1) sub%hot(nd + 6, c) = 0.0_dp
       end do
+      sub%velocity(:, :) = 0.0_dp
+      sub%impulse(:, :) = 0.0_dp
       call sub%share_masses(.true.)
       sub%weight(:, sub%n_grains + 1:) = 0.0_dp
       call sub%update_local_operator()

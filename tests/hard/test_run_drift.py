@@ -1,0 +1,172 @@
+"""Overlaps of long runs: they grow at a loose tolerance, and stay within what is allowed where places are projected.
+
+A projection leaves a tenth of what is allowed at most, to first order in displacements that are themselves of that order, and sees
+the velocities of the step that is over, not the loads of the next: a packing at rest keeps 1.5 times what is allowed."""
+import unittest
+
+import h5py
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks
+
+RADIUS = 0.01
+ALLOWED = 0.005 * RADIUS
+DENSITY = 2500.0
+KEPT = 1.5
+CASE = {
+    "scene": {"dimension": 2, "bodies": "file", "friction": 0.3, "density": DENSITY, "overlap_allowed": ALLOWED},
+    "time": {"step": 1e-3, "steps": 2000},
+    "solver": {"tolerance": 1e-2, "max_iterations": 500},
+    "output": {"directory": "results", "every": 0, "contacts": False, "final_bodies": True, "energy": True},
+}
+WITHOUT = {"scene": {"overlap_projection": False}}
+
+
+def grains_file(path, centres, radii, group=None, planes=()):
+    with h5py.File(path, "w") as file:
+        file["bodies/id"] = np.arange(1, len(radii) + 1)
+        file["bodies/position"] = centres
+        file["bodies/radius"] = radii
+        if group is not None:
+            file["bodies/group"] = group
+        if len(planes) > 0:
+            file["walls/id"] = len(radii) + 1 + np.arange(len(planes))
+            file["walls/point"] = np.array([point for point, _ in planes], float)
+            file["walls/normal"] = np.array([normal for _, normal in planes], float)
+    return path
+
+
+def final_overlaps(run, period=None, low=None):
+    """Largest overlap of two grains of the last state, and of a grain and the planes x_d = low[d] [m]."""
+    with h5py.File(run.path("results", "final_bodies.h5")) as file:
+        centres, radii = file["bodies/position"][:], file["bodies/radius"][:]
+    apart = centres[:, None] - centres[None]
+    if period is not None:
+        apart -= np.where(period > 0.0, np.round(apart / np.where(period > 0.0, period, 1.0)), 0.0) * period
+    overlap = radii[:, None] + radii[None] - np.linalg.norm(apart, axis=2)
+    np.fill_diagonal(overlap, 0.0)
+    beyond = 0.0 if low is None else max((low[d] - (centres[:, d] - radii)).max() for d in range(len(low)) if low[d] is not None)
+    return overlap.max(), beyond
+
+
+class Drift(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.packing = settled_disks(cls.scratch)
+        with h5py.File(cls.packing) as file:
+            cls.centres, cls.radii = file["bodies/position"][:], file["bodies/radius"][:]
+            cls.planes = list(zip(file["walls/point"][:], file["walls/normal"][:]))
+        cls.unit = (DENSITY * np.pi * cls.radii**2).sum() * 9.81 * RADIUS
+
+    def run_here(self, name, change=None, more=None, ranks=1):
+        run = run_case(merged(CASE, {"scene": {"bodies_file": self.packing}}, change or {}, more or {}), ranks, self.here(name))
+        self.assertIn(run.status, (0, 3), str(run))
+        return run
+
+    def test_loose_tolerance(self):
+        """A packing at rest: overlaps grow on and on, or stay; and no kinetic energy comes of it."""
+        without, kept = (run.history() for run in each(self.run_here, [("without", WITHOUT), ("with",)]))
+        half = len(kept["step"]) // 2
+        self.assertEqual(without["projected"].max(), 0)
+        self.assertGreater(without["max_overlap"][-1], 2.0 * ALLOWED)
+        self.assertGreater(without["max_overlap"][-1], 5.0 * without["max_overlap"][0])
+        self.assertGreater(kept["projected"].sum(), 10)
+        self.assertLess(kept["max_overlap"][half:].max(), KEPT * ALLOWED)
+        # what a loose solve leaves of motion, with or without
+        self.assertLess(kept["kinetic_energy"][half:].max(), 1e-3 * self.unit)
+        self.assertLess(kept["kinetic_energy"][half:].mean(), 2.0 * max(kept["kinetic_energy"][:half].mean(),
+                                                                       without["kinetic_energy"][half:].mean()))
+        # the balance of velocities knows nothing of projections
+        self.assertLess(np.abs(kept["energy_error"]).max(), 1e-12 * self.unit)
+
+    def test_ranks_and_subdomains(self):
+        """The same bits on 1 and 2 ranks; close on 1 and 4 subdomains."""
+        grown = grains_file(self.here("grown a little.h5"), self.centres, 1.02 * self.radii, planes=self.planes)
+        change = {"scene": {"bodies_file": grown}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 4},
+                  "time": {"steps": 300}}
+        one, two, whole = each(self.run_here, [("1 rank", change), ("2 ranks", change, {}, 2),
+                                               ("1 subdomain", change, {"decomposition": {"subdomains": 1}})])
+        self.assertEqual([name for name in differences(one.results(), two.results()) if not name.startswith("/run")], [])
+        self.assertGreater(one.history()["projected"].sum(), 10)
+        for run in (one, whole):
+            self.assertLess(run.history()["max_overlap"][-1], KEPT * ALLOWED)
+        # the packing rises by 60 radii a hundred, as grains are larger by two: about as far on any partition
+        heights = [run.history()["potential_energy"] / self.unit for run in (one, whole)]
+        self.assertGreater(heights[0][-1] - heights[0][0], 0.1)
+        self.assertLess(np.abs(heights[0] - heights[1]).max(), 0.1 * (heights[0][-1] - heights[0][0]))
+
+    def test_deep_overlaps(self):
+        """Overlaps of a fifth of the radius, in a box too narrow for the layers: they are undone within some hundred steps. On
+        the way some may get deeper, by a half at most, since sweeps end before they are exact; grains fall into what opens, from
+        a height that is a small part of their radius."""
+        grown = grains_file(self.here("grown.h5"), self.centres, 1.1 * self.radii, planes=self.planes)
+        change = {"scene": {"bodies_file": grown}, "time": {"steps": 500}, "solver": {"tolerance": 1e-3}}
+        without, run = each(self.run_here, [("deep without", change, WITHOUT), ("deep", change)])
+        history, free = run.history(), without.history()
+        self.assertGreater(free["max_overlap"][-1], 0.19 * RADIUS)
+        self.assertLess(history["max_overlap"].max(), 1.5 * history["max_overlap"][0])
+        self.assertLess(history["max_overlap"][-1], KEPT * ALLOWED)
+        overlap, beyond = final_overlaps(run, low=[0.0, 0.0])
+        self.assertLess(max(overlap, beyond), KEPT * ALLOWED)
+        self.assertLess(history["kinetic_energy"].max(), 4.0 * free["kinetic_energy"].max())
+        self.assertLess(history["kinetic_energy"].max(), 0.01 * self.unit)
+        # the projection has lifted the packing, and gave it no velocity
+        self.assertGreater(history["potential_energy"][-1] - history["potential_energy"][0], self.unit)
+
+    def piston(self, name, more=None):
+        """Disks that overlap each other, glued ones below and a piston above that a pressure moves."""
+        x, y = RADIUS * (2 * np.arange(10) + 1), 1.8 * RADIUS * np.arange(1, 7)
+        centres = np.concatenate([np.stack([x, np.zeros(10)], axis=1), np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)])
+        path = grains_file(self.here(name + ".h5"), centres, np.full(70, RADIUS), np.repeat([3, 0], [10, 60]))
+        boundaries = [{"name": "bottom", "shape": "grains", "group": 3},
+                      {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
+                      {"name": "right", "shape": "plane", "normal": [-1.0, 0.0], "point": [20.0 * RADIUS, 0.0]},
+                      {"name": "lid", "shape": "plane", "normal": [0.0, -1.0], "point": [0.0, y[-1] + 0.8 * RADIUS],
+                       "free": [False, True], "pressure": 2000.0, "mass": 5.0}]
+        return self.run_here(name, {"scene": {"bodies_file": path}, "boundary": boundaries, "time": {"steps": 50},
+                                    "solver": {"tolerance": 1e-8, "max_iterations": 5000}, "output": {"every": 1}}, more)
+
+    def test_boundaries_stay(self):
+        """Projections move the free grains only. A piston moves by its velocity alone, glued grains not at all."""
+        run, without = (each(self.piston, [("piston",), ("piston without", WITHOUT)]))
+        moved, unmoved = run.results(), without.results()
+        self.assertEqual(run.history()["projected"].min(), 1)
+        glued = slice(0, 10)
+        for step in range(1, 51):
+            places = moved[f"/steps/{step}/bodies/position"]
+            self.assertTrue(np.array_equal(places[glued], moved["/steps/0/bodies/position"][glued]))
+            before, now = (moved[f"/steps/{k}/boundaries/position"] for k in (step - 1, step))
+            velocity = [moved[f"/steps/{k}/boundaries/velocity"] for k in (step - 1, step)]
+            np.testing.assert_allclose(now - before, 0.5e-3 * (velocity[0] + velocity[1])[:, :2], rtol=0.0, atol=1e-15)
+        self.assertTrue(np.array_equal(moved["/steps/1/boundaries/position"], unmoved["/steps/1/boundaries/position"]))
+        free = slice(10, 70)
+        first = [results["/steps/1/bodies/position"][free] for results in (moved, unmoved)]
+        self.assertGreater(np.abs(first[0] - first[1]).max(), 0.02 * RADIUS)
+        # within sight: half the alert distance, a tenth of the radius
+        self.assertLess(np.linalg.norm(first[0] - first[1], axis=1).max(), 0.05 * RADIUS * (1.0 + 1e-9))
+        self.assertTrue(np.array_equal(moved["/steps/1/bodies/velocity"], unmoved["/steps/1/bodies/velocity"]))
+        # nothing comes to lie behind the piston or the sides
+        places = moved["/steps/50/bodies/position"][free]
+        self.assertTrue(np.all((places[:, 0] > 0.0) & (places[:, 0] < 20.0 * RADIUS)))
+        self.assertLess(places[:, 1].max(), moved["/steps/50/boundaries/position"][3, 1])
+
+    def test_periodic(self):
+        """Overlaps across the sides of a cell are undone as those within: a lattice of 10 by 6 disks that overlap by a tenth."""
+        period = np.array([10 * 2.1 * RADIUS, 6 * 2.1 * RADIUS])
+        rng = np.random.default_rng(5)
+        centres = np.stack(np.meshgrid(2.1 * RADIUS * np.arange(10), 2.1 * RADIUS * np.arange(6), indexing="ij"), -1).reshape(-1, 2)
+        centres = np.mod(centres + rng.uniform(-0.2, 0.2, centres.shape) * RADIUS, period)
+        path = grains_file(self.here("cell.h5"), centres, np.full(60, RADIUS))
+        change = {"scene": {"bodies_file": path, "period": [*period, 0.0], "gravity": [0.0, 0.0]}, "time": {"steps": 100},
+                  "decomposition": {"subdomains": 2}, "solver": {"method": "nscdd"}}
+        run, without = each(self.run_here, [("cell", change), ("cell without", change, WITHOUT)])
+        self.assertGreater(final_overlaps(without, period)[0], 0.1 * RADIUS)
+        self.assertLess(final_overlaps(run, period)[0], KEPT * ALLOWED)
+        # nothing moves it: no velocity at all
+        self.assertEqual(run.history()["kinetic_energy"].max(), 0.0)
+
+
+if __name__ == "__main__":
+    unittest.main()
