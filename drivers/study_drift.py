@@ -2,7 +2,7 @@
 """Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
 tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius.
 
-    python3 drivers/study_drift.py --out DIR [--gravier PROGRAM] [--steps 20000]     about 5 minutes on one core
+    python3 drivers/study_drift.py --out DIR [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
 
 leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png."""
 import argparse
@@ -150,7 +150,9 @@ def draw(path, curves):
         panel.set_title(title, fontsize=10)
         panel.set_xlabel("step")
         panel.set_ylabel("largest overlap / mean radius")
-        panel.legend(frameon=False, fontsize=8)
+        low, high = panel.get_ylim()
+        panel.set_ylim(low, high * (high / low)**0.2)
+        panel.legend(frameon=False, fontsize=7, loc="upper center", ncol=3 if name == "disks" else 2)
     figure.savefig(path, dpi=130)
 
 
