@@ -138,7 +138,11 @@ contains
     integer :: b, c, d, n, nv, side, on_wall
 
     nv = kernels%nv
-    on_wall = count(sub%pair(2, :) > sub%n_bodies)
+    ! on what moves as prescribed: the antagonist, or a candidate glued to it
+    on_wall = 0
+    do c = 1, sub%n_contacts
+      if (any(sub%pair(:, c) > sub%n_bodies)) on_wall = on_wall + 1
+    end do
     n = sub%n_bodies*nv + on_wall*(nv*(nv + 1))/2 + (sub%n_contacts - on_wall)*(nv*(nv + 1) + nv*nv)
     allocate (row(n), column(n), value(n))
     n = 0
@@ -156,7 +160,7 @@ contains
       do side = 1, 2
         if (sub%pair(side, c) <= sub%n_bodies) call add_block(sub%pair(side, c), sub%pair(side, c), side, side)
       end do
-      if (sub%pair(2, c) > sub%n_bodies) cycle
+      if (any(sub%pair(:, c) > sub%n_bodies)) cycle
       if (sub%pair(1, c) > sub%pair(2, c)) then
         call add_block(sub%pair(1, c), sub%pair(2, c), 1, 2)
       else

@@ -1,7 +1,7 @@
 """The results do not depend on the number of ranks: not in one bit, for every method, partition and rule."""
 import unittest
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks, steps_of
+from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks, steps_of, write
 
 FEW = {"solver": {"tolerance": 3e-3}, "time": {"steps": 2}}
 METHODS = {
@@ -116,6 +116,26 @@ class Spheres(RankInvariance):
         self.assertGreater(history["contacts"].max(), 500)
         # falling, then stopped by the ground and by each other
         self.assertLess(history["kinetic_energy"][-1], 0.5 * history["kinetic_energy"].max())
+
+
+class Glued(RankInvariance):
+    """Disks on a row of glued disks that moves as prescribed, in every method: the glued are candidates of their contacts."""
+
+    def test_moving_floor(self):
+        rows = [f"{14 * j + i + 1},{0.1 * i + 0.05 * (j % 2) + 0.05},{0.05 + 0.087 * j},0.05,{1 if j == 0 else 0}"
+                for j in range(6) for i in range(14)]
+        path = self.here("glued.csv")
+        write(path, "id,x,y,radius,group\n" + "\n".join(rows) + "\n")
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": path, "friction": 0.3, "period": [1.4, 0.0]},
+            "boundary": [{"shape": "grains", "group": 1, "velocity": [0.2, 0.0]}],
+            "time": {"step": 1e-3, "steps": 8},
+            "solver": {"tolerance": 1e-2, "max_iterations": 300},
+            "decomposition": {"subdomains": 6},
+            "output": {"directory": "results", "trace": True},
+        }
+        self.compare_ranks({name: merged(case, {"solver": METHODS[name]["solver"], "enriched": METHODS[name].get("enriched", {})},
+                                         {"solver": {"tolerance": 1e-2}}) for name in METHODS}, (1, 3))
 
 
 if __name__ == "__main__":
