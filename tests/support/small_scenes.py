@@ -56,6 +56,12 @@ class Record:
                 rows = state["bodies/id"][:] - 1
                 self.position[k, rows] = state["bodies/position"]
                 self.all_velocities[k, rows] = state["bodies/velocity"]
+            self.image = np.zeros(shape + (dimension,), dtype=int)
+            for k, state in enumerate(states):
+                if "image" in state["bodies"]:
+                    self.image[k, state["bodies/id"][:] - 1] = state["bodies/image"]
+            self.boundary = {name: np.array([state["boundaries"][name][:] for state in states])
+                             for name in ("position", "velocity", "force")} if "boundaries" in states[-1] else {}
             self.contacts = [{name: state["contacts"][name][:] for name in state["contacts"]} if "contacts" in state else None
                              for state in states]
         self.velocity = self.all_velocities[:, :, :dimension]
