@@ -1,0 +1,132 @@
+"""Scenes of a few grains for comparison with formulas: grains given in Python, a run, and all that it wrote as arrays.
+
+What is compared is noted too: with the environment variable GRAVIER_VALIDATION_TABLE set to the path of a CSV file, each
+comparison adds a row (case, quantity, accepted, measured, error, tolerance) to it."""
+import os
+
+import h5py
+import numpy as np
+
+from gravier_runs import RunTestCase, merged, run_case, write
+
+G = 9.81
+EPS = np.finfo(float).eps
+# moment of inertia of a disk or a sphere in units of m R^2
+INERTIA = {2: 1 / 2, 3: 2 / 5}
+
+
+class Grain:
+    """A grain: place and velocity along the axes, spins (one in 2D), the group that glues it to others."""
+
+    def __init__(self, place, velocity=None, spin=None, radius=0.05, mass=0.7, group=0):
+        dimension = len(place)
+        self.place = [float(x) for x in place]
+        self.velocity = [0.0] * dimension if velocity is None else [float(v) for v in velocity]
+        self.spin = [0.0] * (2 * dimension - 3) if spin is None else [float(w) for w in np.atleast_1d(spin)]
+        self.radius, self.mass, self.group = float(radius), float(mass), group
+
+
+def bodies_csv(grains):
+    """Text of a bodies file; identifiers from 1 on."""
+    dimension = len(grains[0].place)
+    axes = "xyz"[:dimension]
+    spins = ["omega"] if dimension == 2 else ["wx", "wy", "wz"]
+    rows = [",".join(["id", "radius", "mass", "group", *axes, *("v" + axis for axis in axes), *spins])]
+    for number, grain in enumerate(grains, 1):
+        cells = [grain.radius, grain.mass, grain.group, *grain.place, *grain.velocity, *grain.spin]
+        rows.append(",".join([str(number), *(repr(cell) for cell in cells)]))
+    return "\n".join(rows) + "\n"
+
+
+class Record:
+    """All written states of a run. Arrays (states, grains, components) with NaN for grains that have left."""
+
+    def __init__(self, run, grains, dimension):
+        self.run, self.dimension = run, dimension
+        with h5py.File(run.path("results", "results.h5")) as file:
+            numbers = sorted(int(name) for name in file["steps"])
+            states = [file[f"steps/{number}"] for number in numbers]
+            self.step = np.array(numbers)
+            self.time = np.array([state.attrs["time"] for state in states])
+            self.present = [state["bodies/id"][:] for state in states]
+            shape = (len(states), len(grains))
+            self.position = np.full(shape + (dimension,), np.nan)
+            self.all_velocities = np.full(shape + (3 * dimension - 3,), np.nan)
+            for k, state in enumerate(states):
+                rows = state["bodies/id"][:] - 1
+                self.position[k, rows] = state["bodies/position"]
+                self.all_velocities[k, rows] = state["bodies/velocity"]
+            self.image = np.zeros(shape + (dimension,), dtype=int)
+            for k, state in enumerate(states):
+                if "image" in state["bodies"]:
+                    self.image[k, state["bodies/id"][:] - 1] = state["bodies/image"]
+            self.boundary = {name: np.array([state["boundaries"][name][:] for state in states])
+                             for name in ("position", "velocity", "force")} if "boundaries" in states[-1] else {}
+            self.contacts = [{name: state["contacts"][name][:] for name in state["contacts"]} if "contacts" in state else None
+                             for state in states]
+        self.velocity = self.all_velocities[:, :, :dimension]
+        self.spin = self.all_velocities[:, :, dimension:]
+
+
+def plane(point, normal, **more):
+    return {"shape": "plane", "point": floats(point), "normal": floats(normal), **more}
+
+
+def floats(values):
+    return [float(value) for value in values]
+
+
+class SmallScene(RunTestCase):
+    """Runs of a few grains. Steps are a power of two, so that times are exact; a tolerance of round-off."""
+    step = 1.0 / 512
+
+    def play(self, title, grains, boundaries=(), gravity=None, steps=100, ranks=1, files=(), **groups):
+        """Run `grains` between `boundaries` (lists of keys) and return what was written. Boundaries have the identifiers that
+        follow on those of the grains."""
+        dimension = len(grains[0].place)
+        gravity = np.zeros(dimension) if gravity is None else gravity
+        directory = self.here(title)
+        os.makedirs(directory)
+        write(os.path.join(directory, "bodies.csv"), bodies_csv(grains))
+        for name, text in dict(files).items():
+            write(os.path.join(directory, name), text)
+        case = merged({
+            "scene": {"dimension": dimension, "bodies": "file", "bodies_file": "bodies.csv", "gravity": floats(gravity)},
+            "boundary": [dict(keys) for keys in boundaries],
+            "time": {"step": self.step, "steps": steps},
+            "solver": {"tolerance": 1e-13, "check_every": 1, "warm_start": False, "max_iterations": 20000},
+            "output": {"directory": "results"},
+        }, groups)
+        run = run_case(case, ranks, directory)
+        self.assert_status(run, 0)
+        return Record(run, grains, dimension)
+
+    def both(self, check):
+        """check(dimension) for disks and spheres."""
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                check(dimension)
+
+    def verify(self, case, quantity, measured, accepted, tolerance):
+        """All numbers `measured` are those accepted, within an absolute tolerance; the worst of them goes into the table."""
+        measured, accepted, tolerance = (np.asarray(value, dtype=float) for value in (measured, accepted, tolerance))
+        measured, accepted, tolerance = np.broadcast_arrays(measured, accepted, tolerance)
+        self.assertGreater(measured.size, 0, f"{case}: {quantity}: nothing was measured")
+        error = np.abs(measured - accepted)
+        worst = np.unravel_index(np.argmax(np.where(np.isnan(error), np.inf, error / tolerance)), error.shape)
+        note(case, quantity, accepted[worst], measured[worst], error[worst], tolerance[worst])
+        self.assertTrue(np.all(error <= tolerance), f"{case}: {quantity}: {measured[worst]!r}, accepted {accepted[worst]!r}, "
+                        f"differs by {error[worst]:.3g}, tolerance {tolerance[worst]:.3g}")
+
+    def rounding(self, record, scale):
+        """What one addition a step of numbers no larger than `scale` may lose."""
+        return 4 * max(record.step[-1], 10) * EPS * scale
+
+
+def note(case, quantity, accepted, measured, error, tolerance):
+    path = os.environ.get("GRAVIER_VALIDATION_TABLE")
+    if not path:
+        return
+    # one write a row: tests that run side by side share the file
+    with open(path, "a", encoding="ascii") as file:
+        file.write(f'"{case}","{quantity}",{accepted:.9g},{measured:.9g},{error:.2g},{tolerance:.2g}\n')

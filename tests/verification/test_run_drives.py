@@ -1,0 +1,233 @@
+"""Boundaries that move, are moved, turn, end somewhere, let grains out or go away, and loads that change, against formulas."""
+import unittest
+
+import numpy as np
+
+from small_scenes import EPS, G, Grain, SmallScene, floats, plane
+
+RADIUS, MASS = 0.05, 0.7
+
+
+class Moves(SmallScene):
+
+    def test_constant_velocity(self):
+        """A plane at constant velocity drives what touches it, and is where it should be; it takes nothing to go on."""
+        def check(dimension):
+            along, speed = np.eye(dimension)[0], 0.375
+            record = self.play(f"constant {dimension}", [Grain(RADIUS * along, radius=RADIUS)],
+                               [plane(0 * along, along, velocity=floats(speed * along))], steps=100)
+            case = f"plane at constant velocity, {dimension}D"
+            self.verify(case, "speed of the grain before it [m/s]", record.velocity[1:, 0], speed * along, 1e-12)
+            self.verify(case, "place of the plane [m]", record.boundary["position"][:, 0],
+                        speed * record.time[:, None] * along, 1e-13)
+            self.verify(case, "force on it from the second step on [N]", record.boundary["force"][2:, 0], 0.0,
+                        10 * EPS * MASS / self.step)
+        self.both(check)
+
+    def test_table(self):
+        """Faster until 0.125 s, then slower: the grain goes with the plane and then flies on."""
+        def check(dimension):
+            along = np.eye(dimension)[0]
+            record = self.play(f"table {dimension}", [Grain(RADIUS * along, radius=RADIUS)],
+                               [plane(0 * along, along, table="drive.csv")], steps=128,
+                               files={"drive.csv": "time,vx\n0,0\n0.125,1\n0.1875,-0.5\n"})
+            t = record.time
+            speed = np.interp(t, [0, 0.125, 0.1875], [0, 1, -0.5])
+            case = f"plane driven by a table, {dimension}D"
+            self.verify(case, "speed of the plane [m/s]", record.boundary["velocity"][1:, 0, 0], speed[1:], 1e-13)
+            self.verify(case, "speed of the grain [m/s]", record.velocity[:, 0, 0], np.maximum.accumulate(speed), 1e-12)
+            # a speed that is linear between the steps makes places exact
+            way = np.concatenate([[0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) * self.step
+            self.verify(case, "place of the plane [m]", record.boundary["position"][:, 0, 0], way, 1e-13)
+        self.both(check)
+
+    def test_belt(self):
+        """A block on a belt reaches its speed at u / (mu g)."""
+        def check(dimension):
+            mu, up = 0.4, np.eye(dimension)[-1]
+            belt = 0.8 * (np.array([1.0, 0.0]) if dimension == 2 else np.array([0.6, -0.8, 0.0]))
+            record = self.play(f"belt {dimension}", [Grain(RADIUS * up, radius=RADIUS)],
+                               [plane(0 * up, up, velocity=floats(belt), friction=mu)], -G * up, 150, scene={"rotation": False})
+            case = f"block on a belt, {dimension}D"
+            speed = np.minimum(mu * G * record.time, 0.8)
+            self.verify(case, "velocity [m/s]", record.velocity[:, 0], speed[:, None] * belt / 0.8, 1e-11)
+            slips = np.linalg.norm(record.velocity[:, 0] - belt, axis=1) > 1e-10
+            self.verify(case, "time until it goes with the belt [s]", record.time[np.argmin(slips)], 0.8 / (mu * G), self.step)
+        self.both(check)
+
+    def test_turning_circle(self):
+        """A disk in a circle that turns: it slips, then its rim goes with the circle. At the lowest point it spins with
+        Omega R / r."""
+        ring, rate = 0.4, 3.0
+        place = [0.0, -(ring - RADIUS)]
+        circle = [{"shape": "circle", "point": [0.0, 0.0], "radius": ring, "rotation": rate, "friction": 0.3}]
+        steady = self.play("steady circle", [Grain(place, spin=rate * ring / RADIUS, radius=RADIUS)], circle, (0, -G), 400)
+        case = "disk in a turning circle"
+        self.verify(case, "spin over Omega in the steady state", steady.spin / rate, ring / RADIUS, 1e-9)
+        self.verify(case, "place of the disk in the steady state [m]", steady.position[:, 0], place, 1e-9)
+        slow = self.play("spun up", [Grain(place, radius=RADIUS)], circle, (0, -G), 1000)
+        middle = slow.position[:-1, 0] + 0.5 * self.step * slow.velocity[:-1, 0]
+        out = middle / np.linalg.norm(middle, axis=1)[:, None]
+        tangent = np.column_stack([-out[:, 1], out[:, 0]])
+        rim = np.sum(tangent * slow.velocity[1:, 0], axis=1) + RADIUS * slow.spin[1:, 0, 0]
+        late = slow.time[1:] > 1.0
+        self.verify(case, "speed of the rim at the contact once it rolls [m/s]", rim[late], rate * ring, 1e-9)
+        # it swings about the lowest point
+        self.assertLess(np.abs(slow.position[:, 0, 0]).max(), 0.5 * ring)
+
+    def test_glued(self):
+        """Glued grains turn about a pivot for 10^4 steps: distances stay and places are those of the turn."""
+        def check(dimension):
+            pivot = np.array([0.1, -0.2, 0.3])[:dimension]
+            places = np.array([[0.5, 0.0, 0.0], [0.5, 0.1, 0.0], [0.6, 0.1, 0.2], [-0.3, 0.4, -0.1]])[:, :dimension]
+            axis = np.array([0.0, 0.0, 1.0]) if dimension == 2 else np.array([2.0, -1.0, 2.0]) / 3
+            rate = 1.7
+            record = self.play(f"glued {dimension}", [Grain(place, radius=RADIUS, group=1) for place in places],
+                               [{"shape": "grains", "group": 1, "pivot": floats(pivot),
+                                 "rotation": rate if dimension == 2 else floats(rate * axis)}],
+                               steps=10000, output={"every": 1000})
+            case = f"glued grains about a pivot, 10^4 steps, {dimension}D"
+
+            def distances(places):
+                return np.linalg.norm(places[:, None] - places[None], axis=-1)
+            found = np.array([distances(state) for state in record.position])
+            self.verify(case, "distances of the grains [m]", found, distances(places), 1e-12)
+            arm = np.zeros((len(places), 3))
+            arm[:, :dimension] = places - pivot
+            angle = rate * record.time[:, None, None]
+            turned = (np.cos(angle) * arm + np.sin(angle) * np.cross(axis, arm) +
+                      (1 - np.cos(angle)) * (arm @ axis)[:, None] * axis)
+            self.verify(case, "places [m]", record.position, turned[..., :dimension] + pivot, 1e-10)
+        self.both(check)
+
+
+class Forces(SmallScene):
+
+    def test_piston(self):
+        """A piston of mass m pushed by F drives N grains in a row: a = F / (m + N m_g), whatever the method."""
+        force, mass, n = 3.0, 1.3, 5
+        ways = {"nlgs": {}, "nscdd": {}, "nscdd_ep": {"enriched": {"direction": 0.01}},
+                "schwarz": {"solver": {"relaxation": 0.5}}, "schwarz_ec": {"solver": {"relaxation": 0.5}}}
+
+        def check(dimension):
+            along = np.eye(dimension)[0]
+            grains = [Grain((2 * k + 1) * RADIUS * along, radius=RADIUS, mass=MASS) for k in range(n)]
+            piston = plane(0 * along, along, free=[True, False, False][:dimension], mass=mass, force=floats(force * along))
+            a = force / (mass + n * MASS)
+            for method, more in ways.items():
+                for parts, ranks in ((1, 1), (3, 1), (3, 2)):
+                    if (method == "nlgs" and parts > 1) or (ranks > 1 and (method, dimension) != ("nscdd", 2)):
+                        continue
+                    if dimension == 3 and (parts == 1 or method not in ("nscdd", "nscdd_ep")):
+                        continue
+                    groups = {"solver": {"method": method, "max_iterations": 100000, **more.get("solver", {})},
+                              "decomposition": {"subdomains": parts}, "enriched": more.get("enriched", {})}
+                    record = self.play(f"piston {dimension} {method} {parts} {ranks}", grains, [piston], steps=10, ranks=ranks,
+                                       **groups)
+                    case = f"piston and {n} grains, {dimension}D, {method}, subdomains: {parts}"
+                    speed = a * record.time[:, None]
+                    self.verify(case, "speed of the piston [m/s]", record.boundary["velocity"][:, 0, :1], speed, 1e-9 * a)
+                    self.verify(case, "speed of the grains [m/s]", record.velocity[:, :, 0], speed, 1e-9 * a)
+        self.both(check)
+
+    def test_pressure(self):
+        """Pressure moves a plane along its normal, with the area between the planes across; a second axis has the period."""
+        def check(dimension):
+            pressure, mass = 30.0, 6.0
+            e = np.eye(dimension)
+            planes = [plane(0 * e[0], e[0]), plane(2.0 * e[0], -e[0])]
+            up = e[-1]
+            lids = [plane(3.0 * up, -up, free=[d == dimension - 1 for d in range(3)], mass=mass, pressure=pressure),
+                    plane(-1.0 * up, up)]
+            period = {} if dimension == 2 else {"scene": {"period": [0.0, 1.5, 0.0]}}
+            record = self.play(f"pressure {dimension}", [Grain(e.sum(axis=0), radius=RADIUS)], planes + lids, steps=20, **period)
+            area = 2.0 if dimension == 2 else 3.0
+            self.verify(f"plane under pressure, {dimension}D", "velocity [m/s]", record.boundary["velocity"][:, 2, :dimension],
+                        -pressure * area / mass * record.time[:, None] * up, 1e-12)
+        self.both(check)
+
+    def test_gravity_table(self):
+        """Gravity that grows with t takes the value of the end of each step: a t (t + h) / 2."""
+        def check(dimension):
+            axes = "xyz"[:dimension]
+            rows = [[0.0] * dimension, [-2.0, -9.0, 4.0][:dimension]]
+            text = ",".join(["time", *("g" + x for x in axes)]) + "\n"
+            text += "".join(",".join(map(repr, [t, *row])) + "\n" for t, row in zip((0.0, 0.5), rows))
+            record = self.play(f"gravity table {dimension}", [Grain([0.0] * dimension)], steps=200,
+                               scene={"gravity_table": "g.csv"}, files={"g.csv": text})
+            t, slope = record.time[:, None], 2.0 * np.array(rows[1])
+            v = slope * t * (t + self.step) / 2
+            self.verify(f"gravity from a table, {dimension}D", "velocity [m/s]", record.velocity[:, 0], v, 1e-12)
+        self.both(check)
+
+    def test_body_force(self):
+        def check(dimension):
+            force = np.array([3.0, -70.0, 20.0])[:dimension]
+            record = self.play(f"body force {dimension}", [Grain([0.0] * dimension, radius=RADIUS, mass=MASS)], steps=200,
+                               scene={"body_force": floats(force)})
+            volume = np.pi * RADIUS ** 2 if dimension == 2 else 4 / 3 * np.pi * RADIUS ** 3
+            self.verify(f"body force, {dimension}D", "velocity [m/s]", record.velocity[:, 0],
+                        force * volume / MASS * record.time[:, None], 1e-12)
+        self.both(check)
+
+
+class Shapes(SmallScene):
+
+    def normals(self, title, places, boundary):
+        record = self.play(title, [Grain(place, radius=RADIUS) for place, _ in places], [boundary], steps=1,
+                           scene={"alert_distance": 0.02})
+        contacts = record.contacts[1]
+        self.assertEqual(list(contacts["candidate"]), list(range(1, len(places) + 1)))
+        for k, (place, foot) in enumerate(places):
+            branch = np.array(place) - np.array(foot)
+            distance = np.linalg.norm(branch)
+            self.verify(title, "normal", contacts["normal"][k], branch / distance, 1e-13)
+            self.verify(title, "gap [m]", contacts["gap"][k], distance - RADIUS, 1e-15)
+
+    def test_segment(self):
+        """Beside the middle and over the ends, on either side."""
+        self.normals("grains at a segment", [([0.5, 0.06], [0.5, 0.0]), ([0.2, -0.052], [0.2, 0.0]),
+                                             ([-0.03, 0.05], [0.0, 0.0]), ([1.04, -0.04], [1.0, 0.0])],
+                     {"shape": "segment", "point": [0.0, 0.0], "end": [1.0, 0.0]})
+
+    def test_rectangle(self):
+        """Over the face, beside an edge, at two corners."""
+        self.normals("grains at a rectangle",
+                     [([0.5, 0.3, 0.06], [0.5, 0.3, 0.0]), ([0.4, 0.2, -0.055], [0.4, 0.2, 0.0]),
+                      ([-0.03, 0.3, 0.05], [0.0, 0.3, 0.0]), ([0.8, 0.64, 0.04], [0.8, 0.6, 0.0]),
+                      ([-0.03, -0.02, 0.045], [0.0, 0.0, 0.0]), ([1.03, 0.62, -0.045], [1.0, 0.6, 0.0])],
+                     {"shape": "rectangle", "point": [0.0, 0.0, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 0.6, 0.0]})
+
+    def test_removal(self):
+        """A ball at rest falls from the time on when its ground is taken away."""
+        def check(dimension):
+            up = np.eye(dimension)[-1]
+            record = self.play(f"removal {dimension}", [Grain(RADIUS * up, radius=RADIUS)],
+                               [plane(0 * up, up, remove_at=0.125)], -G * up, 100)
+            self.verify(f"ground taken away, {dimension}D", "velocity [m/s]", record.velocity[:, 0],
+                        -G * np.maximum(record.time - 0.125, 0.0)[:, None] * up, 1e-12)
+        self.both(check)
+
+    def test_outlet(self):
+        """Grains that fall through an outlet are counted and gone, one after the other; a scene without any goes on."""
+        def check(dimension):
+            e, n = np.eye(dimension), 4
+            heights = 0.1 + 0.13 * np.arange(n)
+            grains = [Grain(0.4 * k * e[0] + height * e[-1], radius=RADIUS) for k, height in enumerate(heights)]
+            for ranks in (1, 2):
+                outlet = {"shape": "outlet", "point": [0.0] * dimension, "normal": floats(e[-1])}
+                record = self.play(f"outlet {dimension} {ranks}", grains, [outlet], -G * e[-1], 200, ranks,
+                                   solver={"method": "nscdd"}, decomposition={"subdomains": 2})
+                left = record.run.history()["left"]
+                case = f"falling out, {dimension}D, ranks: {ranks}"
+                self.verify(case, "grains that have left", left.sum(), n, 0.5)
+                self.assertEqual([len(ids) for ids in record.present], [n, *(n - np.cumsum(left).astype(int))])
+                gone = record.time[1:][left > 0]
+                self.assertEqual(len(gone), n)
+                # gone at the end of the first step in whose middle the centre is behind
+                self.verify(case, "times [s]", gone, np.sqrt(2 * heights / G) + self.step, 0.5 * self.step + 1e-12)
+        self.both(check)
+
+
+if __name__ == "__main__":
+    unittest.main()
