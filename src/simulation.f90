@@ -577,7 +577,6 @@ contains
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
     if (allocated(error)) return
-    if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
     if (figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
     call take_velocities(self%decomposition, self%physics, self%problem)
