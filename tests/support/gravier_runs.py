@@ -5,6 +5,7 @@ The environment names the program (GRAVIER_BIN_DIR) and the launcher (MPIEXEC); 
 """
 import concurrent.futures
 import glob
+import itertools
 import os
 import shutil
 import subprocess
@@ -18,6 +19,8 @@ SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.pa
 PROGRAMS = os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin")))
 GRAVIER = os.path.join(PROGRAMS, "gravier")
 MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
+#: numbers of the runs of this process
+RUNS = itertools.count()
 ENVIRONMENT = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
@@ -54,9 +57,10 @@ class Run:
 def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
     """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run not over after `timeout` seconds is ended and is an error:
     one rank waits for another that has left, or a loop does not end."""
-    # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure
-    before = set(glob.glob(os.path.join(directory, "rank.*")))
-    rank = '"$0" "$@" 2>rank.$$.stderr; status=$?; echo $status >rank.$$.status; exit $status'
+    # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure; each
+    # run has its own names, since several may share a directory
+    own = f"rank.{os.getpid()}_{next(RUNS)}"
+    rank = f'"$0" "$@" 2>{own}.$$.stderr; status=$?; echo $status >{own}.$$.status; exit $status'
     process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", rank, os.path.join(PROGRAMS, program), *arguments], cwd=directory,
                                env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE)
@@ -72,7 +76,7 @@ def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
             process.communicate()
         raise AssertionError(f"{program} {' '.join(arguments)} on {ranks} ranks did not end in {timeout} s") from None
     said = {}
-    for name in sorted(set(glob.glob(os.path.join(directory, "rank.*"))) - before):
+    for name in sorted(glob.glob(os.path.join(glob.escape(directory), own + ".*"))):
         with open(name, "rb") as file:
             said.setdefault(name.rsplit(".", 1)[1], []).append(file.read().decode(errors="replace"))
         os.remove(name)
