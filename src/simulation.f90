@@ -196,7 +196,7 @@ contains
       self%physics%restitution = config%restitution
       self%physics%rotation = config%rotation
       self%physics%h = self%config%time%step
-      call self%problem%kernels%choose(config%dimension, scene%friction, scene%rotation)
+      call self%problem%kernels%choose(config%dimension, scene%friction)
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)

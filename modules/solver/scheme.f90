@@ -95,7 +95,7 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do k = 1, scheme%sweeps
-          call problem%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
+          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
         end do
         scheme%work%relaxations = scheme%work%relaxations + int(scheme%sweeps, i8)*sub%n_contacts
       end associate
