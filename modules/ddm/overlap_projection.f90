@@ -1,5 +1,6 @@
-!> Overlaps that errors of many steps have built up are taken back by moving grains, not by velocities: a projection of
-!> the places on the places without too much overlap. It gives no grain kinetic energy, whatever the time step.
+!> Overlaps that errors of many steps have built up are taken back by moving grains, and boundaries that forces move, not by
+!> velocities: a projection of the places on the places without too much overlap. It gives nothing kinetic energy, whatever
+!> the time step.
 module gravier_overlap_projection
   use gravier_kinds, only: dp, i8
   use gravier_timers, only: start_timer, stop_timer, phase_bodies
@@ -7,6 +8,7 @@ module gravier_overlap_projection
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
   use gravier_problem_builder, only: take_displacements
+  use gravier_boundary_loads, only: take_boundary_displacements
   implicit none
   private
   public :: project_overlaps
@@ -23,11 +25,12 @@ module gravier_overlap_projection
 
 contains
 
-  !> Move grains so that no overlap exceeds `allowed`, as far as sweeps of nonlinear Gauss-Seidel lead there:
-  !> displacements in the metric of the masses, M d = H p with p >= 0 orthogonal to n.(d_i - d_j) + gap + allowed >= 0, in all
-  !> subdomains with shared masses as in NSCDD. They are scaled down together so that no grain moves by more than half the
-  !> alert distance (or `allowed`): two grains that are no contact now cannot come to overlap. Boundaries stay where they are.
-  !> The problem comes back as it was but for the velocities in it. Collective.
+  !> Move grains and boundaries that forces move so that no overlap exceeds `allowed`, as far as sweeps of nonlinear
+  !> Gauss-Seidel lead there: displacements in the metric of the masses, M d = H p with p >= 0 orthogonal to
+  !> n.(d_i - d_j) + gap + allowed >= 0, in all subdomains with shared masses as in NSCDD; for boundaries, see
+  !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
+  !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
+  !> The problem comes back as it was but for velocities and weights. Collective.
   subroutine project_overlaps(decomposition, problem, h, allowed)
     type(decomposition_t), intent(inout) :: decomposition
     !> of a step that is over; gaps at its q_m, velocities at its end
@@ -37,11 +40,15 @@ contains
     type(borrowed_t) :: borrowed(size(problem%sub))
     real(dp) :: enough, factor
     integer :: s, k
+    logical :: has_driven
 
     call start_timer(phase_bodies)
+    has_driven = any(decomposition%boundaries%free(1)) .or. any(decomposition%boundaries%free(2)) .or. &
+      & any(decomposition%boundaries%free(3))
     do s = 1, size(problem%sub)
       call lend(problem, s, h, allowed, borrowed(s))
     end do
+    if (has_driven) call weigh_boundaries(problem, size(decomposition%boundaries))
     enough = remainder*max(allowed, excess(problem, borrowed))
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
@@ -62,6 +69,7 @@ contains
       end associate
     end do
     call take_displacements(decomposition, problem)
+    if (has_driven) call take_boundary_displacements(decomposition, problem)
     call stop_timer(phase_bodies)
   end subroutine project_overlaps
 
@@ -84,7 +92,7 @@ contains
     excess = problem%comm%highest(excess)
   end function excess
 
-  !> Factor that brings all displacements of grains within `limit` [m]. Collective.
+  !> Factor that brings all displacements within `limit` [m]. Collective.
   real(dp) function reduction(problem, limit)
     type(contact_problem_t), intent(in) :: problem
     real(dp), intent(in) :: limit
@@ -94,7 +102,7 @@ contains
     nd = problem%kernels%nd
     longest = 0.0_dp
     do s = 1, size(problem%sub)
-      do b = 1, problem%sub(s)%n_grains
+      do b = 1, problem%sub(s)%n_bodies
         longest = max(longest, norm2(problem%sub(s)%velocity(1:nd, b)))
       end do
     end do
@@ -126,9 +134,39 @@ contains
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :) = 0.0_dp
       call sub%share_masses(.true.)
-      sub%weight(:, sub%n_grains + 1:) = 0.0_dp
-      call sub%update_local_operator()
     end associate
   end subroutine lend
+
+  !> Give each boundary that forces move the mass of the grains that it touches, on its free components. Its own, which its
+  !> inertia asks for, would hold a packing as a fixed wall does: the sweeps have to carry a displacement through it. As heavy
+  !> as one more layer of grains it gives way as they do. The mass is the same whatever the subdomains. Collective.
+  subroutine weigh_boundaries(problem, n_boundaries)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: n_boundaries
+    real(dp) :: parts(n_boundaries, size(problem%sub)), masses(n_boundaries)
+    integer :: s, c, k, b
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          do k = 1, 2
+            b = sub%pair(k, c)
+            if (b <= sub%n_grains .or. b > sub%n_bodies) cycle
+            parts(sub%boundary(b), s) = parts(sub%boundary(b), s) + 1.0_dp/sub%inverse_mass(1, sub%pair(3 - k, c))
+          end do
+        end do
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, masses)
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = sub%n_grains + 1, sub%n_bodies
+          where (sub%inverse_mass(:, b) > 0.0_dp) sub%weight(:, b) = sub%multiplicity(b)/masses(sub%boundary(b))
+        end do
+        call sub%update_local_operator()
+      end associate
+    end do
+  end subroutine weigh_boundaries
 
 end module gravier_overlap_projection
