@@ -18,9 +18,12 @@ module gravier_overlap_projection
   !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
   real(dp), parameter :: remainder = 0.1_dp
 
-  !> What a projection borrows of a subproblem, and its work space.
+  !> What a projection borrows of a subproblem, and its work space; src/memory_report.f90 counts them.
   type :: borrowed_t
-    real(dp), allocatable :: hot(:, :), impulse(:, :), work(:, :)
+    !> shift and, with friction, mu of each contact (1 or 2, n_contacts)
+    real(dp), allocatable :: law(:, :)
+    !> (nc, n_contacts)
+    real(dp), allocatable :: impulse(:, :), work(:, :)
   end type borrowed_t
 
 contains
@@ -30,7 +33,7 @@ contains
   !> n.(d_i - d_j) + gap + allowed >= 0, in all subdomains with shared masses as in NSCDD; for boundaries, see
   !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
   !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
-  !> The problem comes back as it was but for velocities and weights. Collective.
+  !> The problem comes back as it was but for velocities and masses. Collective.
   subroutine project_overlaps(decomposition, problem, h, allowed)
     type(decomposition_t), intent(inout) :: decomposition
     !> of a step that is over; gaps at its q_m, velocities at its end
@@ -62,11 +65,8 @@ contains
     end do
     factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        sub%v_global(:, :) = factor*sub%velocity
-        call move_alloc(borrowed(s)%hot, sub%hot)
-        call move_alloc(borrowed(s)%impulse, sub%impulse)
-      end associate
+      problem%sub(s)%v_global(:, :) = factor*problem%sub(s)%velocity
+      call give_back(problem, s, borrowed(s))
     end do
     call take_displacements(decomposition, problem)
     if (has_driven) call take_boundary_displacements(decomposition, problem)
@@ -122,14 +122,16 @@ contains
 
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
-      borrowed%hot = sub%hot
       borrowed%impulse = sub%impulse
+      allocate (borrowed%law(merge(2, 1, problem%kernels%nc > 1), sub%n_contacts))
       allocate (borrowed%work(problem%kernels%nc, sub%n_contacts))
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
       do c = 1, sub%n_contacts
+        borrowed%law(1, c) = sub%hot(nd + 1, c)
         sub%hot(nd + 1, c) = sub%gap(c) + h*borrowed%work(1, c) + allowed
-        ! no friction
-        if (problem%kernels%nc > 1) sub%hot(nd + 6, c) = 0.0_dp
+        if (problem%kernels%nc == 1) cycle
+        borrowed%law(2, c) = sub%hot(nd + 6, c)
+        sub%hot(nd + 6, c) = 0.0_dp
       end do
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :) = 0.0_dp
@@ -137,9 +139,26 @@ contains
     end associate
   end subroutine lend
 
+  !> Undo `lend`, but for masses and velocities.
+  subroutine give_back(problem, s, borrowed)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: s
+    type(borrowed_t), intent(inout) :: borrowed
+    integer :: c, nd
+
+    nd = problem%kernels%nd
+    associate (sub => problem%sub(s))
+      do c = 1, sub%n_contacts
+        sub%hot(nd + 1, c) = borrowed%law(1, c)
+        if (problem%kernels%nc > 1) sub%hot(nd + 6, c) = borrowed%law(2, c)
+      end do
+      call move_alloc(borrowed%impulse, sub%impulse)
+    end associate
+  end subroutine give_back
+
   !> Give each boundary that forces move the mass of the grains that it touches, on its free components. Its own, which its
   !> inertia asks for, would hold a packing as a fixed wall does: the sweeps have to carry a displacement through it. As heavy
-  !> as one more layer of grains it gives way as they do. The mass is the same whatever the subdomains. Collective.
+  !> as one more layer of grains it gives way as they do. All subdomains give it the same one. Collective.
   subroutine weigh_boundaries(problem, n_boundaries)
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: n_boundaries
