@@ -12,7 +12,7 @@ from gravier_runs import RunTestCase, differences, each, merged, run_case, settl
 RADIUS = 0.01
 ALLOWED = 0.005 * RADIUS
 DENSITY = 2500.0
-PRESSURE = 2000.0  # N/m
+PRESSURE = 2.0e4  # N/m
 KEPT = 1.5
 CASE = {
     "scene": {"dimension": 2, "bodies": "file", "friction": 0.3, "density": DENSITY, "overlap_allowed": ALLOWED},
@@ -166,7 +166,7 @@ class Drift(RunTestCase):
         self.assertLess(places[free, 1].max(), places[lid, 1].max())
 
     def pressed(self, name, more=None, ranks=1):
-        """168 disks at rest between a floor, smooth sides and a lid that a pressure moves, which bears about half their weight."""
+        """168 disks at rest between a floor, smooth sides and a lid that a pressure moves, which bears five times their weight."""
         width, top = self.small_planes[2][0][0], (self.small_centres[:, 1] + self.small_radii).max()
         path = grains_file(self.here(name + ".h5"), self.small_centres, self.small_radii)
         boundaries = [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0], "friction": 0.3},
@@ -182,15 +182,17 @@ class Drift(RunTestCase):
         kept, without = (run.history() for run in each(self.pressed, [("pressed",), ("pressed without", WITHOUT)]))
         half, allowed = len(kept["step"]) // 2, 0.01 * RADIUS
         late = slice(half, None)
-        self.assertGreater(without["max_overlap"][-1], 2.5 * allowed)
-        self.assertGreater(kept["projected"][late].sum(), 10)
-        self.assertLess(kept["max_overlap"][late].max(), KEPT * allowed)
-        self.assertLess(kept["max_overlap"].max(), 3.0 * allowed)
+        self.assertGreater(without["max_overlap"][-1], 10.0 * allowed)
+        self.assertGreater(kept["projected"][late].mean(), 0.5)
+        self.assertLess(np.quantile(kept["max_overlap"][late], 0.95), KEPT * allowed)
+        # a solve that is accepted without a sweep may push some grain in, for a step or two
+        self.assertLess(kept["max_overlap"][late].max(), 6.0 * allowed)
         # projections give no velocity: at rest, but for what a loose solve leaves, with and without
         mass = DENSITY * np.pi * (self.small_radii**2).sum()
         for history in (kept, without):
-            self.assertLess(history["kinetic_energy"][late].mean(), 3e-4 * mass * 9.81 * RADIUS)
+            self.assertLess(history["kinetic_energy"][late].mean(), 0.01 * mass * 9.81 * RADIUS)
             self.assertLess(np.abs(history["energy_error"]).max(), 1e-10 * mass * 9.81 * RADIUS)
+        self.assertLess(kept["kinetic_energy"][late].mean(), 4.0 * without["kinetic_energy"][late].mean())
         # so the mean forces on lid and floor are those that keep the momentum: |change| <= sqrt(2 m E) at both ends
         seconds = 2e-3 * (len(kept["step"]) - half)
         width = self.small_planes[2][0][0]
