@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
-tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius.
+tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius, disks under a piston.
 
     python3 drivers/study_drift.py --out DIR [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
 
@@ -163,6 +163,7 @@ def draw(path, curves):
         panel.axhline(ALLOWED / RADIUS, color="0.4", linewidth=0.7)
         panel.set_title(title, fontsize=10)
         panel.set_xlabel("step")
+        panel.locator_params(axis="x", nbins=5)
         panel.set_ylabel("largest overlap / mean radius")
         low, high = panel.get_ylim()
         panel.set_ylim(low, high * (high / low)**0.2)
