@@ -121,7 +121,7 @@ module gravier_config_table
            unit="m", note="0.2 of the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
            unit="m", note="0.01 of the mean radius"), &
-     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take back larger overlaps by moving the grains apart")]
+     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take overlaps back by moving grains and free boundaries")]
 
   type(key_t), parameter :: boundary_keys(*) = &
     [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &

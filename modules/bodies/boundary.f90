@@ -66,6 +66,7 @@ module gravier_boundary
     procedure :: applied_force => boundary_applied_force
     procedure :: move => boundary_move
     procedure :: carry => boundary_carry
+    procedure :: shift => boundary_shift
     procedure :: get_state => boundary_get_state
     procedure :: set_state => boundary_set_state
   end type boundary_t
@@ -318,6 +319,16 @@ contains
     end if
     x(:) = x + duration*self%velocity(1:nd)
   end subroutine boundary_carry
+
+  !> Put the boundary elsewhere, with the velocity that it has.
+  pure subroutine boundary_shift(self, way)
+    class(boundary_t), intent(inout) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: way(:)
+
+    self%point(1:size(way)) = self%point(1:size(way)) + way
+    self%pivot(1:size(way)) = self%pivot(1:size(way)) + way
+  end subroutine boundary_shift
 
   !> v := turn v.
   pure subroutine rotate(turn, v)

@@ -229,6 +229,19 @@ class Restart(RunTestCase):
         ranks = [(1, 2), (2, 4), (4, 1), (2, 1), (1, 4), (4, 2), (1, 1), (2, 2)]
         each(lambda stop, number: self.one_restart(DRUM, stop, *number, straight, write_drum), list(zip(stops, ranks)))
 
+    def test_piston(self):
+        """Overlaps under a lid that a force moves, taken back step by step: grains and lid go on from where they were put."""
+        case = merged(BOX, {"scene": {"overlap_allowed": 1e-6},
+                            "boundary": [{"shape": "plane", "name": "lid", "point": [0.0, 0.21], "normal": [0.0, -1.0],
+                                          "free": [False, True], "mass": 5.0, "force": [0.0, -2000.0]}],
+                            "time": {"step": 2e-3, "steps": 80}, "decomposition": {"subdomains": 4},
+                            "output": {"every": 7, "boundary_forces": True}})
+        straight = self.straight("piston", case)
+        history = read_csv(os.path.join(straight, "results", "history.csv"))
+        self.assertGreater(history["projected"][30:].sum(), 40)
+        for stop, before, after in ((45, 1, 2), (61, 2, 1), (62, 2, 4)):
+            self.one_restart(case, stop, before, after, straight)
+
     def test_methods(self):
         """Every method, and without a warm start; in 3D with walls of another friction."""
         cases = {
@@ -262,15 +275,25 @@ class Restart(RunTestCase):
             self.assert_status(again, 0)
             self.assertNotIn("from the checkpoint of step 400\n", again.stdout)
             self.assert_same(straight, directory)
-        directory = self.here("usr1")
-        run = Going(case, 2, directory)
-        run.wait_for_rows(draw.randrange(1, 50))
-        run.process.send_signal(signal.SIGUSR1)
-        run.wait_for(lambda: os.path.exists(os.path.join(directory, "results", "checkpoint.h5")), "the checkpoint of SIGUSR1")
-        status, said = run.end()
-        self.assertEqual(status, 0, said)
-        self.assertEqual(said.count("checkpoint  of step"), 2, said)
-        self.assert_same(straight, directory)
+
+        def ask(name, *signals):
+            """A run that is asked once makes one checkpoint, and one at its end."""
+            directory = self.here(name)
+            run = Going(case, 2, directory)
+            run.wait_for_rows(draw.randrange(1, 50))
+            for send in signals:
+                send(run)
+                run.wait_for(lambda: os.path.exists(os.path.join(directory, "results", "checkpoint.h5")), "the checkpoint")
+                run.wait_for_rows(run.rows() + 2)
+            status, said = run.end()
+            self.assertEqual(status, 0, said)
+            self.assertEqual(said.count("checkpoint  of step"), 2, said)
+            self.assert_same(straight, directory)
+
+        ask("usr1", lambda run: run.process.send_signal(signal.SIGUSR1))
+        # a launcher that passes it on to one rank some steps after the other
+        ask("usr1 late", lambda run: os.kill(sorted(run.pids())[0], signal.SIGUSR1),
+            lambda run: os.kill(sorted(run.pids())[1], signal.SIGUSR1))
 
     def test_walltime(self):
         """The run stops before its time is over, and goes on."""
