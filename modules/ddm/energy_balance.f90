@@ -5,7 +5,7 @@ module gravier_energy_balance
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_contact_kernels, only: global_impulse, contact_column, lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: global_impulse, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
@@ -193,7 +193,7 @@ contains
       integer :: column, d
 
       associate (sub => problem%sub(s))
-        call global_impulse(problem%kernels, contact_column(sub%hot, c), contact_column(sub%impulse, c), p)
+        call global_impulse(problem%kernels, sub%hot, sub%impulse, c, p)
         column = sub%pair(2, c)
         if (sub%pair(1, c) > sub%n_grains) then
           column = sub%pair(1, c)

@@ -6,7 +6,7 @@ module gravier_enriched_matrix
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_sweep
-  use gravier_contact_kernels, only: kernels_t, contact_jacobian, contact_column, lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: scheme_t
   use gravier_sparse_direct, only: sparse_factor_t
@@ -163,7 +163,7 @@ contains
       end do
     end do
     do c = 1, sub%n_contacts
-      call contact_jacobian(kernels%nd, kernels%nc, contact_column(sub%hot, c), jacobian(:, :, 1), jacobian(:, :, 2))
+      call contact_jacobian(kernels, sub%hot, c, jacobian(:, :, 1), jacobian(:, :, 2))
       do side = 1, 2
         if (sub%pair(side, c) <= sub%n_bodies) call add_block(sub%pair(side, c), sub%pair(side, c), side, side)
       end do
@@ -186,7 +186,8 @@ contains
       do p = 1, nv
         do q = 1, merge(p, nv, i == j)
           x = 0.0_dp
-          if (sub%moves(p, i) .and. sub%moves(q, j)) x = sum(jacobian(:, p, a)*direction(lane_of(c), :, block_of(c))*jacobian(:, q, b))
+          if (sub%moves(p, i) .and. sub%moves(q, j)) &
+            & x = sum(jacobian(:, p, a)*direction(lane_of(c), :, block_of(c))*jacobian(:, q, b))
           call add((i - 1)*nv + p, (j - 1)*nv + q, x)
         end do
       end do

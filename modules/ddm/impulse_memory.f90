@@ -4,7 +4,7 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: shift_of_code
-  use gravier_contact_kernels, only: kernels_t, tangents, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, contact_tangents, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
@@ -39,7 +39,7 @@ contains
           if (problem%kernels%nc < 3) then
             list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
           else
-            call tangents([sub%hot(q, 1, g), sub%hot(q, 2, g), sub%hot(q, 3, g)], t, u)
+            call contact_tangents(sub%hot, c, t, u)
             list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
             list%impulse(2:4, sub%source(c)) = sub%impulse(q, 2, g)*t + sub%impulse(q, 3, g)*u
           end if
@@ -63,7 +63,7 @@ contains
           if (problem%kernels%nc < 3) then
             sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
           else
-            call tangents([sub%hot(q, 1, g), sub%hot(q, 2, g), sub%hot(q, 3, g)], t, u)
+            call contact_tangents(sub%hot, c, t, u)
             sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
             sub%impulse(q, 2, g) = sum(list%impulse(2:4, sub%source(c))*t)
             sub%impulse(q, 3, g) = sum(list%impulse(2:4, sub%source(c))*u)

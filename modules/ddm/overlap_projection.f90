@@ -4,6 +4,7 @@
 module gravier_overlap_projection
   use gravier_kinds, only: dp, i8
   use gravier_timers, only: start_timer, stop_timer, phase_bodies
+  use gravier_contact_kernels, only: lanes, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
@@ -20,10 +21,10 @@ module gravier_overlap_projection
 
   !> What a projection borrows of a subproblem, and its work space; src/memory_report.f90 counts them.
   type :: borrowed_t
-    !> shift and, with friction, mu of each contact (1 or 2, n_contacts)
-    real(dp), allocatable :: law(:, :)
-    !> (nc, n_contacts)
-    real(dp), allocatable :: impulse(:, :), work(:, :)
+    !> shift and, with friction, mu of each contact (lanes, 1 or 2, blocks)
+    real(dp), allocatable :: law(:, :, :)
+    !> (lanes, nc, blocks)
+    real(dp), allocatable :: impulse(:, :, :), work(:, :, :)
   end type borrowed_t
 
 contains
@@ -56,7 +57,7 @@ contains
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
-          call problem%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
+          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
         end associate
       end do
       call average_copies(problem)
@@ -77,16 +78,15 @@ contains
   real(dp) function excess(problem, borrowed)
     type(contact_problem_t), intent(in) :: problem
     type(borrowed_t), intent(inout) :: borrowed(:)
-    integer :: s, c, nd
+    integer :: s, nd
 
     nd = problem%kernels%nd
     excess = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), work => borrowed(s)%work)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
-        do c = 1, sub%n_contacts
-          excess = max(excess, -(work(1, c) + sub%hot(nd + 1, c)))
-        end do
+        ! lanes without a contact hold zeros
+        excess = max(excess, -minval(work(:, 1, :) + sub%hot(:, nd + 1, :)))
       end associate
     end do
     excess = problem%comm%highest(excess)
@@ -123,18 +123,19 @@ contains
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
       borrowed%impulse = sub%impulse
-      allocate (borrowed%law(merge(2, 1, problem%kernels%nc > 1), sub%n_contacts))
-      allocate (borrowed%work(problem%kernels%nc, sub%n_contacts))
+      allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nc > 1), size(sub%hot, 3)))
+      allocate (borrowed%work, mold=sub%impulse)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
+      borrowed%law(:, 1, :) = sub%hot(:, nd + 1, :)
       do c = 1, sub%n_contacts
-        borrowed%law(1, c) = sub%hot(nd + 1, c)
-        sub%hot(nd + 1, c) = sub%gap(c) + h*borrowed%work(1, c) + allowed
-        if (problem%kernels%nc == 1) cycle
-        borrowed%law(2, c) = sub%hot(nd + 6, c)
-        sub%hot(nd + 6, c) = 0.0_dp
+        sub%hot(lane_of(c), nd + 1, block_of(c)) = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
       end do
+      if (problem%kernels%nc > 1) then
+        borrowed%law(:, 2, :) = sub%hot(:, nd + 6, :)
+        sub%hot(:, nd + 6, :) = 0.0_dp
+      end if
       sub%velocity(:, :) = 0.0_dp
-      sub%impulse(:, :) = 0.0_dp
+      sub%impulse(:, :, :) = 0.0_dp
       call sub%share_masses(.true.)
     end associate
   end subroutine lend
@@ -144,14 +145,12 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     type(borrowed_t), intent(inout) :: borrowed
-    integer :: c, nd
+    integer :: nd
 
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
-      do c = 1, sub%n_contacts
-        sub%hot(nd + 1, c) = borrowed%law(1, c)
-        if (problem%kernels%nc > 1) sub%hot(nd + 6, c) = borrowed%law(2, c)
-      end do
+      sub%hot(:, nd + 1, :) = borrowed%law(:, 1, :)
+      if (problem%kernels%nc > 1) sub%hot(:, nd + 6, :) = borrowed%law(:, 2, :)
       call move_alloc(borrowed%impulse, sub%impulse)
     end associate
   end subroutine give_back

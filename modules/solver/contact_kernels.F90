@@ -22,7 +22,7 @@ module gravier_contact_kernels
   implicit none
   private
   public :: kernels_t, contact_jacobian, global_impulse, tangents, local_operator
-  public :: lanes, n_blocks, block_of, lane_of, contact_column, put_contact_column
+  public :: lanes, n_blocks, block_of, lane_of, contact_tangents
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
@@ -171,41 +171,29 @@ contains
     lane_of = mod(c - 1, lanes) + 1
   end function lane_of
 
-  !> What a field such as `hot` or `impulse` holds of contact `c`.
-  pure function contact_column(field, c) result(column)
-    !> (lanes, n, blocks)
-    real(dp), intent(in), contiguous :: field(:, :, :)
-    integer, intent(in) :: c
-    real(dp) :: column(size(field, 2))
-    column(:) = field(lane_of(c), :, block_of(c))
-  end function contact_column
-
-  !> The reverse.
-  pure subroutine put_contact_column(column, c, field)
-    !> (n)
-    real(dp), intent(in) :: column(:)
-    integer, intent(in) :: c
-    !> (lanes, n, blocks)
-    real(dp), intent(inout), contiguous :: field(:, :, :)
-    field(lane_of(c), :, block_of(c)) = column
-  end subroutine put_contact_column
-
   !> Unit vectors t and s that make (n, t, s) direct, from n alone (Duff et al., JCGT 6(1), 2017).
   pure subroutine tangents(n, t, s)
     real(dp), intent(in) :: n(3)
     real(dp), intent(out) :: t(3), s(3)
+    call find_frame(n(1), n(2), n(3), t(1), t(2), t(3), s(1), s(2), s(3))
+  end subroutine tangents
+
+  !> The same component by component, for loops over lanes.
+  pure subroutine find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
+    real(dp), intent(in) :: nx, ny, nz
+    real(dp), intent(out) :: tx, ty, tz, sx, sy, sz
     real(dp) :: side, a, b
 
-    side = sign(1.0_dp, n(3))
-    a = -1.0_dp/(side + n(3))
-    b = n(1)*n(2)*a
-    t(1) = 1.0_dp + side*n(1)*n(1)*a
-    t(2) = side*b
-    t(3) = -side*n(1)
-    s(1) = b
-    s(2) = side + n(2)*n(2)*a
-    s(3) = -n(2)
-  end subroutine tangents
+    side = sign(1.0_dp, nz)
+    a = -1.0_dp/(side + nz)
+    b = nx*ny*a
+    tx = 1.0_dp + side*nx*nx*a
+    ty = side*b
+    tz = -side*nx
+    sx = b
+    sy = side + ny*ny*a
+    sz = -ny
+  end subroutine find_frame
 
   !> W_nn and the translational part of W_tt of two bodies [1/kg].
   pure subroutine local_operator(n, wi, wj, wn, wt)
@@ -257,52 +245,67 @@ contains
     w = wi(1) + wj(1) + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
   end function tangential_3d
 
-  !> The impulse of one contact on its candidate in global axes [N s].
-  pure subroutine global_impulse(kernels, hot, impulse, p)
+  !> The impulse of contact `c` on its candidate in global axes [N s].
+  pure subroutine global_impulse(kernels, hot, impulse, c, p)
     type(kernels_t), intent(in) :: kernels
-    !> columns of `hot` and `impulse`
-    real(dp), intent(in), contiguous :: hot(:), impulse(:)
+    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :)
+    integer, intent(in) :: c
     !> (nd)
     real(dp), intent(out) :: p(:)
-    real(dp) :: t(3), s(3)
+    real(dp) :: r(kernels%nc), n(kernels%nd), t(3), s(3)
 
-    p(:) = impulse(1)*hot(1:kernels%nd)
+    r(:) = impulse(lane_of(c), :, block_of(c))
+    n(:) = hot(lane_of(c), 1:kernels%nd, block_of(c))
+    p(:) = r(1)*n
     if (kernels%nc == 2) then
-      p(1) = p(1) - impulse(2)*hot(2)
-      p(2) = p(2) + impulse(2)*hot(1)
+      p(1) = p(1) - r(2)*n(2)
+      p(2) = p(2) + r(2)*n(1)
     else if (kernels%nc == 3) then
-      call tangents(hot(1:3), t, s)
-      p(:) = p + impulse(2)*t + impulse(3)*s
+      call contact_tangents(hot, c, t, s)
+      p(:) = p + r(2)*t + r(3)*s
     end if
   end subroutine global_impulse
 
-  !> Rows of H^T of one contact: v = candidate . V_i + antagonist . V_j.
-  pure subroutine contact_jacobian(nd, nc, hot, candidate, antagonist)
-    integer, intent(in) :: nd
-    !> 1 without friction, nd with
-    integer, intent(in) :: nc
-    !> (nh) column of `hot`
-    real(dp), intent(in), contiguous :: hot(:)
+  !> Unit vectors t and s of contact `c` of spheres.
+  pure subroutine contact_tangents(hot, c, t, s)
+    real(dp), intent(in), contiguous :: hot(:, :, :)
+    integer, intent(in) :: c
+    real(dp), intent(out) :: t(3), s(3)
+    real(dp) :: n(3)
+
+    n(:) = hot(lane_of(c), 1:3, block_of(c))
+    call tangents(n, t, s)
+  end subroutine contact_tangents
+
+  !> Rows of H^T of contact `c`: v = candidate . V_i + antagonist . V_j.
+  pure subroutine contact_jacobian(kernels, hot, c, candidate, antagonist)
+    type(kernels_t), intent(in) :: kernels
+    real(dp), intent(in), contiguous :: hot(:, :, :)
+    integer, intent(in) :: c
     !> (nc, nv)
     real(dp), intent(out) :: candidate(:, :), antagonist(:, :)
-    real(dp) :: t(3), s(3)
+    real(dp) :: column(kernels%nh), t(3), s(3)
+    integer :: nd, nc
 
+    nd = kernels%nd
+    nc = kernels%nc
+    column(:) = hot(lane_of(c), :, block_of(c))
     candidate(:, :) = 0.0_dp
-    candidate(1, 1:nd) = hot(1:nd)
+    candidate(1, 1:nd) = column(1:nd)
     antagonist(:, :) = 0.0_dp
     if (nc == 2) then
-      candidate(2, 1) = -hot(2)
-      candidate(2, 2) = hot(1)
-      candidate(2, 3) = -hot(6)
-      antagonist(2, 3) = -hot(7)
+      candidate(2, 1) = -column(2)
+      candidate(2, 2) = column(1)
+      candidate(2, 3) = -column(6)
+      antagonist(2, 3) = -column(7)
     else if (nc == 3) then
-      call tangents(hot(1:3), t, s)
+      call contact_tangents(hot, c, t, s)
       candidate(2, 1:3) = t
       candidate(3, 1:3) = s
-      candidate(2, 4:6) = -hot(7)*s
-      candidate(3, 4:6) = hot(7)*t
-      antagonist(2, 4:6) = -hot(8)*s
-      antagonist(3, 4:6) = hot(8)*t
+      candidate(2, 4:6) = -column(7)*s
+      candidate(3, 4:6) = column(7)*t
+      antagonist(2, 4:6) = -column(8)*s
+      antagonist(3, 4:6) = column(8)*t
     end if
     antagonist(:, 1:nd) = -candidate(:, 1:nd)
   end subroutine contact_jacobian
@@ -520,17 +523,19 @@ contains
     real(dp), intent(in) :: hot(lanes, 9), impulse(lanes, 3)
     real(dp), intent(inout) :: reaction(6, *)
     integer :: q, i, j, d
-    real(dp) :: n(3), t(3), s(3), p(lanes, 3), turn(lanes, 3)
+    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz, p(lanes, 3), turn(lanes, 3)
 
     do q = 1, lanes
-      n(1) = hot(q, 1)
-      n(2) = hot(q, 2)
-      n(3) = hot(q, 3)
-      call tangents(n, t, s)
-      do d = 1, 3
-        p(q, d) = impulse(q, 1)*n(d) + impulse(q, 2)*t(d) + impulse(q, 3)*s(d)
-        turn(q, d) = impulse(q, 2)*s(d) - impulse(q, 3)*t(d)
-      end do
+      nx = hot(q, 1)
+      ny = hot(q, 2)
+      nz = hot(q, 3)
+      call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
+      p(q, 1) = impulse(q, 1)*nx + impulse(q, 2)*tx + impulse(q, 3)*sx
+      p(q, 2) = impulse(q, 1)*ny + impulse(q, 2)*ty + impulse(q, 3)*sy
+      p(q, 3) = impulse(q, 1)*nz + impulse(q, 2)*tz + impulse(q, 3)*sz
+      turn(q, 1) = impulse(q, 2)*sx - impulse(q, 3)*tx
+      turn(q, 2) = impulse(q, 2)*sy - impulse(q, 3)*ty
+      turn(q, 3) = impulse(q, 2)*sz - impulse(q, 3)*tz
     end do
     do q = 1, lanes
       i = pair(1, q)
@@ -593,7 +598,7 @@ contains
     real(dp), intent(in) :: hot(lanes, 9), velocity(6, *)
     real(dp), intent(out) :: v(lanes, 3)
     integer :: q, i, j, d
-    real(dp) :: n(3), t(3), s(3), dv(lanes, 3), spin(lanes, 3)
+    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz, dv(lanes, 3), spin(lanes, 3)
 
     do q = 1, lanes
       i = pair(1, q)
@@ -604,15 +609,15 @@ contains
       end do
     end do
     do q = 1, lanes
-      n(1) = hot(q, 1)
-      n(2) = hot(q, 2)
-      n(3) = hot(q, 3)
-      call tangents(n, t, s)
-      v(q, 1) = dv(q, 1)*n(1) + dv(q, 2)*n(2) + dv(q, 3)*n(3)
-      v(q, 2) = dv(q, 1)*t(1) + dv(q, 2)*t(2) + dv(q, 3)*t(3) &
-        & - (spin(q, 1)*s(1) + spin(q, 2)*s(2) + spin(q, 3)*s(3))
-      v(q, 3) = dv(q, 1)*s(1) + dv(q, 2)*s(2) + dv(q, 3)*s(3) &
-        & + (spin(q, 1)*t(1) + spin(q, 2)*t(2) + spin(q, 3)*t(3))
+      nx = hot(q, 1)
+      ny = hot(q, 2)
+      nz = hot(q, 3)
+      call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
+      v(q, 1) = dv(q, 1)*nx + dv(q, 2)*ny + dv(q, 3)*nz
+      v(q, 2) = dv(q, 1)*tx + dv(q, 2)*ty + dv(q, 3)*tz &
+        & - (spin(q, 1)*sx + spin(q, 2)*sy + spin(q, 3)*sz)
+      v(q, 3) = dv(q, 1)*sx + dv(q, 2)*sy + dv(q, 3)*sz &
+        & + (spin(q, 1)*tx + spin(q, 2)*ty + spin(q, 3)*tz)
     end do
   end subroutine velocity_3d_friction
 
@@ -675,18 +680,26 @@ contains
     real(dp), intent(in) :: hot(lanes, 9), weight(4, *), velocity(6, *), impulse(lanes, 3)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q, i, j
-    real(dp) :: n(3), t(3), s(3), v(lanes, 3), wn, wt, rn, rt, rs, bound, reduction
+    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz, v(lanes, 3), wn, wt, rn, rt, rs, bound, reduction, y, z, tt, ss, ts
 
     call velocity_3d_friction(pair, hot, velocity, v)
     do q = 1, lanes
       i = pair(1, q)
       j = pair(2, q)
-      n(1) = hot(q, 1)
-      n(2) = hot(q, 2)
-      n(3) = hot(q, 3)
-      call tangents(n, t, s)
-      wn = normal_3d(n(2), n(3), weight(1:3, i), weight(1:3, j))
-      wt = tangential_3d(t, s, weight(1:3, i), weight(1:3, j)) + weight(4, i)*hot(q, 7)**2 + weight(4, j)*hot(q, 8)**2
+      nx = hot(q, 1)
+      ny = hot(q, 2)
+      nz = hot(q, 3)
+      call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
+      ! as normal_3d and tangential_3d, written out: arrays of three would keep the lanes from becoming vectors
+      wn = weight(1, i) + weight(1, j)
+      y = (weight(2, i) - weight(1, i)) + (weight(2, j) - weight(1, j))
+      z = (weight(3, i) - weight(1, i)) + (weight(3, j) - weight(1, j))
+      tt = ty**2*y + tz**2*z
+      ss = sy**2*y + sz**2*z
+      ts = ty*sy*y + tz*sz*z
+      wt = wn + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
+      wn = wn + (ny**2*y + nz**2*z)
+      wt = wt + weight(4, i)*hot(q, 7)**2 + weight(4, j)*hot(q, 8)**2
       wt = max(wt, tiny(1.0_dp))
       rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/max(wn, tiny(1.0_dp)))
       bound = hot(q, 9)*rn

@@ -19,7 +19,7 @@ contains
   !> slides over them: each contact takes a place in the first of `n_open` blocks that holds neither of its bodies; full blocks
   !> are done, those of the others move on with the window. What finds no place, as many contacts of one large body, is
   !> swept after the blocks, one contact at a time.
-  pure subroutine group_contacts(pair, n_moving, order, n_grouped)
+  subroutine group_contacts(pair, n_moving, order, n_grouped)
     !> (2, n): bodies above n_moving cannot move, and blocks may share them
     integer, intent(in), contiguous :: pair(:, :)
     integer, intent(in) :: n_moving
@@ -78,7 +78,7 @@ contains
 
   contains
 
-    pure subroutine place(c)
+    subroutine place(c)
       integer, intent(in) :: c
       integer(i8) :: taken_by
 
@@ -94,7 +94,7 @@ contains
       if (pair(2, c) <= n_moving) blocks_of(pair(2, c)) = ibset(blocks_of(pair(2, c)), g)
     end subroutine place
 
-    pure subroutine forget(b)
+    subroutine forget(b)
       integer, intent(in) :: b
       if (b <= n_moving) blocks_of(b) = 0_i8
     end subroutine forget
