@@ -18,7 +18,7 @@ STEP = 1.0e-3  # s, to compact
 # A rigid sample that yields runs ahead of its walls and is caught again, with a period of about the speed of the lid over
 # pressure / (density length): a step not far below that period damps it, and the compression is quasi-static. A residual of
 # 1e-3 is too much then: the errors that it leaves in the velocities are to be small beside the speed of the lid, or the disks
-# are pressed into each other, step by step.
+# are pressed into each other, and taken apart by projections, step by step: they creep and bear less.
 SLOW_STEP = 1.0e-2  # s, to come to rest and to compress
 LAYER = 6.0 * SMALLEST  # m, along the walls, where disks lie less densely
 SOLVER = {"tolerance": 1.0e-3, "max_iterations": 400, "check_every": 10}

@@ -2,7 +2,7 @@
 !> velocities: a projection of the places on the places without too much overlap. It gives nothing kinetic energy, whatever
 !> the time step.
 module gravier_overlap_projection
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_bodies
   use gravier_contact_kernels, only: lanes, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
