@@ -206,9 +206,9 @@ contains
     if (b > 0) e = boundaries(b)%restitution
   end function restitution_of
 
-  !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order of the view,
-  !> then boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, or one a contact
-  !> where the boundary turns.
+  !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
+  !> meet them, so that a sweep walks through memory; then boundaries that forces move, then columns of bodies with prescribed
+  !> velocities: one a boundary, or one a contact where the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
     type(neighbourhood_t), intent(in) :: view
     type(found_t), intent(in) :: found
@@ -217,29 +217,22 @@ contains
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: number_of(:), column_of(:)
-    integer :: c, k, p, b, n
+    integer :: c, p, b, n
 
     associate (list => view%list, boundaries => decomposition%boundaries)
       allocate (number_of(view%bodies%n), column_of(size(boundaries)), source=0)
       n = 0
+      sub%n_grains = 0
       do c = 1, found%n
         p = found%source(c)
-        if (view%bodies%glued(list%candidate(p)) == 0) number_of(list%candidate(p)) = 1
-        if (list%antagonist(p) > 0) then
-          if (view%bodies%glued(list%antagonist(p)) == 0) number_of(list%antagonist(p)) = 1
-        end if
+        call number(list%candidate(p))
+        if (list%antagonist(p) > 0) call number(list%antagonist(p))
         b = boundary_of(view, p)
         if (b == 0) cycle
         column_of(b) = 1
         if (boundaries(b)%turns()) n = n + 1
       end do
       sub%n_contacts = found%n
-      sub%n_grains = 0
-      do k = 1, view%bodies%n
-        if (number_of(k) == 0) cycle
-        sub%n_grains = sub%n_grains + 1
-        number_of(k) = sub%n_grains
-      end do
       sub%n_bodies = sub%n_grains
       do b = 1, size(boundaries)
         if (column_of(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle
@@ -260,6 +253,18 @@ contains
       end do
     end associate
     call pack_contacts(view, found, decomposition%boundaries, number_of, column_of, kernels, physics, sub)
+
+  contains
+
+    !> Give grain `k` the next number, unless it has one or is part of a boundary.
+    subroutine number(k)
+      integer, intent(in) :: k
+
+      if (number_of(k) > 0 .or. view%bodies%glued(k) > 0) return
+      sub%n_grains = sub%n_grains + 1
+      number_of(k) = sub%n_grains
+    end subroutine number
+
   end subroutine pack_subproblem
 
   subroutine allocate_bodies(kernels, n_columns, sub)
