@@ -6,13 +6,14 @@ program test_problem_builder
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t, shape_grains
   use gravier_neighbour_search, only: rule_dual, rule_primal
-  use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities, n_multiplicities
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw_number => draw, plane, make_decomposition
+  use gravier_test_contact_columns, only: contact_column
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_grains = 130, n_walls = 2
@@ -159,7 +160,7 @@ contains
     integer :: s
 
     call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
-    call kernels%choose(nd, friction, friction)
+    call kernels%choose(nd, friction)
     physics%gravity(:) = gravity
     physics%friction = 0.25_dp
     physics%h = h
@@ -259,7 +260,7 @@ contains
     integer, intent(in) :: s, c, i, j
     type(truth_t), intent(in) :: truth
     real(dp), parameter :: rounding = 32*epsilon(1.0_dp)
-    real(dp) :: branch(truth%nd), gap, lever
+    real(dp) :: branch(truth%nd), gap, lever, hot(problem%kernels%nh)
     integer :: nd
 
     nd = truth%nd
@@ -268,13 +269,14 @@ contains
       gap = truth%gap(i, j)
       lever = 0.0_dp
       if (j <= n_grains) lever = truth%cloud%radius(j)
-      right = all(abs(sub%hot(1:nd, c)*norm2(branch) - branch) <= rounding)
+      hot(:) = contact_column(sub%hot, c)
+      right = all(abs(hot(1:nd)*norm2(branch) - branch) <= rounding)
       right = right .and. abs(sub%gap(c) - gap) <= rounding
-      right = right .and. abs(sub%hot(nd + 1, c) - max(gap, 0.0_dp)/h) <= rounding/h
+      right = right .and. abs(hot(nd + 1) - max(gap, 0.0_dp)/h) <= rounding/h
       if (problem%kernels%nc == 1) return
-      right = right .and. abs(sub%hot(nd + 4, c) - truth%cloud%radius(i)) <= 0.0_dp
-      right = right .and. abs(sub%hot(nd + 5, c) - lever) <= 0.0_dp
-      right = right .and. abs(sub%hot(nd + 6, c) - merge(0.75_dp, 0.25_dp, j > n_grains)) <= 0.0_dp
+      right = right .and. abs(hot(nd + 4) - truth%cloud%radius(i)) <= 0.0_dp
+      right = right .and. abs(hot(nd + 5) - lever) <= 0.0_dp
+      right = right .and. abs(hot(nd + 6) - merge(0.75_dp, 0.25_dp, j > n_grains)) <= 0.0_dp
     end associate
   end function right_contact
 
@@ -411,7 +413,7 @@ contains
     do s = 1, size(decomposition%home)
       decomposition%home(s)%radius(:) = 1.0e-6_dp
     end do
-    call kernels%choose(2, .false., .false.)
+    call kernels%choose(2, .false.)
     physics%gravity(:) = gravity
     physics%h = h
     call neighbourhoods%build(decomposition, 4)
@@ -492,7 +494,7 @@ contains
     integer(i8) :: id
 
     call make_boundary_scene(n_subdomains, 0.0_dp, turning, decomposition)
-    call kernels%choose(2, .true., .true.)
+    call kernels%choose(2, .true.)
     physics%friction = 0.1_dp
     physics%h = h
     call neighbourhoods%build(decomposition, 2)
@@ -511,7 +513,7 @@ contains
             call check_glued(problem, s, c, turning)
           end select
           ! impulses of 2, 3, 4
-          sub%impulse(1, c) = id - 9
+          sub%impulse(lane_of(c), 1, block_of(c)) = id - 9
         end do
       end associate
     end do
@@ -522,19 +524,21 @@ contains
   subroutine check_floor(problem, s, c)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c
+    real(dp) :: hot(problem%kernels%nh)
     integer :: j
 
     associate (sub => problem%sub(s))
       j = sub%pair(2, c)
+      hot(:) = contact_column(sub%hot, c)
       call check(j > sub%n_bodies, "floor: moves as prescribed")
       call check_equal(sub%boundary(j), 1, "floor: its number")
       call check_close(sub%v_free(1, j), 0.5_dp, 8*epsilon(1.0_dp), "floor: velocity along")
       call check_close(sub%v_free(2, j), 0.4_dp, 8*epsilon(1.0_dp), "floor: velocity of the point touched")
       call check_close(maxval(abs(sub%inverse_mass(:, j))), 0.0_dp, 0.0_dp, "floor: cannot be moved")
       ! e (v - v of the floor before) = 0.5 (-0.7 - 0.3 - 0.2)
-      call check_close(sub%hot(3, c), -0.6_dp, 8*epsilon(1.0_dp), "floor: shift of the law by restitution")
-      call check_close(sub%hot(6, c), 0.1_dp, 0.0_dp, "floor: lever of the grain")
-      call check_close(sub%hot(7, c), 0.0_dp, 0.0_dp, "floor: no lever")
+      call check_close(hot(3), -0.6_dp, 8*epsilon(1.0_dp), "floor: shift of the law by restitution")
+      call check_close(hot(6), 0.1_dp, 0.0_dp, "floor: lever of the grain")
+      call check_close(hot(7), 0.0_dp, 0.0_dp, "floor: no lever")
     end associate
   end subroutine check_floor
 
@@ -560,18 +564,20 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c
     logical, intent(in) :: turning
+    real(dp) :: hot(problem%kernels%nh)
     integer :: i
 
     associate (sub => problem%sub(s))
       i = sub%pair(1, c)
+      hot(:) = contact_column(sub%hot, c)
       call check(i > sub%n_bodies .and. sub%id(sub%pair(2, c)) == 3, "glued: its boundary is the candidate")
-      call check_close(sub%hot(2, c), -1.0_dp, 8*epsilon(1.0_dp), "glued: normal towards the candidate")
+      call check_close(hot(2), -1.0_dp, 8*epsilon(1.0_dp), "glued: normal towards the candidate")
       call check_close(sub%gap(c), -0.01_dp, 8*epsilon(1.0_dp), "glued: gap")
       call check_close(sub%v_free(1, i), merge(-0.075_dp, 0.125_dp, turning), 8*epsilon(1.0_dp), "glued: velocity along")
       call check_close(sub%v_free(2, i), 0.5_dp, 8*epsilon(1.0_dp), "glued: velocity")
-      call check_close(sub%hot(6, c), 0.0_dp, 0.0_dp, "glued: no lever")
-      call check_close(sub%hot(7, c), 0.1_dp, 0.0_dp, "glued: lever of the free grain")
-      call check_close(sub%hot(8, c), 0.3_dp, 0.0_dp, "glued: friction of the boundary")
+      call check_close(hot(6), 0.0_dp, 0.0_dp, "glued: no lever")
+      call check_close(hot(7), 0.1_dp, 0.0_dp, "glued: lever of the free grain")
+      call check_close(hot(8), 0.3_dp, 0.0_dp, "glued: friction of the boundary")
     end associate
   end subroutine check_glued
 
@@ -620,7 +626,7 @@ contains
     type(interface_figures_t) :: figures
 
     call make_boundary_scene(n_subdomains, 0.01_dp, .false., decomposition)
-    call kernels%choose(2, .true., .true.)
+    call kernels%choose(2, .true.)
     call neighbourhoods%build(decomposition, 2)
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")
