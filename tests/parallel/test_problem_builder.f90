@@ -2,12 +2,14 @@
 !> places and velocities following from identifiers.
 program test_problem_builder
   use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t, shape_grains
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_nlgs, only: nlgs_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
@@ -55,6 +57,11 @@ program test_problem_builder
   end do
   call check(manifold > 0, "some grains are in three subdomains and more")
   call check(visitors > 0, "some shared grains carry no contact at home")
+  do nd = 2, 3
+    do k = 1, size(counts)
+      call test_spins(nd, counts(k))
+    end do
+  end do
   call test_free_flight()
   do k = 1, 2
     call test_boundaries(k, .false.)
@@ -395,6 +402,62 @@ contains
     call check(right, "velocities at home")
     visitors = int(comm%total(int(visitors, i8)))
   end subroutine check_velocities
+
+  !> Without friction grains that turn keep their spins, bit for bit, and no spin is among the unknowns: the problem holds
+  !> velocities of nd components, whatever the bodies have, and its impulses change translations.
+  subroutine test_spins(nd, n_subdomains)
+    integer, intent(in) :: nd, n_subdomains
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
+    type(truth_t) :: truth
+    type(kernels_t) :: kernels
+    type(physics_t) :: physics
+    type(contact_problem_t) :: problem
+    type(interface_figures_t) :: figures
+    type(nlgs_t) :: nlgs
+    type(error_t), allocatable :: error
+    real(dp) :: jump
+    integer :: s, k, d, g, pushed
+    logical :: small, kept
+
+    call make_scene(nd, 0, n_subdomains, .true., rule_dual, .true., decomposition, truth)
+    call check_equal(decomposition%nv, 3*nd - 3, "spins: bodies have them")
+    call kernels%choose(nd, .false.)
+    physics%gravity(:) = gravity
+    physics%h = h
+    call neighbourhoods%build(decomposition, 4)
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call check_equal(problem%kernels%nv, nd, "spins: unknowns of a body")
+    small = .true.
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        small = small .and. size(sub%v_free, 1) == nd .and. size(sub%velocity, 1) == nd .and. size(sub%v_global, 1) == nd
+        small = small .and. size(sub%reaction, 1) == nd .and. size(sub%weight, 1) == nd .and. size(sub%inverse_mass, 1) == nd
+      end associate
+    end do
+    call check(small, "spins: none stored among the unknowns")
+    call nlgs%start(problem, error)
+    call nlgs%iterate(problem, .false., jump, error)
+    call problem%evaluate()
+    call take_velocities(decomposition, physics, problem)
+    kept = .true.
+    pushed = 0
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          g = int(home%id(k))
+          do d = nd + 1, 3*nd - 3
+            kept = kept .and. abs(home%velocity(d, k) - (draw(g, 6 + d) - 0.5_dp)) <= 0.0_dp
+          end do
+          do d = 1, nd
+            if (abs(home%velocity(d, k) - free_velocity(g, d, nd)) > 0.01_dp) pushed = pushed + 1
+          end do
+        end do
+      end associate
+    end do
+    call check(kept, "spins: the bits that they had")
+    call check(comm%total(int(pushed, i8)) > n_grains, "spins: contacts push grains")
+  end subroutine test_spins
 
   !> Without contacts: no bodies in the problem, figures of nothing, free velocities.
   subroutine test_free_flight()
