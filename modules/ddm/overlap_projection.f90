@@ -42,7 +42,7 @@ contains
     !> [s], [m]
     real(dp), intent(in) :: h, allowed
     type(borrowed_t) :: borrowed(size(problem%sub))
-    real(dp) :: enough, factor
+    real(dp) :: enough, factor, sums(2)
     integer :: s, k
     logical :: has_driven
 
@@ -57,7 +57,7 @@ contains
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
-          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
+          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
         end associate
       end do
       call average_copies(problem)

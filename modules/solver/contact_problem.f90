@@ -66,6 +66,9 @@ module gravier_contact_problem
     type(shared_exchange_t) :: shared
     !> subdomains of the scene
     integer :: n_subdomains = 1
+    !> of each subdomain, (sum of |r - y|^2, sum of |r|^2) of the first sweep of the last iteration, which started from y
+    !> (2, subdomains) [N^2 s^2]
+    real(dp), allocatable :: progress(:, :)
     !> contacts of the scene
     integer(i8) :: n_contacts = 0
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
