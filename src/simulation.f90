@@ -1,8 +1,9 @@
 !> A scene in time: what it takes to make one step after the other, without output.
 module gravier_simulation
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, raise, status_input
+  use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
+  use gravier_finite, only: is_finite
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
@@ -596,7 +597,51 @@ contains
     self%fast = self%fast + figures%fast
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
       & self%n_grains - self%n_glued)
+    call check_numbers(self, figures, error)
   end subroutine simulation_advance
+
+  !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
+  subroutine check_numbers(self, figures, error)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s, k, b
+
+    if (.not. is_finite(figures%kinetic_energy)) then
+      do s = 1, size(self%decomposition%home)
+        associate (home => self%decomposition%home(s))
+          do k = 1, home%n
+            if (.not. is_finite(home%mass(k)*sum(home%velocity(:, k)**2))) &
+              & call refuse("kinetic energy of body "//to_text(home%id(k)))
+          end do
+        end associate
+      end do
+      call self%comm%agree(error)
+    end if
+    do b = 1, size(self%decomposition%boundaries)
+      associate (boundary => self%decomposition%boundaries(b))
+        if (.not. (all(is_finite(boundary%point)) .and. all(is_finite(boundary%velocity)))) &
+          & call refuse("motion of boundary '"//boundary%name//"'")
+      end associate
+    end do
+    if (.not. is_finite(figures%kinetic_energy)) call refuse("kinetic energy")
+    if (.not. is_finite(figures%max_overlap)) call refuse("largest overlap")
+    if (.not. is_finite(figures%solve%residual)) call refuse("residual")
+    if (.not. is_finite(figures%solve%jump)) call refuse("jump")
+    do k = 1, self%diagnostics%n_columns
+      if (.not. is_finite(self%diagnostics%value(k))) call refuse(trim(self%diagnostics%name(k)))
+    end do
+
+  contains
+
+    subroutine refuse(what)
+      character(len=*), intent(in) :: what
+
+      call raise(error, status_failure, "step "//to_text(self%step)//": "//what//": not a finite number; expected speeds, "// &
+        & "loads and a &time step that give finite ones")
+    end subroutine refuse
+
+  end subroutine check_numbers
 
   !> q_{i+1} of grains and boundaries.
   subroutine move_to_end(self)

@@ -2,6 +2,7 @@
 module gravier_time_table
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
+  use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_csv_table, only: csv_table_t
   implicit none
   private
@@ -87,10 +88,10 @@ contains
     do
       call table%next_row(found, error)
       if (allocated(error) .or. .not. found) exit
-      call table%get_real(time_column, time, error)
+      call read_number(table, time_column, time, error)
       row(:) = 0.0_dp
       do k = 1, size(column)
-        if (column(k) > 0) call table%get_real(column(k), row(k), error)
+        if (column(k) > 0) call read_number(table, column(k), row(k), error)
       end do
       if (allocated(error)) exit
       if (n > 0) then
@@ -101,6 +102,16 @@ contains
     call set_room(self, n, n)
     if (n == 0 .and. .not. allocated(error)) call table%refuse_file("no rows; at least one was expected", error)
   end subroutine read_rows
+
+  subroutine read_number(table, column, value, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: column
+    real(dp), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+
+    call table%get_real(column, value, error)
+    if (.not. allocated(error) .and. .not. is_bounded(value)) call table%refuse(column, bounded_text, error)
+  end subroutine read_number
 
   subroutine add_row(self, n, time, row)
     type(time_table_t), intent(inout) :: self

@@ -30,6 +30,16 @@ def key(group, name, value, *words, also=None, kind=None):
     return f"{group} {name} = {value} {sorted((also or {}).items()) or ''}", text, ("&" + group, f"{name} = {value}", *words)
 
 
+PLANE = {"shape": "plane", "point": [0.0, -0.1], "normal": [0.0, 1.0]}
+CASE_3D = merged(CASE, {"scene": {"dimension": 3, "lattice_count": [2, 2, 2]}})
+
+
+def boundary_key(name, value, *words, also):
+    """The good case with a boundary that has one bad key."""
+    text = namelist(merged(CASE, {"boundary": {**also, name: "@"}})).replace(f"{name} = '@'", f"{name} = {value}")
+    return f"boundary {name} = {value}", text, ("&boundary", f"{name} = {value}", *words)
+
+
 # title, content of the input file, what the message must have besides the name of the file
 FILES = [
     ("empty", "", ("empty file", "&scene")),
@@ -106,6 +116,35 @@ FILES = [
     key("enriched", "direction", "-1", ">= 0"),
     key("enriched", "cg_tolerance", "1", "(0, 1)"),
     key("output", "every", "-1", ">= 0"),
+    # the magnitude
+    key("time", "step", "1e-200", "expected a number from 1e-30 to 1e30"),
+    key("time", "step", "1e31", "expected a number of at most 1e30 in size"),
+    key("scene", "gravity", "0, -1e200", "expected entries of at most 1e30 in size"),
+    key("scene", "period_origin", "1e300, 0", "expected entries of at most 1e30 in size", also={"scene": {"period": [1.0, 0.0]}}),
+    key("scene", "density", "1e300", "expected a number of at most 1e30 in size"),
+    key("scene", "friction", "1e300", "expected a number of at most 1e30 in size"),
+    key("scene", "radius_max", "1e200", "expected a number of at most 1e30 in size"),
+    key("scene", "radius_min", "1e-200", "expected a number from 1e-30 to 1e30"),
+    key("scene", "mass", "1e-200", "expected a number from 1e-30 to 1e30", kind="column"),
+    *(boundary_key(name, value, *words, also=also) for name, value, words, also in (
+        ("velocity", "1e300, 0", ("entries of at most 1e30 in size",), PLANE),
+        ("rotation", "-1e300", ("entries of at most 1e30 in size",), PLANE),
+        ("point", "0, 1e300", ("entries of at most 1e30 in size",), {"shape": "plane", "normal": [0.0, 1.0]}),
+        ("mass", "1e-300", ("a number from 1e-30 to 1e30",), {**PLANE, "free": [True, False]}),
+        ("force", "1e300, 0", ("entries of at most 1e30 in size",), {**PLANE, "free": [True, False], "mass": 1.0}),
+        ("radius", "1e-200", ("a number from 1e-30 to 1e30",), {"shape": "circle"}),
+        ("end", "1e-200, 0", ("a point at least 1e-30 m from point",), {"shape": "segment"}),
+    )),
+    ("edge_a = 1e-200", namelist({**CASE_3D, "boundary": {"shape": "rectangle", "edge_a": [1e-200, 0.0], "edge_b": [0.0, 1.0]}}),
+     ("edge_a = 1e-200, 0.0", "expected a length of at least 1e-30 m")),
+    ("edge_b = 1e-200", namelist({**CASE_3D, "boundary": {"shape": "rectangle", "edge_a": [1.0, 0.0], "edge_b": [0.0, 1e-200]}}),
+     ("edge_b = 0.0, 1e-200", "expected a length of at least 1e-30 m")),
+    # places that grains of 1 cm cannot tell apart from others
+    ("far period", case({"scene": {"period": [1.0, 0.0], "period_origin": [1e20, 0.0]}}),
+     ("&scene period_origin: a box as far as 1.000E+020 m", "at most 1.000E+008 m", "1e10 radii of the smallest grain")),
+    ("far boundary", case({"boundary": {**PLANE, "point": [0.0, -1e20]}}),
+     ("boundary 'boundary 1': a coordinate or length of 1.000E+020 m", "at most 1.000E+008 m")),
+    ("huge circle", case({"boundary": {"shape": "circle", "radius": 1e20}}), ("a coordinate or length of 1.000E+020 m",)),
     key("output", "directory", "''", "not empty"),
     # the choice
     key("scene", "bodies", "'cubes'", "'column', 'lattice', 'file' or 'sample'"),
@@ -133,6 +172,11 @@ FILES = [
         also={"solver": {"method": "nscdd"}, "decomposition": {"partition": "metis"}}),
     key("solver", "criterion", "'error'", "bodies = 'column' only"),
     key("scene", "column_count", "5", "belongs to bodies = 'column'"),
+]
+
+TABLES = [
+    ("speed", "time,vx\n0,0\n1,1e300\n", ("table.csv", "line 3", "column vx", '"1e300"', "a number of at most 1e30 in size")),
+    ("time", "time,vx\n0,0\n1e300,1\n", ("table.csv", "line 3", "column time", '"1e300"', "a number of at most 1e30 in size")),
 ]
 
 BODIES = """id,x,y,radius,vx,mass,shape,nx,ny
@@ -173,6 +217,11 @@ CSV_FILES = [
     ("radius negative", changed("1,0.0,0.1,0.1", "1,0.0,0.1,-2"), ("line 2", "column radius", '"-2"', "radius > 0")),
     ("mass 0", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,0"), ("line 5", "column mass", '"0"', "mass > 0")),
     ("mass of some", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,"), ("id 4", "column mass", "for all or for none")),
+    ("radius 1e-200", changed("4,0.9,0.1,0.1", "4,0.9,0.1,1e-200"), ("line 5", "column radius", "a number from 1e-30 to 1e30")),
+    ("mass 1e200", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,1e200"), ("line 5", "column mass", "from 1e-30 to 1e30")),
+    ("speed 1e200", changed("1,0.0,0.1,0.1,0.0", "1,0.0,0.1,0.1,-1e200"), ("line 2", "column vx", "at most 1e30 in size")),
+    ("place 1e200", changed("4,0.9", "4,1e200"), ("line 5", "column x", "at most 1e30 in size")),
+    ("plane at 1e200", changed("9,0.0,0.0", "9,0.0,1e200"), ("line 6", "column y", "at most 1e30 in size")),
     ("unknown shape", changed("1.0,grain,,\n9", "1.0,cube,,\n9"), ("line 5", "column shape", '"cube"', "grain or plane")),
     ("plane without normal", changed("plane,0.0,1.0", "plane,,"), ("line 6", "column nx", "empty")),
     ("plane with a zero normal", changed("plane,0.0,1.0", "plane,0.0,0.0"), ("line 6", "column nx", "not zero")),
@@ -204,6 +253,12 @@ HDF5_FILES = [
     ("infinity", {"velocity": put(ROWS["velocity"], (0, 2), np.inf)}, {}, ("/bodies/velocity", "id 1", "infinity", "finite")),
     ("radius 0", {"radius": put(ROWS["radius"], 4, 0)}, {}, ("/bodies/radius", "id 5", "> 0")),
     ("mass negative", {"mass": put(ROWS["mass"], 1, -1)}, {}, ("/bodies/mass", "id 2", "> 0")),
+    ("radius 1e-200", {"radius": put(ROWS["radius"], 4, 1e-200)}, {}, ("/bodies/radius", "id 5", "from 1e-30 to 1e30")),
+    ("radius 1e200", {"radius": put(ROWS["radius"], 4, 1e200)}, {}, ("/bodies/radius", "id 5", "from 1e-30 to 1e30")),
+    ("mass 1e200", {"mass": put(ROWS["mass"], 1, 1e200)}, {}, ("/bodies/mass", "id 2", "from 1e-30 to 1e30")),
+    ("speed 1e200", {"velocity": put(ROWS["velocity"], (0, 2), -1e200)}, {}, ("/bodies/velocity", "id 1", "at most 1e30")),
+    ("place 1e200", {"position": put(ROWS["position"], (4, 0), 1e200)}, {}, ("/bodies/position", "id 5", "at most 1e30")),
+    ("plane at 1e200", {}, {"point": np.array([[0.0, 1e200]])}, ("/walls/point", "id 9", "at most 1e30")),
     ("zero normal", {}, {"normal": np.zeros((1, 2))}, ("/walls/normal", "id 9", "not zero")),
     ("three dimensions", {"position": np.zeros((5, 3)), "velocity": np.zeros((5, 6))}, {}, ("/bodies/position",)),
     ("rows missing", {"radius": np.full(4, 0.1)}, {}, ("/bodies/radius", "4 rows", "5")),
@@ -272,6 +327,23 @@ class BadInput(RunTestCase):
             write(os.path.join(directory, "case.nml"), text)
             return "case.nml"
         self.refuse_all(FILES, prepare_input)
+
+    def test_tables(self):
+        def prepare_table(directory, text):
+            write(os.path.join(directory, "table.csv"), text)
+            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"boundary": {**PLANE, "table": "table.csv"}})))
+            return "table.csv"
+        self.refuse_all(TABLES, prepare_table)
+
+    def test_far_bodies(self):
+        def prepare_far(directory, text, scene):
+            write(os.path.join(directory, "bodies.csv"), text)
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv", **scene))
+            return "case.nml"
+        words = ("a coordinate or length of 1.000E+010 m", "at most 1.000E+009 m")
+        self.refuse_all([("grain", changed("4,0.9", "4,1e10"), {}, ("id 4", *words)),
+                         ("wall", changed("9,0.0,0.0", "9,0.0,-1e10"), {}, ("boundary 'wall 9'", *words)),
+                         ("period", BODIES, {"period": [2.0, 0.0], "period_origin": [1e10, 0.0]}, ("period", *words))], prepare_far)
 
     def test_csv_bodies(self):
         def prepare_csv(directory, text):
