@@ -40,6 +40,11 @@ def boundary_key(name, value, *words, also):
     return f"boundary {name} = {value}", text, ("&boundary", f"{name} = {value}", *words)
 
 
+def bodies_case(path, boundary=(), **scene):
+    return namelist({"scene": {"bodies": "file", "bodies_file": path, **scene}, "boundary": list(boundary), "time": CASE["time"],
+                     "output": CASE["output"]})
+
+
 # title, content of the input file, what the message must have besides the name of the file
 FILES = [
     ("empty", "", ("empty file", "&scene")),
@@ -116,6 +121,15 @@ FILES = [
     key("enriched", "direction", "-1", ">= 0"),
     key("enriched", "cg_tolerance", "1", "(0, 1)"),
     key("output", "every", "-1", ">= 0"),
+    # boundaries
+    ("a group of two boundaries", bodies_case("bodies.csv", boundary=[{"name": name, "shape": "grains", "group": group}
+                                                                      for name, group in (("a", 2), ("b", 3), ("c", 2))]),
+     ("&boundary (the 3rd, 'c') group = 2", "a group of its own, but the 1st has it too")),
+    *(boundary_key(name, value, *words, also=also) for name, value, words, also in (
+        ("force", "0, 1", ("0 along each component that is not free",), {**PLANE, "free": [True, False], "mass": 1.0}),
+        ("pressure", "1", ("0 where no component along normal is free",), {**PLANE, "free": [True, False], "mass": 1.0}),
+        ("normal", "0, 0", ("not all 0",), {"shape": "plane"}),
+    )),
     # the magnitude
     key("time", "step", "1e-200", "expected a number from 1e-30 to 1e30"),
     key("time", "step", "1e31", "expected a number of at most 1e30 in size"),
@@ -174,9 +188,18 @@ FILES = [
     key("scene", "column_count", "5", "belongs to bodies = 'column'"),
 ]
 
+FREE_X = {"free": [True, False], "mass": 1.0}
+# title, content of table.csv, keys of the plane that it drives, what the message must have
 TABLES = [
-    ("speed", "time,vx\n0,0\n1,1e300\n", ("table.csv", "line 3", "column vx", '"1e300"', "a number of at most 1e30 in size")),
-    ("time", "time,vx\n0,0\n1e300,1\n", ("table.csv", "line 3", "column time", '"1e300"', "a number of at most 1e30 in size")),
+    ("vx where x is free", "time,vx\n0,1\n", FREE_X, ("column vx", "'boundary 1'", "no such column where this component is free")),
+    ("fy where y is not free", "time,fx,fy\n0,1,1\n", FREE_X, ("column fy", "no such column where this component is not free")),
+    ("fx where nothing is free", "time,fx\n0,1\n", {}, ("column fx", "no such column where this component is not free")),
+    ("omega where x is free", "time,omega\n0,1\n", FREE_X, ("a rotation rate", "where a component of the translation is free")),
+    ("pressure across the free axis", "time,pressure\n0,1\n", FREE_X,
+     ("column pressure", "no such column but for a plane of which a component along normal is free")),
+    ("pressure where nothing is free", "time,pressure\n0,1\n", {}, ("column pressure", "no such column but for a plane")),
+    ("speed", "time,vx\n0,0\n1,1e300\n", {}, ("table.csv", "line 3", "column vx", '"1e300"', "a number of at most 1e30 in size")),
+    ("time", "time,vx\n0,0\n1e300,1\n", {}, ("table.csv", "line 3", "column time", '"1e300"', "a number of at most 1e30 in size")),
 ]
 
 BODIES = """id,x,y,radius,vx,mass,shape,nx,ny
@@ -276,10 +299,6 @@ def write_bodies(path, bodies, walls):
     return path
 
 
-def bodies_case(path, **scene):
-    return namelist({"scene": {"bodies": "file", "bodies_file": path, **scene}, "time": CASE["time"], "output": CASE["output"]})
-
-
 class BadInput(RunTestCase):
     """Every bad input runs twice: once where nothing was run before, once where an earlier run has left its results, and of
     these once on one rank and once on two."""
@@ -329,9 +348,10 @@ class BadInput(RunTestCase):
         self.refuse_all(FILES, prepare_input)
 
     def test_tables(self):
-        def prepare_table(directory, text):
+        def prepare_table(directory, text, drive):
             write(os.path.join(directory, "table.csv"), text)
-            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"boundary": {**PLANE, "table": "table.csv"}})))
+            boundary = {**PLANE, **drive, "table": "table.csv"}
+            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"boundary": boundary})))
             return "table.csv"
         self.refuse_all(TABLES, prepare_table)
 
