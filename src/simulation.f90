@@ -31,6 +31,9 @@ module gravier_simulation
   private
   public :: simulation_t, step_figures_t
 
+  !> times the imbalance that the last division reached: one that is worth another division
+  real(dp), parameter :: worth_dividing = 1.1_dp
+
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
     type(solve_report_t) :: solve
@@ -84,6 +87,8 @@ module gravier_simulation
     real(dp) :: overlap_allowed = huge(1.0_dp)
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
+    !> the same just after space was last divided in a step; 0 before
+    real(dp) :: reached_imbalance = 0.0_dp
   contains
     procedure :: init => simulation_init
     procedure :: make => simulation_make
@@ -362,6 +367,7 @@ contains
     self%largest_overlap = figures%max_overlap
     if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
+    if (figures%divided) self%reached_imbalance = self%imbalance
   end subroutine simulation_assemble
 
   !> q_m of grains and boundaries; boundaries whose time has come are taken away.
@@ -529,7 +535,8 @@ contains
     figures%fast = counts(1)
   end subroutine count_fast
 
-  !> Whether this step starts from a new partition: by schedule, or because contacts lie unevenly.
+  !> Whether this step starts from a new partition: by schedule, or because contacts lie unevenly, and more so than just after
+  !> the last one: what that could not cure is not tried again.
   subroutine check_division(self, figures)
     class(simulation_t), intent(in) :: self
     type(step_figures_t), intent(inout) :: figures
@@ -538,7 +545,7 @@ contains
       if (self%step == 0 .or. config%subdomains == 1) return
       if (config%repartition_every > 0) figures%divided = mod(self%step, config%repartition_every) == 0
       if (config%repartition_imbalance > 0.0_dp) figures%divided = figures%divided .or. &
-        & self%imbalance > config%repartition_imbalance
+        & self%imbalance > max(config%repartition_imbalance, worth_dividing*self%reached_imbalance)
     end associate
   end subroutine check_division
 
@@ -703,6 +710,7 @@ contains
     self%last_written = -1
     self%restarted = .false.
     self%imbalance = 1.0_dp
+    self%reached_imbalance = 0.0_dp
   end subroutine simulation_free
 
 end module gravier_simulation

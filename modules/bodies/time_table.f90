@@ -1,8 +1,9 @@
 !> Quantities given in a table against time: linear between the rows, constant before the first and after the last.
 module gravier_time_table
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_magnitude, only: is_bounded, bounded_text
+  use gravier_random_hash, only: hash_words
   use gravier_csv_table, only: csv_table_t
   implicit none
   private
@@ -19,6 +20,7 @@ module gravier_time_table
   contains
     procedure :: read => time_table_read
     procedure :: at => time_table_at
+    procedure :: digest => time_table_digest
   end type time_table_t
 
 contains
@@ -165,5 +167,25 @@ contains
       value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
     end if
   end function time_table_at
+
+  !> A number that tells tables of other columns, times or values apart; the table has been read.
+  pure integer(i8) function time_table_digest(self) result(digest)
+    class(time_table_t), intent(in) :: self
+    integer(i8), allocatable :: words(:)
+    integer :: row, k, n
+
+    allocate (words(size(self%has) + size(self%time) + size(self%value)))
+    words(1:size(self%has)) = merge(1_i8, 0_i8, self%has)
+    n = size(self%has)
+    do row = 1, size(self%time)
+      n = n + 1
+      words(n) = transfer(self%time(row), 0_i8)
+      do k = 1, size(self%value, 1)
+        n = n + 1
+        words(n) = transfer(self%value(k, row), 0_i8)
+      end do
+    end do
+    digest = hash_words(words)
+  end function time_table_digest
 
 end module gravier_time_table
