@@ -42,6 +42,7 @@ contains
     type(scene_t), intent(out) :: scene
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
+    integer :: b
 
     select case (config%scene%bodies)
     case ("column")
@@ -59,6 +60,9 @@ contains
     if (allocated(error)) return
     scene%n_walls = data%n_walls
     call set_period(config%scene, data, scene)
+    do b = 1, size(scene%boundaries)
+      scene%boundaries(b)%period(:) = scene%period%length
+    end do
     call take_data(comm, config%scene, data, scene)
     call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)

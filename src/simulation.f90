@@ -25,6 +25,7 @@ module gravier_simulation
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
+  use gravier_scene_period, only: check_in_period
   use gravier_scheme_choice, only: choose_scheme
   use gravier_column_solution, only: column_solution_t
   implicit none
@@ -144,6 +145,9 @@ contains
     self%n_walls = scene%n_walls
     call set_physics(self, scene)
     call check_period(self, scene, error)
+    if (.not. allocated(error)) call check_in_period(config, scene, 2.0_dp*scene%largest_radius + &
+      & self%decomposition%rule%range(), error)
+    call comm%agree(error)
     if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%scheme)

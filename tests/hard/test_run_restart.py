@@ -26,7 +26,7 @@ DRUM = {
         {"shape": "plane", "name": "belt", "point": [0.0, -0.01], "normal": [0.0, 1.0], "velocity": [0.3, 0.0]},
         {"shape": "plane", "name": "lid", "point": [0.0, 0.31], "normal": [0.0, -1.0], "free": [False, True], "mass": 2.0,
          "force": [0.0, -50.0]},
-        {"shape": "circle", "name": "bubble", "point": [0.25, 0.1], "radius": 0.6, "table": "drive.csv"},
+        {"shape": "segment", "name": "paddle", "point": [0.46, 0.18], "end": [0.54, 0.2], "table": "drive.csv"},
         {"shape": "segment", "name": "blade", "point": [0.1, 0.05], "end": [0.15, 0.12], "remove_at": 0.065},
         {"shape": "grains", "name": "stirrer", "group": 1, "rotation": [3.0], "pivot": [0.3, 0.1]},
         {"shape": "outlet", "name": "hole", "point": [0.0, 0.27], "normal": [0.0, -1.0]},

@@ -130,6 +130,24 @@ FILES = [
         ("pressure", "1", ("0 where no component along normal is free",), {**PLANE, "free": [True, False], "mass": 1.0}),
         ("normal", "0, 0", ("not all 0",), {"shape": "plane"}),
     )),
+    *((title, case({"scene": {"period": [1.0, 0.0]}, "boundary": boundary}), ("boundary 'boundary 1': expected", *words, "axis x"))
+      for title, boundary, words in (
+        ("plane across a period", {"shape": "plane", "point": [-0.1, 0.0], "normal": [1.0, 0.0]}, ("a normal at right angles",)),
+        ("outlet across a period", {"shape": "outlet", "point": [-0.1, 0.0], "normal": [0.1, 1.0]}, ("a normal at right angles",)),
+        ("plane that tilts in a period", {**PLANE, "rotation": [0.1]}, ("no rotation but about",)),
+        ("segment longer than a period", {"shape": "segment", "point": [0.0, -0.1], "end": [0.98, -0.1]}, ("a width", "period of 1.000")),
+        ("segment that turns", {"shape": "segment", "point": [0.0, -0.1], "end": [0.0, 0.88], "rotation": [0.1]}, ("a width",)),
+        ("circle larger than a period", {"shape": "circle", "point": [0.5, 0.0], "radius": 0.51}, ("a width", "here 1.020")),
+      )),
+    *((title, namelist(merged(CASE_3D, {"scene": {"period": [1.0, 0.0, 0.0]}, "boundary": boundary})),
+       ("boundary 'boundary 1': expected", words, "axis x"))
+      for title, boundary, words in (
+        ("oblique cylinder", {"shape": "cylinder", "axis": [1.0, 1.0, 0.0], "radius": 0.3}, "an axis along, or at right angles"),
+        ("wide cylinder", {"shape": "cylinder", "axis": [0.0, 1.0, 0.0], "radius": 0.6}, "a width"),
+        ("cylinder that tilts", {"shape": "cylinder", "axis": [0.0, 1.0, 0.0], "radius": 0.3, "rotation": [0.0, 0.0, 1.0]},
+         "no rotation but about its axis"),
+        ("belt that turns", {"shape": "plane", "normal": [0.0, 0.0, 1.0], "rotation": [0.0, 0.0, 1.0]}, "no rotation but about"),
+      )),
     # the magnitude
     key("time", "step", "1e-200", "expected a number from 1e-30 to 1e30"),
     key("time", "step", "1e31", "expected a number of at most 1e30 in size"),
@@ -354,6 +372,16 @@ class BadInput(RunTestCase):
             write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"boundary": boundary})))
             return "table.csv"
         self.refuse_all(TABLES, prepare_table)
+
+    def test_turning_glued_bodies(self):
+        """Glued grains that turn and reach half round a periodic cell, in the rows of the second rank."""
+        def prepare_turning(directory, period):
+            write(os.path.join(directory, "bodies.csv"), "id,x,y,radius,group\n1,0.1,0,0.05,1\n2,0.3,0,0.05,1\n3,0.55,0,0.05,1\n")
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv", period=[period, 0.0], boundary=[
+                {"shape": "grains", "group": 1, "pivot": [0.1, 0.0], "rotation": [1.0]}]))
+            return "case.nml"
+        self.refuse_all([("wide", 1.0, ("boundary 'boundary 1'", "nearer to an image of the pivot than half the period", "axis x"))],
+                        prepare_turning)
 
     def test_far_bodies(self):
         def prepare_far(directory, text, scene):
