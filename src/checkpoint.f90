@@ -9,7 +9,7 @@ module gravier_checkpoint
   use gravier_boundary, only: boundary_t, boundary_words
   use gravier_impulse_memory, only: impulse_entries, list_impulses, match_impulses
   use gravier_energy_balance, only: energy_words
-  use gravier_config, only: config_t, write_active
+  use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
   implicit none
   private
