@@ -253,7 +253,8 @@ module gravier_config_table
            note="the product of `grid` if given, else `1`"), &
      key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again"), &
      key_t("decomposition", "repartition_imbalance", kind_real, "0.0", "0 or > 1", &
-           "largest over mean number of contacts of a subdomain that asks for a new partition; 0: never")]
+           "largest over mean number of contacts of a subdomain that asks for a new partition, where it exceeds 1.1 times "// &
+           "what the last one reached; 0: never")]
 
   type(key_t), parameter :: enriched_keys(*) = &
     [key_t("enriched", "direction", kind_real, "0.3", ">= 0", "search direction l", unit="1/W_aa or kg"), &
