@@ -55,9 +55,9 @@ contains
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), velocity => problem%sub(s)%velocity)
+        call problem%shared%sum_copies(s, velocity)
         do k = 1, part%n_shared
           b = part%body(k)
-          call problem%shared%add_copies(s, k, velocity(:, b))
           velocity(:, b) = velocity(:, b)/part%multiplicity(k)
         end do
       end associate

@@ -175,7 +175,7 @@ contains
   !> but the order of the sums. Collective.
   subroutine contact_problem_evaluate(self)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s, k, b, nv
+    integer :: s, nv
 
     nv = self%kernels%nv
     do s = 1, size(self%sub)
@@ -184,13 +184,8 @@ contains
     end do
     call self%shared%pass()
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s), part => self%shared%part(s))
-        do k = 1, part%n_shared
-          b = part%body(k)
-          call self%shared%add_copies(s, k, sub%reaction(:, b))
-        end do
-        call add_impulses(sub)
-      end associate
+      call self%shared%sum_copies(s, self%sub(s)%reaction)
+      call add_impulses(self%sub(s))
     end do
 
   contains
