@@ -18,25 +18,26 @@ module gravier_bench_kernels
 
   integer, parameter :: name_length = 32
   character(len=name_length), parameter :: kernel_names(*) = [character(len=name_length) :: &
-    & "2d_frictionless", "2d_frictionless_spin", "2d_friction", "3d_frictionless", "3d_frictionless_spin", "3d_friction", &
-    & "2d_frictionless_recording", "2d_friction_recording", "3d_frictionless_recording", "3d_friction_recording"]
+    & "2d_frictionless", "2d_frictionless_spin", "2d_friction", "3d_frictionless", "3d_frictionless_spin", "3d_friction"]
+  !> what is added to the name of a kernel for the version that records the velocities which solved the laws
+  character(len=*), parameter :: recorder = "_recording"
+  character(len=*), parameter :: places(3) = [character(len=12) :: "core_cache", "last_cache", "memory"]
 
-  !> contacts a grain, far from walls
-  real(dp), parameter :: contacts_2d = 2.0_dp, contacts_3d = 3.5_dp
+  !> contacts a grain in packings of some size, walls included
+  real(dp), parameter :: contacts_2d = 1.95_dp, contacts_3d = 3.35_dp
   !> contacts of a problem in the first caches of a core, and share of the last cache that one beyond them takes
   integer, parameter :: few_contacts = 2000
   real(dp), parameter :: share_of_cache = 0.1_dp
   !> the largest problem streams so many times the last cache
   integer, parameter :: times_cache = 4
 
-  !> One kernel and contacts for it.
+  !> One kernel, in its two versions, and contacts for it.
   type :: kernel_problem_t
     character(len=name_length) :: name
     character(len=12) :: place
-    logical :: recording = .false.
     type(kernels_t) :: kernels
     type(subproblem_t) :: sub
-    !> (nc, contacts), of recording kernels
+    !> (nc, contacts)
     real(dp), allocatable :: law_velocity(:, :)
   contains
     procedure :: sweep_once
@@ -46,11 +47,12 @@ module gravier_bench_kernels
 contains
 
   !> One sweep over all contacts.
-  subroutine sweep_once(self)
+  subroutine sweep_once(self, recording)
     class(kernel_problem_t), intent(inout) :: self
+    logical, intent(in) :: recording
 
     associate (sub => self%sub)
-      if (self%recording) then
+      if (recording) then
         call self%kernels%sweep_recording(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, self%law_velocity)
       else
         call self%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
@@ -60,13 +62,14 @@ contains
 
   !> Bytes that one sweep moves at least, each array once: of a contact pair and hot read, impulses read and written, law
   !> velocities written; of a body velocities read and written, weights read.
-  pure integer(i8) function streamed(self) result(bytes)
+  pure integer(i8) function streamed(self, recording) result(bytes)
     class(kernel_problem_t), intent(in) :: self
+    logical, intent(in) :: recording
     integer(i8) :: words
 
     associate (sub => self%sub)
       words = size(sub%hot, kind=i8) + 2*size(sub%impulse, kind=i8) + 2*size(sub%velocity, kind=i8) + size(sub%weight, kind=i8)
-      if (self%recording) words = words + size(self%law_velocity, kind=i8)
+      if (recording) words = words + size(self%law_velocity, kind=i8)
       bytes = words*(storage_size(sub%hot)/8) + size(sub%pair, kind=i8)*(storage_size(sub%pair)/8)
     end associate
   end function streamed
@@ -76,7 +79,6 @@ contains
     type(options_t), intent(in) :: options
     type(kernel_problem_t), allocatable, intent(out) :: problems(:)
     type(error_t), allocatable, intent(inout) :: error
-    character(len=*), parameter :: places(3) = [character(len=12) :: "core_cache", "last_cache", "memory"]
     integer :: k, p, n
 
     allocate (problems(size(places)*size(kernel_names)))
@@ -100,7 +102,7 @@ contains
     logical, intent(in) :: largest
     real(dp) :: per_cache
 
-    per_cache = real(last_cache(), dp)*small%sub%n_contacts/small%streamed()
+    per_cache = real(last_cache(), dp)*small%sub%n_contacts/small%streamed(.false.)
     if (.not. largest) then
       n = nint(share_of_cache*per_cache)
       if (options%contacts > 0) n = min(n, options%contacts)
@@ -111,7 +113,7 @@ contains
     end if
   end function wanted_contacts
 
-  !> A problem of about `n` contacts for a kernel, with the masses and velocities that a solve starts from.
+  !> A problem of about `n` contacts for the kernel of a name, with the masses and velocities that a solve starts from.
   subroutine make_problem(name, n, problem, error)
     character(len=*), intent(in) :: name
     integer, intent(in) :: n
@@ -136,9 +138,8 @@ contains
       call start_velocities(simulation%problem, shared_masses=.false.)
       problem%name = name
       problem%kernels = simulation%problem%kernels
-      problem%recording = index(name, "recording") > 0
       call take(simulation%problem%sub(1), problem%sub)
-      allocate (problem%law_velocity(problem%kernels%nc, merge(problem%sub%n_contacts, 0, problem%recording)), source=0.0_dp)
+      allocate (problem%law_velocity(problem%kernels%nc, problem%sub%n_contacts), source=0.0_dp)
     end if
     call simulation%free()
     call alone%free()
@@ -167,38 +168,42 @@ contains
     type(record_t), intent(inout) :: record
     type(case_t) :: of
     real(dp) :: rate, bytes
-    integer :: k
+    integer :: k, version
 
     do k = 1, size(problems)
       associate (problem => problems(k))
-        of = case_t("kernel_"//trim(problem%place), problem%name, int(problem%sub%n_contacts, i8), 1)
-        rate = relaxation_rate(problem, options%seconds)
-        bytes = real(problem%streamed(), dp)/problem%sub%n_contacts
-        call record%note(of, "relaxations", "1/s", rate)
-        call record%note(of, "bytes_per_relaxation", "B", bytes)
-        call record%note(of, "ratio_to_triad", "1", rate*bytes/bandwidth)
-        call record%note(of, "contacts_per_body", "1", real(problem%sub%n_contacts, dp)/problem%sub%n_columns)
-        call record%note(of, "share_of_pressing_contacts", "1", &
-          & real(count(problem%sub%impulse(1, :) > 0.0_dp), dp)/problem%sub%n_contacts)
+        do version = 1, 2
+          of = case_t("kernel_"//trim(problem%place), problem%name, int(problem%sub%n_contacts, i8), 1)
+          if (version == 2) of%name = trim(problem%name)//recorder
+          rate = relaxation_rate(problem, version == 2, options%seconds)
+          bytes = real(problem%streamed(version == 2), dp)/problem%sub%n_contacts
+          call record%note(of, "relaxations", "1/s", rate)
+          call record%note(of, "bytes_per_relaxation", "B", bytes)
+          call record%note(of, "ratio_to_triad", "1", rate*bytes/bandwidth)
+          call record%note(of, "bodies", "1", real(problem%sub%n_columns, dp))
+          call record%note(of, "share_of_pressing_contacts", "1", &
+            & real(count(problem%sub%impulse(1, :) > 0.0_dp), dp)/problem%sub%n_contacts)
+        end do
       end associate
     end do
   end subroutine measure_kernels
 
   !> Relaxations a second, over at least so many seconds after one sweep that brings the data near.
-  real(dp) function relaxation_rate(problem, seconds) result(rate)
+  real(dp) function relaxation_rate(problem, recording, seconds) result(rate)
     type(kernel_problem_t), intent(inout) :: problem
+    logical, intent(in) :: recording
     real(dp), intent(in) :: seconds
     real(dp) :: start, now
     integer :: k, together, n
 
-    call problem%sweep_once()
+    call problem%sweep_once(recording)
     ! the clock is read once in so many relaxations
     together = 1 + 100000/problem%sub%n_contacts
     n = 0
     start = MPI_Wtime()
     do
       do k = 1, together
-        call problem%sweep_once()
+        call problem%sweep_once(recording)
       end do
       n = n + together
       now = MPI_Wtime()
@@ -208,22 +213,23 @@ contains
   end function relaxation_rate
 
   !> So many sweeps of one kernel and nothing else: what counts instructions compares two numbers of sweeps.
-  subroutine sweep_kernel(name, n, sweeps, contacts, error)
-    character(len=*), intent(in) :: name
-    !> contacts wanted
-    integer, intent(in) :: n, sweeps
+  subroutine sweep_kernel(options, contacts, error)
+    !> with a kernel and a number of sweeps
+    type(options_t), intent(in) :: options
     !> contacts there are
     integer, intent(out) :: contacts
     type(error_t), allocatable, intent(inout) :: error
     type(kernel_problem_t) :: problem
-    integer :: k
+    integer :: k, n
 
+    n = few_contacts
+    if (options%contacts > 0) n = options%contacts
     contacts = 0
-    call make_problem(name, n, problem, error)
+    call make_problem(options%kernel, n, problem, error)
     if (allocated(error)) return
     contacts = problem%sub%n_contacts
-    do k = 1, sweeps
-      call problem%sweep_once()
+    do k = 1, options%sweeps
+      call problem%sweep_once(options%recording)
     end do
   end subroutine sweep_kernel
 

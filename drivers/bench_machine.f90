@@ -93,7 +93,7 @@ contains
       blank = index(rest, " ")
       word = rest(1:blank - 1)
       rest = rest(blank + 1:)
-      if (.not. changes_code(word)) cycle
+      if (.not. changes_code(word) .or. index(" "//flags//" ", " "//word//" ") > 0) cycle
       if (len(flags) > 0) flags = flags//" "
       flags = flags//word
     end do
@@ -102,7 +102,7 @@ contains
   pure logical function changes_code(word)
     character(len=*), intent(in) :: word
     changes_code = index(word, "-O") == 1 .or. index(word, "-march=") == 1 .or. index(word, "-mprefer") == 1
-    if (index(word, "-f") == 1) changes_code = index(word, "-fintrinsic-modules") /= 1 .and. index(word, "-fpre-include") /= 1
+    if (index(word, "-f") == 1) changes_code = index(word, "-fintrinsic-modules") /= 1 .and. index(word, "-fpre") /= 1
   end function changes_code
 
   !> Today, as year-month-day.

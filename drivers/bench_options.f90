@@ -18,15 +18,16 @@ module gravier_bench_options
     & "  --contacts N     contacts of the kernels' largest problems (as many as fill the last cache four times, and no"//nl// &
     & "                   fewer than 1000000; quick: 1000000)"//nl// &
     & "  --spheres N      spheres of the largest step (1000000; quick: 100000); scaling takes a fifth, or all if quick"//nl// &
-    & "  --iterations N   iterations of each solve (100; quick: 50)"//nl// &
+    & "  --iterations N   iterations of each solve (100; quick: 30)"//nl// &
     & "  --triad N        numbers in each array of the bandwidth test (as many as fill the last cache four times)"//nl// &
-    & "  --kernel NAME    do nothing but sweeps of one kernel, over --contacts N, as many as --sweeps K says; no table"//nl// &
+    & "  --kernel NAME    nothing but sweeps of one kernel over --contacts N (2000), as many as --sweeps says; no table"//nl// &
     & "  --sweeps K       goes with --kernel"//nl// &
+    & "  --recording      goes with --kernel: the version that records velocities"//nl// &
     & "  --help"//nl// &
     & "exit status: 0 done; 2 bad usage; 4 anything else"
 
   type :: options_t
-    logical :: help = .false., quick = .false.
+    logical :: help = .false., quick = .false., recording = .false.
     character(len=:), allocatable :: csv
     !> blank where all are measured
     character(len=:), allocatable :: kernel
@@ -53,6 +54,9 @@ contains
       case ("--help", "-h")
         options%help = .true.
         k = k + 1
+      case ("--recording")
+        options%recording = .true.
+        k = k + 1
       case ("--quick")
         options%quick = .true.
         k = k + 1
@@ -66,6 +70,7 @@ contains
     if (allocated(error)) return
     if ((options%kernel /= "") .neqv. (options%sweeps > 0)) call raise(error, status_input, &
       & "--kernel and --sweeps go together; only one is given")
+    if (options%recording .and. options%kernel == "") call raise(error, status_input, "--recording goes with --kernel")
     if (options%kernel /= "" .and. .not. any(kernels == options%kernel)) call raise(error, status_input, &
       & "--kernel '"//options%kernel//"': expected one of "//joined(kernels))
     call fill_in(options)
@@ -138,9 +143,9 @@ contains
 
     if (options%rounds == 0) options%rounds = merge(3, 5, options%quick)
     if (.not. options%seconds > 0.0_dp) options%seconds = merge(0.05_dp, 0.2_dp, options%quick)
-    if (options%contacts == 0 .and. options%quick) options%contacts = 1000000
+    if (options%contacts == 0 .and. options%quick .and. options%kernel == "") options%contacts = 1000000
     if (options%spheres == 0) options%spheres = merge(100000, 1000000, options%quick)
-    if (options%iterations == 0) options%iterations = merge(50, 100, options%quick)
+    if (options%iterations == 0) options%iterations = merge(30, 100, options%quick)
   end subroutine fill_in
 
   pure function joined(names) result(text)

@@ -22,9 +22,9 @@ module gravier_bench_packing
   !> gap within which the share wanted of the nearest pairs lies: the sum of two radii has a triangular distribution
   real(dp), parameter :: alert_2d = spacing - 2.0_dp + (1.0_dp - smallest)*1.1835_dp
   real(dp), parameter :: alert_3d = spacing - 2.0_dp + (1.0_dp - smallest)*1.0871_dp
-  !> components of the velocities at the start lie between plus and minus so many alert distances a step: enough for many
-  !> contacts to press
-  real(dp), parameter :: agitation = 3.0_dp
+  !> velocities at the start: neighbours approach each other along every axis by so many alert distances a step, and each
+  !> component is changed at random by up to the second number of them, so that some contacts press, slip or are open
+  real(dp), parameter :: approach = 1.0_dp, agitation = 2.0_dp
 
   type :: packing_t
     !> space dimension
@@ -67,8 +67,9 @@ contains
     n = product(int(self%count, i8))
   end function packing_grains
 
-  !> Place and velocity of a grain: functions of its identifier alone. Rows of disks lie in the gaps of the row below, layers
-  !> of spheres, square ones, in the gaps of the layer below: a face-centred cubic lattice.
+  !> Place of a grain at q_m, where contacts are found, and its velocity at the start of a step: functions of its identifier
+  !> alone. Rows of disks lie in the gaps of the row below, layers of spheres, square ones, in the gaps of the layer below: a
+  !> face-centred cubic lattice.
   pure subroutine packing_place(self, id, position, velocity)
     class(packing_t), intent(in) :: self
     integer(i8), intent(in) :: id
@@ -86,7 +87,8 @@ contains
     do d = 1, self%nd
       position(d) = 1.0_dp + jitter + place(d)*pitch(self%nd, d) + jitter*(hash_uniform(2, id, d) - 0.5_dp)
       if (d < self%nd) position(d) = position(d) + 0.5_dp*spacing*mod(place(self%nd), 2)
-      velocity(d) = agitation*alert(self%nd)*radius/step*(2.0_dp*hash_uniform(3, id, d) - 1.0_dp)
+      velocity(d) = alert(self%nd)*radius/step*(agitation*(2.0_dp*hash_uniform(3, id, d) - 1.0_dp) + &
+        & approach*(0.5_dp*(self%count(d) - 1) - place(d)))
     end do
     position(:) = radius*position
   end subroutine packing_place
@@ -129,6 +131,7 @@ contains
     grains%glued(:) = 0
     do k = 1, grains%n
       call packing%place(grains%id(k), grains%position(:, k), grains%velocity(:, k))
+      grains%position(:, k) = grains%position(:, k) - 0.5_dp*step*grains%velocity(1:packing%nd, k)
     end do
     simulation%decomposition%nv = nv
     call simulation%problem%kernels%choose(packing%nd, packing%friction, nv > packing%nd)
@@ -169,17 +172,19 @@ contains
     end associate
   end subroutine fit_box
 
-  !> Grains to where they were at the start, with the velocities of the start: the next step is the same again, but for the
-  !> impulses that it starts from.
-  subroutine reset_grains(packing, simulation)
+  !> Grains to where they were at the start of the first step, or in the middle of it, with the velocities of its start: the
+  !> next step is the same again, but for the impulses that it starts from.
+  subroutine reset_grains(packing, simulation, middle)
     type(packing_t), intent(in) :: packing
     type(simulation_t), intent(inout) :: simulation
+    logical, intent(in) :: middle
     integer :: s, k
 
     do s = 1, size(simulation%decomposition%home)
       associate (home => simulation%decomposition%home(s))
         do k = 1, home%n
           call packing%place(home%id(k), home%position(:, k), home%velocity(:, k))
+          if (.not. middle) home%position(:, k) = home%position(:, k) - 0.5_dp*step*home%velocity(1:packing%nd, k)
         end do
       end associate
     end do

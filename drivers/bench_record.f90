@@ -83,7 +83,8 @@ contains
     same = a%group == b%group .and. a%name == b%name .and. a%size == b%size .and. a%ranks == b%ranks
   end function same
 
-  !> Print the rows of a group: medians, and in brackets the least and the greatest value.
+  !> Print the rows of a group: medians, and in brackets the least and the greatest value. What is the same in every round is
+  !> left to the table.
   subroutine record_print(self, unit, group)
     class(record_t), intent(in) :: self
     integer, intent(in) :: unit
@@ -94,6 +95,7 @@ contains
     do k = 1, self%n
       associate (row => self%rows(k))
         if (row%of%group /= group) cycle
+        if (size(row%values) > 1 .and. .not. maxval(row%values) > minval(row%values)) cycle
         write (unit, "(2x, a26, i10, i3, 2x, a26, es11.3, '  [', es10.3, ',', es10.3, ']  ', a)") row%of%name(1:26), row%of%size, &
           & row%of%ranks, row%quantity(1:26), median(row%values), minval(row%values), maxval(row%values), trim(row%unit)
       end associate

@@ -10,7 +10,9 @@ module gravier_bench_scene
   use gravier_nscdd, only: average_copies
   use gravier_scheme, only: work_t
   use gravier_solve, only: solve_report_t, solve_contacts
+  use gravier_file_system, only: make_directory, remove_file, remove_directory
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_run_output, only: run_output_t
   use gravier_bench_packing, only: packing_t, make_simulation, reset_grains
   use gravier_bench_record, only: record_t, case_t
   implicit none
@@ -28,6 +30,7 @@ module gravier_bench_scene
     procedure :: measure_lists => bench_scene_measure_lists
     procedure :: measure_detection => bench_scene_measure_detection
     procedure :: measure_step => bench_scene_measure_step
+    procedure :: measure_output => bench_scene_measure_output
     procedure :: measure_exchange => bench_scene_measure_exchange
     procedure :: measure_interface => bench_scene_measure_interface
     procedure :: unknowns => bench_scene_unknowns
@@ -65,7 +68,7 @@ contains
     real(dp) :: start
 
     associate (simulation => self%simulation)
-      call reset_grains(self%packing, simulation)
+      call reset_grains(self%packing, simulation, middle=.true.)
       call simulation%comm%barrier()
       start = MPI_Wtime()
       call simulation%neighbourhoods%build(simulation%decomposition, impulse_entries(simulation%problem%kernels))
@@ -81,7 +84,7 @@ contains
     type(record_t), intent(inout) :: record
     real(dp) :: mean(n_phases), least(n_phases), most(n_phases), grains
 
-    call reset_grains(self%packing, self%simulation)
+    call reset_grains(self%packing, self%simulation, middle=.false.)
     call reset_timers()
     call self%simulation%assemble(self%figures)
     call gather_timers(self%simulation%comm, mean, least, most)
@@ -103,7 +106,7 @@ contains
 
     call self%measure_lists(record, lists)
     associate (simulation => self%simulation)
-      call reset_grains(self%packing, simulation)
+      call reset_grains(self%packing, simulation, middle=.false.)
       call reset_timers()
       call simulation%comm%barrier()
       start = MPI_Wtime()
@@ -143,6 +146,36 @@ contains
     call record%note(of, "share_bodies", "1", mean(phase_bodies)/step)
     call record%note(of, "share_rest", "1", max(0.0_dp, 1.0_dp - sum(mean)/step))
   end subroutine note_shares
+
+  !> Write the state as a run does, to a directory that is removed.
+  subroutine bench_scene_measure_output(self, directory, step, record, error)
+    class(bench_scene_t), intent(inout) :: self
+    character(len=*), intent(in) :: directory
+    !> what the step took [s]
+    real(dp), intent(in) :: step
+    type(record_t), intent(inout) :: record
+    type(error_t), allocatable, intent(inout) :: error
+    type(run_output_t) :: output
+    real(dp) :: start, seconds
+
+    if (allocated(error)) return
+    if (self%simulation%comm%rank == 0) call make_directory(directory, error)
+    call self%simulation%comm%agree(error)
+    if (allocated(error)) return
+    self%simulation%config%output%directory = directory
+    call output%open(self%simulation, "gravier_bench", error)
+    start = MPI_Wtime()
+    if (.not. allocated(error)) call output%write_state(self%simulation, error)
+    seconds = MPI_Wtime() - start
+    call output%finish(self%simulation, .false., error)
+    if (self%simulation%comm%rank == 0) then
+      call remove_file(directory//"/results.h5")
+      call remove_file(directory//"/history.csv")
+      call remove_directory(directory)
+    end if
+    call record%note(self%of, "write_state", "s", seconds)
+    call record%note(self%of, "write_state_over_step", "1", seconds/step)
+  end subroutine bench_scene_measure_output
 
   !> One exchange between the copies of shared bodies, as NSCDD makes it.
   subroutine bench_scene_measure_exchange(self, seconds, record)
@@ -192,7 +225,7 @@ contains
     real(dp) :: mean(n_phases), least(n_phases), most(n_phases)
 
     before = self%simulation%scheme%work_done()
-    call reset_grains(self%packing, self%simulation)
+    call reset_grains(self%packing, self%simulation, middle=.false.)
     call reset_timers()
     call self%simulation%advance(self%figures, error)
     if (allocated(error)) return

@@ -52,7 +52,7 @@ contains
     integer :: contacts
 
     if (world%rank == 0) then
-      call sweep_kernel(options%kernel, max(options%contacts, 1), options%sweeps, contacts, error)
+      call sweep_kernel(options, contacts, error)
       if (.not. allocated(error)) write (output_unit, "(a)") options%kernel//": "//to_text(contacts)//" contacts, "// &
         & to_text(options%sweeps)//" sweeps"
     end if
