@@ -193,8 +193,9 @@ class Bench(RunTestCase):
                (["--rounds", "0"], "--rounds '0': expected an integer >= 1"), (["--contacts", "1e6"], "--contacts '1e6'"),
                (["--spheres", "-3"], "--spheres '-3'"), (["--iterations"], "--iterations ''"),
                (["--triad", "99999999999"], "--triad '99999999999'"), (["--seconds", "inf"], "--seconds 'inf'"),
-               (["--seconds", "1e999"], "--seconds '1e999'"), (["--kernel", "4d", "--sweeps", "1"], "--kernel '4d': expected one of 2d"),
-               (["--kernel", "3d_friction"], "go together"), (["--sweeps", "2"], "go together"), (["--recording"], "--recording goes")]
+               (["--seconds", "1e999"], "--seconds '1e999'"), (["--kernel", "3d_friction"], "go together"),
+               (["--kernel", "4d", "--sweeps", "1"], "--kernel '4d': expected one of 2d"), (["--sweeps", "2"], "go together"),
+               (["--recording"], "--recording goes")]
         for (arguments, expected), run in zip(bad, each(lambda a, _: gravier(*a, ranks=2, directory=directory,
                                                                              program="gravier_bench"), bad)):
             self.assert_status(run, 2)
@@ -209,7 +210,7 @@ class Bench(RunTestCase):
         self.assertEqual(run.stdout.count("usage: gravier_bench"), 1)
 
     def test_figures(self):
-        """plot_bench.py draws the table, and refuses another."""
+        """plot_bench.py draws and prints the table, and refuses another."""
         self.table(2)
         script = os.path.join(SOURCE, "drivers/plot_bench.py")
         done = subprocess.run([sys.executable, script, self.runs[2].path("table.csv"), "--out", self.here("figures")],
@@ -217,6 +218,9 @@ class Bench(RunTestCase):
         self.assertEqual((done.returncode, done.stderr), (0, b""))
         self.assertEqual(sorted(os.listdir(self.here("figures"))), ["bench_kernels.png", "bench_kernels.svg", "bench_step.png",
                                                                     "bench_step.svg"])
+        done = subprocess.run([sys.executable, script, self.runs[2].path("table.csv"), "--markdown"], stdout=subprocess.PIPE)
+        self.assertEqual(done.returncode, 0)
+        self.assertEqual(done.stdout.count(b"3d_friction_recording"), len(PLACES))
         done = subprocess.run([sys.executable, script, os.path.join(SOURCE, "README.md"), "--out", self.here("none")],
                               stderr=subprocess.PIPE)
         self.assertEqual(done.returncode, 1)
