@@ -54,7 +54,7 @@ def draw_kernels(rows, axes):
             limits = [bandwidth / cases[name]["bytes_per_relaxation"][0] / 1e6 for name in names]
             axes.hlines(limits, [n - 0.45 for n in range(len(names))], [n + 0.45 for n in range(len(names))], color="#D55E00",
                         label="triad over bytes streamed")
-    axes.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names], fontsize=8)
+    axes.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names], fontsize=6.5)
     axes.set_ylabel("relaxations [10$^6$/s], one core")
     axes.legend(frameon=False, fontsize=8)
     axes.grid(True, axis="y", color="0.9", linewidth=0.6)
@@ -95,11 +95,13 @@ def print_tables(rows, machine):
     table(["triad", "elements of an array", "GB/s"],
           [[f"on {ranks} core{'s at once' if ranks > 1 else ''}", str(size), text(case["bandwidth"], 1e-9)]
            for (group, _, size, ranks), case in rows.items() if group == "triad"])
-    for place, (label, _) in PLACES.items():
-        print(f"Data in {label}:\n")
-        table(["kernel", "contacts", "10^6 relaxations/s", "bytes a relaxation", "bytes a second over triad"],
-              [[f"`{name}`", str(size), text(case["relaxations"], 1e-6), f"{case['bytes_per_relaxation'][0]:.1f}",
-                text(case["ratio_to_triad"], digits=2)] for (group, name, size, _), case in rows.items() if group == place])
+    places = {place: {name: (size, case) for (group, name, size, _), case in rows.items() if group == place} for place in PLACES}
+    table(["kernel", "bytes a relaxation", *(f"10^6 relaxations/s, {label}" for label, _ in PLACES.values()),
+           "contacts in memory", "bytes a second over triad"],
+          [[f"`{name}`", f"{case['bytes_per_relaxation'][0]:.0f}",
+            *(text(cases[name][1]["relaxations"], 1e-6) for cases in places.values()), str(size),
+            text(case["ratio_to_triad"], digits=2)]
+           for name, (size, case) in places["kernel_memory"].items()])
     table(["one exchange", "spheres", "ranks", "ms", "shared bodies", "numbers of all copies", "ns a number"],
           [[name, str(size), str(ranks), text(case["exchange"], 1e3), f"{case['shared_bodies'][0]:.0f}",
             f"{case['copies_values'][0]:.0f}", text(case["seconds_per_value"], 1e9)]
