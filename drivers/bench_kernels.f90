@@ -36,7 +36,8 @@ module gravier_bench_kernels
     character(len=name_length) :: name
     character(len=12) :: place
     type(kernels_t) :: kernels
-    type(subproblem_t) :: sub
+    !> one
+    type(subproblem_t), allocatable :: sub(:)
     !> (nc, contacts)
     real(dp), allocatable :: law_velocity(:, :)
   contains
@@ -51,7 +52,7 @@ contains
     class(kernel_problem_t), intent(inout) :: self
     logical, intent(in) :: recording
 
-    associate (sub => self%sub)
+    associate (sub => self%sub(1))
       if (recording) then
         call self%kernels%sweep_recording(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, self%law_velocity)
       else
@@ -67,7 +68,7 @@ contains
     logical, intent(in) :: recording
     integer(i8) :: words
 
-    associate (sub => self%sub)
+    associate (sub => self%sub(1))
       words = size(sub%hot, kind=i8) + 2*size(sub%impulse, kind=i8) + 2*size(sub%velocity, kind=i8) + size(sub%weight, kind=i8)
       if (recording) words = words + size(self%law_velocity, kind=i8)
       bytes = words*(storage_size(sub%hot)/8) + size(sub%pair, kind=i8)*(storage_size(sub%pair)/8)
@@ -102,7 +103,7 @@ contains
     logical, intent(in) :: largest
     real(dp) :: per_cache
 
-    per_cache = real(last_cache(), dp)*small%sub%n_contacts/small%streamed(.false.)
+    per_cache = real(last_cache(), dp)*small%sub(1)%n_contacts/small%streamed(.false.)
     if (.not. largest) then
       n = nint(share_of_cache*per_cache)
       if (options%contacts > 0) n = min(n, options%contacts)
@@ -138,26 +139,12 @@ contains
       call start_velocities(simulation%problem, shared_masses=.false.)
       problem%name = name
       problem%kernels = simulation%problem%kernels
-      call take(simulation%problem%sub(1), problem%sub)
-      allocate (problem%law_velocity(problem%kernels%nc, problem%sub%n_contacts), source=0.0_dp)
+      call move_alloc(simulation%problem%sub, problem%sub)
+      allocate (problem%law_velocity(problem%kernels%nc, problem%sub(1)%n_contacts), source=0.0_dp)
     end if
     call simulation%free()
     call alone%free()
   end subroutine make_problem
-
-  !> Take over what sweeps need of a subproblem.
-  subroutine take(from, to)
-    type(subproblem_t), intent(inout) :: from
-    type(subproblem_t), intent(inout) :: to
-
-    to%n_columns = from%n_columns
-    to%n_contacts = from%n_contacts
-    call move_alloc(from%pair, to%pair)
-    call move_alloc(from%hot, to%hot)
-    call move_alloc(from%weight, to%weight)
-    call move_alloc(from%velocity, to%velocity)
-    call move_alloc(from%impulse, to%impulse)
-  end subroutine take
 
   !> One round over all problems: rates, and what they are of the bandwidth of this round. Not collective.
   subroutine measure_kernels(options, problems, bandwidth, record)
@@ -173,16 +160,16 @@ contains
     do k = 1, size(problems)
       associate (problem => problems(k))
         do version = 1, 2
-          of = case_t("kernel_"//trim(problem%place), problem%name, int(problem%sub%n_contacts, i8), 1)
+          of = case_t("kernel_"//trim(problem%place), problem%name, int(problem%sub(1)%n_contacts, i8), 1)
           if (version == 2) of%name = trim(problem%name)//recorder
           rate = relaxation_rate(problem, version == 2, options%seconds)
-          bytes = real(problem%streamed(version == 2), dp)/problem%sub%n_contacts
+          bytes = real(problem%streamed(version == 2), dp)/problem%sub(1)%n_contacts
           call record%note(of, "relaxations", "1/s", rate)
           call record%note(of, "bytes_per_relaxation", "B", bytes)
           call record%note(of, "ratio_to_triad", "1", rate*bytes/bandwidth)
-          call record%note(of, "bodies", "1", real(problem%sub%n_columns, dp))
+          call record%note(of, "bodies", "1", real(problem%sub(1)%n_columns, dp))
           call record%note(of, "share_of_pressing_contacts", "1", &
-            & real(count(problem%sub%impulse(1, :) > 0.0_dp), dp)/problem%sub%n_contacts)
+            & real(count(problem%sub(1)%impulse(1, :) > 0.0_dp), dp)/problem%sub(1)%n_contacts)
         end do
       end associate
     end do
@@ -198,7 +185,7 @@ contains
 
     call problem%sweep_once(recording)
     ! the clock is read once in so many relaxations
-    together = 1 + 100000/problem%sub%n_contacts
+    together = 1 + 100000/problem%sub(1)%n_contacts
     n = 0
     start = MPI_Wtime()
     do
@@ -209,7 +196,7 @@ contains
       now = MPI_Wtime()
       if (now - start >= seconds .and. now > start) exit
     end do
-    rate = real(problem%sub%n_contacts, dp)*n/(now - start)
+    rate = real(problem%sub(1)%n_contacts, dp)*n/(now - start)
   end function relaxation_rate
 
   !> So many sweeps of one kernel and nothing else: what counts instructions compares two numbers of sweeps.
@@ -227,7 +214,7 @@ contains
     contacts = 0
     call make_problem(options%kernel, n, problem, error)
     if (allocated(error)) return
-    contacts = problem%sub%n_contacts
+    contacts = problem%sub(1)%n_contacts
     do k = 1, options%sweeps
       call problem%sweep_once(options%recording)
     end do
