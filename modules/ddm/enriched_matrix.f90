@@ -5,10 +5,10 @@
 module gravier_enriched_matrix
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_sweep
+  use gravier_timers, only: start_timer, stop_timer, phase_factorise
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: scheme_t
+  use gravier_scheme, only: scheme_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
   implicit none
   private
@@ -279,20 +279,14 @@ contains
     type(enriched_matrix_t), intent(inout) :: matrix
     integer :: s, k
 
-    call start_timer(phase_sweep)
+    call begin_sweeps(scheme, problem)
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        do k = 1, scheme%sweeps - 1
-          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
-        end do
-        call problem%kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, &
-          & sub%impulse, matrix%part(s)%law_velocity)
-        scheme%work%relaxations = scheme%work%relaxations + int(scheme%sweeps, i8)*sub%n_contacts
-      end associate
+      do k = 1, scheme%sweeps - 1
+        call sweep_once(scheme, problem, s, k)
+      end do
+      call sweep_once(scheme, problem, s, scheme%sweeps, matrix%part(s)%law_velocity)
     end do
-    scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
-    scheme%work%iterations = scheme%work%iterations + 1
-    call stop_timer(phase_sweep)
+    call end_sweeps(scheme, problem)
   end subroutine sweep_all_recording
 
 end module gravier_enriched_matrix

@@ -4,7 +4,7 @@ module gravier_nscdd
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_velocities, sweep_all
+  use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
   implicit none
   private
   public :: nscdd_t, average_copies
@@ -24,7 +24,7 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
-    call start_velocities(problem, shared_masses=.true.)
+    call start_sweeps(self, problem, shared_masses=.true.)
   end subroutine nscdd_start
 
   subroutine nscdd_iterate(self, problem, measure, jump, error)
@@ -55,9 +55,9 @@ contains
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), velocity => problem%sub(s)%velocity)
+        call problem%shared%sum_copies(s, velocity)
         do k = 1, part%n_shared
           b = part%body(k)
-          call problem%shared%add_copies(s, k, velocity(:, b))
           velocity(:, b) = velocity(:, b)/part%multiplicity(k)
         end do
       end associate

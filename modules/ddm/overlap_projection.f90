@@ -12,12 +12,12 @@ module gravier_overlap_projection
   use gravier_boundary_loads, only: take_boundary_displacements
   implicit none
   private
-  public :: project_overlaps
+  public :: project_overlaps, overlap_remainder
 
   !> sweeps between two looks at what is left, and at most in one projection: what they leave is for the next steps
   integer, parameter :: check_every = 10, max_sweeps = 200
   !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
-  real(dp), parameter :: remainder = 0.1_dp
+  real(dp), parameter :: overlap_remainder = 0.1_dp
 
   !> What a projection borrows of a subproblem, and its work space; src/memory_report.f90 counts them.
   type :: borrowed_t
@@ -42,7 +42,7 @@ contains
     !> [s], [m]
     real(dp), intent(in) :: h, allowed
     type(borrowed_t) :: borrowed(size(problem%sub))
-    real(dp) :: enough, factor
+    real(dp) :: enough, factor, sums(2)
     integer :: s, k
     logical :: has_driven
 
@@ -53,11 +53,11 @@ contains
       call lend(problem, s, h, allowed, borrowed(s))
     end do
     if (has_driven) call weigh_boundaries(problem, size(decomposition%boundaries))
-    enough = remainder*max(allowed, excess(problem, borrowed))
+    enough = overlap_remainder*max(allowed, excess(problem, borrowed))
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
-          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
+          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
         end associate
       end do
       call average_copies(problem)

@@ -28,8 +28,9 @@ module gravier_contact_kernels
   integer, parameter :: lanes = 16
 
   abstract interface
-    !> One Gauss-Seidel sweep: updates velocity and impulse.
-    pure subroutine sweep_kernel(n_grouped, pair, hot, weight, velocity, impulse)
+    !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
+    !> the impulse that the sweep started from.
+    pure subroutine sweep_kernel(n_grouped, pair, hot, weight, velocity, impulse, sums)
       import :: dp
       implicit none
       !> contacts in whole blocks without common bodies
@@ -37,16 +38,47 @@ module gravier_contact_kernels
       integer, intent(in), contiguous :: pair(:, :)
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :)
       real(dp), intent(inout), contiguous :: velocity(:, :), impulse(:, :, :)
+      real(dp), intent(out) :: sums(2)
     end subroutine sweep_kernel
     !> The same, keeping v at each contact as it was when its law was solved.
-    pure subroutine recording_kernel(n_grouped, pair, hot, weight, velocity, impulse, law_velocity)
+    pure subroutine recording_kernel(n_grouped, pair, hot, weight, velocity, impulse, sums, law_velocity)
       import :: dp
       implicit none
+      !> contacts in whole blocks without common bodies
       integer, intent(in) :: n_grouped
       integer, intent(in), contiguous :: pair(:, :)
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :)
-      real(dp), intent(inout), contiguous :: velocity(:, :), impulse(:, :, :), law_velocity(:, :, :)
+      real(dp), intent(inout), contiguous :: velocity(:, :), impulse(:, :, :)
+      real(dp), intent(out) :: sums(2)
+      real(dp), intent(inout), contiguous :: law_velocity(:, :, :)
     end subroutine recording_kernel
+    !> From y = r + beta (r - previous), under which the velocities are; r goes into `previous`.
+    pure subroutine momentum_kernel(n_grouped, pair, hot, weight, velocity, impulse, sums, beta, previous)
+      import :: dp
+      implicit none
+      !> contacts in whole blocks without common bodies
+      integer, intent(in) :: n_grouped
+      integer, intent(in), contiguous :: pair(:, :)
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :)
+      real(dp), intent(inout), contiguous :: velocity(:, :), impulse(:, :, :)
+      real(dp), intent(out) :: sums(2)
+      real(dp), intent(in) :: beta
+      real(dp), intent(inout), contiguous :: previous(:, :, :)
+    end subroutine momentum_kernel
+    !> Both.
+    pure subroutine momentum_recording_kernel(n_grouped, pair, hot, weight, velocity, impulse, sums, beta, previous, law_velocity)
+      import :: dp
+      implicit none
+      !> contacts in whole blocks without common bodies
+      integer, intent(in) :: n_grouped
+      integer, intent(in), contiguous :: pair(:, :)
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :)
+      real(dp), intent(inout), contiguous :: velocity(:, :), impulse(:, :, :)
+      real(dp), intent(out) :: sums(2)
+      real(dp), intent(in) :: beta
+      real(dp), intent(inout), contiguous :: previous(:, :, :)
+      real(dp), intent(inout), contiguous :: law_velocity(:, :, :)
+    end subroutine momentum_recording_kernel
     !> reaction := reaction + H impulse.
     pure subroutine reaction_kernel(pair, hot, impulse, reaction)
       import :: dp
@@ -78,6 +110,8 @@ module gravier_contact_kernels
     integer :: nd = 2, nv = 2, nw = 2, nc = 1, nh = 4
     procedure(sweep_kernel), pointer, nopass :: sweep => null()
     procedure(recording_kernel), pointer, nopass :: sweep_recording => null()
+    procedure(momentum_kernel), pointer, nopass :: sweep_momentum => null()
+    procedure(momentum_recording_kernel), pointer, nopass :: sweep_momentum_recording => null()
     procedure(reaction_kernel), pointer, nopass :: add_reaction => null()
     procedure(velocity_kernel), pointer, nopass :: contact_velocity => null()
     procedure(residual_kernel), pointer, nopass :: residual => null()
@@ -104,24 +138,32 @@ contains
     if (friction .and. dimension == 2) then
       self%sweep => sweep_2d_friction
       self%sweep_recording => sweep_2d_friction_recording
+      self%sweep_momentum => sweep_2d_friction_momentum
+      self%sweep_momentum_recording => sweep_2d_friction_momentum_recording
       self%add_reaction => add_reaction_2d_friction
       self%contact_velocity => contact_velocity_2d_friction
       self%residual => residual_2d_friction
     else if (friction) then
       self%sweep => sweep_3d_friction
       self%sweep_recording => sweep_3d_friction_recording
+      self%sweep_momentum => sweep_3d_friction_momentum
+      self%sweep_momentum_recording => sweep_3d_friction_momentum_recording
       self%add_reaction => add_reaction_3d_friction
       self%contact_velocity => contact_velocity_3d_friction
       self%residual => residual_3d_friction
     else if (dimension == 2) then
       self%sweep => sweep_2d_frictionless
       self%sweep_recording => sweep_2d_frictionless_recording
+      self%sweep_momentum => sweep_2d_frictionless_momentum
+      self%sweep_momentum_recording => sweep_2d_frictionless_momentum_recording
       self%add_reaction => add_reaction_2d_frictionless
       self%contact_velocity => contact_velocity_2d_frictionless
       self%residual => residual_2d_frictionless
     else
       self%sweep => sweep_3d_frictionless
       self%sweep_recording => sweep_3d_frictionless_recording
+      self%sweep_momentum => sweep_3d_frictionless_momentum
+      self%sweep_momentum_recording => sweep_3d_frictionless_momentum_recording
       self%add_reaction => add_reaction_3d_frictionless
       self%contact_velocity => contact_velocity_3d_frictionless
       self%residual => residual_3d_frictionless
@@ -142,8 +184,8 @@ contains
 #undef RELAX_BLOCKS
 #undef SWEEP
 #undef LAW
-#define LAW , law_velocity
 #define RECORD
+#define LAW , law_velocity
 #define RELAX(name) name/**/_blocks_recording
 #include "contact_sweeps.inc"
 #undef RELAX
@@ -152,6 +194,42 @@ contains
 #define SWEEP(name) name/**/_recording
 #define SINGLE
 #include "contact_sweeps.inc"
+#undef SINGLE
+#undef RELAX
+#undef RELAX_BLOCKS
+#undef SWEEP
+#undef LAW
+#undef RECORD
+#define MOMENTUM
+#define LAW , beta, previous
+#define RELAX(name) name/**/_blocks_momentum
+#include "contact_sweeps.inc"
+#undef RELAX
+#define RELAX(name) name/**/_singles_momentum
+#define RELAX_BLOCKS(name) name/**/_blocks_momentum
+#define SWEEP(name) name/**/_momentum
+#define SINGLE
+#include "contact_sweeps.inc"
+#undef SINGLE
+#undef RELAX
+#undef RELAX_BLOCKS
+#undef SWEEP
+#undef LAW
+#define RECORD
+#define LAW , beta, previous, law_velocity
+#define RELAX(name) name/**/_blocks_momentum_recording
+#include "contact_sweeps.inc"
+#undef RELAX
+#define RELAX(name) name/**/_singles_momentum_recording
+#define RELAX_BLOCKS(name) name/**/_blocks_momentum_recording
+#define SWEEP(name) name/**/_momentum_recording
+#define SINGLE
+#include "contact_sweeps.inc"
+#undef SINGLE
+#undef RELAX
+#undef RELAX_BLOCKS
+#undef SWEEP
+#undef LAW
 
   !> Blocks that so many contacts take.
   pure integer function n_blocks(n_contacts)

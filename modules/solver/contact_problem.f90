@@ -66,6 +66,9 @@ module gravier_contact_problem
     type(shared_exchange_t) :: shared
     !> subdomains of the scene
     integer :: n_subdomains = 1
+    !> of each subdomain, (sum of |r - y|^2, sum of |r|^2) of the first sweep of the last iteration, which started from y
+    !> (2, subdomains) [N^2 s^2]
+    real(dp), allocatable :: progress(:, :)
     !> contacts of the scene
     integer(i8) :: n_contacts = 0
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
@@ -172,7 +175,7 @@ contains
   !> but the order of the sums. Collective.
   subroutine contact_problem_evaluate(self)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s, k, b, nv
+    integer :: s, nv
 
     nv = self%kernels%nv
     do s = 1, size(self%sub)
@@ -181,13 +184,8 @@ contains
     end do
     call self%shared%pass()
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s), part => self%shared%part(s))
-        do k = 1, part%n_shared
-          b = part%body(k)
-          call self%shared%add_copies(s, k, sub%reaction(:, b))
-        end do
-        call add_impulses(sub)
-      end associate
+      call self%shared%sum_copies(s, self%sub(s)%reaction)
+      call add_impulses(self%sub(s))
     end do
 
   contains
