@@ -1,5 +1,5 @@
-!> The loops over contacts: adjoint operators, exact local solves, blocks relaxed together, padding, the record of law
-!> velocities, tangents, the residual.
+!> The loops over contacts: adjoint operators, exact local solves, blocks relaxed together, momentum, padding, the record
+!> of law velocities, tangents, the residual.
 program test_contact_kernels
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
@@ -21,6 +21,11 @@ program test_contact_kernels
     real(dp), allocatable :: weight(:, :), velocity(:, :)
   end type case_t
 
+  !> What sweeps carry along.
+  type :: memory_t
+    real(dp), allocatable :: law_velocity(:, :, :), previous(:, :, :)
+  end type memory_t
+
   integer, parameter :: n_grains = 9, n_columns = 11
   !> numbers of size 1 throughout; sums of some ten of them
   real(dp), parameter :: rounding = 1.0e-13_dp
@@ -38,6 +43,7 @@ program test_contact_kernels
       call test_record(dimension, friction)
       call test_components(dimension, friction)
       call test_blocks(dimension, friction)
+      call test_momentum(dimension, friction)
       call test_plain_loop(dimension, friction)
       call test_padding(dimension, friction)
     end do
@@ -258,7 +264,7 @@ contains
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :), reaction(:, :)
     real(dp), allocatable, dimension(:, :, :) :: start, v, law_velocity, change
-    real(dp) :: sums(2)
+    real(dp) :: sums(2), changes(2)
     integer :: trial, regimes(3), regime, d
 
     regimes(:) = 0
@@ -273,7 +279,10 @@ contains
         allocate (before(kernels%nv, n_columns), source=problem%velocity)
         call kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, impulse, sums)
         law_velocity(:, :, :) = huge(1.0_dp)
-        call kernels%sweep_recording(0, problem%pair, problem%hot, problem%weight, problem%velocity, impulse, law_velocity)
+        call kernels%sweep_recording(0, problem%pair, problem%hot, problem%weight, problem%velocity, impulse, changes, &
+          & law_velocity)
+        call check_close(changes(1), sums(1), 10*rounding, "sums of a sweep: changes squared")
+        call check_close(changes(2), sum(impulse**2), 10*rounding, "sums of a sweep: impulses squared")
         call check_close(sums(1), sum((impulse - start)**2), 10*rounding, "residual: distance to the solution, squared")
         call check_close(sums(2), sum(start**2), rounding, "residual: impulse, squared")
         call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
@@ -355,6 +364,7 @@ contains
     integer, parameter :: n = 25
     type(case_t) :: plain, recording, short, one
     real(dp), allocatable :: law_velocity(:, :, :), v(:, :, :)
+    real(dp) :: sums(2)
     integer :: sweep, c
     logical :: same, kept
 
@@ -366,14 +376,14 @@ contains
     kept = .true.
     do sweep = 1, 5
       short = recording
-      call plain%kernels%sweep(0, plain%pair, plain%hot, plain%weight, plain%velocity, plain%impulse)
+      call plain%kernels%sweep(0, plain%pair, plain%hot, plain%weight, plain%velocity, plain%impulse, sums)
       call recording%kernels%sweep_recording(0, recording%pair, recording%hot, recording%weight, recording%velocity, &
-        & recording%impulse, law_velocity)
+        & recording%impulse, sums, law_velocity)
       same = same .and. all(abs(plain%velocity - recording%velocity) <= rounding) &
         & .and. all(abs(plain%impulse - recording%impulse) <= rounding)
       do c = 1, n
         call take_contact(short, c, one)
-        call one%kernels%sweep(0, one%pair, one%hot, one%weight, one%velocity, one%impulse)
+        call one%kernels%sweep(0, one%pair, one%hot, one%weight, one%velocity, one%impulse, sums)
         call one%kernels%contact_velocity(one%pair, one%hot, one%velocity, v(:, :, 1:1))
         kept = kept .and. all(abs(v(1, :, 1) - law_velocity(lane_of(c), :, block_of(c))) <= rounding)
         short%velocity(:, :) = one%velocity
@@ -457,52 +467,113 @@ contains
     end associate
   end subroutine make_blocks
 
-  !> Blocks relaxed together end where their contacts relaxed one after the other in the same order do, impulses, velocities
-  !> and law velocities, up to roundings; so do those of the plain loop below.
+  !> One sweep with what it may carry along.
+  subroutine sweep_once(variant, n_grouped, problem, memory, sums)
+    !> 1 plain, 2 recording, 3 with momentum, 4 both
+    integer, intent(in) :: variant, n_grouped
+    type(case_t), intent(inout) :: problem
+    type(memory_t), intent(inout) :: memory
+    real(dp), intent(out) :: sums(2)
+
+    associate (kernels => problem%kernels, pair => problem%pair, hot => problem%hot, weight => problem%weight)
+      select case (variant)
+      case (1)
+        call kernels%sweep(n_grouped, pair, hot, weight, problem%velocity, problem%impulse, sums)
+      case (2)
+        call kernels%sweep_recording(n_grouped, pair, hot, weight, problem%velocity, problem%impulse, sums, memory%law_velocity)
+      case (3)
+        call kernels%sweep_momentum(n_grouped, pair, hot, weight, problem%velocity, problem%impulse, sums, 0.4_dp, &
+          & memory%previous)
+      case (4)
+        call kernels%sweep_momentum_recording(n_grouped, pair, hot, weight, problem%velocity, problem%impulse, sums, 0.4_dp, &
+          & memory%previous, memory%law_velocity)
+      end select
+    end associate
+  end subroutine sweep_once
+
+  subroutine start_memory(problem, memory)
+    type(case_t), intent(in) :: problem
+    type(memory_t), intent(out) :: memory
+
+    allocate (memory%law_velocity, memory%previous, mold=problem%impulse)
+    memory%law_velocity(:, :, :) = 0.0_dp
+    memory%previous(:, :, :) = 0.5_dp*problem%impulse
+  end subroutine start_memory
+
+  !> Blocks relaxed together end where their contacts relaxed one after the other in the same order do: velocities,
+  !> impulses, sums and what sweeps carry along, up to roundings. A plain loop ends there too.
   subroutine test_blocks(dimension, friction)
     integer, intent(in) :: dimension
     logical, intent(in) :: friction
     type(case_t) :: singly, blocks
-    real(dp), allocatable, dimension(:, :, :) :: one_by_one, together
-    integer :: sweep, round
+    type(memory_t) :: one_by_one, together
+    real(dp) :: sums(2), singles(2)
+    integer :: sweep, variant
 
-    do round = 1, 2
-      call make_blocks(dimension, friction, 3, 7, 80 + round, singly)
-      call make_blocks(dimension, friction, 3, 7, 80 + round, blocks)
-      allocate (one_by_one, together, source=singly%impulse)
+    do variant = 1, 4
+      call make_blocks(dimension, friction, 3, 7, 80 + variant, singly)
+      blocks = singly
+      call start_memory(singly, one_by_one)
+      call start_memory(blocks, together)
       do sweep = 1, 4
-        if (round == 1) then
-          call singly%kernels%sweep(0, singly%pair, singly%hot, singly%weight, singly%velocity, singly%impulse)
-          call blocks%kernels%sweep(blocks%n_grouped, blocks%pair, blocks%hot, blocks%weight, blocks%velocity, blocks%impulse)
-        else
-          call singly%kernels%sweep_recording(0, singly%pair, singly%hot, singly%weight, singly%velocity, singly%impulse, &
-            & one_by_one)
-          call blocks%kernels%sweep_recording(blocks%n_grouped, blocks%pair, blocks%hot, blocks%weight, blocks%velocity, &
-            & blocks%impulse, together)
-        end if
-        call check(all(abs(blocks%velocity - singly%velocity) <= rounding), "blocks: velocities as contact by contact")
-        call check(all(abs(blocks%impulse - singly%impulse) <= rounding), "blocks: impulses as contact by contact")
-        call check(all(abs(together - one_by_one) <= rounding), "blocks: law velocities as contact by contact")
+        call sweep_once(variant, 0, singly, one_by_one, singles)
+        call sweep_once(variant, blocks%n_grouped, blocks, together, sums)
+        call check(all(abs(blocks%velocity - singly%velocity) <= 10*rounding), "blocks: velocities as contact by contact")
+        call check(all(abs(blocks%impulse - singly%impulse) <= 10*rounding), "blocks: impulses as contact by contact")
+        call check(all(abs(together%law_velocity - one_by_one%law_velocity) <= 10*rounding), &
+          & "blocks: law velocities as contact by contact")
+        call check(all(abs(together%previous - one_by_one%previous) <= 10*rounding), "blocks: previous impulses")
+        ! sums of some tens of squares
+        call check(all(abs(sums - singles) <= 100*rounding*(1.0_dp + singles)), "blocks: sums as contact by contact")
       end do
-      deallocate (one_by_one, together)
     end do
-    call make_blocks(dimension, friction, 3, 7, 83, singly)
-    call make_blocks(dimension, friction, 3, 7, 83, blocks)
-    call blocks%kernels%sweep(blocks%n_grouped, blocks%pair, blocks%hot, blocks%weight, blocks%velocity, blocks%impulse)
-    call relax_plainly(singly)
+    call make_blocks(dimension, friction, 3, 7, 85, singly)
+    blocks = singly
+    call start_memory(blocks, together)
+    call sweep_once(1, blocks%n_grouped, blocks, together, sums)
+    call relax_plainly(singly, singles)
     call check(all(abs(blocks%velocity - singly%velocity) <= rounding), "blocks: velocities of a plain loop")
     call check(all(abs(blocks%impulse - singly%impulse) <= rounding), "blocks: impulses of a plain loop")
+    call check(all(abs(sums - singles) <= 10*rounding*(1.0_dp + singles)), "blocks: sums of a plain loop")
   end subroutine test_blocks
 
+  !> A sweep with momentum is the plain one from y = r + beta (r - previous), and leaves r.
+  subroutine test_momentum(dimension, friction)
+    integer, intent(in) :: dimension
+    logical, intent(in) :: friction
+    type(case_t) :: problem, plain
+    type(memory_t) :: memory
+    real(dp), allocatable :: start(:, :, :)
+    real(dp) :: sums(2), expected(2)
+    integer :: variant
+
+    do variant = 3, 4
+      call make_blocks(dimension, friction, 2, 5, 86 + variant, problem)
+      plain = problem
+      call start_memory(problem, memory)
+      allocate (start, source=problem%impulse)
+      plain%impulse(:, :, :) = plain%impulse + 0.4_dp*(plain%impulse - memory%previous)
+      call sweep_once(variant, problem%n_grouped, problem, memory, sums)
+      call check(all(abs(memory%previous - start) <= 0.0_dp), "momentum: leaves the impulses it found")
+      call sweep_once(variant - 2, plain%n_grouped, plain, memory, expected)
+      call check(all(abs(problem%velocity - plain%velocity) <= rounding), "momentum: velocities")
+      call check(all(abs(problem%impulse - plain%impulse) <= rounding), "momentum: impulses")
+      call check(all(abs(sums - expected) <= 10*rounding*(1.0_dp + expected)), "momentum: sums")
+      deallocate (start)
+    end do
+  end subroutine test_momentum
+
   !> One sweep, contact by contact, by the rows of the Jacobian.
-  subroutine relax_plainly(problem)
+  subroutine relax_plainly(problem, sums)
     type(case_t), intent(inout) :: problem
+    real(dp), intent(out) :: sums(2)
     real(dp), dimension(problem%kernels%nc, problem%kernels%nv) :: candidate, antagonist
     real(dp), dimension(problem%kernels%nc) :: r, change, v
     real(dp) :: hot(problem%kernels%nh)
     integer :: c, d, w, nd
 
     nd = problem%kernels%nd
+    sums(:) = 0.0_dp
     do c = 1, problem%n
       associate (i => problem%pair(1, c), j => problem%pair(2, c), velocity => problem%velocity, weight => problem%weight)
         hot(:) = contact_column(problem%hot, c)
@@ -515,6 +586,8 @@ contains
         change(:) = r
         call solve_law(problem%kernels, hot, hot(nd + 2), hot(min(nd + 3, size(hot))), v, r)
         change(:) = r - change
+        sums(1) = sums(1) + sum(change**2)
+        sums(2) = sums(2) + sum(r**2)
         call put_contact_column(r, c, problem%impulse)
         do d = 1, problem%kernels%nv
           w = min(d, problem%kernels%nw)
@@ -623,9 +696,10 @@ contains
     integer, intent(in) :: dimension
     logical, intent(in) :: friction
     type(case_t) :: problem, other
-    real(dp), allocatable :: before(:, :), law_velocity(:, :, :), v(:, :, :), reaction(:, :), hot(:, :, :)
+    type(memory_t) :: memory, fast
+    real(dp), allocatable :: before(:, :), v(:, :, :), reaction(:, :), hot(:, :, :)
     real(dp) :: sums(2), others(2)
-    integer :: n
+    integer :: n, variant
 
     do n = 1, 2*lanes - 1, 2
       call make_blocks(dimension, friction, 0, n, 100 + n, problem)
@@ -637,9 +711,9 @@ contains
       allocate (before, source=problem%velocity)
       allocate (reaction(problem%kernels%nv, size(problem%velocity, 2)), source=0.0_dp)
       allocate (hot, source=problem%hot)
-      allocate (law_velocity, v, mold=problem%impulse)
-      law_velocity(:, :, :) = 0.0_dp
-      v(:, :, :) = 0.0_dp
+      allocate (v, mold=problem%impulse)
+      call start_memory(problem, memory)
+      call start_memory(other, fast)
       associate (kernels => problem%kernels)
         call kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
         call kernels%residual(other%pair, other%hot, other%weight, other%velocity, other%impulse, others)
@@ -648,19 +722,21 @@ contains
         call check_close(maxval(abs(reaction(:, 1))), 0.0_dp, 0.0_dp, "padding: no reaction")
         call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
         call check_padding(v, n, "contact velocities")
-        call kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse)
-        call kernels%sweep_recording(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, law_velocity)
-        call kernels%sweep(0, other%pair, other%hot, other%weight, other%velocity, other%impulse)
-        call kernels%sweep_recording(0, other%pair, other%hot, other%weight, other%velocity, other%impulse, v)
       end associate
+      do variant = 1, 4
+        call sweep_once(variant, 0, problem, memory, sums)
+        call sweep_once(variant, 0, other, fast, others)
+        call check_close(maxval(abs(sums - others)), 0.0_dp, 0.0_dp, "padding: sums of sweeps")
+      end do
       call check(same_bits(problem%velocity(:, 1:1), before(:, 1:1)), "padding: the first body keeps its velocity")
       call check(same_bits(problem%velocity(:, 2:), other%velocity(:, 2:)), "padding: the first body moves no other")
       call check_padding(problem%impulse, n, "impulses")
       call check_padding(problem%hot, n, "fields")
-      call check_padding(law_velocity, n, "law velocities")
-      call check_padding(v, n, "law velocities, the first body being fast")
+      call check_padding(memory%law_velocity, n, "law velocities")
+      call check_padding(memory%previous, n, "previous impulses")
+      call check_padding(fast%law_velocity, n, "law velocities, the first body being fast")
       call check(same_contacts(problem%hot, hot, n), "sweeps change no field")
-      deallocate (before, law_velocity, v, reaction, hot)
+      deallocate (before, v, reaction, hot)
     end do
   end subroutine test_padding
 
@@ -734,6 +810,7 @@ contains
     logical, intent(in) :: friction
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :), start(:, :, :), reaction(:, :)
+    real(dp) :: sums(2)
     integer :: b, d
 
     call make_case(dimension, friction, 30, 71, problem)
@@ -746,7 +823,7 @@ contains
       allocate (before(kernels%nv, n_columns), source=problem%velocity)
       allocate (start, source=problem%impulse)
       allocate (reaction(kernels%nv, n_columns), source=0.0_dp)
-      call kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse)
+      call kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
       start(:, :, :) = problem%impulse - start
       call kernels%add_reaction(problem%pair, problem%hot, start, reaction)
       do d = 1, kernels%nv
@@ -765,7 +842,8 @@ contains
     do k = 0, 3
       call make_case(2 + mod(k, 2), k > 1, 0, 1, problem)
       allocate (before(problem%kernels%nv, n_columns), source=problem%velocity)
-      call problem%kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse)
+      call problem%kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
+      call check_close(maxval(abs(sums)), 0.0_dp, 0.0_dp, "no contacts: no change")
       call problem%kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
       call check(same_bits(before, problem%velocity), "no contacts: nothing moves")
       call check_close(maxval(abs(sums)), 0.0_dp, 0.0_dp, "no contacts: no residual")
