@@ -706,6 +706,8 @@ contains
       where (problem%pair(:, 1:n) == 1) problem%pair(:, 1:n) = 2
       ! contacts of the second body with itself are left out
       call part_bodies(problem)
+      ! a body that cannot move has W = 0 with itself
+      if (mod(n, 4) == 1) problem%weight(:, 1) = 0.0_dp
       other = problem
       other%velocity(:, 1) = -1.0e3_dp*other%velocity(:, 1)
       allocate (before, source=problem%velocity)
@@ -717,16 +719,16 @@ contains
       associate (kernels => problem%kernels)
         call kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
         call kernels%residual(other%pair, other%hot, other%weight, other%velocity, other%impulse, others)
-        call check_close(maxval(abs(sums - others)), 0.0_dp, 0.0_dp, "padding: residual")
+        call check(all(abs(sums - others) <= 0.0_dp), "padding: residual")
         call kernels%add_reaction(problem%pair, problem%hot, problem%impulse, reaction)
-        call check_close(maxval(abs(reaction(:, 1))), 0.0_dp, 0.0_dp, "padding: no reaction")
+        call check(all(abs(reaction(:, 1)) <= 0.0_dp), "padding: no reaction")
         call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
         call check_padding(v, n, "contact velocities")
       end associate
       do variant = 1, 4
         call sweep_once(variant, 0, problem, memory, sums)
         call sweep_once(variant, 0, other, fast, others)
-        call check_close(maxval(abs(sums - others)), 0.0_dp, 0.0_dp, "padding: sums of sweeps")
+        call check(all(abs(sums - others) <= 0.0_dp), "padding: sums of sweeps")
       end do
       call check(same_bits(problem%velocity(:, 1:1), before(:, 1:1)), "padding: the first body keeps its velocity")
       call check(same_bits(problem%velocity(:, 2:), other%velocity(:, 2:)), "padding: the first body moves no other")

@@ -20,6 +20,7 @@ program test_sweep_order
   call test_large_body()
   call test_prescribed()
   call test_chain()
+  call test_ring()
   call finish_checks()
   call MPI_Finalize()
 
@@ -196,5 +197,22 @@ contains
     ! odd and even contacts fill blocks in turn
     call check_close(mean_move(order, n_grouped), 0.5_dp*lanes, 0.5_dp*lanes, "chain: close to the order")
   end subroutine test_chain
+
+  !> A few bodies in a ring touch again and again, each in more contacts than there are blocks under way: what was in a
+  !> block that is done does not keep its bodies from others.
+  subroutine test_ring()
+    integer, parameter :: n = 20*window, bodies = 4*lanes
+    integer, allocatable :: pair(:, :), order(:)
+    integer :: c, n_grouped
+
+    allocate (pair(2, n), order(n))
+    do c = 1, n
+      pair(1, c) = 1 + mod(c, bodies)
+      pair(2, c) = 1 + mod(c + 1, bodies)
+    end do
+    call group_contacts(pair, bodies, order, n_grouped)
+    call check_order(pair, bodies, order, n_grouped, "ring")
+    call check(n_grouped > n - window, "ring: nearly all grouped")
+  end subroutine test_ring
 
 end program test_sweep_order
