@@ -6,7 +6,7 @@ module gravier_bench_kernels
   use gravier_communicator, only: communicator_t
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: subproblem_t
-  use gravier_scheme, only: start_velocities
+  use gravier_scheme, only: start_sweeps
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_bench_machine, only: last_cache
   use gravier_bench_options, only: options_t
@@ -18,9 +18,11 @@ module gravier_bench_kernels
 
   integer, parameter :: name_length = 32
   character(len=name_length), parameter :: kernel_names(*) = [character(len=name_length) :: &
-    & "2d_frictionless", "2d_frictionless_spin", "2d_friction", "3d_frictionless", "3d_frictionless_spin", "3d_friction"]
-  !> what is added to the name of a kernel for the version that records the velocities which solved the laws
-  character(len=*), parameter :: recorder = "_recording"
+    & "2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
+  !> versions of a kernel: as it is; recording the velocities which solved the laws; from extrapolated impulses
+  integer, parameter :: plain = 1, recording = 2, momentum = 3
+  !> what each adds to the name of a kernel
+  character(len=*), parameter :: version_names(3) = [character(len=10) :: "", "_recording", "_momentum"]
   character(len=*), parameter :: places(3) = [character(len=12) :: "core_cache", "last_cache", "memory"]
 
   !> contacts a grain in packings of some size, walls included
@@ -31,15 +33,15 @@ module gravier_bench_kernels
   !> the largest problem streams so many times the last cache
   integer, parameter :: times_cache = 4
 
-  !> One kernel, in its two versions, and contacts for it.
+  !> One kernel, in its versions, and contacts for it.
   type :: kernel_problem_t
     character(len=name_length) :: name
     character(len=12) :: place
     type(kernels_t) :: kernels
     !> one
     type(subproblem_t), allocatable :: sub(:)
-    !> (nc, contacts)
-    real(dp), allocatable :: law_velocity(:, :)
+    !> what recording writes, and what momentum reads and writes (lanes, nc, blocks)
+    real(dp), allocatable :: law_velocity(:, :, :), previous(:, :, :)
   contains
     procedure :: sweep_once
     procedure :: streamed
@@ -48,29 +50,37 @@ module gravier_bench_kernels
 contains
 
   !> One sweep over all contacts.
-  subroutine sweep_once(self, recording)
+  subroutine sweep_once(self, version)
     class(kernel_problem_t), intent(inout) :: self
-    logical, intent(in) :: recording
+    integer, intent(in) :: version
+    real(dp) :: sums(2)
 
     associate (sub => self%sub(1))
-      if (recording) then
-        call self%kernels%sweep_recording(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, self%law_velocity)
-      else
-        call self%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
-      end if
+      select case (version)
+      case (recording)
+        call self%kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+          & self%law_velocity)
+      case (momentum)
+        call self%kernels%sweep_momentum(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+          & 0.0_dp, self%previous)
+      case default
+        call self%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
+      end select
     end associate
   end subroutine sweep_once
 
   !> Bytes that one sweep moves at least, each array once: of a contact pair and hot read, impulses read and written, law
-  !> velocities written; of a body velocities read and written, weights read.
-  pure integer(i8) function streamed(self, recording) result(bytes)
+  !> velocities written, previous impulses read and written; of a body velocities read and written, weights read. Lanes of
+  !> the last block that hold no contact count too.
+  pure integer(i8) function streamed(self, version) result(bytes)
     class(kernel_problem_t), intent(in) :: self
-    logical, intent(in) :: recording
+    integer, intent(in) :: version
     integer(i8) :: words
 
     associate (sub => self%sub(1))
       words = size(sub%hot, kind=i8) + 2*size(sub%impulse, kind=i8) + 2*size(sub%velocity, kind=i8) + size(sub%weight, kind=i8)
-      if (recording) words = words + size(self%law_velocity, kind=i8)
+      if (version == recording) words = words + size(self%law_velocity, kind=i8)
+      if (version == momentum) words = words + 2*size(self%previous, kind=i8)
       bytes = words*(storage_size(sub%hot)/8) + size(sub%pair, kind=i8)*(storage_size(sub%pair)/8)
     end associate
   end function streamed
@@ -103,7 +113,7 @@ contains
     logical, intent(in) :: largest
     real(dp) :: per_cache
 
-    per_cache = real(last_cache(), dp)*small%sub(1)%n_contacts/small%streamed(.false.)
+    per_cache = real(last_cache(), dp)*small%sub(1)%n_contacts/small%streamed(plain)
     if (.not. largest) then
       n = nint(share_of_cache*per_cache)
       if (options%contacts > 0) n = min(n, options%contacts)
@@ -131,16 +141,15 @@ contains
       packing = make_packing(3, nint(n/contacts_3d))
     end if
     packing%friction = index(name, "frictionless") == 0
-    packing%spin = index(name, "spin") > 0
     call alone%init(MPI_COMM_SELF)
     call make_simulation(packing, alone, simulation, error)
     if (.not. allocated(error)) then
       call simulation%assemble(figures)
-      call start_velocities(simulation%problem, shared_masses=.false.)
+      call start_sweeps(simulation%scheme, simulation%problem, shared_masses=.false.)
       problem%name = name
       problem%kernels = simulation%problem%kernels
       call move_alloc(simulation%problem%sub, problem%sub)
-      allocate (problem%law_velocity(problem%kernels%nc, problem%sub(1)%n_contacts), source=0.0_dp)
+      allocate (problem%law_velocity, problem%previous, source=problem%sub(1)%impulse)
     end if
     call simulation%free()
     call alone%free()
@@ -159,38 +168,38 @@ contains
 
     do k = 1, size(problems)
       associate (problem => problems(k))
-        do version = 1, 2
-          of = case_t("kernel_"//trim(problem%place), problem%name, int(problem%sub(1)%n_contacts, i8), 1)
-          if (version == 2) of%name = trim(problem%name)//recorder
-          rate = relaxation_rate(problem, version == 2, options%seconds)
-          bytes = real(problem%streamed(version == 2), dp)/problem%sub(1)%n_contacts
+        do version = 1, size(version_names)
+          of = case_t("kernel_"//trim(problem%place), trim(problem%name)//version_names(version), &
+            & int(problem%sub(1)%n_contacts, i8), 1)
+          rate = relaxation_rate(problem, version, options%seconds)
+          bytes = real(problem%streamed(version), dp)/problem%sub(1)%n_contacts
           call record%note(of, "relaxations", "1/s", rate)
           call record%note(of, "bytes_per_relaxation", "B", bytes)
           call record%note(of, "ratio_to_triad", "1", rate*bytes/bandwidth)
           call record%note(of, "bodies", "1", real(problem%sub(1)%n_columns, dp))
           call record%note(of, "share_of_pressing_contacts", "1", &
-            & real(count(problem%sub(1)%impulse(1, :) > 0.0_dp), dp)/problem%sub(1)%n_contacts)
+            & real(count(problem%sub(1)%impulse(:, 1, :) > 0.0_dp), dp)/problem%sub(1)%n_contacts)
         end do
       end associate
     end do
   end subroutine measure_kernels
 
   !> Relaxations a second, over at least so many seconds after one sweep that brings the data near.
-  real(dp) function relaxation_rate(problem, recording, seconds) result(rate)
+  real(dp) function relaxation_rate(problem, version, seconds) result(rate)
     type(kernel_problem_t), intent(inout) :: problem
-    logical, intent(in) :: recording
+    integer, intent(in) :: version
     real(dp), intent(in) :: seconds
     real(dp) :: start, now
     integer :: k, together, n
 
-    call problem%sweep_once(recording)
+    call problem%sweep_once(version)
     ! the clock is read once in so many relaxations
     together = 1 + 100000/problem%sub(1)%n_contacts
     n = 0
     start = MPI_Wtime()
     do
       do k = 1, together
-        call problem%sweep_once(recording)
+        call problem%sweep_once(version)
       end do
       n = n + together
       now = MPI_Wtime()
@@ -216,7 +225,7 @@ contains
     if (allocated(error)) return
     contacts = problem%sub(1)%n_contacts
     do k = 1, options%sweeps
-      call problem%sweep_once(options%recording)
+      call problem%sweep_once(merge(recording, plain, options%recording))
     end do
   end subroutine sweep_kernel
 

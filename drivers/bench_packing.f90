@@ -32,8 +32,6 @@ module gravier_bench_packing
     !> grains along each axis, 1 beyond nd
     integer :: count(3) = 1
     logical :: friction = .true.
-    !> grains carry a spin though nothing turns them; with friction they always do
-    logical :: spin = .false.
     character(len=10) :: method = "nlgs"
     integer :: subdomains = 1, iterations = 100
     !> of nscdd_ep
@@ -114,16 +112,14 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(body_set_t) :: made, grains
-    integer :: k, nv
+    integer :: k
 
     if (allocated(error)) return
     call parse_config("packing", case_text(packing), config, error)
     call comm%agree(error)
     if (.not. allocated(error)) call simulation%make(comm, config, made, error)
     if (allocated(error)) return
-    nv = made%nv
-    if (packing%spin) nv = 3*packing%nd - 3
-    call grains%init(packing%nd, nv, 0, made%n)
+    call grains%init(packing%nd, made%nv, 0, made%n)
     grains%id(:) = made%id
     grains%radius(:) = made%radius
     grains%mass(:) = made%mass
@@ -133,8 +129,6 @@ contains
       call packing%place(grains%id(k), grains%position(:, k), grains%velocity(:, k))
       grains%position(:, k) = grains%position(:, k) - 0.5_dp*step*grains%velocity(1:packing%nd, k)
     end do
-    simulation%decomposition%nv = nv
-    call simulation%problem%kernels%choose(packing%nd, packing%friction, nv > packing%nd)
     call fit_box(packing, simulation)
     call simulation%start(grains, error)
   end subroutine make_simulation
