@@ -7,7 +7,7 @@ program test_problem_builder
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t, shape_grains
   use gravier_neighbour_search, only: rule_dual, rule_primal
-  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_nlgs, only: nlgs_t
   use gravier_decomposition, only: decomposition_t
@@ -37,13 +37,14 @@ program test_problem_builder
   end type truth_t
 
   type(communicator_t), target :: comm
-  integer :: nd, k, visitors, manifold
+  integer :: nd, k, visitors, manifold, grouped
   integer, parameter :: counts(*) = [1, 3, 7, 16]
 
   call start_parallel()
   call comm%init()
   visitors = 0
   manifold = 0
+  grouped = 0
   do nd = 2, 3
     do k = 1, size(counts)
       call test_problem(nd, 0, counts(k), .true., rule_dual, .false.)
@@ -56,6 +57,7 @@ program test_problem_builder
     call test_problem(nd, 2**(nd - 2), 7, .true., rule_primal, .false.)
   end do
   call check(manifold > 0, "some grains are in three subdomains and more")
+  call check(comm%total(int(grouped, i8)) > 0, "some contacts are relaxed together")
   call check(visitors > 0, "some shared grains carry no contact at home")
   do nd = 2, 3
     do k = 1, size(counts)
@@ -259,7 +261,37 @@ contains
       right = right .and. maxval(abs(sub%impulse)) <= 0.0_dp .or. sub%n_contacts == 0
     end associate
     call check(right, "contacts of a subdomain as packed")
+    call check_blocks(problem, s)
   end subroutine check_contacts
+
+  !> In the blocks that are relaxed together no body occurs twice that forces move; walls may. What fills the last block is
+  !> without effect.
+  subroutine check_blocks(problem, s)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    integer, allocatable :: last_block(:)
+    integer :: c, side
+    logical :: apart, padded
+
+    associate (sub => problem%sub(s))
+      allocate (last_block(sub%n_columns), source=0)
+      apart = mod(sub%n_grouped, lanes) == 0 .and. sub%n_grouped <= sub%n_contacts
+      do c = 1, sub%n_grouped
+        do side = 1, 2
+          if (sub%pair(side, c) > sub%n_bodies) cycle
+          apart = apart .and. last_block(sub%pair(side, c)) /= block_of(c)
+          last_block(sub%pair(side, c)) = block_of(c)
+        end do
+      end do
+      call check(apart, "blocks without common bodies")
+      padded = size(sub%pair, 2) == lanes*n_blocks(sub%n_contacts) .and. size(sub%hot, 3) == n_blocks(sub%n_contacts)
+      do c = sub%n_contacts + 1, size(sub%pair, 2)
+        padded = padded .and. all(sub%pair(:, c) == 1) .and. all(abs(sub%hot(lane_of(c), :, block_of(c))) <= 0.0_dp)
+      end do
+      call check(padded, "the last block is filled with contacts of no effect")
+      grouped = grouped + sub%n_grouped
+    end associate
+  end subroutine check_blocks
 
   !> Normal, gap, shift, levers and friction; a few roundings of numbers of size 1, of size 1/h for the shift.
   pure logical function right_contact(problem, s, c, i, j, truth) result(right)
