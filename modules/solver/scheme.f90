@@ -8,6 +8,14 @@ module gravier_scheme
   private
   public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, begin_sweeps, sweep_once, end_sweeps
 
+  !> growth of |r - y|^2 between iterations that shortens the memory, and what is left of t then
+  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.7_dp
+  !> least 1 - beta: at the start, after an idle phase, ever; its factor after a window that grew, and after one that shrank
+  real(dp), parameter :: first_margin = 0.1_dp, wary_margin = 0.3_dp, least_margin = 0.02_dp, widen = 3.0_dp, narrow = 0.7_dp
+  !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
+  integer, parameter :: window = 10, idle_limit = 20
+  real(dp), parameter :: progress_made = 0.8_dp
+
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
     integer(i8) :: solves = 0, iterations = 0
@@ -25,15 +33,21 @@ module gravier_scheme
     real(dp), allocatable :: velocity(:, :)
   end type momentum_part_t
 
-  !> Nesterov's extrapolation between iterations, with adaptive restart: iteration k starts from
-  !> y = r_k + beta (r_k - r_k-1), beta = (t_k - 1)/t_k+1, t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983; O'Donoghue and
-  !> Candes 2015). It forgets (t = 1) whenever the sweep moves impulses further from y than the last one did from its own.
+  !> Nesterov's extrapolation between iterations: iteration k starts from y = r_k + beta (r_k - r_k-1) with
+  !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
+  !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 21: growth from one iteration to the next shortens the
+  !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
+  !> without progress come as many plain iterations as the solve has had.
   type :: momentum_t
     logical :: on = .false.
-    real(dp) :: t = 1.0_dp, beta = 0.0_dp
-    !> |r - y|^2 of the last iteration [N^2 s^2]
-    real(dp) :: change = huge(1.0_dp)
+    real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
+    !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
+    real(dp) :: change = huge(1.0_dp), window_change = 0.0_dp, last_window_change = huge(1.0_dp), lowest = huge(1.0_dp)
+    !> iterations of this solve, windows since `lowest`, plain iterations to come
+    integer :: iterations = 0, idle_windows = 0, plain = 0
     type(momentum_part_t), allocatable :: part(:)
+  contains
+    procedure :: steer => momentum_steer
   end type momentum_t
 
   type, abstract :: scheme_t
@@ -114,10 +128,7 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer :: s
 
-    momentum%t = 1.0_dp
-    momentum%beta = 0.0_dp
-    momentum%change = huge(1.0_dp)
-    if (allocated(momentum%part)) deallocate (momentum%part)
+    momentum = momentum_t(on=.true.)
     allocate (momentum%part(size(problem%sub)))
     do s = 1, size(problem%sub)
       momentum%part(s)%impulse = problem%sub(s)%impulse
@@ -205,24 +216,60 @@ contains
   subroutine end_sweeps(scheme, problem)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(in) :: problem
-    real(dp) :: sums(2), next
+    real(dp) :: sums(2)
 
     scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
     scheme%work%iterations = scheme%work%iterations + 1
     call stop_timer(phase_sweep)
     if (.not. scheme%momentum%on) return
-    associate (momentum => scheme%momentum)
-      call problem%comm%sum_parts(problem%progress, sums)
-      if (sums(1) <= momentum%change) then
-        next = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*momentum%t**2))
-        momentum%beta = (momentum%t - 1.0_dp)/next
-        momentum%t = next
-      else
-        momentum%beta = 0.0_dp
-        momentum%t = 1.0_dp
-      end if
-      momentum%change = sums(1)
-    end associate
+    call problem%comm%sum_parts(problem%progress, sums)
+    call scheme%momentum%steer(sums(1))
   end subroutine end_sweeps
+
+  !> Choose beta of the next iteration by what this one has changed.
+  pure subroutine momentum_steer(self, change)
+    class(momentum_t), intent(inout) :: self
+    !> |r - y|^2 of the first sweep, over all subdomains [N^2 s^2]
+    real(dp), intent(in) :: change
+    real(dp) :: t
+
+    t = self%t
+    if (change > growth_allowed*self%change) t = max(1.0_dp, memory_kept*t)
+    self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
+    self%change = change
+    self%window_change = self%window_change + change
+    self%iterations = self%iterations + 1
+    if (mod(self%iterations, window) == 0) call close_window(self)
+    self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin)
+    if (self%plain > 0) self%beta = 0.0_dp
+  end subroutine momentum_steer
+
+  !> The end of a window of iterations: the margin, and whether momentum still pays.
+  pure subroutine close_window(momentum)
+    type(momentum_t), intent(inout) :: momentum
+
+    if (momentum%window_change > momentum%last_window_change) then
+      momentum%margin = min(1.0_dp, widen*momentum%margin)
+    else
+      momentum%margin = max(least_margin, narrow*momentum%margin)
+    end if
+    if (momentum%plain > 0) then
+      momentum%plain = momentum%plain - window
+      if (momentum%plain <= 0) then
+        momentum%t = 1.0_dp
+        momentum%margin = wary_margin
+        momentum%idle_windows = 0
+        momentum%lowest = momentum%window_change
+      end if
+    else if (momentum%window_change < progress_made*momentum%lowest) then
+      momentum%lowest = momentum%window_change
+      momentum%idle_windows = 0
+    else
+      momentum%idle_windows = momentum%idle_windows + 1
+      if (momentum%idle_windows >= idle_limit) momentum%plain = momentum%iterations
+    end if
+    momentum%last_window_change = momentum%window_change
+    momentum%window_change = 0.0_dp
+  end subroutine close_window
 
 end module gravier_scheme
