@@ -26,6 +26,10 @@ def nscdd(sweeps):
     return {"solver": {"method": "nscdd", "sweeps": sweeps}}
 
 
+def momentum(method, sweeps):
+    return {"solver": {"method": method, "sweeps": sweeps, "acceleration": "momentum"}}
+
+
 def schwarz(sweeps, relaxation=1.0):
     return {"solver": {"method": "schwarz", "sweeps": sweeps, "relaxation": relaxation}}
 
@@ -120,6 +124,8 @@ class MethodInvariance(RunTestCase):
 
     def test_without_friction(self):
         self.compare(0.0, [("nscdd", nscdd(2), part) for part in PARTS] +
+                     [("nlgs, momentum", momentum("nlgs", 1), PARTS[0])] +
+                     [("nscdd, momentum", momentum("nscdd", 2), part) for part in SOME] +
                      [("schwarz", schwarz(2, 0.7), part) for part in PARTS] +
                      [("nscdd_ep, mumps", nscdd_ep(30, "mumps"), part) for part in PARTS] +
                      [("nscdd_ep, cg", nscdd_ep(30, "cg"), part) for part in SOME] +
@@ -127,6 +133,8 @@ class MethodInvariance(RunTestCase):
 
     def test_with_friction(self):
         self.compare(0.1, [("nscdd", nscdd(1), part) for part in PARTS] +
+                     [("nlgs, momentum", momentum("nlgs", 1), PARTS[0])] +
+                     [("nscdd, momentum", momentum("nscdd", 1), part) for part in SOME] +
                      # not relaxed, Schwarz oscillates on some partitions into 4 subdomains and more
                      [("schwarz", schwarz(1, 0.7), part) for part in PARTS] +
                      [("nscdd_ep, mumps", nscdd_ep(30, "mumps"), part) for part in SOME] +

@@ -1,0 +1,109 @@
+!> How momentum chooses its extrapolation from the changes it sees: memory, margin, plain iterations.
+program test_momentum
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: dp
+  use gravier_scheme, only: momentum_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  call MPI_Init()
+  call test_decay()
+  call test_growth_between_iterations()
+  call test_growth_between_windows()
+  call test_idle_windows()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  !> While changes decay, beta follows Nesterov's sequence up to the margin, which narrows to 0.02.
+  subroutine test_decay()
+    type(momentum_t) :: momentum
+    real(dp) :: change, t, next
+    integer :: k
+
+    change = 1.0_dp
+    t = 1.0_dp
+    do k = 1, 9
+      call momentum%steer(change)
+      next = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
+      call check_close(momentum%beta, (t - 1.0_dp)/next, 1e-15_dp, "decay: beta of the sequence")
+      t = next
+      change = 0.9_dp*change
+    end do
+    do k = 10, 2000
+      call momentum%steer(change)
+      change = 0.9_dp*change
+    end do
+    call check_close(momentum%beta, 0.98_dp, 1e-15_dp, "decay: beta in the end")
+    call check_equal(momentum%plain, 0, "decay: no plain iterations")
+  end subroutine test_decay
+
+  !> Growth by more than 2 % shortens the memory by three tenths; less growth does not.
+  subroutine test_growth_between_iterations()
+    type(momentum_t) :: momentum, grown
+    integer :: k
+
+    do k = 1, 6
+      call momentum%steer(1.0_dp)
+    end do
+    grown = momentum
+    call momentum%steer(1.01_dp)
+    call grown%steer(1.03_dp)
+    call check(grown%beta > 0.0_dp, "growth: some memory is kept")
+    call check_close(grown%t, 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*(0.7_dp*sequence(6))**2)), 1e-14_dp, "growth: memory")
+    call check_close(momentum%t, sequence(7), 1e-14_dp, "growth: slight growth forgets nothing")
+  end subroutine test_growth_between_iterations
+
+  !> t after n iterations.
+  pure real(dp) function sequence(n) result(t)
+    integer, intent(in) :: n
+    integer :: k
+
+    t = 1.0_dp
+    do k = 1, n
+      t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
+    end do
+  end function sequence
+
+  !> Windows that grow, too slowly for one iteration to tell, take beta to zero within four.
+  subroutine test_growth_between_windows()
+    type(momentum_t) :: momentum
+    real(dp) :: change
+    integer :: k
+
+    change = 1.0_dp
+    do k = 1, 50
+      change = 1.01_dp*change
+      call momentum%steer(change)
+    end do
+    call check_close(momentum%beta, 0.0_dp, tiny(1.0_dp), "windows that grow: beta")
+    do k = 1, 200
+      change = 0.99_dp*change
+      call momentum%steer(change)
+    end do
+    call check(momentum%beta > 0.5_dp, "windows that shrink again: beta")
+  end subroutine test_growth_between_windows
+
+  !> Twenty windows without a fifth less: as many plain iterations as there were, then momentum again.
+  subroutine test_idle_windows()
+    type(momentum_t) :: momentum
+    integer :: k, plain
+
+    do k = 1, 209
+      call momentum%steer(1.0_dp)
+    end do
+    call check(momentum%beta > 0.5_dp, "idle: momentum until the limit")
+    plain = 0
+    do k = 210, 419
+      call momentum%steer(1.0_dp)
+      if (abs(momentum%beta) <= 0.0_dp) plain = plain + 1
+    end do
+    call check_equal(plain, 210, "idle: plain iterations")
+    do k = 420, 450
+      call momentum%steer(1.0_dp)
+    end do
+    call check(momentum%beta > 0.5_dp, "idle: momentum again")
+  end subroutine test_idle_windows
+
+end program test_momentum

@@ -1,0 +1,118 @@
+"""Momentum: the solutions are those of plain iterations, it takes far fewer of them, it takes not many more to any tolerance on
+any problem here, and a run goes on from a checkpoint bit by bit.
+
+With -v (ctest -V) the iterations to each tolerance are printed, plain and with momentum."""
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks
+
+TOLERANCES = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4]
+CHECK_EVERY = 5
+
+MOMENTUM = {"solver": {"acceleration": "momentum"}}
+NLGS = {"solver": {"method": "nlgs"}}
+METHODS = {
+    "nlgs": NLGS,
+    "nlgs, 3 sweeps": {"solver": {"method": "nlgs", "sweeps": 3}},
+    "nscdd": {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 8}},
+    "nscdd, 3 sweeps": {"solver": {"method": "nscdd", "sweeps": 3}, "decomposition": {"subdomains": 8, "partition": "metis"}},
+    "nscdd_ep": {"solver": {"method": "nscdd_ep", "sweeps": 3}, "decomposition": {"subdomains": 4},
+                 "enriched": {"direction": 1.0, "contacts": "active"}},
+}
+
+
+def first_below(trace):
+    """Iterations after which the residual was first at most each of TOLERANCES, None where it never was."""
+    found = []
+    for tolerance in TOLERANCES:
+        below = np.nonzero(trace["residual"] <= tolerance)[0]
+        found.append(int(trace["iteration"][below[0]]) if len(below) else None)
+    return found
+
+
+class Momentum(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.packing = settled_disks(cls.scratch)
+        cls.disks = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": cls.packing, "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 1},
+            "solver": {"tolerance": TOLERANCES[-1], "max_iterations": 6000, "check_every": CHECK_EVERY},
+            "output": {"directory": "results", "trace": True},
+        }
+        cls.column = merged(cls.disks, {"scene": {"bodies": "column", "bodies_file": None, "column_count": 40, "radius": 0.05,
+                                                  "friction": 0.0}})
+        fall = {
+            "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012,
+                      "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 350},
+            "solver": {"tolerance": 1e-3, "max_iterations": 1000},
+            "output": {"directory": ".", "every": 0, "final_bodies": True},
+        }
+        spheres = run_case(fall, directory=cls.scratch + "/spheres")
+        if spheres.status != 0:
+            raise AssertionError(f"the packing of spheres was not made: {spheres}")
+        cls.spheres = merged(cls.disks, {"scene": {"dimension": 3, "bodies_file": spheres.path("final_bodies.h5")}})
+
+    def pairs(self, cases):
+        """{title: (iterations to each tolerance, plain and with momentum)}."""
+        jobs = [(title, plain) for title in cases for plain in (True, False)]
+        runs = dict(zip(jobs, each(lambda title, plain: run_case(
+            merged(cases[title], {} if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_")), timeout=300), jobs)))
+        found = {}
+        print()
+        for title in cases:
+            for plain in (True, False):
+                # 3: the tolerance was not met, which is no failure of a comparison
+                self.assertIn(runs[title, plain].status, (0, 3), runs[title, plain])
+            found[title] = tuple(first_below(runs[title, plain].trace()) for plain in (True, False))
+            print(f"  {title:30s} {found[title][0]}\n  {'':21s} momentum {found[title][1]}")
+        return found
+
+    def test_never_much_slower(self):
+        """To every tolerance that plain iterations reach, momentum takes at most a tenth more and one check."""
+        cases = {f"column, {name}": merged(self.column, method) for name, method in METHODS.items() if name != "nscdd_ep"}
+        for name, method in METHODS.items():
+            cases[f"disks 0.3, {name}"] = merged(self.disks, method)
+        for friction in (0.0, 0.1, 0.5, 0.8, 1.2):
+            cases[f"disks {friction}, nlgs"] = merged(self.disks, NLGS, {"scene": {"friction": friction}})
+        for friction in (0.0, 0.3, 0.5, 0.8, 1.2):
+            cases[f"spheres {friction}, nlgs"] = merged(self.spheres, NLGS, {"scene": {"friction": friction}})
+        cases["spheres 0.3, nscdd"] = merged(self.spheres, METHODS["nscdd"])
+        for title, (plain, momentum) in self.pairs(cases).items():
+            for tolerance, most, taken in zip(TOLERANCES, plain, momentum):
+                if most is not None:
+                    with self.subTest(title, tolerance=tolerance):
+                        self.assertIsNotNone(taken)
+                        self.assertLessEqual(taken, 1.1 * most + CHECK_EVERY)
+
+    def test_gains(self):
+        """What it is for: a sixth of the iterations, or fewer, to 1e-4 on settled packings."""
+        cases = {"disks 0.0": merged(self.disks, NLGS, {"scene": {"friction": 0.0}}), "disks 0.3": merged(self.disks, NLGS),
+                 "spheres 0.3": merged(self.spheres, NLGS), "spheres 0.3 in 8": merged(self.spheres, METHODS["nscdd"])}
+        for title, (plain, momentum) in self.pairs(cases).items():
+            with self.subTest(title):
+                # what plain iterations did not reach took them more than max_iterations
+                self.assertIsNotNone(momentum[-1])
+                self.assertLessEqual(6 * momentum[-1], plain[-1] or 6000)
+
+    def test_restart(self):
+        """Four steps at once, and two steps, then two more from the checkpoint on another number of ranks."""
+        case = merged(self.disks, METHODS["nscdd"], MOMENTUM,
+                      {"time": {"steps": 4}, "solver": {"tolerance": 1e-3}, "output": {"checkpoint_every": 1}})
+        straight = run_case(case, 1, self.here("straight"))
+        self.assert_status(straight, 0)
+        self.assert_status(run_case(merged(case, {"time": {"steps": 2}}), 2, self.here("stopped")), 0)
+        again = run_case(case, 1, self.here("stopped"), options=["--restart"])
+        self.assert_status(again, 0)
+        # the text of the input tells how many steps were asked for first
+        self.assertEqual([name for name in differences(straight.results(), again.results()) if name != "/run@input_text"], [])
+        self.assertEqual(differences(straight.trace(), again.trace()), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
