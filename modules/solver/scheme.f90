@@ -8,6 +8,8 @@ module gravier_scheme
   private
   public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, begin_sweeps, sweep_once, end_sweeps
 
+  !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
+  real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)
   !> growth of |r - y|^2 between iterations that shortens the memory, and what is left of t then
   real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.7_dp
   !> least 1 - beta: at the start, after an idle phase, ever; its factor after a window that grew, and after one that shrank
@@ -42,7 +44,7 @@ module gravier_scheme
     logical :: on = .false.
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
-    real(dp) :: change = huge(1.0_dp), window_change = 0.0_dp, last_window_change = huge(1.0_dp), lowest = huge(1.0_dp)
+    real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
     !> iterations of this solve, windows since `lowest`, plain iterations to come
     integer :: iterations = 0, idle_windows = 0, plain = 0
     type(momentum_part_t), allocatable :: part(:)
