@@ -44,6 +44,9 @@ module gravier_simulation
     integer(i8) :: left = 0, fast = 0
     !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
     logical :: listed = .false., divided = .false., refused = .false.
+    !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
+    !> space was divided anew
+    real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
@@ -371,7 +374,11 @@ contains
     self%largest_overlap = figures%max_overlap
     if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
-    if (figures%divided) self%reached_imbalance = self%imbalance
+    if (figures%divided) then
+      self%reached_imbalance = self%imbalance
+      call self%scheme%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
+      call self%scheme%forget_times()
+    end if
   end subroutine simulation_assemble
 
   !> q_m of grains and boundaries; boundaries whose time has come are taken away.

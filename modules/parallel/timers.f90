@@ -5,7 +5,7 @@ module gravier_timers
   use gravier_communicator, only: communicator_t
   implicit none
   private
-  public :: start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases
+  public :: clock, start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases
   public :: phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, phase_sweep, phase_exchange, &
     & phase_interface_solve, phase_factorise, phase_check, phase_output
 
@@ -21,6 +21,11 @@ module gravier_timers
   real(dp) :: started(n_phases) = 0.0_dp
 
 contains
+
+  !> Seconds on the clock of this rank.
+  real(dp) function clock()
+    clock = MPI_Wtime()
+  end function clock
 
   subroutine start_timer(phase)
     integer, intent(in) :: phase
