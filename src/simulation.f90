@@ -20,7 +20,7 @@ module gravier_simulation
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
-  use gravier_overlap_projection, only: project_overlaps, overlap_remainder
+  use gravier_overlap_projection, only: project_overlaps
   use gravier_diagnostics, only: diagnostics_t
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
@@ -604,8 +604,10 @@ contains
     call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
       & self%time, figures%left > 0)
     call move_to_end(self)
-    figures%projected = figures%max_overlap - self%overlap_allowed > overlap_remainder*self%overlap_allowed
+    call stop_timer(phase_bodies)
+    figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
+    call start_timer(phase_bodies)
     if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     call stop_timer(phase_bodies)
     self%step = self%step + 1

@@ -401,7 +401,7 @@ contains
       end do
     end subroutine scatter_channel
 
-  end subroutine shared_exchange_pass
+  end subroutine shared_exchange_finish
 
   !> Put the values of the shared bodies of part `p` into its outgoing slots.
   subroutine shared_exchange_load(self, p, field)
