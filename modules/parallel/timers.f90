@@ -10,8 +10,8 @@ module gravier_timers
     & phase_interface_solve, phase_factorise, phase_check, phase_projection, phase_output
 
   integer, parameter :: phase_bodies = 1, phase_neighbourhood = 2, phase_detection = 3, phase_interface = 4, phase_setup = 5, &
-    & phase_sweep = 6, phase_exchange = 7, phase_factorise = 8, phase_interface_solve = 9, phase_check = 10, phase_projection = 11, &
-    & phase_output = 12
+    & phase_sweep = 6, phase_exchange = 7, phase_factorise = 8, phase_interface_solve = 9, phase_check = 10, &
+    & phase_projection = 11, phase_output = 12
   integer, parameter :: n_phases = 12
   !> what the log calls the phases
   character(len=28), parameter :: phase_names(n_phases) = [character(len=28) :: "bodies: move, migrate", &
