@@ -24,6 +24,8 @@ module gravier_contact_problem
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
     integer, allocatable :: home(:)
+    !> place of each grain among those at home in this subdomain, 0 for those at home elsewhere (n_grains)
+    integer, allocatable :: place(:)
     !> subdomains in which each body carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
     !> number of the boundary behind a column (n_grains + 1 to n_columns)
