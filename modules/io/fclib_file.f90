@@ -9,7 +9,7 @@ module gravier_fclib_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: fclib_matrix_t, fclib_local_t, fclib_global_t, read_fclib, write_fclib_local
+  public :: fclib_matrix_t, fclib_local_t, fclib_global_t, read_fclib, write_fclib_local, compressed_rows
 
   !> A sparse matrix by compressed rows, numbered from 1; entries of the same place add up, columns come in any order.
   type :: fclib_matrix_t
@@ -31,8 +31,8 @@ module gravier_fclib_file
     real(dp), allocatable :: q(:)
     !> (contacts)
     real(dp), allocatable :: mu(:)
-    !> (dimension*contacts) impulses of the solution, or of the first guess, where the file has one
-    real(dp), allocatable :: r(:)
+    !> (dimension, contacts) impulses of the solution, or of the first guess, where the file has one
+    real(dp), allocatable :: r(:, :)
   end type fclib_local_t
 
   !> M V = H r + G l + f, G^T V + b = 0, v = H^T V + w.
@@ -89,11 +89,27 @@ contains
     call read_matrix(file, path, "/fclib_local/W", n, n, local%w, error)
     call read_vector(file, path, "/fclib_local/vectors/q", n, local%q, error)
     if (file%exists("/fclib_local/solution/r")) then
-      call read_vector(file, path, "/fclib_local/solution/r", n, local%r, error)
+      call read_impulses(file, path, "/fclib_local/solution/r", local, error)
     else if (file%exists("/fclib_local/guesses/1/r")) then
-      call read_vector(file, path, "/fclib_local/guesses/1/r", n, local%r, error)
+      call read_impulses(file, path, "/fclib_local/guesses/1/r", local, error)
     end if
   end subroutine read_local
+
+  subroutine read_impulses(file, path, dataset, local, error)
+    type(h5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: path, dataset
+    type(fclib_local_t), intent(inout) :: local
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: values(:)
+    integer :: a
+
+    call read_vector(file, path, dataset, local%dimension*size(local%mu), values, error)
+    if (allocated(error)) return
+    allocate (local%r(local%dimension, size(local%mu)))
+    do a = 1, size(local%mu)
+      local%r(:, a) = values((a - 1)*local%dimension + 1:a*local%dimension)
+    end do
+  end subroutine read_impulses
 
   subroutine read_global(file, path, global, error)
     type(h5_file_t), intent(inout) :: file
@@ -242,7 +258,7 @@ contains
       call read_indices(file, path, group//"/p", int(nz), 0, n_columns - 1, column, error)
     end select
     if (.not. allocated(error)) call read_entries(file, path, group//"/x", size(row), value, error)
-    if (.not. allocated(error)) matrix = compressed(n_rows, n_columns, row, column, value)
+    if (.not. allocated(error)) matrix = compressed_rows(n_rows, n_columns, row, column, value)
   end subroutine read_matrix
 
   !> Numbers of the line (row or column) and of the place in it, from 0, of the entries of a matrix compressed by lines.
@@ -285,7 +301,7 @@ contains
   end subroutine read_entries
 
   !> Compressed rows from entries in any order, whose rows and columns count from 0.
-  pure function compressed(n_rows, n_columns, row, column, value) result(matrix)
+  pure function compressed_rows(n_rows, n_columns, row, column, value) result(matrix)
     integer, intent(in) :: n_rows, n_columns
     integer, intent(in), contiguous :: row(:), column(:)
     real(dp), intent(in), contiguous :: value(:)
@@ -310,7 +326,7 @@ contains
       matrix%value(next(i)) = value(k)
       next(i) = next(i) + 1
     end do
-  end function compressed
+  end function compressed_rows
 
   !> A matrix without columns.
   pure function empty_matrix(n_rows) result(matrix)
@@ -329,8 +345,8 @@ contains
     !> where `r` is allocated it is written as the solution
     type(fclib_local_t), intent(in) :: local
     type(error_t), allocatable, intent(inout) :: error
-    !> (dimension*contacts) W r + q
-    real(dp), intent(in), contiguous, optional :: velocity(:)
+    !> (dimension, contacts) W r + q
+    real(dp), intent(in), contiguous, optional :: velocity(:, :)
     type(h5_file_t) :: file
     logical :: mine
 
@@ -348,8 +364,8 @@ contains
     call write_reals("/fclib_local/W/x", local%w%value)
     call write_reals("/fclib_local/vectors/q", local%q)
     call write_reals("/fclib_local/vectors/mu", local%mu)
-    if (allocated(local%r)) call write_reals("/fclib_local/solution/r", local%r)
-    if (present(velocity)) call write_reals("/fclib_local/solution/u", velocity)
+    if (allocated(local%r)) call write_columns("/fclib_local/solution/r", local%r)
+    if (present(velocity)) call write_columns("/fclib_local/solution/u", velocity)
     call file%close(error)
 
   contains
@@ -378,6 +394,19 @@ contains
       real(dp), intent(in), contiguous :: values(:)
       call file%write_rows(dataset, values(1:merge(size(values), 0, mine)), error)
     end subroutine write_reals
+
+    subroutine write_columns(dataset, values)
+      character(len=*), intent(in) :: dataset
+      real(dp), intent(in), contiguous :: values(:, :)
+      real(dp), allocatable :: flat(:)
+      integer :: a
+
+      allocate (flat(size(values)))
+      do a = 1, size(values, 2)
+        flat((a - 1)*size(values, 1) + 1:a*size(values, 1)) = values(:, a)
+      end do
+      call write_reals(dataset, flat)
+    end subroutine write_columns
 
   end subroutine write_fclib_local
 

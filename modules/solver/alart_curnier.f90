@@ -1,7 +1,7 @@
 !> The function of Alart and Curnier on a packed contact problem: zero where impulses and velocities satisfy Signorini's condition
 !> and Coulomb's law, and piecewise smooth, with the blocks of its generalised Jacobian.
 !>
-!> With x = r - v/s, s > 0 [1/kg] of each contact, P_n = max(x_n, 0) and P_t = x_t cut to the disc of radius mu P_n, it is
+!> With x = r - v/s, s the stiffness of each contact, P_n = max(x_n, 0) and P_t = x_t cut to the disc of radius mu P_n, it is
 !> F = s (r - P) [m/s]: v where a contact sticks, s r where it is open.
 module gravier_alart_curnier
   use gravier_kinds, only: dp
@@ -10,16 +10,12 @@ module gravier_alart_curnier
   private
   public :: alart_curnier_t
 
-  !> A problem v = W r + q + alpha S (r - centre) and its function; alpha S (r - centre) keeps r near `centre`.
   type :: alart_curnier_t
-    !> times the stiffness of each contact: s of the function
-    real(dp) :: slope = 1.0_dp
-    real(dp) :: alpha = 0.0_dp
-    !> (dimension, contacts)
-    real(dp), allocatable :: centre(:, :), v(:, :), f(:, :)
+    !> velocities and the function at the point evaluated last (dimension, contacts)
+    real(dp), allocatable :: v(:, :), f(:, :)
     !> dP/dx of each contact by columns (dimension**2, contacts)
     real(dp), allocatable :: cut(:, :)
-    !> blocks of the Jacobian, as those of the problem
+    !> blocks of the Jacobian, in the order of those of the problem
     real(dp), allocatable :: own(:, :), coupling(:, :)
   contains
     procedure :: init => alart_curnier_init
@@ -29,19 +25,15 @@ module gravier_alart_curnier
 
 contains
 
-  subroutine alart_curnier_init(self, problem, slope)
+  subroutine alart_curnier_init(self, problem)
     class(alart_curnier_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem
-    real(dp), intent(in) :: slope
     integer :: d, n
 
     d = problem%dimension
     n = problem%n_contacts
-    self%slope = slope
-    if (allocated(self%v)) deallocate (self%centre, self%v, self%f, self%cut, self%own, self%coupling)
-    allocate (self%centre(d, n), self%v(d, n), self%f(d, n), self%cut(d**2, n), self%own(d**2, n))
-    allocate (self%coupling(d**2, size(problem%other)))
-    self%centre(:, :) = 0.0_dp
+    if (allocated(self%v)) deallocate (self%v, self%f, self%cut, self%own, self%coupling)
+    allocate (self%v(d, n), self%f(d, n), self%cut(d**2, n), self%own(d**2, n), self%coupling(d**2, size(problem%other)))
   end subroutine alart_curnier_init
 
   !> Velocities, the function and dP/dx at r.
@@ -50,22 +42,17 @@ contains
     type(delassus_t), intent(in) :: problem
     !> (dimension, contacts)
     real(dp), intent(in), contiguous :: r(:, :)
-    !> |F| / |q|
+    !> |F| [m/s]
     real(dp), intent(out) :: size_of_f
-    real(dp) :: s, scale
     integer :: a
 
     call problem%velocity(r, self%v)
     do a = 1, problem%n_contacts
-      self%v(:, a) = self%v(:, a) + self%alpha*problem%stiffness(a)*(r(:, a) - self%centre(:, a))
-      s = self%slope*problem%stiffness(a)
-      self%f(:, a) = r(:, a) - self%v(:, a)/s
+      self%f(:, a) = r(:, a) - self%v(:, a)/problem%stiffness(a)
       call cut_to_law(problem%mu(a), self%f(:, a), self%cut(:, a))
-      self%f(:, a) = s*(r(:, a) - self%f(:, a))
+      self%f(:, a) = problem%stiffness(a)*(r(:, a) - self%f(:, a))
     end do
-    scale = norm2(problem%q)
     size_of_f = norm2(self%f)
-    if (scale > 0.0_dp) size_of_f = size_of_f/scale
   end subroutine alart_curnier_evaluate
 
   !> P of x, and dP/dx.
@@ -104,22 +91,24 @@ contains
     end do
   end subroutine cut_to_law
 
-  !> Blocks of the Jacobian at the point evaluated last: cut (W + alpha S) + s (1 - cut).
+  !> Blocks of the Jacobian at the point evaluated last: cut W + s (1 - cut).
   subroutine alart_curnier_differentiate(self, problem)
     class(alart_curnier_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem
     real(dp) :: moved(problem%dimension**2)
-    integer :: a, i, k, d
+    integer :: a, i, k, d, diagonal
 
     d = problem%dimension
     do a = 1, problem%n_contacts
       moved = problem%own(:, a)
       do i = 1, d
-        moved(1 + (i - 1)*(d + 1)) = moved(1 + (i - 1)*(d + 1)) + (self%alpha - self%slope)*problem%stiffness(a)
+        diagonal = 1 + (i - 1)*(d + 1)
+        moved(diagonal) = moved(diagonal) - problem%stiffness(a)
       end do
       call multiply(d, self%cut(:, a), moved, self%own(:, a))
       do i = 1, d
-        self%own(1 + (i - 1)*(d + 1), a) = self%own(1 + (i - 1)*(d + 1), a) + self%slope*problem%stiffness(a)
+        diagonal = 1 + (i - 1)*(d + 1)
+        self%own(diagonal, a) = self%own(diagonal, a) + problem%stiffness(a)
       end do
       do k = problem%first(a), problem%first(a + 1) - 1
         call multiply(d, self%cut(:, a), problem%coupling(:, k), self%coupling(:, k))

@@ -67,8 +67,8 @@ contains
     real(dp), intent(inout), contiguous :: previous(:, :)
     !> result of this sweep; then the start of the next
     real(dp), intent(inout), contiguous :: r(:, :)
-    real(dp) :: x(size(r, 1)), next, beta
-    integer :: a
+    real(dp) :: next, beta, x, along, across
+    integer :: a, i
 
     next = 1.0_dp
     beta = 0.0_dp
@@ -78,10 +78,15 @@ contains
     end if
     t = next
     do a = 1, problem%n_contacts
-      x = r(:, a)
-      r(:, a) = x + beta*(x - previous(:, a))
-      call project_on_cone(r(:, a), problem%mu(a))
-      previous(:, a) = x
+      across = 0.0_dp
+      do i = 1, problem%dimension
+        x = r(i, a)
+        r(i, a) = x + beta*(x - previous(i, a))
+        previous(i, a) = x
+        if (i > 1) across = across + r(i, a)**2
+      end do
+      along = problem%mu(a)*r(1, a)
+      if (along < 0.0_dp .or. across > along**2) call project_on_cone(r(:, a), problem%mu(a))
     end do
   end subroutine extrapolate
 

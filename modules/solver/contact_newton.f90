@@ -1,156 +1,215 @@
-!> Proximal Newton method for a packed contact problem with any blocks, W possibly of deficient rank: an outer loop of
-!> proximal points, v = W r + q + alpha S (r - r_k), whose weight alpha falls while it goes well and rises when it does not,
-!> around a semismooth Newton method on the function of Alart and Curnier with a nonmonotone line search. The outer loop has the
-!> solutions of the problem itself, Coulomb's exact law included, as its fixed points for every alpha.
+!> Proximal Newton method for a packed contact problem with any blocks, W possibly of deficient rank. Outer loop: proximal
+!> points, the solutions of v = W r + q + alpha S (r - r_k), S the stiffnesses; the weight alpha falls while they are found in
+!> few steps and rises where they are not found. The fixed points of the loop are the solutions of the problem itself, Coulomb's
+!> exact law included, for every alpha. Inner loop: semismooth Newton steps on the function of Alart and Curnier, with a
+!> nonmonotone line search; where a step gains little, sweeps of Gauss-Seidel on the same proximal problem.
 module gravier_contact_newton
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_delassus, only: delassus_t
   use gravier_alart_curnier, only: alart_curnier_t
   use gravier_block_system, only: block_system_t
+  use gravier_block_sweeps, only: sweep_blocks
   implicit none
   private
-  public :: newton_control_t, solve_by_newton
+  public :: contact_newton_t
 
-  type :: newton_control_t
-    real(dp) :: tolerance = 1.0e-8_dp
-    !> Newton's steps, each a factorisation
-    integer :: most_steps = 1000
-    !> Newton's steps to one proximal point
-    integer :: inner_steps = 25
-    real(dp) :: alpha_start = 1.0e-3_dp, alpha_least = 1.0e-13_dp, alpha_most = 10.0_dp
-    !> of alpha, after a proximal point found quickly, slowly, not at all
-    real(dp) :: fall = 0.3_dp, hold = 1.5_dp, rise = 3.0_dp
-    !> what is left of F when a proximal point counts as found
-    real(dp) :: inner_tolerance = 0.05_dp
-    real(dp) :: slope = 1.0_dp
-    logical :: log = .false.
-  end type newton_control_t
-
+  !> alpha at the start, its bounds, and what it is multiplied with after a proximal point found in few steps, in many, not found
+  real(dp), parameter :: alpha_start = 1.0e-3_dp, alpha_least = 1.0e-13_dp, alpha_most = 10.0_dp
+  real(dp), parameter :: fall = 0.1_dp, hold = 1.5_dp, rise = 3.0_dp
+  !> steps to a proximal point that are few, that are not many, and the most
+  integer, parameter :: few_steps = 6, some_steps = 12, most_inner_steps = 25
+  !> what is left of |F| where a proximal point counts as found; a step that leaves more than `little_gain` gains little
+  real(dp), parameter :: found_point = 0.05_dp, little_gain = 0.3_dp
+  !> sweeps after such a step
+  integer, parameter :: smoothing_sweeps = 30
   !> the line search compares with the greatest of so many last values, and halves the step so often at most
   integer, parameter :: memory = 5, most_halvings = 8
-  !> steps to a proximal point that are few, and not many
-  integer, parameter :: few_steps = 6, some_steps = 12
+  real(dp), parameter :: sufficient = 1.0e-4_dp
+
+  !> The method and its work space. It can be called again and goes on with the weight it had.
+  type :: contact_newton_t
+    private
+    real(dp) :: alpha = alpha_start
+    !> the problem of the proximal point at hand
+    type(delassus_t) :: near
+    type(alart_curnier_t) :: law
+    type(block_system_t) :: system
+    !> (dimension, contacts)
+    real(dp), allocatable :: centre(:, :), x(:, :), v(:, :), trial(:, :), direction(:, :)
+  contains
+    procedure :: init => contact_newton_init
+    procedure :: free => contact_newton_free
+    procedure :: solve => contact_newton_solve
+  end type contact_newton_t
 
 contains
 
-  !> Solve, from the impulses given.
-  subroutine solve_by_newton(problem, control, r, steps, measure, error)
+  subroutine contact_newton_init(self, problem, error)
+    class(contact_newton_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem
-    type(newton_control_t), intent(in) :: control
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: d, n
+
+    call self%free()
+    d = problem%dimension
+    n = problem%n_contacts
+    self%alpha = alpha_start
+    self%near = problem
+    call self%law%init(problem)
+    allocate (self%centre(d, n), self%x(d, n), self%v(d, n), self%trial(d, n), self%direction(d, n))
+    call self%system%init(problem, error)
+  end subroutine contact_newton_init
+
+  subroutine contact_newton_free(self)
+    class(contact_newton_t), intent(inout) :: self
+
+    call self%system%free()
+    call self%near%free()
+    if (allocated(self%x)) deallocate (self%centre, self%x, self%v, self%trial, self%direction)
+  end subroutine contact_newton_free
+
+  !> Solve the problem given to `init`, from the impulses given.
+  subroutine contact_newton_solve(self, problem, tolerance, most_steps, r, steps, measure)
+    class(contact_newton_t), intent(inout) :: self
+    type(delassus_t), intent(in) :: problem
+    !> on the consistent measure of gravier_delassus
+    real(dp), intent(in) :: tolerance
+    !> Newton's steps, each a factorisation
+    integer, intent(in) :: most_steps
     !> start in, best result out (dimension, contacts)
     real(dp), intent(inout), contiguous :: r(:, :)
     integer, intent(out) :: steps
-    !> of the result: the consistent measure of gravier_delassus
+    !> of the result
     real(dp), intent(out) :: measure
-    type(error_t), allocatable, intent(inout) :: error
-    type(alart_curnier_t) :: law
-    type(block_system_t) :: system
-    real(dp), allocatable :: x(:, :), v(:, :)
     real(dp) :: found, before, ignored
     integer :: taken
     logical :: success
 
     steps = 0
-    measure = huge(measure)
-    if (allocated(error)) return
-    call law%init(problem, control%slope)
-    call system%init(problem, error)
-    allocate (x(size(r, 1), size(r, 2)), v(size(r, 1), size(r, 2)))
-    call problem%velocity(r, v)
-    call problem%measure(r, v, ignored, measure)
+    call problem%velocity(r, self%v)
+    call problem%measure(r, self%v, ignored, measure)
     before = measure
-    law%alpha = control%alpha_start
-    law%centre(:, :) = r
-    do while (measure > control%tolerance .and. steps < control%most_steps .and. .not. allocated(error))
-      x(:, :) = law%centre
-      call find_proximal_point(problem, control, law, system, x, taken, success)
+    self%centre(:, :) = r
+    do while (measure > tolerance .and. steps < most_steps)
+      call set_proximal(self, problem)
+      self%x(:, :) = self%centre
+      call find_proximal_point(self, norm2(problem%q)*tolerance, min(most_inner_steps, most_steps - steps), taken, success)
       steps = steps + taken
-      call problem%velocity(x, v)
-      call problem%measure(x, v, ignored, found)
-      if (control%log) print "(a,es9.2,i4,l2,es10.2,i6)", "   prox alpha ", law%alpha, taken, success, found, steps
+      call problem%velocity(self%x, self%v)
+      call problem%measure(self%x, self%v, ignored, found)
       if (found < measure) then
         measure = found
-        r(:, :) = x
+        r(:, :) = self%x
       end if
-      if (success) then
-        law%centre(:, :) = x
-        if (taken <= few_steps) law%alpha = max(law%alpha*control%fall, control%alpha_least)
-        if (taken > some_steps) law%alpha = law%alpha*control%hold
-      else
-        law%alpha = min(law%alpha*control%rise, control%alpha_most)
-        if (found < before) law%centre(:, :) = x
+      if (success .or. found < before) self%centre(:, :) = self%x
+      if (.not. success) then
+        self%alpha = min(self%alpha*rise, alpha_most)
+      else if (taken <= few_steps) then
+        self%alpha = max(self%alpha*fall, alpha_least)
+      else if (taken > some_steps) then
+        self%alpha = min(self%alpha*hold, alpha_most)
       end if
       before = found
     end do
-    call system%free()
-  end subroutine solve_by_newton
+  end subroutine contact_newton_solve
 
-  !> Newton's method on F(x) = 0 at a fixed centre.
-  subroutine find_proximal_point(problem, control, law, system, x, steps, success)
+  !> v = W r + q + alpha S (r - centre).
+  subroutine set_proximal(self, problem)
+    class(contact_newton_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem
-    type(newton_control_t), intent(in) :: control
-    type(alart_curnier_t), intent(inout) :: law
-    type(block_system_t), intent(inout) :: system
-    !> start in, result out (dimension, contacts)
-    real(dp), intent(inout), contiguous :: x(:, :)
+    real(dp) :: weight
+    integer :: a, i, diagonal
+
+    do a = 1, problem%n_contacts
+      weight = self%alpha*problem%stiffness(a)
+      self%near%own(:, a) = problem%own(:, a)
+      do i = 1, problem%dimension
+        diagonal = 1 + (i - 1)*(problem%dimension + 1)
+        self%near%own(diagonal, a) = self%near%own(diagonal, a) + weight
+      end do
+      self%near%q(:, a) = problem%q(:, a) - weight*self%centre(:, a)
+    end do
+  end subroutine set_proximal
+
+  !> Newton's method on F(x) = 0 of the proximal problem, from x.
+  subroutine find_proximal_point(self, tolerance, most_steps, steps, success)
+    class(contact_newton_t), intent(inout) :: self
+    !> of the problem itself [m/s]
+    real(dp), intent(in) :: tolerance
+    integer, intent(in) :: most_steps
     integer, intent(out) :: steps
     !> F has fallen as asked
     logical, intent(out) :: success
-    real(dp), allocatable :: direction(:, :)
     real(dp) :: past(memory), f, goal
     logical :: regular
 
-    allocate (direction(size(x, 1), size(x, 2)))
     steps = 0
     past = 0.0_dp
-    call law%evaluate(problem, x, f)
-    goal = max(control%inner_tolerance*f, 0.1_dp*control%tolerance)
+    call self%law%evaluate(self%near, self%x, f)
+    goal = max(found_point*f, 0.1_dp*tolerance)
     do
       success = f <= goal
-      if (success .or. steps == control%inner_steps) exit
+      if (success .or. steps == most_steps) exit
       past(1 + mod(steps, memory)) = f
-      call law%differentiate(problem)
-      direction(:, :) = -law%f
-      call system%solve(law%own, law%coupling, direction, regular)
+      call self%law%differentiate(self%near)
+      self%direction(:, :) = -self%law%f
+      call self%system%solve(self%law%own, self%law%coupling, self%direction, regular)
       steps = steps + 1
       if (.not. regular) exit
-      call search_line(problem, law, maxval(past), direction, x, f)
+      call search_line(self, maxval(past), f)
+      if (f > max(goal, little_gain*maxval(past))) call smooth(self, f)
     end do
   end subroutine find_proximal_point
 
-  !> Go along a direction: the whole step, or half of it and so on until F falls below a reference, or to where it was least.
-  subroutine search_line(problem, law, reference, direction, x, f)
-    type(delassus_t), intent(in) :: problem
-    type(alart_curnier_t), intent(inout) :: law
+  !> Go along the direction: the whole step, or half of it and so on until F falls below a reference, or to where it was least.
+  subroutine search_line(self, reference, f)
+    class(contact_newton_t), intent(inout) :: self
     real(dp), intent(in) :: reference
-    real(dp), intent(in), contiguous :: direction(:, :)
-    real(dp), intent(inout), contiguous :: x(:, :)
     !> |F| at the new point
     real(dp), intent(out) :: f
-    real(dp), allocatable :: trial(:, :)
     real(dp) :: step, best_step, least
     integer :: k
 
     step = 1.0_dp
     best_step = 0.0_dp
     least = huge(least)
-    allocate (trial(size(x, 1), size(x, 2)))
     do k = 1, most_halvings
-      trial(:, :) = x + step*direction
-      call law%evaluate(problem, trial, f)
+      self%trial(:, :) = self%x + step*self%direction
+      call self%law%evaluate(self%near, self%trial, f)
       if (f < least) then
         least = f
         best_step = step
       end if
-      if (f <= (1.0_dp - 1.0e-4_dp*step)*reference) exit
+      if (f <= (1.0_dp - sufficient*step)*reference) exit
       step = 0.5_dp*step
     end do
     if (k > most_halvings) then
-      trial(:, :) = x + best_step*direction
-      call law%evaluate(problem, trial, f)
+      self%trial(:, :) = self%x + best_step*self%direction
+      call self%law%evaluate(self%near, self%trial, f)
     end if
-    x(:, :) = trial
+    self%x(:, :) = self%trial
   end subroutine search_line
+
+  !> Sweeps on the proximal problem, kept where they bring F down.
+  subroutine smooth(self, f)
+    class(contact_newton_t), intent(inout) :: self
+    !> |F| at x
+    real(dp), intent(inout) :: f
+    real(dp) :: moved, before
+    integer :: k
+
+    before = f
+    self%trial(:, :) = self%x
+    do k = 1, smoothing_sweeps
+      call sweep_blocks(self%near, self%trial, moved)
+    end do
+    call self%law%evaluate(self%near, self%trial, f)
+    if (f <= before) then
+      self%x(:, :) = self%trial
+    else
+      call self%law%evaluate(self%near, self%x, f)
+    end if
+  end subroutine smooth
 
 end module gravier_contact_newton

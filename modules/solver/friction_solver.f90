@@ -1,0 +1,122 @@
+!> The methods for packed contact problems with any blocks, by name, and the choice among them: sweeps with momentum first, then
+!> Newton's method, and so on in turn with budgets that double, from the best impulses so far.
+module gravier_friction_solver
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_delassus, only: delassus_t
+  use gravier_block_sweeps, only: solve_by_sweeps
+  use gravier_contact_newton, only: contact_newton_t
+  implicit none
+  private
+  public :: friction_methods, friction_control_t, friction_report_t, solve_friction
+
+  character(len=*), parameter :: friction_methods(4) = [character(len=8) :: "auto", "nlgs", "momentum", "newton"]
+
+  type :: friction_control_t
+    !> one of friction_methods
+    character(len=:), allocatable :: method
+    !> on the consistent measure of gravier_delassus
+    real(dp) :: tolerance = 1.0e-8_dp
+    !> sweeps and Newton's steps together
+    integer :: max_iterations = 100000
+  end type friction_control_t
+
+  type :: friction_report_t
+    logical :: converged = .false.
+    integer :: sweeps = 0, newton_steps = 0
+    !> of the impulses found: the two measures of gravier_delassus
+    real(dp) :: literature = 0.0_dp, consistent = 0.0_dp
+  end type friction_report_t
+
+  !> budgets of the first turn; turns in which they may double
+  integer, parameter :: first_sweeps = 200, first_steps = 20, most_doublings = 20
+  !> sweeps that leave more than this of the measure bring little
+  real(dp), parameter :: little_gain = 0.5_dp
+
+contains
+
+  !> Solve, from the impulses given.
+  subroutine solve_friction(problem, control, r, report, error)
+    type(delassus_t), intent(in) :: problem
+    type(friction_control_t), intent(in) :: control
+    !> start in, best result out (dimension, contacts)
+    real(dp), intent(inout), contiguous :: r(:, :)
+    type(friction_report_t), intent(out) :: report
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: v(:, :)
+    type(contact_newton_t) :: newton
+    real(dp) :: measure
+
+    if (allocated(error)) return
+    select case (control%method)
+    case ("nlgs", "momentum")
+      call solve_by_sweeps(problem, control%tolerance, control%max_iterations, control%method == "momentum", r, &
+        & report%sweeps, measure)
+    case ("newton")
+      call newton%init(problem, error)
+      if (.not. allocated(error)) call newton%solve(problem, control%tolerance, control%max_iterations, r, &
+        & report%newton_steps, measure)
+      call newton%free()
+    case ("auto")
+      call solve_in_turn(problem, control, r, report, error)
+    case default
+      call raise(error, status_input, "method '"//control%method//"': expected auto, nlgs, momentum or newton")
+    end select
+    if (allocated(error)) return
+    allocate (v(size(r, 1), size(r, 2)))
+    call problem%velocity(r, v)
+    call problem%measure(r, v, report%literature, report%consistent)
+    report%converged = report%consistent <= control%tolerance
+  end subroutine solve_friction
+
+  !> Sweeps and Newton's steps in turn.
+  subroutine solve_in_turn(problem, control, r, report, error)
+    type(delassus_t), intent(in) :: problem
+    type(friction_control_t), intent(in) :: control
+    real(dp), intent(inout), contiguous :: r(:, :)
+    type(friction_report_t), intent(inout) :: report
+    type(error_t), allocatable, intent(inout) :: error
+    type(contact_newton_t) :: newton
+    real(dp), allocatable :: best(:, :)
+    real(dp) :: least, measure
+    integer :: turn, done, most_sweeps
+
+    allocate (best(size(r, 1), size(r, 2)))
+    best(:, :) = r
+    least = huge(least)
+    most_sweeps = first_sweeps
+    do turn = 0, huge(turn) - 1
+      call solve_by_sweeps(problem, control%tolerance, min(most_sweeps, left()), .true., r, done, measure)
+      report%sweeps = report%sweeps + done
+      most_sweeps = merge(first_sweeps, 2*most_sweeps, measure > little_gain*least)
+      call keep_best()
+      if (least <= control%tolerance .or. left() == 0) exit
+      if (turn == 0) call newton%init(problem, error)
+      if (allocated(error)) exit
+      call newton%solve(problem, control%tolerance, min(first_steps*2**min(turn, most_doublings), left()), r, done, measure)
+      report%newton_steps = report%newton_steps + done
+      call keep_best()
+      if (least <= control%tolerance .or. left() == 0) exit
+    end do
+    call newton%free()
+
+  contains
+
+    !> iterations that are left
+    integer function left()
+      left = control%max_iterations - report%sweeps - report%newton_steps
+    end function left
+
+    !> go on from the best impulses so far
+    subroutine keep_best()
+      if (measure < least) then
+        least = measure
+        best(:, :) = r
+      else
+        r(:, :) = best
+      end if
+    end subroutine keep_best
+
+  end subroutine solve_in_turn
+
+end module gravier_friction_solver
