@@ -10,11 +10,13 @@ module gravier_block_sweeps
 
   !> the measure is taken when a sweep moves impulses by less than so many tolerances
   real(dp), parameter :: near_tolerance = 4.0_dp
+  !> sweeps between two looks at what they gain
+  integer, parameter :: window = 100
 
 contains
 
-  !> Sweep until the consistent measure of gravier_delassus meets the tolerance, or the budget is spent.
-  subroutine solve_by_sweeps(problem, tolerance, most_sweeps, momentum, r, sweeps, measure)
+  !> Sweep until the consistent measure of gravier_delassus meets the tolerance, the budget is spent, or patience.
+  subroutine solve_by_sweeps(problem, tolerance, most_sweeps, momentum, r, sweeps, measure, patience)
     type(delassus_t), intent(in) :: problem
     real(dp), intent(in) :: tolerance
     integer, intent(in) :: most_sweeps
@@ -25,13 +27,17 @@ contains
     integer, intent(out) :: sweeps
     !> of the result
     real(dp), intent(out) :: measure
+    !> end when the gain of the last sweeps promises no result within so many more; absent: never
+    integer, intent(in), optional :: patience
     real(dp), allocatable :: v(:, :), previous(:, :)
-    real(dp) :: moved, moved_before, t, ignored
+    real(dp) :: moved, moved_before, least, least_before, t, ignored
 
     allocate (v(size(r, 1), size(r, 2)), previous(size(r, 1), merge(size(r, 2), 0, momentum)))
     if (momentum) previous(:, :) = r
     t = 1.0_dp
     moved_before = huge(moved)
+    least = huge(least)
+    least_before = huge(least)
     sweeps = 0
     do
       if (sweeps == most_sweeps) exit
@@ -42,6 +48,14 @@ contains
       end if
       if (momentum) call extrapolate(problem, moved > moved_before, t, previous, r)
       moved_before = moved
+      least = min(least, moved)
+      if (mod(sweeps, window) == 0) then
+        if (present(patience)) then
+          if (.not. promising(least_before, least, tolerance, patience)) exit
+        end if
+        least_before = least
+        least = huge(least)
+      end if
     end do
     ! extrapolated impulses are no result
     if (momentum .and. sweeps > 0) r(:, :) = previous
@@ -56,6 +70,15 @@ contains
     end function reached
 
   end subroutine solve_by_sweeps
+
+  !> Whether a figure that fell so far in a window comes down to the tolerance within so many sweeps at this rate.
+  pure logical function promising(before, after, tolerance, sweeps)
+    real(dp), intent(in) :: before, after, tolerance
+    integer, intent(in) :: sweeps
+
+    promising = after <= tolerance
+    if (.not. promising) promising = window*(log(after) - log(tolerance)) <= sweeps*(log(before) - log(after))
+  end function promising
 
   !> Nesterov's extrapolation x + beta (x - previous), brought back to the cones; none, and a fresh start, where the last sweep
   !> moved impulses by more than the one before.

@@ -2,27 +2,25 @@
 !> points, the solutions of v = W r + q + alpha S (r - r_k), S the stiffnesses; the weight alpha falls while they are found in
 !> few steps and rises where they are not found. The fixed points of the loop are the solutions of the problem itself, Coulomb's
 !> exact law included, for every alpha. Inner loop: semismooth Newton steps on the function of Alart and Curnier, with a
-!> nonmonotone line search; where a step gains little, sweeps of Gauss-Seidel on the same proximal problem.
+!> nonmonotone line search.
 module gravier_contact_newton
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_delassus, only: delassus_t
   use gravier_alart_curnier, only: alart_curnier_t
   use gravier_block_system, only: block_system_t
-  use gravier_block_sweeps, only: sweep_blocks
   implicit none
   private
   public :: contact_newton_t
 
-  !> alpha at the start, its bounds, and what it is multiplied with after a proximal point found in few steps, in many, not found
+  !> alpha at the start and its bounds
   real(dp), parameter :: alpha_start = 1.0e-3_dp, alpha_least = 1.0e-13_dp, alpha_most = 10.0_dp
-  real(dp), parameter :: fall = 0.1_dp, hold = 1.5_dp, rise = 3.0_dp
-  !> steps to a proximal point that are few, that are not many, and the most
-  integer, parameter :: few_steps = 6, some_steps = 12, most_inner_steps = 25
-  !> what is left of |F| where a proximal point counts as found; a step that leaves more than `little_gain` gains little
-  real(dp), parameter :: found_point = 0.05_dp, little_gain = 0.3_dp
-  !> sweeps after such a step
-  integer, parameter :: smoothing_sweeps = 30
+  !> what it is multiplied with after a proximal point found in very few steps, in few, in many, not found
+  real(dp), parameter :: drop = 0.1_dp, fall = 0.7_dp, climb = 1.5_dp, rise = 3.0_dp
+  !> steps to a proximal point that are very few, few, not many, and the most
+  integer, parameter :: very_few_steps = 2, few_steps = 6, some_steps = 12, most_inner_steps = 25
+  !> what is left of |F| where a proximal point counts as found
+  real(dp), parameter :: found_point = 0.05_dp
   !> the line search compares with the greatest of so many last values, and halves the step so often at most
   integer, parameter :: memory = 5, most_halvings = 8
   real(dp), parameter :: sufficient = 1.0e-4_dp
@@ -105,10 +103,12 @@ contains
       if (success .or. found < before) self%centre(:, :) = self%x
       if (.not. success) then
         self%alpha = min(self%alpha*rise, alpha_most)
+      else if (taken <= very_few_steps) then
+        self%alpha = max(self%alpha*drop, alpha_least)
       else if (taken <= few_steps) then
         self%alpha = max(self%alpha*fall, alpha_least)
       else if (taken > some_steps) then
-        self%alpha = min(self%alpha*hold, alpha_most)
+        self%alpha = min(self%alpha*climb, alpha_most)
       end if
       before = found
     end do
@@ -158,7 +158,6 @@ contains
       steps = steps + 1
       if (.not. regular) exit
       call search_line(self, maxval(past), f)
-      if (f > max(goal, little_gain*maxval(past))) call smooth(self, f)
     end do
   end subroutine find_proximal_point
 
@@ -190,26 +189,5 @@ contains
     end if
     self%x(:, :) = self%trial
   end subroutine search_line
-
-  !> Sweeps on the proximal problem, kept where they bring F down.
-  subroutine smooth(self, f)
-    class(contact_newton_t), intent(inout) :: self
-    !> |F| at x
-    real(dp), intent(inout) :: f
-    real(dp) :: moved, before
-    integer :: k
-
-    before = f
-    self%trial(:, :) = self%x
-    do k = 1, smoothing_sweeps
-      call sweep_blocks(self%near, self%trial, moved)
-    end do
-    call self%law%evaluate(self%near, self%trial, f)
-    if (f <= before) then
-      self%x(:, :) = self%trial
-    else
-      call self%law%evaluate(self%near, self%x, f)
-    end if
-  end subroutine smooth
 
 end module gravier_contact_newton

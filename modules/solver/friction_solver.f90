@@ -1,5 +1,5 @@
-!> The methods for packed contact problems with any blocks, by name, and the choice among them: sweeps with momentum first, then
-!> Newton's method, and so on in turn with budgets that double, from the best impulses so far.
+!> The methods for packed contact problems with any blocks, by name, and the choice among them: sweeps with momentum as long as
+!> they promise a result soon, then Newton's method, and so on in turn with budgets that double, from the best impulses so far.
 module gravier_friction_solver
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
@@ -28,8 +28,8 @@ module gravier_friction_solver
     real(dp) :: literature = 0.0_dp, consistent = 0.0_dp
   end type friction_report_t
 
-  !> budgets of the first turn; turns in which they may double
-  integer, parameter :: first_sweeps = 200, first_steps = 20, most_doublings = 20
+  !> of the first turn: sweeps within which a result must be in sight, Newton's steps; turns in which they may double
+  integer, parameter :: first_patience = 2000, first_steps = 20, most_doublings = 20
   !> sweeps that leave more than this of the measure bring little
   real(dp), parameter :: little_gain = 0.5_dp
 
@@ -79,16 +79,16 @@ contains
     type(contact_newton_t) :: newton
     real(dp), allocatable :: best(:, :)
     real(dp) :: least, measure
-    integer :: turn, done, most_sweeps
+    integer :: turn, done, patience
 
     allocate (best(size(r, 1), size(r, 2)))
     best(:, :) = r
     least = huge(least)
-    most_sweeps = first_sweeps
+    patience = first_patience
     do turn = 0, huge(turn) - 1
-      call solve_by_sweeps(problem, control%tolerance, min(most_sweeps, left()), .true., r, done, measure)
+      call solve_by_sweeps(problem, control%tolerance, left(), .true., r, done, measure, patience)
       report%sweeps = report%sweeps + done
-      most_sweeps = merge(first_sweeps, 2*most_sweeps, measure > little_gain*least)
+      patience = merge(first_patience, 2*patience, measure > little_gain*least)
       call keep_best()
       if (least <= control%tolerance .or. left() == 0) exit
       if (turn == 0) call newton%init(problem, error)

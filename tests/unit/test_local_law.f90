@@ -99,7 +99,8 @@ contains
     real(dp), intent(out) :: defect
     real(dp) :: v(size(b)), scale, excess
 
-    v = matmul(w, r) + b
+    v = matmul(w, r)
+    v = v + b
     scale = norm2(b) + norm2(w)*norm2(r)
     excess = norm2(r(2:)) - mu*r(1)
     if (r(1) <= 0.0_dp) then
