@@ -552,7 +552,7 @@ contains
 
     pattern = ""
     do i = 1, len(path)
-      if (index("*?[", path(i:i)) > 0) pattern = pattern//""
+      if (index("*?[\", path(i:i)) > 0) pattern = pattern//"\"
       pattern = pattern//path(i:i)
     end do
   end function escaped

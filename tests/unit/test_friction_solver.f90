@@ -240,13 +240,17 @@ contains
     type(delassus_t) :: problem
     type(friction_report_t) :: report
     real(dp) :: r(3, 4*boxes), v(3, 4*boxes), weight, sliding
-    integer :: b, m
+    integer :: b, m, plain
 
     call make_stack(slope, friction, problem)
     weight = step*gravity/sqrt(1.0_dp + slope**2)
     sliding = weight*max(0.0_dp, slope - friction)
+    plain = 0
     do m = 1, size(methods)
       call solve(problem, trim(methods(m)), tolerance, r, report)
+      if (methods(m) == "nlgs") plain = report%sweeps
+      if (methods(m) == "momentum") call check(report%sweeps < plain, "stack: momentum spares sweeps")
+      print *, trim(methods(m)), report%sweeps, report%newton_steps
       call check(report%converged, "stack: "//trim(methods(m))//" converges")
       call problem%velocity(r, v)
       ! |defect| <= tolerance |q|, and the sum over a face is as well conditioned as the stack is high
