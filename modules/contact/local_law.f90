@@ -14,6 +14,10 @@ module gravier_local_law
 
   !> Newton's steps and bisections on the secular equation; bisections alone end after these
   integer, parameter :: most_steps = 120
+  !> |b_n|/|b| below which results are refined
+  real(dp), parameter :: small_approach = 1.0e-2_dp
+  !> a refinement that turns a direction by more [rad] is none
+  real(dp), parameter :: largest_turn = 1.0e-2_dp
 
 contains
 
@@ -46,7 +50,7 @@ contains
     end if
     r(1) = normal_impulse(w(1), w(1) + w(3)*ratio, b(1))
     r(2) = ratio*r(1)
-    if (sticks) call refine_stick_2d(w, b, r)
+    if (sticks .and. loses_digits(b)) call refine_stick_2d(w, b, r)
   end subroutine solve_law_2d
 
   !> Impulse of one contact in three dimensions.
@@ -74,8 +78,19 @@ contains
     r(1) = normal_impulse(w(1), w(1) + w(4)*ratio(1) + w(7)*ratio(2), b(1))
     r(2) = ratio(1)*r(1)
     r(3) = ratio(2)*r(1)
-    if (sticks) call refine_stick_3d(w, b, r)
+    if (.not. loses_digits(b)) return
+    if (sticks) then
+      call refine_stick_3d(w, b, r)
+    else if (mu > 0.0_dp) then
+      call refine_slip(w, b, mu, r)
+    end if
   end subroutine solve_law_3d
+
+  !> Whether the approach is so slow beside the slip that refinement pays: N p - c loses digits as |b|/|b_n|.
+  pure logical function loses_digits(b)
+    real(dp), intent(in) :: b(:)
+    loses_digits = abs(b(1)) < small_approach*maxval(abs(b))
+  end function loses_digits
 
   !> -b_n/(W_nn + W_nt p). Where the block is not positive definite there may be no solution: then without friction.
   pure real(dp) function normal_impulse(w_normal, w_along, b_normal) result(r_normal)
@@ -88,7 +103,42 @@ contains
     end if
   end function normal_impulse
 
-  !> One step of refinement of W r + b = 0: what rounding leaves grows with |b|/|b_n| otherwise.
+  !> One step of Newton's method on v_n = 0 and the part of v_t across r_t = 0, in r_n and the direction of r_t.
+  pure subroutine refine_slip(w, b, mu, r)
+    real(dp), intent(in) :: w(9), b(3), mu
+    real(dp), intent(inout) :: r(3)
+    real(dp) :: v(3), along(2), slope(4), load(2), change(2), length
+    logical :: regular
+
+    length = length_of(r(2:3))
+    if (length <= 0.0_dp) return
+    along = r(2:3)/length
+    v = b + w(1:3)*r(1) + w(4:6)*r(2) + w(7:9)*r(3)
+    ! derivatives of v_n, then of the part across, by r_n and by the length of arc on the unit disc
+    slope(1) = w(1) + mu*(w(4)*along(1) + w(7)*along(2))
+    slope(2) = across(w(2) + mu*(w(5)*along(1) + w(8)*along(2)), w(3) + mu*(w(6)*along(1) + w(9)*along(2)))
+    slope(3) = length*across(w(4), w(7))
+    slope(4) = length*across(across(w(5), w(8)), across(w(6), w(9))) - (along(1)*v(2) + along(2)*v(3))
+    load(1) = -v(1)
+    load(2) = -across(v(2), v(3))
+    call solve_shifted(slope, 0.0_dp, load, change, regular)
+    if (.not. regular .or. abs(change(2)) > largest_turn) return
+    r(1) = r(1) + change(1)
+    r(2) = along(1) - change(2)*along(2)
+    r(3) = along(2) + change(2)*along(1)
+    r(2:3) = r(2:3)*(mu*r(1)/length_of(r(2:3)))
+
+  contains
+
+    !> of a vector (t, s), the part at a right angle to the direction of r_t
+    pure real(dp) function across(t, s)
+      real(dp), intent(in) :: t, s
+      across = along(1)*s - along(2)*t
+    end function across
+
+  end subroutine refine_slip
+
+  !> One step of refinement of W r + b = 0.
   pure subroutine refine_stick_2d(w, b, r)
     real(dp), intent(in) :: w(4), b(2)
     real(dp), intent(inout) :: r(2)
@@ -142,7 +192,7 @@ contains
       if (inside) return
     end if
     ! |p| <= mu beyond `high`
-    high = norm2(c)/mu + norm2(n)
+    high = length_of(c)/mu + sqrt(n(1)**2 + n(2)**2 + n(3)**2 + n(4)**2)
     l = low
     do k = 1, most_steps
       call solve_shifted(n, l, c, p, regular)
@@ -150,7 +200,7 @@ contains
       if (.not. regular) then
         low = l
       else
-        length = norm2(p)
+        length = length_of(p)
         if (abs(length - mu) <= 2.0_dp*epsilon(mu)*mu) exit
         if (length > mu) then
           low = l
@@ -165,8 +215,14 @@ contains
       if (abs(next - l) <= epsilon(l)*abs(l)) exit
       l = next
     end do
-    p = p*(mu/norm2(p))
+    p = p*(mu/length_of(p))
   end subroutine solve_on_disc
+
+  !> |x|, faster than norm2
+  pure real(dp) function length_of(x)
+    real(dp), intent(in) :: x(2)
+    length_of = sqrt(x(1)**2 + x(2)**2)
+  end function length_of
 
   !> Greatest l for which N + l is singular; negative where there is none above 0.
   pure real(dp) function greatest_pole(n) result(pole)
@@ -204,7 +260,8 @@ contains
     real(dp), intent(in) :: mu
     real(dp) :: tangential
 
-    tangential = norm2(x(2:))
+    ! norm2 is slow for its care of overflow
+    tangential = sqrt(sum(x(2:)**2))
     if (tangential <= mu*x(1)) return
     if (mu*tangential <= -x(1)) then
       x(:) = 0.0_dp

@@ -72,7 +72,7 @@ contains
       return
     end if
     derivative(1) = 1.0_dp
-    length = norm2(x(2:))
+    length = sqrt(sum(x(2:)**2))
     if (length <= mu*x(1)) then
       do i = 2, d
         derivative(i + (i - 1)*d) = 1.0_dp

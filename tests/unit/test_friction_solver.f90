@@ -21,6 +21,8 @@ program test_friction_solver
   call check_jacobian(3)
   call check_stack(0.2_dp, 0.3_dp, sharp_methods)
   call check_stack(0.5_dp, 0.3_dp, friction_methods)
+  call check_turns()
+  call check_start_is_kept()
   call check_random(2)
   call check_random(3)
   call check_refusals()
@@ -29,9 +31,10 @@ program test_friction_solver
 contains
 
   !> Unit cubes one on the other on a plane that rises by the angle whose tangent is `slope`: four contacts at the corners of
-  !> each face, of frame n = z, t = x, s = y, twice as rough as those on the plane. W and q from the bodies.
-  subroutine make_stack(slope, friction, problem)
-    real(dp), intent(in) :: slope, friction
+  !> each face, of frame n = z, t = x, s = y, W and q from the bodies.
+  subroutine make_stack(slope, friction, between, problem)
+    !> between: friction of the boxes on each other
+    real(dp), intent(in) :: slope, friction, between
     type(delassus_t), intent(inout) :: problem
     real(dp) :: h(6*boxes, 12*boxes), w(12*boxes, 12*boxes), free(6*boxes), q(12*boxes), mu(4*boxes)
     real(dp) :: corner(3)
@@ -52,8 +55,7 @@ contains
         if (b > 1) call add_wrench(h(6*b - 11:6*b - 6, k + 1:k + 3), corner, -1.0_dp)
       end do
     end do
-    ! at the same friction everywhere, boxes that slide as one would be about to slide on each other
-    mu = 2.0_dp*friction
+    mu = between
     mu(1:4) = friction
     ! the inertia of a cube of side 1 is m/6
     w = 0.0_dp
@@ -242,7 +244,8 @@ contains
     real(dp) :: r(3, 4*boxes), v(3, 4*boxes), weight, sliding
     integer :: b, m, plain
 
-    call make_stack(slope, friction, problem)
+    ! at the same friction everywhere, boxes that slide as one would be about to slide on each other
+    call make_stack(slope, friction, 2.0_dp*friction, problem)
     weight = step*gravity/sqrt(1.0_dp + slope**2)
     sliding = weight*max(0.0_dp, slope - friction)
     plain = 0
@@ -250,7 +253,6 @@ contains
       call solve(problem, trim(methods(m)), tolerance, r, report)
       if (methods(m) == "nlgs") plain = report%sweeps
       if (methods(m) == "momentum") call check(report%sweeps < plain, "stack: momentum spares sweeps")
-      print *, trim(methods(m)), report%sweeps, report%newton_steps
       call check(report%converged, "stack: "//trim(methods(m))//" converges")
       call problem%velocity(r, v)
       ! |defect| <= tolerance |q|, and the sum over a face is as well conditioned as the stack is high
@@ -262,6 +264,50 @@ contains
       call check_close(maxval(abs(v(:, 5:))), 0.0_dp, 1.0e-7_dp*weight, "stack: boxes rest on each other")
     end do
   end subroutine check_stack
+
+  !> Boxes about to slide on each other while they slide as one: sweeps creep, the default goes on with Newton's method.
+  subroutine check_turns()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    real(dp) :: r(3, 4*boxes)
+
+    call make_stack(0.5_dp, 0.3_dp, 0.3_dp, problem)
+    call solve(problem, "nlgs", 1.0e-11_dp, r, report)
+    call check(.not. report%converged, "sweeps creep")
+    call solve(problem, "auto", 1.0e-11_dp, r, report)
+    call check(report%converged, "sweeps and Newton's steps in turn converge")
+    call check(report%newton_steps > 0, "by Newton's steps")
+    call check(report%sweeps + report%newton_steps < 5000, "soon")
+  end subroutine check_turns
+
+  !> Proximal points: of the many solutions of a stack, that near the start is found, self-stress included.
+  subroutine check_start_is_kept()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    type(friction_control_t) :: control
+    type(error_t), allocatable :: error
+    real(dp) :: r(3, 4*boxes), first(3, 4*boxes), weightless(3, 4*boxes)
+    integer :: a, i
+
+    call make_stack(0.1_dp, 0.5_dp, 0.5_dp, problem)
+    do a = 1, 4*boxes
+      do i = 1, 3
+        r(i, a) = 0.05_dp*merge(1.0_dp, 0.5_dp, i == 1)*hash_uniform(6, int(a, i8), i)
+      end do
+    end do
+    control%method = "newton"
+    control%tolerance = 1.0e-7_dp
+    call solve_friction(problem, control, r, report, error)
+    call check(report%converged, "a stack under self-stress")
+    first = r
+    control%tolerance = 1.0e-11_dp
+    call solve_friction(problem, control, r, report, error)
+    call check(report%converged, "the same, more exactly")
+    call check_close(maxval(abs(r - first)), 0.0_dp, 1.0e-4_dp*maxval(abs(first)), "self-stress stays")
+    weightless = 0.0_dp
+    call solve_friction(problem, control, weightless, report, error)
+    call check(maxval(abs(weightless - first)) > 1.0e-2_dp*maxval(abs(first)), "another start, another self-stress")
+  end subroutine check_start_is_kept
 
   !> Every method on problems with more and with less motions than impulses, symmetric or not: the law itself.
   subroutine check_random(dimension)
@@ -326,7 +372,7 @@ contains
     type(error_t), allocatable :: error
     real(dp) :: r(3, 4*boxes)
 
-    call make_stack(0.2_dp, 0.3_dp, problem)
+    call make_stack(0.2_dp, 0.3_dp, 0.6_dp, problem)
     control%method = "auto"
     control%max_iterations = 3
     r = 0.0_dp
