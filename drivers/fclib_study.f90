@@ -33,7 +33,7 @@ contains
       allocate (local)
       call condense(global, local, reason)
     end if
-    call problem%init(local%dimension, local%w%row_start, local%w%column, local%w%value, local%q, local%mu, reason)
+    call problem%init(local%dimension, local%w, local%q, local%mu, reason)
     if (allocated(reason)) call raise(error, status_input, path//": "//reason%message)
   end subroutine read_problem
 

@@ -6,7 +6,17 @@ module gravier_block_sweeps
   use gravier_local_law, only: solve_law_2d, solve_law_3d, project_on_cone
   implicit none
   private
-  public :: sweep_blocks, solve_by_sweeps
+  public :: sweep_control_t, sweep_blocks, solve_by_sweeps
+
+  type :: sweep_control_t
+    !> on the consistent measure of gravier_delassus
+    real(dp) :: tolerance = 1.0e-8_dp
+    integer :: most_sweeps = 100000
+    !> extrapolate the impulses between sweeps
+    logical :: momentum = .false.
+    !> end when the gain of the last sweeps promises no result within so many more
+    integer :: patience = huge(1)
+  end type sweep_control_t
 
   !> the measure is taken when a sweep moves impulses by less than so many tolerances
   real(dp), parameter :: near_tolerance = 4.0_dp
@@ -16,49 +26,42 @@ module gravier_block_sweeps
 contains
 
   !> Sweep until the consistent measure of gravier_delassus meets the tolerance, the budget is spent, or patience.
-  subroutine solve_by_sweeps(problem, tolerance, most_sweeps, momentum, r, sweeps, measure, patience)
+  subroutine solve_by_sweeps(problem, control, r, sweeps, measure)
     type(delassus_t), intent(in) :: problem
-    real(dp), intent(in) :: tolerance
-    integer, intent(in) :: most_sweeps
-    !> extrapolate the impulses between sweeps
-    logical, intent(in) :: momentum
+    type(sweep_control_t), intent(in) :: control
     !> impulses: start in, result out (dimension, contacts)
     real(dp), intent(inout), contiguous :: r(:, :)
     integer, intent(out) :: sweeps
     !> of the result
     real(dp), intent(out) :: measure
-    !> end when the gain of the last sweeps promises no result within so many more; absent: never
-    integer, intent(in), optional :: patience
     real(dp), allocatable :: v(:, :), previous(:, :)
     real(dp) :: moved, moved_before, least, least_before, t, ignored
 
-    allocate (v(size(r, 1), size(r, 2)), previous(size(r, 1), merge(size(r, 2), 0, momentum)))
-    if (momentum) previous(:, :) = r
+    allocate (v(size(r, 1), size(r, 2)), previous(size(r, 1), merge(size(r, 2), 0, control%momentum)))
+    if (control%momentum) previous(:, :) = r
     t = 1.0_dp
     moved_before = huge(moved)
     least = huge(least)
     least_before = huge(least)
     sweeps = 0
     do
-      if (sweeps == most_sweeps) exit
+      if (sweeps == control%most_sweeps) exit
       call sweep_blocks(problem, r, moved)
       sweeps = sweeps + 1
-      if (moved <= near_tolerance*tolerance .or. sweeps == 1) then
+      if (moved <= near_tolerance*control%tolerance .or. sweeps == 1) then
         if (reached()) return
       end if
-      if (momentum) call extrapolate(problem, moved > moved_before, t, previous, r)
+      if (control%momentum) call extrapolate(problem, moved > moved_before, t, previous, r)
       moved_before = moved
       least = min(least, moved)
       if (mod(sweeps, window) == 0) then
-        if (present(patience)) then
-          if (.not. promising(least_before, least, tolerance, patience)) exit
-        end if
+        if (.not. promising(least_before, least, control)) exit
         least_before = least
         least = huge(least)
       end if
     end do
     ! extrapolated impulses are no result
-    if (momentum .and. sweeps > 0) r(:, :) = previous
+    if (control%momentum .and. sweeps > 0) r(:, :) = previous
     if (reached()) return
 
   contains
@@ -66,18 +69,18 @@ contains
     logical function reached()
       call problem%velocity(r, v)
       call problem%measure(r, v, ignored, measure)
-      reached = measure <= tolerance
+      reached = measure <= control%tolerance
     end function reached
 
   end subroutine solve_by_sweeps
 
-  !> Whether a figure that fell so far in a window comes down to the tolerance within so many sweeps at this rate.
-  pure logical function promising(before, after, tolerance, sweeps)
-    real(dp), intent(in) :: before, after, tolerance
-    integer, intent(in) :: sweeps
+  !> Whether a figure that fell so far in a window comes down to the tolerance soon enough at this rate.
+  pure logical function promising(before, after, control)
+    real(dp), intent(in) :: before, after
+    type(sweep_control_t), intent(in) :: control
 
-    promising = after <= tolerance
-    if (.not. promising) promising = window*(log(after) - log(tolerance)) <= sweeps*(log(before) - log(after))
+    promising = after <= control%tolerance .or. control%patience == huge(control%patience)
+    if (.not. promising) promising = window*(log(after) - log(control%tolerance)) <= control%patience*(log(before) - log(after))
   end function promising
 
   !> Nesterov's extrapolation x + beta (x - previous), brought back to the cones; none, and a fresh start, where the last sweep
@@ -123,19 +126,18 @@ contains
     real(dp) :: scale
 
     if (problem%dimension == 2) then
-      call sweep_2d(problem%n_contacts, problem%first, problem%other, problem%coupling, problem%own, problem, r, moved)
+      call sweep_2d(problem%first, problem%other, problem%coupling, problem, r, moved)
     else
-      call sweep_3d(problem%n_contacts, problem%first, problem%other, problem%coupling, problem%own, problem, r, moved)
+      call sweep_3d(problem%first, problem%other, problem%coupling, problem, r, moved)
     end if
     scale = norm2(problem%q)
     moved = sqrt(moved)
     if (scale > 0.0_dp) moved = moved/scale
   end subroutine sweep_blocks
 
-  pure subroutine sweep_2d(n, first, other, coupling, own, problem, r, moved)
-    integer, intent(in) :: n
+  pure subroutine sweep_2d(first, other, coupling, problem, r, moved)
     integer, intent(in), contiguous :: first(:), other(:)
-    real(dp), intent(in), contiguous :: coupling(:, :), own(:, :)
+    real(dp), intent(in), contiguous :: coupling(:, :)
     type(delassus_t), intent(in) :: problem
     real(dp), intent(inout), contiguous :: r(:, :)
     real(dp), intent(out) :: moved
@@ -143,7 +145,7 @@ contains
     integer :: a, k
 
     moved = 0.0_dp
-    do a = 1, n
+    do a = 1, size(first) - 1
       b(1) = problem%q(1, a)
       b(2) = problem%q(2, a)
       do k = first(a), first(a + 1) - 1
@@ -152,17 +154,16 @@ contains
         b(1) = b(1) + coupling(1, k)*x1 + coupling(3, k)*x2
         b(2) = b(2) + coupling(2, k)*x1 + coupling(4, k)*x2
       end do
-      call solve_law_2d(own(:, a), b, problem%mu(a), new)
+      call solve_law_2d(problem%own(:, a), b, problem%mu(a), new)
       moved = moved + problem%stiffness(a)**2*((new(1) - r(1, a))**2 + (new(2) - r(2, a))**2)
       r(1, a) = new(1)
       r(2, a) = new(2)
     end do
   end subroutine sweep_2d
 
-  pure subroutine sweep_3d(n, first, other, coupling, own, problem, r, moved)
-    integer, intent(in) :: n
+  pure subroutine sweep_3d(first, other, coupling, problem, r, moved)
     integer, intent(in), contiguous :: first(:), other(:)
-    real(dp), intent(in), contiguous :: coupling(:, :), own(:, :)
+    real(dp), intent(in), contiguous :: coupling(:, :)
     type(delassus_t), intent(in) :: problem
     real(dp), intent(inout), contiguous :: r(:, :)
     real(dp), intent(out) :: moved
@@ -170,7 +171,7 @@ contains
     integer :: a, k
 
     moved = 0.0_dp
-    do a = 1, n
+    do a = 1, size(first) - 1
       b(1) = problem%q(1, a)
       b(2) = problem%q(2, a)
       b(3) = problem%q(3, a)
@@ -182,7 +183,7 @@ contains
         b(2) = b(2) + coupling(2, k)*x1 + coupling(5, k)*x2 + coupling(8, k)*x3
         b(3) = b(3) + coupling(3, k)*x1 + coupling(6, k)*x2 + coupling(9, k)*x3
       end do
-      call solve_law_3d(own(:, a), b, problem%mu(a), new)
+      call solve_law_3d(problem%own(:, a), b, problem%mu(a), new)
       moved = moved + problem%stiffness(a)**2*((new(1) - r(1, a))**2 + (new(2) - r(2, a))**2 + (new(3) - r(3, a))**2)
       r(1, a) = new(1)
       r(2, a) = new(2)

@@ -3,7 +3,8 @@
 module gravier_condensation
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_fclib_file, only: fclib_matrix_t, fclib_local_t, fclib_global_t, compressed_rows
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, transposed
+  use gravier_fclib_file, only: fclib_local_t, fclib_global_t
   use gravier_sparse_direct, only: sparse_factor_t
   implicit none
   private
@@ -28,7 +29,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(sparse_factor_t) :: factor
     type(error_t), allocatable :: reason
-    type(fclib_matrix_t) :: columns
+    type(sparse_rows_t) :: columns
     type(entries_t) :: w
     real(dp), allocatable :: x(:, :)
     integer :: first, last, n_contact
@@ -70,10 +71,10 @@ contains
     allocate (row(m + 2*size(global%g%value)), column(m + 2*size(global%g%value)), value(m + 2*size(global%g%value)))
     m = 0
     do i = 1, n
-      do k = global%m%row_start(i), global%m%row_start(i + 1) - 1
+      do k = global%m%start(i), global%m%start(i + 1) - 1
         call put(i, global%m%column(k), global%m%value(k))
       end do
-      do k = global%g%row_start(i), global%g%row_start(i + 1) - 1
+      do k = global%g%start(i), global%g%start(i + 1) - 1
         call put(i, n + global%g%column(k), -global%g%value(k))
         call put(n + global%g%column(k), i, global%g%value(k))
       end do
@@ -97,7 +98,7 @@ contains
   !> Columns first to last of W; entries that are exactly 0 are left out.
   subroutine solve_columns(h, columns, factor, first, last, w, error)
     !> H, and its transpose
-    type(fclib_matrix_t), intent(in) :: h, columns
+    type(sparse_rows_t), intent(in) :: h, columns
     type(sparse_factor_t), intent(inout) :: factor
     integer, intent(in) :: first, last
     type(entries_t), intent(inout) :: w
@@ -110,7 +111,7 @@ contains
     x(:, :) = 0.0_dp
     none(:) = 0.0_dp
     do j = first, last
-      do k = columns%row_start(j), columns%row_start(j + 1) - 1
+      do k = columns%start(j), columns%start(j + 1) - 1
         i = columns%column(k)
         x(i, j - first + 1) = x(i, j - first + 1) + columns%value(k)
       end do
@@ -119,14 +120,14 @@ contains
     do j = first, last
       call add_transposed(h, x(:, j - first + 1), none, column)
       do i = 1, size(column)
-        if (abs(column(i)) > 0.0_dp) call append(w, i - 1, j - 1, column(i))
+        if (abs(column(i)) > 0.0_dp) call append(w, i, j, column(i))
       end do
     end do
   end subroutine solve_columns
 
   !> y = H^T x + w.
   pure subroutine add_transposed(h, x, w, y)
-    type(fclib_matrix_t), intent(in) :: h
+    type(sparse_rows_t), intent(in) :: h
     !> (n_rows or more), (n_columns)
     real(dp), intent(in), contiguous :: x(:), w(:)
     real(dp), intent(out), contiguous :: y(:)
@@ -134,27 +135,13 @@ contains
 
     y(:) = w
     do i = 1, h%n_rows
-      do k = h%row_start(i), h%row_start(i + 1) - 1
+      do k = h%start(i), h%start(i + 1) - 1
         y(h%column(k)) = y(h%column(k)) + h%value(k)*x(i)
       end do
     end do
   end subroutine add_transposed
 
-  pure function transposed(h) result(columns)
-    type(fclib_matrix_t), intent(in) :: h
-    type(fclib_matrix_t) :: columns
-    integer, allocatable :: row(:), column(:)
-    integer :: i
-
-    allocate (row(size(h%column)), column(size(h%column)))
-    do i = 1, h%n_rows
-      column(h%row_start(i):h%row_start(i + 1) - 1) = i - 1
-    end do
-    row(:) = h%column - 1
-    columns = compressed_rows(h%n_columns, h%n_rows, row, column, h%value)
-  end function transposed
-
-  !> One more entry, numbered from 0; the room doubles when it is full.
+  !> One more entry; the room doubles when it is full.
   pure subroutine append(entries, row, column, value)
     type(entries_t), intent(inout) :: entries
     integer, intent(in) :: row, column

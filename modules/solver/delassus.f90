@@ -4,6 +4,7 @@ module gravier_delassus
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_sparse_rows, only: sparse_rows_t
   use gravier_local_law, only: project_on_cone
   implicit none
   private
@@ -30,13 +31,12 @@ module gravier_delassus
 
 contains
 
-  !> Pack a matrix given by compressed rows. A contact that no impulse can move raises an error.
-  subroutine delassus_init(self, dimension, row_start, column, value, q, mu, error)
+  !> Pack a problem. A contact that its own impulse cannot move raises an error.
+  subroutine delassus_init(self, dimension, w, q, mu, error)
     class(delassus_t), intent(inout) :: self
     integer, intent(in) :: dimension
-    !> entries row_start(i) to row_start(i + 1) - 1 are those of row i; entries of the same place add up
-    integer, intent(in), contiguous :: row_start(:), column(:)
-    real(dp), intent(in), contiguous :: value(:)
+    !> (dimension*contacts, dimension*contacts)
+    type(sparse_rows_t), intent(in) :: w
     !> (dimension*contacts), (contacts)
     real(dp), intent(in), contiguous :: q(:), mu(:)
     type(error_t), allocatable, intent(inout) :: error
@@ -48,8 +48,8 @@ contains
     self%n_contacts = size(mu)
     allocate (self%q(dimension, size(mu)), self%stiffness(size(mu)), self%own(dimension**2, size(mu)))
     self%mu = mu
-    call find_blocks(self, row_start, column, value)
-    call fill_blocks(self, row_start, column, value)
+    call find_blocks(self, w)
+    call fill_blocks(self, w)
     do a = 1, self%n_contacts
       self%q(:, a) = q((a - 1)*dimension + 1:a*dimension)
       self%stiffness(a) = 0.0_dp
@@ -63,10 +63,9 @@ contains
   end subroutine delassus_init
 
   !> List the pairs of contacts that entries other than 0 couple.
-  subroutine find_blocks(self, row_start, column, value)
+  subroutine find_blocks(self, w)
     type(delassus_t), intent(inout) :: self
-    integer, intent(in), contiguous :: row_start(:), column(:)
-    real(dp), intent(in), contiguous :: value(:)
+    type(sparse_rows_t), intent(in) :: w
     integer, allocatable :: seen_from(:), found(:)
     integer :: a, b, k, n, pass
 
@@ -76,9 +75,9 @@ contains
       n = 0
       do a = 1, self%n_contacts
         self%first(a) = n + 1
-        do k = row_start((a - 1)*self%dimension + 1), row_start(a*self%dimension + 1) - 1
-          b = (column(k) - 1)/self%dimension + 1
-          if (b == a .or. seen_from(b) == a .or. abs(value(k)) <= 0.0_dp) cycle
+        do k = w%start((a - 1)*self%dimension + 1), w%start(a*self%dimension + 1) - 1
+          b = (w%column(k) - 1)/self%dimension + 1
+          if (b == a .or. seen_from(b) == a .or. abs(w%value(k)) <= 0.0_dp) cycle
           seen_from(b) = a
           n = n + 1
           if (pass == 2) found(n) = b
@@ -94,10 +93,9 @@ contains
     allocate (self%coupling(self%dimension**2, n))
   end subroutine find_blocks
 
-  subroutine fill_blocks(self, row_start, column, value)
+  subroutine fill_blocks(self, w)
     type(delassus_t), intent(inout) :: self
-    integer, intent(in), contiguous :: row_start(:), column(:)
-    real(dp), intent(in), contiguous :: value(:)
+    type(sparse_rows_t), intent(in) :: w
     integer, allocatable :: place(:)
     integer :: a, b, i, k, d, entry
 
@@ -111,13 +109,13 @@ contains
         place(self%other(k)) = k
       end do
       do i = 1, d
-        do k = row_start((a - 1)*d + i), row_start((a - 1)*d + i + 1) - 1
-          b = (column(k) - 1)/d + 1
-          entry = i + mod(column(k) - 1, d)*d
+        do k = w%start((a - 1)*d + i), w%start((a - 1)*d + i + 1) - 1
+          b = (w%column(k) - 1)/d + 1
+          entry = i + mod(w%column(k) - 1, d)*d
           if (b == a) then
-            self%own(entry, a) = self%own(entry, a) + value(k)
-          else if (abs(value(k)) > 0.0_dp) then
-            self%coupling(entry, place(b)) = self%coupling(entry, place(b)) + value(k)
+            self%own(entry, a) = self%own(entry, a) + w%value(k)
+          else if (abs(w%value(k)) > 0.0_dp) then
+            self%coupling(entry, place(b)) = self%coupling(entry, place(b)) + w%value(k)
           end if
         end do
       end do
@@ -146,21 +144,20 @@ contains
     real(dp), intent(out), contiguous :: v(:, :)
 
     if (self%dimension == 2) then
-      call multiply_2d(self%n_contacts, self%first, self%other, self%coupling, self%own, self%q, r, v)
+      call multiply_2d(self%first, self%other, self%coupling, self%own, self%q, r, v)
     else
-      call multiply_3d(self%n_contacts, self%first, self%other, self%coupling, self%own, self%q, r, v)
+      call multiply_3d(self%first, self%other, self%coupling, self%own, self%q, r, v)
     end if
   end subroutine delassus_velocity
 
-  pure subroutine multiply_2d(n, first, other, coupling, own, q, r, v)
-    integer, intent(in) :: n
+  pure subroutine multiply_2d(first, other, coupling, own, q, r, v)
     integer, intent(in), contiguous :: first(:), other(:)
     real(dp), intent(in), contiguous :: coupling(:, :), own(:, :), q(:, :), r(:, :)
     real(dp), intent(out), contiguous :: v(:, :)
     real(dp) :: s1, s2, x1, x2
     integer :: a, k
 
-    do a = 1, n
+    do a = 1, size(first) - 1
       x1 = r(1, a)
       x2 = r(2, a)
       s1 = q(1, a) + own(1, a)*x1 + own(3, a)*x2
@@ -176,15 +173,14 @@ contains
     end do
   end subroutine multiply_2d
 
-  pure subroutine multiply_3d(n, first, other, coupling, own, q, r, v)
-    integer, intent(in) :: n
+  pure subroutine multiply_3d(first, other, coupling, own, q, r, v)
     integer, intent(in), contiguous :: first(:), other(:)
     real(dp), intent(in), contiguous :: coupling(:, :), own(:, :), q(:, :), r(:, :)
     real(dp), intent(out), contiguous :: v(:, :)
     real(dp) :: s1, s2, s3, x1, x2, x3
     integer :: a, k
 
-    do a = 1, n
+    do a = 1, size(first) - 1
       x1 = r(1, a)
       x2 = r(2, a)
       x3 = r(3, a)

@@ -4,7 +4,7 @@ module gravier_friction_solver
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_delassus, only: delassus_t
-  use gravier_block_sweeps, only: solve_by_sweeps
+  use gravier_block_sweeps, only: sweep_control_t, solve_by_sweeps
   use gravier_contact_newton, only: contact_newton_t
   implicit none
   private
@@ -44,14 +44,15 @@ contains
     type(friction_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
     real(dp), allocatable :: v(:, :)
+    type(sweep_control_t) :: sweeping
     type(contact_newton_t) :: newton
     real(dp) :: measure
 
     if (allocated(error)) return
     select case (control%method)
     case ("nlgs", "momentum")
-      call solve_by_sweeps(problem, control%tolerance, control%max_iterations, control%method == "momentum", r, &
-        & report%sweeps, measure)
+      sweeping = sweep_control_t(control%tolerance, control%max_iterations, control%method == "momentum")
+      call solve_by_sweeps(problem, sweeping, r, report%sweeps, measure)
     case ("newton")
       call newton%init(problem, error)
       if (.not. allocated(error)) call newton%solve(problem, control%tolerance, control%max_iterations, r, &
@@ -79,16 +80,18 @@ contains
     type(contact_newton_t) :: newton
     real(dp), allocatable :: best(:, :)
     real(dp) :: least, measure
-    integer :: turn, done, patience
+    type(sweep_control_t) :: sweeping
+    integer :: turn, done
 
     allocate (best(size(r, 1), size(r, 2)))
     best(:, :) = r
     least = huge(least)
-    patience = first_patience
+    sweeping = sweep_control_t(control%tolerance, control%max_iterations, .true., first_patience)
     do turn = 0, huge(turn) - 1
-      call solve_by_sweeps(problem, control%tolerance, left(), .true., r, done, measure, patience)
+      sweeping%most_sweeps = left()
+      call solve_by_sweeps(problem, sweeping, r, done, measure)
       report%sweeps = report%sweeps + done
-      patience = merge(first_patience, 2*patience, measure > little_gain*least)
+      sweeping%patience = merge(first_patience, 2*sweeping%patience, measure > little_gain*least)
       call keep_best()
       if (least <= control%tolerance .or. left() == 0) exit
       if (turn == 0) call newton%init(problem, error)

@@ -3,6 +3,7 @@
 program test_friction_solver
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows
   use gravier_random_hash, only: hash_uniform
   use gravier_delassus, only: delassus_t
   use gravier_alart_curnier, only: alart_curnier_t
@@ -96,19 +97,21 @@ contains
     real(dp), intent(in), contiguous :: q(:), mu(:)
     type(delassus_t), intent(inout) :: problem
     type(error_t), allocatable :: error
-    integer :: row_start(size(q) + 1), column(size(q)**2), i, n
-    real(dp) :: value(size(q)**2)
+    type(sparse_rows_t) :: rows
+    integer :: row(size(w)), column(size(w)), i, j, k
+    real(dp) :: value(size(w))
 
-    n = size(q)
-    do i = 1, n
-      row_start(i) = n*(i - 1) + 1
-      value(n*(i - 1) + 1:n*i) = w(i, :)
+    k = 0
+    do j = 1, size(w, 2)
+      do i = 1, size(w, 1)
+        k = k + 1
+        row(k) = i
+        column(k) = j
+        value(k) = w(i, j)
+      end do
     end do
-    do i = 1, n**2
-      column(i) = 1 + mod(i - 1, n)
-    end do
-    row_start(n + 1) = n**2 + 1
-    call problem%init(dimension, row_start, column, value, q, mu, error)
+    rows = compressed_rows(size(w, 1), size(w, 2), row, column, value)
+    call problem%init(dimension, rows, q, mu, error)
     call check(.not. allocated(error), "a problem of contacts is packed")
   end subroutine pack
 
@@ -144,13 +147,14 @@ contains
   !> v = W r + q of the packed problem.
   subroutine check_packing()
     type(delassus_t) :: problem
+    type(sparse_rows_t) :: w
     type(error_t), allocatable :: error
     real(dp) :: r(2, 2), v(2, 2)
 
-    ! W by rows, an entry in two parts, a coupling that is 0
-    call problem%init(2, [1, 4, 7, 10, 12], [1, 2, 1, 1, 2, 4, 1, 3, 4, 3, 4], &
-      & [1.0_dp, 0.5_dp, 1.0_dp, 0.5_dp, 3.0_dp, 7.0_dp, 0.0_dp, 4.0_dp, 0.0_dp, 0.0_dp, 5.0_dp], &
-      & [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp], [0.3_dp, 0.3_dp], error)
+    ! an entry in two parts, a coupling that is 0
+    w = compressed_rows(4, 4, [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4], [1, 2, 1, 1, 2, 4, 1, 3, 4, 3, 4], &
+      & [1.0_dp, 0.5_dp, 1.0_dp, 0.5_dp, 3.0_dp, 7.0_dp, 0.0_dp, 4.0_dp, 0.0_dp, 0.0_dp, 5.0_dp])
+    call problem%init(2, w, [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp], [0.3_dp, 0.3_dp], error)
     call check(.not. allocated(error), "a matrix by rows is packed")
     r(:, 1) = [1.0_dp, 10.0_dp]
     r(:, 2) = [100.0_dp, 1000.0_dp]
@@ -369,6 +373,7 @@ contains
     type(delassus_t) :: problem
     type(friction_control_t) :: control
     type(friction_report_t) :: report
+    type(sparse_rows_t) :: w
     type(error_t), allocatable :: error
     real(dp) :: r(3, 4*boxes)
 
@@ -383,7 +388,8 @@ contains
     call solve_friction(problem, control, r, report, error)
     call check(allocated(error), "a method that does not exist")
     deallocate (error)
-    call problem%init(2, [1, 2, 3], [1, 2], [0.0_dp, 1.0_dp], [1.0_dp, 1.0_dp], [0.3_dp], error)
+    w = compressed_rows(2, 2, [1, 2], [1, 2], [0.0_dp, 1.0_dp])
+    call problem%init(2, w, [1.0_dp, 1.0_dp], [0.3_dp], error)
     call check(allocated(error), "a contact whose normal impulse moves nothing")
   end subroutine check_refusals
 
