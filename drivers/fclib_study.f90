@@ -37,12 +37,13 @@ contains
     if (allocated(reason)) call raise(error, status_input, path//": "//reason%message)
   end subroutine read_problem
 
-  !> Solve from zero impulses; processor time of the solve alone.
-  subroutine solve_timed(problem, control, r, report, seconds, error)
+  !> Solve; processor time of the solve alone.
+  subroutine solve_timed(problem, control, start, r, report, seconds, error)
     type(delassus_t), intent(in) :: problem
     type(friction_control_t), intent(in) :: control
-    !> result (dimension, contacts)
-    real(dp), allocatable, intent(inout) :: r(:, :)
+    !> impulses to start from, result (dimension, contacts)
+    real(dp), intent(in), contiguous :: start(:, :)
+    real(dp), intent(out), contiguous :: r(:, :)
     type(friction_report_t), intent(out) :: report
     real(dp), intent(out) :: seconds
     type(error_t), allocatable, intent(inout) :: error
@@ -50,11 +51,10 @@ contains
     integer :: n
 
     seconds = 0.0_dp
-    if (allocated(r)) deallocate (r)
-    allocate (r(problem%dimension, problem%n_contacts))
+    r(:, :) = start
     n = 0
     do while (n < most_repeats .and. .not. allocated(error))
-      r(:, :) = 0.0_dp
+      r(:, :) = start
       call cpu_time(before)
       call solve_friction(problem, control, r, report, error)
       call cpu_time(after)

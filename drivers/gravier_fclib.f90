@@ -23,6 +23,7 @@ program gravier_fclib
     & "                       several with commas between, or all"//nl// &
     & "  --tolerance T        on es, the unit-consistent measure of the defect (1e-8)"//nl// &
     & "  --max-iterations N   sweeps and Newton steps of one solve (100000)"//nl// &
+    & "  --warm               start from the impulses in the file, its solution or first guess, where it has some"//nl// &
     & "  --csv FILE           the results as a table"//nl// &
     & "  --profile FILE       performance profile of the methods, as a table"//nl// &
     & "  --write DIR          each problem, reduced to its contacts, with the impulses found by the method named last"//nl// &
@@ -30,7 +31,7 @@ program gravier_fclib
     & "exit status: 0 all solved; 2 bad input or usage; 3 a solve did not reach its tolerance; 4 anything else"
 
   type :: options_t
-    logical :: help = .false.
+    logical :: help = .false., warm = .false.
     character(len=8), allocatable :: methods(:)
     real(dp) :: tolerance = 1.0e-8_dp
     integer :: max_iterations = 100000
@@ -82,6 +83,8 @@ contains
       select case (argument(k))
       case ("--help", "-h")
         options%help = .true.
+      case ("--warm")
+        options%warm = .true.
       case ("--method", "--tolerance", "--max-iterations", "--csv", "--profile", "--write")
         call read_value(options, k, error)
         k = k + 1
@@ -251,20 +254,23 @@ contains
     type(csv_writer_t), intent(inout) :: table
     type(error_t), allocatable, intent(inout) :: error
     type(friction_control_t) :: control
-    real(dp), allocatable :: r(:, :), v(:, :)
+    real(dp), allocatable :: start(:, :), r(:, :), v(:, :)
     character(len=:), allocatable :: name
     integer :: m
 
     name = path(index(path, "/", back=.true.) + 1:)
     control%tolerance = options%tolerance
     control%max_iterations = options%max_iterations
+    allocate (start(problem%dimension, problem%n_contacts), r(problem%dimension, problem%n_contacts))
+    start(:, :) = 0.0_dp
+    if (options%warm .and. allocated(local%r)) start(:, :) = local%r
     do m = 1, size(options%methods)
       control%method = trim(options%methods(m))
       results(m)%problem = name
       results(m)%method = control%method
       results(m)%dimension = problem%dimension
       results(m)%contacts = problem%n_contacts
-      call solve_timed(problem, control, r, results(m)%report, results(m)%seconds, error)
+      call solve_timed(problem, control, start, r, results(m)%report, results(m)%seconds, error)
       call comm%agree(error)
       if (allocated(error)) return
       if (comm%rank /= 0) cycle

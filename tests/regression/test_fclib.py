@@ -175,6 +175,18 @@ class Fclib(RunTestCase):
             self.assertEqual([int(local[f"W/{key}"][0]) for key in ("m", "n", "nz", "nzmax")], [12, 12, -2, len(local["W/x"])])
             self.assertEqual(int(local["spacedim"][0]), 2)
 
+    def test_warm_start(self):
+        write_local(self.path("a.h5"), *local_problem())
+        self.solve("a.h5", "--write", "solved", "--tolerance", "1e-9")
+        with h5py.File(self.path("solved/a.h5")) as file, h5py.File(self.path("a.h5"), "a") as cold:
+            cold["fclib_local/guesses/1/r"] = file["fclib_local/solution/r"][()]
+        for path in ("solved/a.h5", "a.h5"):
+            self.solve(path, "--csv", "cold.csv")
+            self.solve(path, "--warm", "--csv", "warm.csv")
+            self.assertGreater(int(read_table(self.path("cold.csv"))["sweeps"][0]), 10)
+            # the first check of a start that is a solution already
+            self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"])
+
     def test_global_problems_are_reduced(self):
         m, h, f, mu = box_stack()
         shift = np.tile([1e-3, 2e-3, -1e-3], len(mu))

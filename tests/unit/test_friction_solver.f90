@@ -1,6 +1,7 @@
 !> Packed contact problems with full blocks: evaluation, measures, and every method on a stack of boxes, whose contacts are more
 !> than its bodies can tell apart, and on random problems.
 program test_friction_solver
+  use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows
@@ -16,6 +17,7 @@ program test_friction_solver
   integer, parameter :: boxes = 3
   character(len=*), parameter :: sharp_methods(2) = [character(len=8) :: "auto", "newton"]
 
+  call MPI_Init()
   call check_packing()
   call check_units()
   call check_jacobian(2)
@@ -24,10 +26,13 @@ program test_friction_solver
   call check_stack(0.5_dp, 0.3_dp, friction_methods)
   call check_turns()
   call check_start_is_kept()
-  call check_random(2)
-  call check_random(3)
+  call check_random(2, 24)
+  call check_random(3, 24)
+  ! beyond the order of dense factors
+  call check_random(3, 60)
   call check_refusals()
   call finish_checks()
+  call MPI_Finalize()
 
 contains
 
@@ -314,15 +319,15 @@ contains
   end subroutine check_start_is_kept
 
   !> Every method on problems with more and with less motions than impulses, symmetric or not: the law itself.
-  subroutine check_random(dimension)
-    integer, intent(in) :: dimension
+  subroutine check_random(dimension, contacts)
+    integer, intent(in) :: dimension, contacts
     type(delassus_t) :: problem
     type(friction_report_t) :: report
-    real(dp) :: r(dimension, 24)
+    real(dp) :: r(dimension, contacts)
     integer :: k, m
 
     do k = 1, 4
-      call make_random(10 + k, dimension, 24, merge(6, -10, k <= 2), merge(1.0e-3_dp, 0.0_dp, mod(k, 2) == 0), problem)
+      call make_random(10 + k, dimension, contacts, merge(6, -10, k <= 2), merge(1.0e-3_dp, 0.0_dp, mod(k, 2) == 0), problem)
       do m = 1, size(friction_methods)
         call solve(problem, trim(friction_methods(m)), 1.0e-11_dp, r, report)
         call check(report%converged, "random problem: "//trim(friction_methods(m))//" converges")
