@@ -28,8 +28,8 @@ module gravier_friction_solver
     real(dp) :: literature = 0.0_dp, consistent = 0.0_dp
   end type friction_report_t
 
-  !> of the first turn: sweeps within which a result must be in sight, Newton's steps; turns in which they may double
-  integer, parameter :: first_patience = 2000, first_steps = 20, most_doublings = 20
+  !> of the first turn: sweeps within which a result must be in sight, Newton's steps; bounds of their doubling
+  integer, parameter :: first_patience = 2000, most_patience = 10**9, first_steps = 20, most_doublings = 20
   !> sweeps that leave more than this of the measure bring little
   real(dp), parameter :: little_gain = 0.5_dp
 
@@ -39,7 +39,7 @@ contains
   subroutine solve_friction(problem, control, r, report, error)
     type(delassus_t), intent(in) :: problem
     type(friction_control_t), intent(in) :: control
-    !> start in, best result out (dimension, contacts)
+    !> start in, result out (dimension, contacts)
     real(dp), intent(inout), contiguous :: r(:, :)
     type(friction_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
@@ -91,7 +91,7 @@ contains
       sweeping%most_sweeps = left()
       call solve_by_sweeps(problem, sweeping, r, done, measure)
       report%sweeps = report%sweeps + done
-      sweeping%patience = merge(first_patience, 2*sweeping%patience, measure > little_gain*least)
+      sweeping%patience = merge(first_patience, min(2*sweeping%patience, most_patience), measure > little_gain*least)
       call keep_best()
       if (least <= control%tolerance .or. left() == 0) exit
       if (turn == 0) call newton%init(problem, error)
