@@ -7,7 +7,7 @@ program gravier_fclib
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: path_t, add_path, list_files, make_directory
   use gravier_csv_writer, only: csv_writer_t
-  use gravier_command_line, only: argument, leave
+  use gravier_command_line, only: argument, positive_integer, positive_real, leave
   use gravier_fclib_file, only: fclib_local_t, write_fclib_local
   use gravier_delassus, only: delassus_t
   use gravier_friction_solver, only: friction_control_t, friction_methods
@@ -97,8 +97,22 @@ contains
       end select
       k = k + 1
     end do
+    if (options%directory /= "") then
+      do k = 1, size(files)
+        if (files(k)%text == written_path(options%directory, files(k)%text) .or. "./"//files(k)%text == &
+          & written_path(options%directory, files(k)%text)) call raise(error, status_input, "--write '"//options%directory// &
+          & "': expected another directory than that of "//files(k)%text)
+      end do
+    end if
     if (size(files) == 0 .and. .not. options%help) call raise(error, status_input, "no file given; see gravier_fclib --help")
   end subroutine read_options
+
+  !> Where --write puts the problem of a file.
+  pure function written_path(directory, path) result(written)
+    character(len=*), intent(in) :: directory, path
+    character(len=:), allocatable :: written
+    written = directory//"/"//path(index(path, "/", back=.true.) + 1:)
+  end function written_path
 
   !> Read option `k` of the command line and its value, which follows.
   subroutine read_value(options, k, error)
@@ -114,7 +128,7 @@ contains
     case ("--method")
       call read_methods(word, options%methods, error)
     case ("--tolerance")
-      call read_positive(word, options%tolerance)
+      options%tolerance = positive_real(word)
       if (options%tolerance <= 0.0_dp) call raise(error, status_input, "--tolerance '"//word// &
         & "': expected a finite real number > 0")
     case ("--max-iterations")
@@ -158,29 +172,6 @@ contains
       rest = rest(comma + 1:)
     end do
   end subroutine read_methods
-
-  !> The number that a word of digits means; 0 for anything else.
-  integer function positive_integer(word) result(value)
-    character(len=*), intent(in) :: word
-    integer :: stat
-
-    value = 0
-    if (word == "" .or. verify(word, "0123456789") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat /= 0) value = 0
-  end function positive_integer
-
-  !> The finite number > 0 that a word means; 0 for anything else.
-  subroutine read_positive(word, value)
-    character(len=*), intent(in) :: word
-    real(dp), intent(out) :: value
-    integer :: stat
-
-    value = 0.0_dp
-    if (word == "" .or. verify(word, "0123456789.eEdD+-") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat /= 0 .or. .not. (value > 0.0_dp .and. value <= huge(value))) value = 0.0_dp
-  end subroutine read_positive
 
   !> Add a file, or those of a directory.
   subroutine add_files(path, files, error)
@@ -282,7 +273,7 @@ contains
     allocate (v(problem%dimension, problem%n_contacts))
     call problem%velocity(r, v)
     local%r = r
-    call write_fclib_local(comm, options%directory//"/"//name, local, error, velocity=v)
+    call write_fclib_local(comm, written_path(options%directory, path), local, error, velocity=v)
   end subroutine solve_problem
 
 end program gravier_fclib

@@ -315,6 +315,8 @@ class Fclib(RunTestCase):
             (("a.h5", "--tolerance", "0"), "--tolerance '0': expected a finite real number > 0"),
             (("a.h5", "--max-iterations", "-1"), "--max-iterations '-1': expected an integer >= 1"),
             (("a.h5", "--csv"), "--csv '': expected a path"),
+            (("a.h5", "--write", "."), "--write '.': expected another directory than that of a.h5"),
+            (("nothing/../a.h5", "--write", "nothing/.."), "expected another directory than that of nothing/../a.h5"),
             (("a.h5", "--speed"), "unknown option '--speed'"),
         ]:
             with self.subTest(message):
