@@ -1,5 +1,5 @@
-!> Sparse direct solution on one rank, against a dense Cholesky factorisation, and of general matrices, sparse and dense: values, right-hand sides, what is
-!> factorised again and what is not, errors.
+!> Sparse direct solution on one rank, against a dense Cholesky factorisation, and of general matrices, sparse and dense:
+!> values, right-hand sides, what is factorised again and what is not, errors.
 program test_sparse_direct
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
