@@ -18,7 +18,7 @@ STEP = 1.0e-3  # s, to compact
 # A rigid sample that yields runs ahead of its walls and is caught again, with a period of about the speed of the lid over
 # pressure / (density length): a step not far below that period damps it, and the compression is quasi-static. A residual of
 # 1e-3 is too much then: the errors that it leaves in the velocities are to be small beside the speed of the lid, or the disks
-# are pressed into each other, step by step.
+# are pressed into each other, and taken apart by projections, step by step: they creep and bear less.
 SLOW_STEP = 1.0e-2  # s, to come to rest and to compress
 LAYER = 6.0 * SMALLEST  # m, along the walls, where disks lie less densely
 SOLVER = {"tolerance": 1.0e-3, "max_iterations": 400, "check_every": 10}
@@ -118,7 +118,7 @@ def compress(options, centres, radii, size, mass):
     run(options.out / "shear", {
         "scene": scene("../compact.h5", 0.5, 0.2 * SMALLEST),
         "time": {"step": SLOW_STEP, "steps": steps},
-        "solver": {**SOLVER, "tolerance": 3.0e-5, "max_iterations": 1000},
+        "solver": {**SOLVER, "tolerance": options.tolerance, "max_iterations": options.max_iterations},
         "output": {"directory": ".", "every": max(1, steps // 250), "final_bodies": True}},
         walls(size, mass, {"velocity": [0.0, -speed]}))
 
@@ -131,6 +131,8 @@ def main():
     parser.add_argument("--compacted", action="store_true", help="start from the disks that an earlier run left in OUT/rest")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
     parser.add_argument("--rate", type=float, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
+    parser.add_argument("--tolerance", type=float, default=3.0e-5, help="of the solves while the lid comes down")
+    parser.add_argument("--max-iterations", type=int, default=1000)
     parser.add_argument("--strain", type=float, default=0.15, help="vertical strain at the end")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -168,12 +170,17 @@ def main():
     write_csv(options.out / "study_biaxial.csv", {"axial_strain": strain, "lateral_strain": lateral, "axial_stress": top,
         "lateral_stress": side, "sin_phi": sine, "solid_fraction": fraction, "coordination": number})
     smooth = np.convolve(sine, np.ones(9) / 9.0, "valid")
-    overlap = read_history(options.out / "shear")["max_overlap"].max() / radii.mean()
+    history = read_history(options.out / "shear")
     # the volume has become constant
     late = strain > 0.75 * options.strain
     mean_top, mean_side = top[late].mean(), side[late].mean()
     summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(),
-                   sin_phi_mean_stresses=(mean_top - mean_side) / (mean_top + mean_side), largest_overlap_over_radius=overlap,
+                   sin_phi_mean_stresses=(mean_top - mean_side) / (mean_top + mean_side),
+                   solid_fraction_least=fraction.min(), solid_fraction_most=fraction.max(), solid_fraction_last=fraction[-1],
+                   largest_overlap_over_radius=history["max_overlap"].max() / radii.mean(),
+                   median_overlap_over_radius=np.median(history["max_overlap"]) / radii.mean(),
+                   sweeps=history["sweeps"].mean(), converged=history["converged"].mean(),
+                   projected=history["projected"].mean(),
                    inertial_number=options.rate * 2.0 * radii.mean() * np.sqrt(DENSITY / PRESSURE))
     write_csv(options.out / "study_biaxial_summary.csv", {"quantity": list(summary),
               "value": [float(value) for value in summary.values()]})

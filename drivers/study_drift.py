@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
-tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius.
+tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius, disks under a piston.
 
     python3 drivers/study_drift.py --out DIR [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
 
@@ -19,6 +19,7 @@ FRICTION = 0.3
 STEP = 1.0e-3  # s
 DRUM, RATE = 0.34, 0.3  # m, rad/s
 LOOSE = (1.0e-2, 1.0e-3, 1.0e-4)
+PRESSURE, LID_MASS = 2.0e4, 20.0  # N/m, kg
 GROWN = 1.1  # grains that touch overlap by a fifth of their radius once they are larger by a tenth
 
 
@@ -35,13 +36,20 @@ def box(size):
     return sides
 
 
+def lid(centres, radii):
+    """A plane on the grains that a pressure moves, which bears several times their weight."""
+    return {"name": "lid", "shape": "plane", "normal": [0.0, -1.0], "point": [0.0, (centres[:, 1] + radii).max()],
+            "free": [False, True], "pressure": PRESSURE, "mass": LID_MASS}
+
+
 def groups(dimension, bodies, steps, tolerance, projection, every):
     return {
         "scene": {"dimension": dimension, "bodies": "file", "bodies_file": bodies, "density": DENSITY, "friction": FRICTION,
                   "overlap_allowed": ALLOWED, "overlap_projection": projection},
         "time": {"step": STEP, "steps": steps},
         "solver": {"tolerance": tolerance, "max_iterations": 500, "check_every": 5},
-        "output": {"directory": ".", "every": every, "contacts": False, "final_bodies": True, "energy": True, "structure": True}}
+        "output": {"directory": ".", "every": every, "contacts": False, "final_bodies": True, "energy": True, "structure": True,
+                   "boundary_forces": True}}
 
 
 def settle(options, name, centres, radii, boundaries):
@@ -54,7 +62,7 @@ def settle(options, name, centres, radii, boundaries):
     return folder / "final_bodies.h5"
 
 
-def figures(folder, name, tolerance, projection, seconds, first):
+def figures(folder, name, tolerance, projection, seconds, first, width):
     """A row of the table: what the run says of its second half, energies against its start."""
     history = read_history(folder)
     half = len(history["step"]) // 2
@@ -64,6 +72,10 @@ def figures(folder, name, tolerance, projection, seconds, first):
     last = read_bodies(folder / "final_bodies.h5")[0]
     creep = (mass[:, None] * (last - first)).sum(0) / mass.sum()
     weight = mass.sum() * 9.81
+    # what the loads, pressure included, do not account for: the work of the projection
+    given = history["potential_energy"] + history["load_work"]
+    if "position_y:lid" in history:
+        given = given + PRESSURE * width * history["position_y:lid"] + history["boundary_work"]
     return {
         "run": name, "tolerance": tolerance, "projection": int(projection), "grains": len(radii), "steps": len(history["step"]),
         "largest_overlap": history["max_overlap"][half:].max() / RADIUS,
@@ -72,10 +84,8 @@ def figures(folder, name, tolerance, projection, seconds, first):
         # of a grain, in units of m g R
         "kinetic_energy": history["kinetic_energy"][half:].mean() / (weight * RADIUS),
         "largest_kinetic_energy": history["kinetic_energy"].max() / (weight * RADIUS),
-        # what the potential energy gained, and what of it the loads do not account for: the work of the projection
         "potential_energy": (history["potential_energy"][-1] - history["potential_energy"][0]) / (weight * RADIUS),
-        "projection_work": ((history["potential_energy"] + history["load_work"])[-1]
-                            - (history["potential_energy"] + history["load_work"])[0]) / (weight * RADIUS),
+        "projection_work": (given[-1] - given[0]) / (weight * RADIUS),
         "creep_up": creep[-1] / RADIUS, "creep_side": np.linalg.norm(creep[:-1]) / RADIUS,
         "projected": history["projected"].mean(), "listed": history["listed"].sum(),
         "sweeps": history["sweeps"].mean(), "seconds": seconds}, history
@@ -96,12 +106,14 @@ def main():
     drummed = settle(options, "in_drum", *lattice([-DRUM, -DRUM], mouth, SMALLEST, LARGEST, rng, lambda x, r:
                                                   (np.linalg.norm(x, axis=1) < DRUM - 1.05 * r) & (x[:, 1] < 0.02)), drum)
     centres, radii, _ = read_bodies(disks)
+    pressed = [*box(flat), lid(centres, radii)]
     write_hdf5(options.out / "grown.h5", centres, GROWN * radii)
     turning = [{**drum[0], "rotation": RATE}]
     runs = [("disks", 2, disks, t, options.steps, box(flat)) for t in LOOSE]
     runs += [("spheres", 3, spheres, t, options.steps // 2, box(cube)) for t in LOOSE[:2]]
     runs += [("drum", 2, drummed, t, options.steps // 2, turning) for t in LOOSE[:2]]
     runs += [("grown", 2, options.out / "grown.h5", 1.0e-3, options.steps // 10, box(flat))]
+    runs += [("piston", 2, disks, t, options.steps // 2, pressed) for t in LOOSE[:2]]
     rows, curves = [], {}
     for name, dimension, bodies, tolerance, steps, boundaries in runs:
         for projection in (False, True):
@@ -109,7 +121,7 @@ def main():
             seconds = run(folder, groups(dimension, str(Path(bodies).resolve()), steps, tolerance, projection, 0), boundaries,
                           program=options.gravier)
             row, history = figures(folder, name, tolerance, projection, seconds, read_bodies(bodies)[0]
-                                   if name != "grown" else centres)
+                                   if name != "grown" else centres, flat[0])
             rows.append(row)
             curves[name, tolerance, projection] = history
             print(row, flush=True)
@@ -136,9 +148,11 @@ def write_curves(path, curves):
 
 def draw(path, curves):
     """Largest overlap of each run, dashed without the projection."""
-    panels = {"disks": "disks at rest", "spheres": "spheres at rest", "drum": "slow drum", "grown": "initial overlaps"}
+    panels = {"disks": "disks at rest", "spheres": "spheres at rest", "drum": "slow drum", "grown": "initial overlaps",
+              "piston": "disks under a piston"}
     colours = dict(zip(LOOSE, ("#b2182b", "#08519c", "#238b45")))
-    figure, axes = plt.subplots(2, 2, figsize=(10.0, 6.6), layout="constrained")
+    figure, axes = plt.subplots(2, 3, figsize=(14.0, 6.6), layout="constrained")
+    axes.flat[len(panels)].axis("off")
     for panel, (name, title) in zip(axes.flat, panels.items()):
         for (run_name, tolerance, projection), history in curves.items():
             if run_name != name:
@@ -149,6 +163,7 @@ def draw(path, curves):
         panel.axhline(ALLOWED / RADIUS, color="0.4", linewidth=0.7)
         panel.set_title(title, fontsize=10)
         panel.set_xlabel("step")
+        panel.locator_params(axis="x", nbins=5)
         panel.set_ylabel("largest overlap / mean radius")
         low, high = panel.get_ylim()
         panel.set_ylim(low, high * (high / low)**0.2)

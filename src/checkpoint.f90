@@ -5,10 +5,11 @@ module gravier_checkpoint
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_checkpoint_file, only: checkpoint_file_t
+  use gravier_time_table, only: time_table_t
   use gravier_boundary, only: boundary_t, boundary_words
   use gravier_impulse_memory, only: impulse_entries, list_impulses, match_impulses
   use gravier_energy_balance, only: energy_words
-  use gravier_config, only: config_t, write_active
+  use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -31,7 +32,7 @@ contains
 
     if (allocated(error)) return
     call file%create(simulation%comm, path, error)
-    call file%write_text("scene", fixed_options(simulation%config), error)
+    call file%write_text("scene", fixed_options(simulation), error)
     call file%write_scalar("subdomains", int(simulation%decomposition%n_subdomains, i8), error)
     call file%write_scalar("time_step", simulation%physics%h, error)
     call file%write_scalar("theta", simulation%config%time%theta, error)
@@ -47,6 +48,7 @@ contains
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
     call file%write_scalar("lists_made", simulation%neighbourhoods%builds, error)
     call file%write_scalar("imbalance", simulation%imbalance, error)
+    call file%write_scalar("reached_imbalance", simulation%reached_imbalance, error)
     call pack_boundaries(simulation%decomposition%boundaries, words)
     call file%write_array("boundaries", words, error)
     if (simulation%neighbourhoods%builds > 0) then
@@ -89,6 +91,7 @@ contains
     call file%read_scalar("last_written", last_written, error)
     call file%read_scalar("lists_made", builds, error)
     call file%read_scalar("imbalance", simulation%imbalance, error)
+    call file%read_scalar("reached_imbalance", simulation%reached_imbalance, error)
     call file%read_array("boundary_impulses", words, error)
     if (.not. allocated(error)) call take_reals(words, simulation%boundary_impulses, size(simulation%boundary_impulses))
     if (allocated(error)) return
@@ -129,7 +132,7 @@ contains
       call expect(subdomains == config%decomposition%subdomains, "&decomposition subdomains", to_text(subdomains))
       call expect(.not. abs(h - config%time%step) > 0.0_dp, "&time step", to_text(h))
       call expect(.not. abs(theta - config%time%theta) > 0.0_dp, "&time theta", to_text(theta))
-      if (.not. allocated(error)) call compare_options(path, before, fixed_options(config), config%file, error)
+      if (.not. allocated(error)) call compare_options(path, before, fixed_options(simulation), config%file, error)
     end associate
     if (allocated(error)) return
     if (grains /= simulation%n_first .or. abs(radius - simulation%decomposition%rule%mean_radius) > 0.0_dp) call raise(error, &
@@ -195,15 +198,15 @@ contains
     at = at + length + 1
   end subroutine next_line
 
-  !> The options in force that must not change, a line each.
-  function fixed_options(config) result(text)
-    type(config_t), intent(in) :: config
+  !> The options in force that must not change, a line each, and what tells contents of tables apart.
+  function fixed_options(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
     character(len=:), allocatable :: options, line
-    integer :: at
+    integer :: at, b
     logical :: fixed
 
-    call write_active(options, config)
+    call write_active(options, simulation%config)
     text = ""
     fixed = .false.
     at = 1
@@ -212,6 +215,20 @@ contains
       if (line(1:min(1, len(line))) == "&") fixed = index(fixed_groups//" ", line//" ") > 0
       if (fixed .and. index(line, "  title = ") /= 1) text = text//line//newline
     end do
+    call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
+    do b = 1, size(simulation%config%boundaries)
+      call add_table(simulation%decomposition%boundaries(simulation%n_walls + b)%table, trim(simulation%config%boundaries(b)%table))
+    end do
+
+  contains
+
+    subroutine add_table(table, path)
+      type(time_table_t), intent(in) :: table
+      character(len=*), intent(in) :: path
+
+      if (allocated(table%has)) text = text//"contents of "//path//", digest "//to_text(table%digest())//newline
+    end subroutine add_table
+
   end function fixed_options
 
   pure subroutine pack_boundaries(boundaries, words)

@@ -1,6 +1,7 @@
 !> The exact impulses of a column of equal grains at rest under gravity: each contact carries what stands on it.
 module gravier_column_solution
   use gravier_kinds, only: dp
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_solve, only: exact_solution_t
   implicit none
@@ -22,7 +23,7 @@ contains
     class(column_solution_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
     real(dp), allocatable :: parts(:, :)
-    real(dp) :: sums(2), exact
+    real(dp) :: sums(2), exact, impulse(problem%kernels%nc)
     integer :: s, c, upper
 
     allocate (parts(2, size(problem%sub)), source=0.0_dp)
@@ -32,8 +33,9 @@ contains
           ! the grain that stands on the contact: the higher of two, or the one on the ground
           upper = int(sub%id(sub%pair(1, c)))
           if (sub%pair(2, c) <= sub%n_bodies) upper = max(upper, int(sub%id(sub%pair(2, c))))
+          impulse(:) = sub%impulse(lane_of(c), :, block_of(c))
           exact = (self%count - upper + 1)*self%unit_impulse
-          parts(1, s) = parts(1, s) + (sub%impulse(1, c) - exact)**2 + sum(sub%impulse(2:, c)**2)
+          parts(1, s) = parts(1, s) + (impulse(1) - exact)**2 + sum(impulse(2:)**2)
           parts(2, s) = parts(2, s) + exact**2
         end do
       end associate

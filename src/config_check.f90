@@ -3,6 +3,7 @@ module gravier_config_check
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_config_types, only: config_t
   use gravier_config_table, only: key_t, keys, kind_real, kind_logical
   use gravier_config_keys, only: choices_text
@@ -57,13 +58,14 @@ contains
     integer :: rule, k, instance
 
     copy = config
-    do rule = 1, 3
+    do rule = 1, 4
       do k = 1, size(keys)
         do instance = 1, group_count(config, keys(k)%group)
           report%instance = instance
           if (rule == 1) call check_required(report, copy, keys(k), error)
           if (rule == 2) call check_owner(report, copy, keys(k), error)
           if (rule == 3) call check_planar(report, copy, keys(k), error)
+          if (rule == 4) call check_magnitude(report, copy, keys(k), error)
           if (allocated(error)) return
         end do
       end do
@@ -122,6 +124,28 @@ contains
     if (key%kind == kind_logical) &
       call expect(report, all(.not. slot%logicals(key%planar + 1:)), key%group, trim(key%name), error, what)
   end subroutine check_planar
+
+  !> A number that sums of squares and products of a few of them survive. What is only compared, as a tolerance, is exempt, and
+  !> so are directions, of which ratios count: they have no unit, and are not coefficients of friction (>= 0). Numbers
+  !> that must be above 0 and are not have a message of their own.
+  subroutine check_magnitude(report, config, key, error)
+    type(report_t), intent(in) :: report
+    type(config_t), target, intent(inout) :: config
+    type(key_t), intent(in) :: key
+    type(error_t), allocatable, intent(inout) :: error
+    type(slot_t) :: slot
+
+    if (key%kind /= kind_real .or. (key%unit == "" .and. key%allowed /= ">= 0")) return
+    if (.not. is_given(report, key%group, key%name)) return
+    slot = slot_of(config, key, report%instance)
+    if (key%count == 1) then
+      call expect(report, is_bounded(slot%real), key%group, trim(key%name), error, bounded_text)
+      if (key%allowed == "> 0" .and. slot%real > 0.0_dp) &
+        call expect(report, is_size(slot%real), key%group, trim(key%name), error, size_text)
+    else
+      call expect(report, all(is_bounded(slot%reals)), key%group, trim(key%name), error, "entries of at most 1e30 in size")
+    end if
+  end subroutine check_magnitude
 
   subroutine check_scene(report, config, error)
     type(report_t), intent(in) :: report
@@ -194,6 +218,8 @@ contains
       call expect(report, solver%max_iterations >= 1, "solver", "max_iterations", error)
       call expect(report, solver%sweeps >= 1, "solver", "sweeps", error)
       call expect(report, solver%relaxation > 0.0_dp .and. solver%relaxation <= 1.0_dp, "solver", "relaxation", error)
+      call expect(report, solver%acceleration == "none" .or. index(solver%method, "schwarz") == 0, "solver", &
+                  "acceleration", error, "'none': method = '"//trim(solver%method)//"' diverges with momentum")
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
     end associate
   end subroutine check_solver

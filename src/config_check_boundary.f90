@@ -2,6 +2,7 @@
 module gravier_config_check_boundary
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
+  use gravier_magnitude, only: is_size
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_config_keys, only: choices_text, has_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, ordinal
@@ -12,6 +13,8 @@ module gravier_config_check_boundary
   !> shapes of each dimension
   character(len=*), parameter :: shapes_of(2:3) = ["plane segment circle grains outlet     ", &
                                                    "plane rectangle cylinder grains outlet "]
+  !> shortest edge
+  character(len=*), parameter :: shortest = "1e-30 m"
   !> largest cosine of the angle between the edges of a rectangle
   real(dp), parameter :: right_angle = 1.0e-6_dp
 
@@ -89,16 +92,21 @@ contains
     type(report_t), intent(in) :: report
     type(boundary_config_t), intent(in) :: boundary
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: span(3)
 
     select case (boundary%shape)
     case ("plane", "outlet")
       call expect(report, is_vector(boundary%normal), "boundary", "normal", error)
     case ("segment")
-      call expect(report, any(abs(boundary%end_point - boundary%point) > 0.0_dp), "boundary", "end", error, &
-                  "another point than point")
+      span(:) = boundary%end_point - boundary%point
+      call expect(report, is_vector(span), "boundary", "end", error, "another point than point")
+      call expect(report, is_length(span), "boundary", "end", error, &
+                  "a point at least "//shortest//" from point")
     case ("rectangle")
       call expect(report, is_vector(boundary%edge_a), "boundary", "edge_a", error)
       call expect(report, is_vector(boundary%edge_b), "boundary", "edge_b", error)
+      call expect(report, is_length(boundary%edge_a), "boundary", "edge_a", error, "a length of at least "//shortest)
+      call expect(report, is_length(boundary%edge_b), "boundary", "edge_b", error, "a length of at least "//shortest)
       if (allocated(error)) return
       call expect(report, abs(cosine(boundary%edge_a, boundary%edge_b)) <= right_angle, "boundary", "edge_b", error, &
                   "an edge at right angles to "//shown_text(report, "boundary", "edge_a")//", within 1e-6")
@@ -158,6 +166,13 @@ contains
     real(dp), intent(in) :: vector(:)
     is_vector = any(abs(vector) > 0.0_dp)
   end function is_vector
+
+  !> Is it long enough for its square to count?
+  pure logical function is_length(vector)
+    !> shape (3) [m]
+    real(dp), intent(in) :: vector(:)
+    is_length = is_size(maxval(abs(vector)))
+  end function is_length
 
   !> Cosine of the angle between two vectors other than 0.
   pure real(dp) function cosine(a, b)

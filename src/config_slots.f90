@@ -215,6 +215,7 @@ contains
     case ("max_iterations"); slot%integer => config%solver%max_iterations
     case ("sweeps"); slot%integer => config%solver%sweeps
     case ("relaxation"); slot%real => config%solver%relaxation
+    case ("acceleration"); slot%choice => config%solver%acceleration
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
     case ("on_failure"); slot%choice => config%solver%on_failure

@@ -121,7 +121,7 @@ module gravier_config_table
            unit="m", note="0.2 of the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
            unit="m", note="0.01 of the mean radius"), &
-     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take back larger overlaps by moving the grains apart")]
+     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take overlaps back by moving grains and free boundaries")]
 
   type(key_t), parameter :: boundary_keys(*) = &
     [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
@@ -233,6 +233,8 @@ module gravier_config_table
      key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
            "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)"), &
+     key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
+           "`momentum`: iterations start from impulses extrapolated from the last two (`nlgs`, `nscdd`, `nscdd_ep` only)"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
@@ -251,7 +253,8 @@ module gravier_config_table
            note="the product of `grid` if given, else `1`"), &
      key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again"), &
      key_t("decomposition", "repartition_imbalance", kind_real, "0.0", "0 or > 1", &
-           "largest over mean number of contacts of a subdomain that asks for a new partition; 0: never")]
+           "largest over mean number of contacts of a subdomain that asks for a new partition, where it exceeds 1.1 times "// &
+           "what the last one reached; 0: never")]
 
   type(key_t), parameter :: enriched_keys(*) = &
     [key_t("enriched", "direction", kind_real, "0.3", ">= 0", "search direction l", unit="1/W_aa or kg"), &

@@ -80,6 +80,8 @@ module gravier_config_types
     integer :: max_iterations, sweeps, check_every
     !> in (0, 1]
     real(dp) :: relaxation
+    !> none or momentum
+    character(len=choice_length) :: acceleration
     logical :: warm_start
     !> continue, stop or discard
     character(len=choice_length) :: on_failure

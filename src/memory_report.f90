@@ -62,6 +62,12 @@ contains
       call items(1)%add("impulse", 8, kernels%nc)
       call items(1)%add("gap", 8, 1)
       call items(1)%add("source", 4, 1)
+      ! a projection of places borrows these
+      if (simulation%overlap_allowed < huge(1.0_dp)) then
+        call items(1)%add("law of projections", 8, merge(2, 1, kernels%nc > 1))
+        call items(1)%add("impulse of projections", 8, kernels%nc)
+        call items(1)%add("velocity of projections", 8, kernels%nc)
+      end if
       items(2)%name = "near pair"
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)

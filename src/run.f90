@@ -6,7 +6,7 @@ module gravier_run
   use gravier_errors, only: error_t, raise, status_ok, status_input, status_unconverged, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_signals, only: catch_signals, take_signal
+  use gravier_signals, only: catch_signals, take_signals
   use gravier_timers, only: reset_timers
   use gravier_body_store, only: body_set_t
   use gravier_file_system, only: make_directory, check_readable
@@ -27,6 +27,8 @@ module gravier_run
   type :: interruption_t
     !> on the clock of this rank: of the program, of the first step, of the last checkpoint, of the end of the last step [s]
     real(dp) :: start = 0.0_dp, first_step = 0.0_dp, last_checkpoint = 0.0_dp, last_step = huge(1.0_dp)
+    !> requests by SIGUSR1 that checkpoints have answered
+    integer(i8) :: answered = 0
     !> longest step and longest checkpoint so far [s]
     real(dp) :: longest = 0.0_dp, dearest = 0.0_dp
     logical :: stops = .false.
@@ -230,23 +232,24 @@ contains
     type(run_output_t), intent(inout) :: output
     type(interruption_t), intent(inout) :: interruption
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: asked(3)
+    integer(i8) :: asked(3), requests
     logical :: stops, due
     real(dp) :: now
 
-    call take_signal(stops, due)
+    call take_signals(stops, requests)
+    requests = simulation%comm%largest(requests)
     now = MPI_Wtime()
     associate (config => simulation%config%output)
       ! clocks of ranks differ: what one of them finds counts for all
       asked(:) = 0
       if (stops) asked(1) = 1
-      if (due) asked(2) = 1
       if (config%checkpoint_seconds > 0.0_dp .and. now - interruption%last_checkpoint >= config%checkpoint_seconds) asked(2) = 1
       interruption%longest = max(interruption%longest, now - interruption%last_step)
       if (config%walltime > 0.0_dp .and. now - interruption%start + time_to_stop(interruption) >= config%walltime) asked(3) = 1
       interruption%last_step = now
       call simulation%comm%sum_counts(asked)
-      due = asked(2) > 0
+      due = asked(2) > 0 .or. requests > interruption%answered
+      interruption%answered = requests
       if (config%checkpoint_every > 0) due = due .or. mod(simulation%step, config%checkpoint_every) == 0
       if (simulation%step == simulation%config%time%steps) then
         ! one that may be prolonged

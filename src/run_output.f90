@@ -11,6 +11,7 @@ module gravier_run_output
   use gravier_build_info, only: version
   use gravier_contact_structure, only: bin_width
   use gravier_diagnostics, only: diagnostics_t
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
   use gravier_checkpoint, only: save_checkpoint, checkpoint_name
@@ -303,9 +304,9 @@ contains
           else
             rows%antagonist(n) = simulation%decomposition%boundaries(-view%list%antagonist(p))%id
           end if
-          rows%normal(:, n) = sub%hot(1:nd, c)
+          rows%normal(:, n) = sub%hot(lane_of(c), 1:nd, block_of(c))
           rows%gap(n) = sub%gap(c)
-          rows%impulse(1:nc, n) = sub%impulse(:, c)
+          rows%impulse(1:nc, n) = sub%impulse(lane_of(c), :, block_of(c))
         end do
       end associate
     end do

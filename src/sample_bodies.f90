@@ -3,6 +3,7 @@ module gravier_sample_bodies
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_magnitude, only: sharpest, far_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
   use gravier_motion, only: grain_mass
@@ -13,7 +14,7 @@ module gravier_sample_bodies
   use gravier_config_types, only: config_t
   implicit none
   private
-  public :: make_lattice, make_sample
+  public :: make_lattice, make_sample, farthest_place
 
 contains
 
@@ -39,6 +40,8 @@ contains
     radii%radius_max = config%scene%radius_max
     data%total = product(int(config%scene%lattice_count(1:box%nd), i8))
     call draw_grains(comm, radii, config%scene%density, config%scene%seed, data)
+    call check_box(comm, config, box, data, error)
+    if (allocated(error)) return
     call lattice%init(box, config%scene%radius_max, data%total, never)
     call lattice%place(config%scene%seed, data%id, data%radius, data%position)
     call make_planes(box, .false., data)
@@ -66,6 +69,33 @@ contains
     end associate
   end subroutine make_lattice_box
 
+  !> Refuse a box so far from the origin that grains in it could not be told apart. Errors are the same on all ranks. Collective.
+  subroutine check_box(comm, config, box, data, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(sample_box_t), intent(in) :: box
+    !> radii are known
+    type(bodies_data_t), intent(in) :: data
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: corner, far
+
+    corner = max(maxval(abs(box%lower(1:box%nd))), maxval(abs(box%upper(1:box%nd))))
+    far = farthest_place(comm, data%radius)
+    if (corner > far) call raise(error, status_input, config%file//": &scene period_origin: a box as far as "// &
+      & to_text(corner, 4)//" m from the origin: expected at most "//to_text(far, 4)//" m, "//far_text)
+  end subroutine check_box
+
+  !> How far from the origin grains may be for rounding not to hide the gaps between them [m]. Collective.
+  real(dp) function farthest_place(comm, radius) result(far)
+    type(communicator_t), intent(in) :: comm
+    !> of the grains of this rank [m]
+    real(dp), intent(in) :: radius(:)
+
+    far = huge(1.0_dp)
+    if (size(radius) > 0) far = sharpest*minval(radius)
+    far = -comm%highest(-far)
+  end function farthest_place
+
   !> The sample of &sample before any preparation: grains at rest with identifiers from 1, a plane on each side of the box
   !> that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period. Failure
   !> (status_input): a table of radii that cannot be read, grains that find no place in the box. Errors are the same on all
@@ -86,6 +116,8 @@ contains
     box%lower(:) = config%scene%period_origin
     box%upper(:) = box%lower + config%sample%box
     box%periodic(:) = config%scene%period > 0.0_dp
+    call check_box(comm, config, box, data, error)
+    if (allocated(error)) return
     if (config%sample%arrangement == "lattice") then
       call place_in_lattice(config%sample%seed, radii%largest(), box, data, error)
     else

@@ -3,6 +3,7 @@ module gravier_scene
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_magnitude, only: far_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
@@ -11,7 +12,7 @@ module gravier_scene
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_config_types, only: config_t, scene_config_t
-  use gravier_sample_bodies, only: make_lattice, make_sample
+  use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
   use gravier_scene_boundaries, only: make_boundaries
   implicit none
   private
@@ -41,6 +42,7 @@ contains
     type(scene_t), intent(out) :: scene
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
+    integer :: b
 
     select case (config%scene%bodies)
     case ("column")
@@ -58,7 +60,11 @@ contains
     if (allocated(error)) return
     scene%n_walls = data%n_walls
     call set_period(config%scene, data, scene)
+    do b = 1, size(scene%boundaries)
+      scene%boundaries(b)%period(:) = scene%period%length
+    end do
     call take_data(comm, config%scene, data, scene)
+    call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
 
@@ -74,6 +80,44 @@ contains
     scene%period%length(:) = data%period
     scene%period%origin(:) = data%origin
   end subroutine set_period
+
+  !> Refuse places so far from the origin that rounding would hide the gaps between grains. Errors are the same on all ranks.
+  !> Collective.
+  subroutine check_places(comm, config, data, scene, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(scene_t), intent(in) :: scene
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: far
+    integer :: k
+
+    if (scene%n_grains == 0) return
+    far = farthest_place(comm, data%radius)
+    if (scene%period%on()) call check("period", maxval(abs(scene%period%origin) + scene%period%length))
+    do k = 1, size(scene%boundaries)
+      associate (boundary => scene%boundaries(k))
+        call check("boundary '"//boundary%name//"'", max(maxval(abs(boundary%point)), maxval(abs(boundary%edge)), &
+          & maxval(abs(boundary%pivot)), boundary%radius))
+      end associate
+    end do
+    do k = 1, data%n
+      call check("id "//to_text(data%id(k)), maxval(abs(data%position(:, k))))
+    end do
+    call comm%agree(error)
+
+  contains
+
+    subroutine check(what, coordinate)
+      character(len=*), intent(in) :: what
+      !> the largest in size [m]
+      real(dp), intent(in) :: coordinate
+
+      if (coordinate > far) call raise(error, status_input, config%file//": "//what//": a coordinate or length of "// &
+        & to_text(coordinate, 4)//" m: expected at most "//to_text(far, 4)//" m, "//far_text)
+    end subroutine check
+
+  end subroutine check_places
 
   !> Glue the grains of a group to the boundary of that group. Errors are the same on all ranks. Collective.
   subroutine glue(comm, config, data, scene, error)

@@ -46,6 +46,7 @@ contains
       allocate (nlgs_t :: scheme)
     end select
     scheme%sweeps = config%solver%sweeps
+    scheme%momentum%on = config%solver%acceleration == "momentum"
   end subroutine choose_scheme
 
   pure type(search_direction_t) function direction_of(enriched) result(direction)

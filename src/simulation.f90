@@ -1,8 +1,9 @@
 !> A scene in time: what it takes to make one step after the other, without output.
 module gravier_simulation
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, raise, status_input
+  use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
+  use gravier_finite, only: is_finite
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
@@ -24,11 +25,15 @@ module gravier_simulation
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
+  use gravier_scene_period, only: check_in_period
   use gravier_scheme_choice, only: choose_scheme
   use gravier_column_solution, only: column_solution_t
   implicit none
   private
   public :: simulation_t, step_figures_t
+
+  !> times the imbalance that the last division reached: one that is worth another division
+  real(dp), parameter :: worth_dividing = 1.1_dp
 
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
@@ -39,6 +44,9 @@ module gravier_simulation
     integer(i8) :: left = 0, fast = 0
     !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
     logical :: listed = .false., divided = .false., refused = .false.
+    !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
+    !> space was divided anew
+    real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
@@ -83,6 +91,8 @@ module gravier_simulation
     real(dp) :: overlap_allowed = huge(1.0_dp)
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
+    !> the same just after space was last divided in a step; 0 before
+    real(dp) :: reached_imbalance = 0.0_dp
   contains
     procedure :: init => simulation_init
     procedure :: make => simulation_make
@@ -138,6 +148,9 @@ contains
     self%n_walls = scene%n_walls
     call set_physics(self, scene)
     call check_period(self, scene, error)
+    if (.not. allocated(error)) call check_in_period(config, scene, 2.0_dp*scene%largest_radius + &
+      & self%decomposition%rule%range(), error)
+    call comm%agree(error)
     if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%scheme)
@@ -196,7 +209,7 @@ contains
       self%physics%restitution = config%restitution
       self%physics%rotation = config%rotation
       self%physics%h = self%config%time%step
-      call self%problem%kernels%choose(config%dimension, scene%friction, scene%rotation)
+      call self%problem%kernels%choose(config%dimension, scene%friction)
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
@@ -361,6 +374,11 @@ contains
     self%largest_overlap = figures%max_overlap
     if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
+    if (figures%divided) then
+      self%reached_imbalance = self%imbalance
+      call self%scheme%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
+      call self%scheme%forget_times()
+    end if
   end subroutine simulation_assemble
 
   !> q_m of grains and boundaries; boundaries whose time has come are taken away.
@@ -528,7 +546,8 @@ contains
     figures%fast = counts(1)
   end subroutine count_fast
 
-  !> Whether this step starts from a new partition: by schedule, or because contacts lie unevenly.
+  !> Whether this step starts from a new partition: by schedule, or because contacts lie unevenly, and more so than just after
+  !> the last one: what that could not cure is not tried again.
   subroutine check_division(self, figures)
     class(simulation_t), intent(in) :: self
     type(step_figures_t), intent(inout) :: figures
@@ -537,7 +556,7 @@ contains
       if (self%step == 0 .or. config%subdomains == 1) return
       if (config%repartition_every > 0) figures%divided = mod(self%step, config%repartition_every) == 0
       if (config%repartition_imbalance > 0.0_dp) figures%divided = figures%divided .or. &
-        & self%imbalance > config%repartition_imbalance
+        & self%imbalance > max(config%repartition_imbalance, worth_dividing*self%reached_imbalance)
     end associate
   end subroutine check_division
 
@@ -585,8 +604,10 @@ contains
     call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
       & self%time, figures%left > 0)
     call move_to_end(self)
+    call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
+    call start_timer(phase_bodies)
     if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     call stop_timer(phase_bodies)
     self%step = self%step + 1
@@ -596,7 +617,51 @@ contains
     self%fast = self%fast + figures%fast
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
       & self%n_grains - self%n_glued)
+    call check_numbers(self, figures, error)
   end subroutine simulation_advance
+
+  !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
+  subroutine check_numbers(self, figures, error)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s, k, b
+
+    if (.not. is_finite(figures%kinetic_energy)) then
+      do s = 1, size(self%decomposition%home)
+        associate (home => self%decomposition%home(s))
+          do k = 1, home%n
+            if (.not. is_finite(home%mass(k)*sum(home%velocity(:, k)**2))) &
+              & call refuse("kinetic energy of body "//to_text(home%id(k)))
+          end do
+        end associate
+      end do
+      call self%comm%agree(error)
+    end if
+    do b = 1, size(self%decomposition%boundaries)
+      associate (boundary => self%decomposition%boundaries(b))
+        if (.not. (all(is_finite(boundary%point)) .and. all(is_finite(boundary%velocity)))) &
+          & call refuse("motion of boundary '"//boundary%name//"'")
+      end associate
+    end do
+    if (.not. is_finite(figures%kinetic_energy)) call refuse("kinetic energy")
+    if (.not. is_finite(figures%max_overlap)) call refuse("largest overlap")
+    if (.not. is_finite(figures%solve%residual)) call refuse("residual")
+    if (.not. is_finite(figures%solve%jump)) call refuse("jump")
+    do k = 1, self%diagnostics%n_columns
+      if (.not. is_finite(self%diagnostics%value(k))) call refuse(trim(self%diagnostics%name(k)))
+    end do
+
+  contains
+
+    subroutine refuse(what)
+      character(len=*), intent(in) :: what
+
+      call raise(error, status_failure, "step "//to_text(self%step)//": "//what//": not a finite number; expected speeds, "// &
+        & "loads and a &time step that give finite ones")
+    end subroutine refuse
+
+  end subroutine check_numbers
 
   !> q_{i+1} of grains and boundaries.
   subroutine move_to_end(self)
@@ -658,6 +723,7 @@ contains
     self%last_written = -1
     self%restarted = .false.
     self%imbalance = 1.0_dp
+    self%reached_imbalance = 0.0_dp
   end subroutine simulation_free
 
 end module gravier_simulation

@@ -3,7 +3,7 @@ module gravier_random_hash
   use gravier_kinds, only: dp, i8
   implicit none
   private
-  public :: hash_uniform
+  public :: hash_uniform, hash_words
 
 contains
 
@@ -21,6 +21,17 @@ contains
     s = mix(ieor(s, mix(int(stream, i8) + 77_i8)))
     x = (real(shiftr(s, 12), dp) + 0.5_dp)*2.0_dp**(-52)
   end function hash_uniform
+
+  !> A number that tells sequences of words from each other: those that differ in one word never have the same.
+  pure integer(i8) function hash_words(words) result(digest)
+    integer(i8), intent(in) :: words(:)
+    integer :: k
+
+    digest = mix(int(size(words), i8))
+    do k = 1, size(words)
+      digest = mix(ieor(digest, words(k)))
+    end do
+  end function hash_words
 
   !> Bijective mixing of 64 bits by shifts and multiplications of 32-bit halves, so that nothing overflows.
   pure integer(i8) function mix(word) result(z)

@@ -2,14 +2,17 @@
 !> a note, which the time loop takes when it likes; what other signals do is left as it is.
 module gravier_signals
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
+  use gravier_kinds, only: i8
   implicit none
   private
-  public :: catch_signals, take_signal
+  public :: catch_signals, take_signals
 
   ! Linux numbers
   integer(c_int), parameter :: sigusr1 = 10, sigterm = 15
-  !> what arrived since take_signal was called last
-  logical, volatile :: stop_asked = .false., checkpoint_asked = .false.
+  !> SIGTERM arrived since take_signals was called last
+  logical, volatile :: stop_asked = .false.
+  !> SIGUSR1 that arrived since the start
+  integer(i8), volatile :: checkpoints_asked = 0
 
   interface
     type(c_funptr) function c_signal(number, action) bind(C, name="signal")
@@ -30,16 +33,17 @@ contains
     ignored = c_signal(sigusr1, c_funloc(ask_checkpoint))
   end subroutine catch_signals
 
-  !> Whether this process was asked to stop, or to write a checkpoint, since the last call. Not collective: a launcher
-  !> may signal one rank only, or several at different times, so that the ranks have to agree before they act.
-  subroutine take_signal(stop, checkpoint)
-    logical, intent(out) :: stop, checkpoint
+  !> Whether this process was asked to stop since the last call, and how many times it was asked for a checkpoint since
+  !> the start. Not collective: a launcher may signal one rank only, or several, of which one learns of it a step after
+  !> another, so that the ranks have to agree before they act. The largest count of a rank grows once a request.
+  subroutine take_signals(stop, checkpoints)
+    logical, intent(out) :: stop
+    integer(i8), intent(out) :: checkpoints
 
     stop = stop_asked
     if (stop) stop_asked = .false.
-    checkpoint = checkpoint_asked
-    if (checkpoint) checkpoint_asked = .false.
-  end subroutine take_signal
+    checkpoints = checkpoints_asked
+  end subroutine take_signals
 
   subroutine ask_stop(number) bind(C)
     integer(c_int), value :: number
@@ -48,7 +52,7 @@ contains
 
   subroutine ask_checkpoint(number) bind(C)
     integer(c_int), value :: number
-    checkpoint_asked = number == sigusr1
+    if (number == sigusr1) checkpoints_asked = checkpoints_asked + 1
   end subroutine ask_checkpoint
 
 end module gravier_signals

@@ -55,10 +55,14 @@ module gravier_boundary
     real(dp) :: remove_at = huge(1.0_dp)
     !> false once removed
     logical :: present = .true.
+    !> of the scene, 0 along axes that are not periodic: what has a finite extent acts on the image of a grain that is nearest [m]
+    real(dp) :: period(3) = 0.0_dp
   contains
     procedure :: touches => boundary_touches
     procedure :: is_driven => boundary_is_driven
     procedure :: turns => boundary_turns
+    procedure :: turns_about => boundary_turns_about
+    procedure :: half_width => boundary_half_width
     procedure :: locate => boundary_locate
     procedure :: velocity_at => boundary_velocity_at
     procedure :: last_velocity_at => boundary_last_velocity_at
@@ -66,6 +70,7 @@ module gravier_boundary
     procedure :: applied_force => boundary_applied_force
     procedure :: move => boundary_move
     procedure :: carry => boundary_carry
+    procedure :: shift => boundary_shift
     procedure :: get_state => boundary_get_state
     procedure :: set_state => boundary_set_state
   end type boundary_t
@@ -114,6 +119,59 @@ contains
     end if
   end function boundary_turns
 
+  !> Whether it turns, now or later, about axis `k`.
+  pure logical function boundary_turns_about(self, k)
+    class(boundary_t), intent(in) :: self
+    integer, intent(in) :: k
+
+    boundary_turns_about = abs(self%given_spin(k)) > 0.0_dp
+    if (.not. allocated(self%table%has)) return
+    if (size(self%table%has) == 6) then
+      boundary_turns_about = boundary_turns_about .or. (k == 3 .and. self%table%has(3))
+    else
+      boundary_turns_about = boundary_turns_about .or. self%table%has(3 + k)
+    end if
+  end function boundary_turns_about
+
+  !> Half of what a segment, rectangle, circle or cylinder takes along axis `d`, in any position that it may turn to [m].
+  pure real(dp) function boundary_half_width(self, d) result(half)
+    class(boundary_t), intent(in) :: self
+    integer, intent(in) :: d
+
+    if (self%shape == shape_circle .or. self%shape == shape_cylinder) then
+      half = self%radius
+    else if (self%turns()) then
+      half = 0.5_dp*sqrt(sum(self%edge**2))
+    else
+      half = 0.5_dp*sum(abs(self%edge(d, :)))
+    end if
+  end function boundary_half_width
+
+  !> The image of a point that is nearest to the middle of a finite shape, or to the pivot of glued grains. What is endless takes
+  !> the point as it is.
+  pure subroutine find_image(self, x, image)
+    class(boundary_t), intent(in) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: x(:)
+    real(dp), intent(out) :: image(3)
+    real(dp) :: middle(3)
+    integer :: d
+
+    image(:) = 0.0_dp
+    image(1:size(x)) = x
+    select case (self%shape)
+    case (shape_plane, shape_outlet)
+      return
+    case (shape_grains)
+      middle(:) = self%pivot
+    case default
+      middle(:) = self%point + 0.5_dp*(self%edge(:, 1) + self%edge(:, 2))
+    end select
+    do d = 1, size(x)
+      if (self%period(d) > 0.0_dp) image(d) = x(d) - self%period(d)*anint((x(d) - middle(d))/self%period(d))
+    end do
+  end subroutine find_image
+
   !> Nearest point of the surface: distance from it, negative behind a surface that has a behind, and unit normal
   !> there towards `x`.
   pure subroutine boundary_locate(self, x, distance, normal)
@@ -127,8 +185,8 @@ contains
     integer :: nd
 
     nd = size(x)
-    from(:) = 0.0_dp
-    from(1:nd) = x - self%point(1:nd)
+    call find_image(self, x, from)
+    from(:) = from - self%point
     select case (self%shape)
     case (shape_circle, shape_cylinder)
       from(:) = from - sum(from*self%axis)*self%axis
@@ -204,7 +262,10 @@ contains
     real(dp), intent(in) :: x(:)
     !> (nd)
     real(dp), intent(out) :: velocity(:)
-    call rigid_velocity(x, self%pivot, self%velocity, self%spin, velocity)
+    real(dp) :: image(3)
+
+    call find_image(self, x, image)
+    call rigid_velocity(image, self%pivot, self%velocity, self%spin, velocity)
   end subroutine boundary_velocity_at
 
   !> The same with velocity and spin at the start of the step.
@@ -214,18 +275,21 @@ contains
     real(dp), intent(in) :: x(:)
     !> (nd)
     real(dp), intent(out) :: velocity(:)
-    call rigid_velocity(x, self%pivot, self%last_velocity, self%last_spin, velocity)
+    real(dp) :: image(3)
+
+    call find_image(self, x, image)
+    call rigid_velocity(image, self%pivot, self%last_velocity, self%last_spin, velocity)
   end subroutine boundary_last_velocity_at
 
   pure subroutine rigid_velocity(x, pivot, translation, spin, velocity)
-    real(dp), intent(in) :: x(:), pivot(3), translation(3), spin(3)
+    real(dp), intent(in) :: x(3), pivot(3), translation(3), spin(3)
+    !> (nd)
     real(dp), intent(out) :: velocity(:)
     real(dp) :: arm(3), turned(3)
 
-    arm(:) = 0.0_dp
-    arm(1:size(x)) = x - pivot(1:size(x))
+    arm(:) = x - pivot
     turned(:) = cross(spin, arm)
-    velocity(:) = translation(1:size(x)) + turned(1:size(x))
+    velocity(:) = translation(1:size(velocity)) + turned(1:size(velocity))
   end subroutine rigid_velocity
 
   !> Set the prescribed velocity and spin of a time; free components are left.
@@ -304,20 +368,31 @@ contains
     real(dp), intent(in) :: duration
     !> (nd) [m]
     real(dp), intent(inout) :: x(:)
-    real(dp) :: arm(3), turn(3, 3), angle(3)
+    real(dp) :: place(3), arm(3), turn(3, 3), angle(3)
     integer :: nd
 
     nd = size(x)
     if (any(abs(self%spin) > 0.0_dp)) then
-      arm(:) = 0.0_dp
-      arm(1:nd) = x - self%pivot(1:nd)
+      call find_image(self, x, place)
+      arm(:) = place - self%pivot
       angle(:) = self%spin*duration
       call make_rotation(angle, turn)
       call rotate(turn, arm)
-      x(:) = self%pivot(1:nd) + arm(1:nd)
+      ! the image that was moved, back to where the point was
+      x(:) = self%pivot(1:nd) + arm(1:nd) + (x - place(1:nd))
     end if
     x(:) = x + duration*self%velocity(1:nd)
   end subroutine boundary_carry
+
+  !> Put the boundary elsewhere, with the velocity that it has.
+  pure subroutine boundary_shift(self, way)
+    class(boundary_t), intent(inout) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: way(:)
+
+    self%point(1:size(way)) = self%point(1:size(way)) + way
+    self%pivot(1:size(way)) = self%pivot(1:size(way)) + way
+  end subroutine boundary_shift
 
   !> v := turn v.
   pure subroutine rotate(turn, v)

@@ -3,6 +3,7 @@
 module gravier_radius_distribution
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_magnitude, only: is_size, size_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
@@ -99,6 +100,7 @@ contains
       call table%get_real(table%column("share"), share(n), error)
       if (allocated(error)) exit
       if (radius(n) <= 0.0_dp) call table%refuse(table%column("radius"), "a radius above 0", error)
+      if (.not. is_size(radius(n))) call table%refuse(table%column("radius"), size_text, error)
       if (share(n) < 0.0_dp) call table%refuse(table%column("share"), "a share of 0 or more", error)
     end do
     if (allocated(error)) return

@@ -1,7 +1,9 @@
 !> Quantities given in a table against time: linear between the rows, constant before the first and after the last.
 module gravier_time_table
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_magnitude, only: is_bounded, bounded_text
+  use gravier_random_hash, only: hash_words
   use gravier_csv_table, only: csv_table_t
   implicit none
   private
@@ -18,6 +20,7 @@ module gravier_time_table
   contains
     procedure :: read => time_table_read
     procedure :: at => time_table_at
+    procedure :: digest => time_table_digest
   end type time_table_t
 
 contains
@@ -87,10 +90,10 @@ contains
     do
       call table%next_row(found, error)
       if (allocated(error) .or. .not. found) exit
-      call table%get_real(time_column, time, error)
+      call read_number(table, time_column, time, error)
       row(:) = 0.0_dp
       do k = 1, size(column)
-        if (column(k) > 0) call table%get_real(column(k), row(k), error)
+        if (column(k) > 0) call read_number(table, column(k), row(k), error)
       end do
       if (allocated(error)) exit
       if (n > 0) then
@@ -101,6 +104,16 @@ contains
     call set_room(self, n, n)
     if (n == 0 .and. .not. allocated(error)) call table%refuse_file("no rows; at least one was expected", error)
   end subroutine read_rows
+
+  subroutine read_number(table, column, value, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: column
+    real(dp), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+
+    call table%get_real(column, value, error)
+    if (.not. allocated(error) .and. .not. is_bounded(value)) call table%refuse(column, bounded_text, error)
+  end subroutine read_number
 
   subroutine add_row(self, n, time, row)
     type(time_table_t), intent(inout) :: self
@@ -154,5 +167,25 @@ contains
       value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
     end if
   end function time_table_at
+
+  !> A number that tells tables of other columns, times or values apart; the table has been read.
+  pure integer(i8) function time_table_digest(self) result(digest)
+    class(time_table_t), intent(in) :: self
+    integer(i8), allocatable :: words(:)
+    integer :: row, k, n
+
+    allocate (words(size(self%has) + size(self%time) + size(self%value)))
+    words(1:size(self%has)) = merge(1_i8, 0_i8, self%has)
+    n = size(self%has)
+    do row = 1, size(self%time)
+      n = n + 1
+      words(n) = transfer(self%time(row), 0_i8)
+      do k = 1, size(self%value, 1)
+        n = n + 1
+        words(n) = transfer(self%value(k, row), 0_i8)
+      end do
+    end do
+    digest = hash_words(words)
+  end function time_table_digest
 
 end module gravier_time_table

@@ -1,4 +1,4 @@
-!> What grains do to boundaries: impulses of a step, and the velocities of boundaries that forces move.
+!> What grains do to boundaries: impulses of a step, and the velocities and displacements of boundaries that forces move.
 module gravier_boundary_loads
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: global_impulse
@@ -6,7 +6,7 @@ module gravier_boundary_loads
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
+  public :: sum_boundary_impulses, take_boundary_velocities, take_boundary_displacements, carry_glued, set_glued_velocities
 
 contains
 
@@ -28,7 +28,7 @@ contains
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
           if (all(sub%pair(:, c) <= sub%n_grains)) cycle
-          call global_impulse(problem%kernels, sub%hot(:, c), sub%impulse(:, c), p)
+          call global_impulse(problem%kernels, sub%hot, sub%impulse, c, p)
           if (sub%pair(2, c) > sub%n_grains) then
             b = sub%boundary(sub%pair(2, c))
             p(:) = -p
@@ -61,6 +61,40 @@ contains
       end associate
     end do
   end subroutine take_boundary_velocities
+
+  !> Move the boundaries that forces move, and the grains glued to them, by what v_global holds in the place of
+  !> velocities [m]. All copies of a boundary hold the same bits; ranks without one learn them. Collective.
+  subroutine take_boundary_displacements(decomposition, problem)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), allocatable :: ways(:)
+    integer :: s, k, b, nd
+
+    nd = decomposition%nd
+    allocate (ways(nd*size(decomposition%boundaries)), source=-huge(1.0_dp))
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do k = sub%n_grains + 1, sub%n_bodies
+          b = sub%boundary(k)
+          ways((b - 1)*nd + 1:b*nd) = sub%v_global(1:nd, k)
+        end do
+      end associate
+    end do
+    call decomposition%comm%highest_of(ways)
+    ! nothing touches it
+    where (ways <= -huge(1.0_dp)) ways = 0.0_dp
+    do b = 1, size(decomposition%boundaries)
+      call decomposition%boundaries(b)%shift(ways((b - 1)*nd + 1:b*nd))
+    end do
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          b = home%glued(k)
+          if (b > 0) home%position(:, k) = home%position(:, k) + ways((b - 1)*nd + 1:b*nd)
+        end do
+      end associate
+    end do
+  end subroutine take_boundary_displacements
 
   !> Move glued grains with their boundaries, which have not moved yet, for a time.
   subroutine carry_glued(decomposition, duration)

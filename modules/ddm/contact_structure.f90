@@ -1,6 +1,7 @@
 !> How grains hold each other: coordination, fabric, sliding, distribution of forces, overlaps.
 module gravier_contact_structure
   use gravier_kinds, only: dp, i8
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
@@ -56,7 +57,7 @@ contains
     largest = 0.0_dp
     do s = 1, size(problem%sub)
       call count_contacts(problem%sub(s), nd, problem%kernels%nc, counts, parts(:, s))
-      if (problem%sub(s)%n_contacts > 0) largest = max(largest, maxval(problem%sub(s)%impulse(1, :)))
+      if (problem%sub(s)%n_contacts > 0) largest = max(largest, maxval(problem%sub(s)%impulse(:, 1, :)))
     end do
     call count_ends(problem, counts)
     call problem%comm%sum_counts(counts)
@@ -93,27 +94,29 @@ contains
     !> (nd**2 + 2)
     real(dp), intent(inout) :: part(:)
     real(dp) :: bound
-    integer :: c, d
+    integer :: c, d, q, g
 
     do c = 1, sub%n_contacts
       if (sub%gap(c) < 0.0_dp) then
         counts(overlapping) = counts(overlapping) + 1
         part(nd**2 + 2) = part(nd**2 + 2) - sub%gap(c)
       end if
-      if (.not. sub%impulse(1, c) > 0.0_dp) cycle
+      q = lane_of(c)
+      g = block_of(c)
+      if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
       counts(carrying) = counts(carrying) + 1
-      part(nd**2 + 1) = part(nd**2 + 1) + sub%impulse(1, c)
+      part(nd**2 + 1) = part(nd**2 + 1) + sub%impulse(q, 1, g)
       if (nc > 1) then
-        bound = sub%hot(nd + 6, c)*sub%impulse(1, c)
+        bound = sub%hot(q, nd + 6, g)*sub%impulse(q, 1, g)
         if (bound > 0.0_dp) then
           counts(with_friction) = counts(with_friction) + 1
-          if (norm2(sub%impulse(2:, c)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
+          if (norm2(sub%impulse(q, 2:, g)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
         end if
       end if
       if (any(sub%pair(:, c) > sub%n_grains)) cycle
       counts(carrying_grains) = counts(carrying_grains) + 1
       do d = 1, nd
-        part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + sub%hot(1:nd, c)*sub%hot(d, c)
+        part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + sub%hot(q, 1:nd, g)*sub%hot(q, d, g)
       end do
     end do
   end subroutine count_contacts
@@ -131,7 +134,7 @@ contains
         ! the first row of `reaction` serves as number of contacts
         sub%reaction(:, :) = 0.0_dp
         do c = 1, sub%n_contacts
-          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
+          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
           do k = 1, 2
             sub%reaction(1, sub%pair(k, c)) = sub%reaction(1, sub%pair(k, c)) + 1.0_dp
           end do
@@ -174,8 +177,8 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
-          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
-          force = sub%impulse(1, c)/(h*self%force_mean)
+          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+          force = sub%impulse(lane_of(c), 1, block_of(c))/(h*self%force_mean)
           part(s) = part(s) + (force - 1.0_dp)**2
           bin = n_bins + 1
           if (force < n_bins*bin_width) bin = min(int(force/bin_width) + 1, n_bins)

@@ -5,7 +5,7 @@ module gravier_energy_balance
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_contact_kernels, only: global_impulse
+  use gravier_contact_kernels, only: global_impulse, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
@@ -168,17 +168,19 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
     real(dp), intent(inout) :: part(n_sums)
-    real(dp), allocatable :: mean(:, :), v(:, :)
-    integer :: c
+    real(dp), allocatable :: mean(:, :), v(:, :, :)
+    integer :: c, q, g
 
     associate (sub => problem%sub(s), kernels => problem%kernels)
-      allocate (mean(kernels%nv, sub%n_columns), v(kernels%nc, sub%n_contacts))
+      allocate (mean(kernels%nv, sub%n_columns), v(lanes, kernels%nc, n_blocks(sub%n_contacts)))
       call find_start(view, earlier, kernels%nd, sub, mean)
       mean(:, :) = 0.5_dp*(mean + sub%v_global)
       call kernels%contact_velocity(sub%pair, sub%hot, mean, v)
       do c = 1, sub%n_contacts
-        part(in_normal) = part(in_normal) - sub%impulse(1, c)*v(1, c)
-        part(in_friction) = part(in_friction) - sum(sub%impulse(2:, c)*v(2:, c))
+        q = lane_of(c)
+        g = block_of(c)
+        part(in_normal) = part(in_normal) - sub%impulse(q, 1, g)*v(q, 1, g)
+        part(in_friction) = part(in_friction) - sum(sub%impulse(q, 2:, g)*v(q, 2:, g))
         if (any(sub%pair(:, c) > sub%n_grains)) call add_boundary_work(c)
       end do
     end associate
@@ -191,7 +193,7 @@ contains
       integer :: column, d
 
       associate (sub => problem%sub(s))
-        call global_impulse(problem%kernels, sub%hot(:, c), sub%impulse(:, c), p)
+        call global_impulse(problem%kernels, sub%hot, sub%impulse, c, p)
         column = sub%pair(2, c)
         if (sub%pair(1, c) > sub%n_grains) then
           column = sub%pair(1, c)
@@ -228,19 +230,20 @@ contains
     !> A column that stands for grain `k` of the view, or for a boundary.
     subroutine fill(column, k)
       integer, intent(in) :: column, k
-      real(dp) :: point(nd)
+      real(dp) :: point(nd), normal(nd)
 
       if (column <= sub%n_grains) then
-        start(:, column) = view%bodies%velocity(:, k)
+        start(:, column) = view%bodies%velocity(1:size(start, 1), k)
         return
       end if
       ! where the free grain touches it
+      normal(:) = sub%hot(lane_of(c), 1:nd, block_of(c))
       if (k < 0) then
-        point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + sub%gap(c))*sub%hot(1:nd, c)
+        point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + sub%gap(c))*normal
       else if (k == i) then
-        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*sub%hot(1:nd, c)
+        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*normal
       else
-        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*sub%hot(1:nd, c)
+        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*normal
       end if
       call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
     end subroutine fill

@@ -5,10 +5,10 @@
 module gravier_enriched_matrix
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_sweep
-  use gravier_contact_kernels, only: kernels_t, contact_jacobian
+  use gravier_timers, only: start_timer, stop_timer, phase_factorise
+  use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: scheme_t
+  use gravier_scheme, only: scheme_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
   implicit none
   private
@@ -25,12 +25,12 @@ module gravier_enriched_matrix
 
   !> What one subdomain adds to its contact problem.
   type :: enriched_part_t
-    !> l of each component (nc, n_contacts) [kg]
-    real(dp), allocatable :: direction(:, :)
-    !> velocity that solved the law at each contact's last update (nc, n_contacts) [m/s]
-    real(dp), allocatable :: law_velocity(:, :)
-    !> work spaces: contact values (nc, n_contacts), body values (nv, n_columns)
-    real(dp), allocatable :: contact_work(:, :), body_work(:, :)
+    !> l of each component (lanes, nc, blocks) [kg]
+    real(dp), allocatable :: direction(:, :, :)
+    !> velocity that solved the law at each contact's last update (lanes, nc, blocks) [m/s]
+    real(dp), allocatable :: law_velocity(:, :, :)
+    !> work spaces: contact values (lanes, nc, blocks), body values (nv, n_columns)
+    real(dp), allocatable :: contact_work(:, :, :), body_work(:, :)
     type(sparse_factor_t) :: factor
   end type enriched_part_t
 
@@ -71,8 +71,11 @@ contains
     type(subproblem_t), intent(in) :: sub
 
     if (allocated(part%direction)) deallocate (part%direction, part%law_velocity, part%contact_work, part%body_work)
-    allocate (part%direction(kernels%nc, sub%n_contacts), part%law_velocity(kernels%nc, sub%n_contacts), &
-      & part%contact_work(kernels%nc, sub%n_contacts), part%body_work(kernels%nv, sub%n_columns), source=0.0_dp)
+    allocate (part%direction(lanes, kernels%nc, n_blocks(sub%n_contacts)), source=0.0_dp)
+    allocate (part%law_velocity, part%contact_work, mold=part%direction)
+    part%law_velocity(:, :, :) = 0.0_dp
+    part%contact_work(:, :, :) = 0.0_dp
+    allocate (part%body_work(kernels%nv, sub%n_columns), source=0.0_dp)
   end subroutine make_room
 
   !> Set l and factorise the matrices that it or the problem changed.
@@ -107,22 +110,26 @@ contains
     type(search_direction_t), intent(in) :: rule
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
-    real(dp), intent(out), contiguous :: direction(:, :)
+    !> (lanes, nc, blocks)
+    real(dp), intent(out), contiguous :: direction(:, :, :)
     real(dp) :: w(2)
-    integer :: c
+    integer :: c, q, g
 
+    direction(:, :, :) = 0.0_dp
     do c = 1, sub%n_contacts
-      direction(:, c) = rule%value
+      q = lane_of(c)
+      g = block_of(c)
+      direction(q, :, g) = rule%value
       if (rule%relative) then
         call sub%local_operator(c, sub%inverse_mass, w)
-        direction(1, c) = rule%value/w(1)
-        direction(2:, c) = rule%value/w(2)
+        direction(q, 1, g) = rule%value/w(1)
+        direction(q, 2:, g) = rule%value/w(2)
       end if
       if (.not. rule%active_only) cycle
-      if (.not. sub%impulse(1, c) > 0.0_dp) then
-        direction(:, c) = 0.0_dp
+      if (.not. sub%impulse(q, 1, g) > 0.0_dp) then
+        direction(q, :, g) = 0.0_dp
       else if (kernels%nc > 1) then
-        if (norm2(sub%impulse(2:, c)) >= sub%hot(kernels%nh, c)*sub%impulse(1, c)) direction(2:, c) = 0.0_dp
+        if (norm2(sub%impulse(q, 2:, g)) >= sub%hot(q, kernels%nh, g)*sub%impulse(q, 1, g)) direction(q, 2:, g) = 0.0_dp
       end if
     end do
   end subroutine set_direction
@@ -131,7 +138,7 @@ contains
   subroutine assemble(kernels, sub, direction, row, column, value)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
-    real(dp), intent(in), contiguous :: direction(:, :)
+    real(dp), intent(in), contiguous :: direction(:, :, :)
     integer, allocatable, intent(out) :: row(:), column(:)
     real(dp), allocatable, intent(out) :: value(:)
     real(dp) :: jacobian(kernels%nc, kernels%nv, 2)
@@ -156,7 +163,7 @@ contains
       end do
     end do
     do c = 1, sub%n_contacts
-      call contact_jacobian(kernels%nd, kernels%nc, sub%hot(:, c), jacobian(:, :, 1), jacobian(:, :, 2))
+      call contact_jacobian(kernels, sub%hot, c, jacobian(:, :, 1), jacobian(:, :, 2))
       do side = 1, 2
         if (sub%pair(side, c) <= sub%n_bodies) call add_block(sub%pair(side, c), sub%pair(side, c), side, side)
       end do
@@ -179,7 +186,8 @@ contains
       do p = 1, nv
         do q = 1, merge(p, nv, i == j)
           x = 0.0_dp
-          if (sub%moves(p, i) .and. sub%moves(q, j)) x = sum(jacobian(:, p, a)*direction(:, c)*jacobian(:, q, b))
+          if (sub%moves(p, i) .and. sub%moves(q, j)) &
+            & x = sum(jacobian(:, p, a)*direction(lane_of(c), :, block_of(c))*jacobian(:, q, b))
           call add((i - 1)*nv + p, (j - 1)*nv + q, x)
         end do
       end do
@@ -231,7 +239,7 @@ contains
 
     associate (part => self%part(s), sub => problem%sub(s))
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, part%contact_work)
-      part%contact_work(:, :) = part%direction*(part%law_velocity - part%contact_work)
+      part%contact_work(:, :, :) = part%direction*(part%law_velocity - part%contact_work)
       part%body_work(:, :) = 0.0_dp
       call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
       call self%solve(problem, s, part%body_work, error)
@@ -271,20 +279,14 @@ contains
     type(enriched_matrix_t), intent(inout) :: matrix
     integer :: s, k
 
-    call start_timer(phase_sweep)
+    call begin_sweeps(scheme, problem)
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        do k = 1, scheme%sweeps - 1
-          call problem%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
-        end do
-        call problem%kernels%sweep_recording(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, &
-          & matrix%part(s)%law_velocity)
-        scheme%work%relaxations = scheme%work%relaxations + int(scheme%sweeps, i8)*sub%n_contacts
-      end associate
+      do k = 1, scheme%sweeps - 1
+        call sweep_once(scheme, problem, s, k)
+      end do
+      call sweep_once(scheme, problem, s, scheme%sweeps, matrix%part(s)%law_velocity)
     end do
-    scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
-    scheme%work%iterations = scheme%work%iterations + 1
-    call stop_timer(phase_sweep)
+    call end_sweeps(scheme, problem)
   end subroutine sweep_all_recording
 
 end module gravier_enriched_matrix

@@ -4,7 +4,7 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: shift_of_code
-  use gravier_contact_kernels, only: kernels_t, tangents
+  use gravier_contact_kernels, only: kernels_t, contact_tangents, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
@@ -25,7 +25,7 @@ contains
   subroutine keep_impulses(problem, neighbourhoods)
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
-    integer :: s, c
+    integer :: s, c, q, g
     real(dp) :: t(3), u(3)
 
     do s = 1, size(problem%sub)
@@ -33,13 +33,15 @@ contains
         list%impulse(:, :) = 0.0_dp
         do c = 1, sub%n_contacts
           ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart
-          if (.not. sub%impulse(1, c) > 0.0_dp) cycle
+          q = lane_of(c)
+          g = block_of(c)
+          if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           if (problem%kernels%nc < 3) then
-            list%impulse(:, sub%source(c)) = sub%impulse(:, c)
+            list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
           else
-            call tangents(sub%hot(1:3, c), t, u)
-            list%impulse(1, sub%source(c)) = sub%impulse(1, c)
-            list%impulse(2:4, sub%source(c)) = sub%impulse(2, c)*t + sub%impulse(3, c)*u
+            call contact_tangents(sub%hot, c, t, u)
+            list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
+            list%impulse(2:4, sub%source(c)) = sub%impulse(q, 2, g)*t + sub%impulse(q, 3, g)*u
           end if
         end do
       end associate
@@ -50,19 +52,21 @@ contains
   subroutine recall_impulses(neighbourhoods, problem)
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, c
+    integer :: s, c, q, g
     real(dp) :: t(3), u(3)
 
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
         do c = 1, sub%n_contacts
+          q = lane_of(c)
+          g = block_of(c)
           if (problem%kernels%nc < 3) then
-            sub%impulse(:, c) = list%impulse(:, sub%source(c))
+            sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
           else
-            call tangents(sub%hot(1:3, c), t, u)
-            sub%impulse(1, c) = list%impulse(1, sub%source(c))
-            sub%impulse(2, c) = sum(list%impulse(2:4, sub%source(c))*t)
-            sub%impulse(3, c) = sum(list%impulse(2:4, sub%source(c))*u)
+            call contact_tangents(sub%hot, c, t, u)
+            sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
+            sub%impulse(q, 2, g) = sum(list%impulse(2:4, sub%source(c))*t)
+            sub%impulse(q, 3, g) = sum(list%impulse(2:4, sub%source(c))*u)
           end if
         end do
       end associate

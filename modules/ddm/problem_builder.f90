@@ -10,7 +10,8 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_neighbour_list, only: neighbour_list_t
-  use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of
+  use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
@@ -205,9 +206,9 @@ contains
     if (b > 0) e = boundaries(b)%restitution
   end function restitution_of
 
-  !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order of the view,
-  !> then boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, or one a contact
-  !> where the boundary turns.
+  !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
+  !> meet them, so that a sweep walks through memory; then boundaries that forces move, then columns of bodies with prescribed
+  !> velocities: one a boundary, or one a contact where the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
     type(neighbourhood_t), intent(in) :: view
     type(found_t), intent(in) :: found
@@ -216,29 +217,22 @@ contains
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: number_of(:), column_of(:)
-    integer :: c, k, p, b, n
+    integer :: c, p, b, n
 
     associate (list => view%list, boundaries => decomposition%boundaries)
       allocate (number_of(view%bodies%n), column_of(size(boundaries)), source=0)
       n = 0
+      sub%n_grains = 0
       do c = 1, found%n
         p = found%source(c)
-        if (view%bodies%glued(list%candidate(p)) == 0) number_of(list%candidate(p)) = 1
-        if (list%antagonist(p) > 0) then
-          if (view%bodies%glued(list%antagonist(p)) == 0) number_of(list%antagonist(p)) = 1
-        end if
+        call number(list%candidate(p))
+        if (list%antagonist(p) > 0) call number(list%antagonist(p))
         b = boundary_of(view, p)
         if (b == 0) cycle
         column_of(b) = 1
         if (boundaries(b)%turns()) n = n + 1
       end do
       sub%n_contacts = found%n
-      sub%n_grains = 0
-      do k = 1, view%bodies%n
-        if (number_of(k) == 0) cycle
-        sub%n_grains = sub%n_grains + 1
-        number_of(k) = sub%n_grains
-      end do
       sub%n_bodies = sub%n_grains
       do b = 1, size(boundaries)
         if (column_of(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle
@@ -259,6 +253,18 @@ contains
       end do
     end associate
     call pack_contacts(view, found, decomposition%boundaries, number_of, column_of, kernels, physics, sub)
+
+  contains
+
+    !> Give grain `k` the next number, unless it has one or is part of a boundary.
+    subroutine number(k)
+      integer, intent(in) :: k
+
+      if (number_of(k) > 0 .or. view%bodies%glued(k) > 0) return
+      sub%n_grains = sub%n_grains + 1
+      number_of(k) = sub%n_grains
+    end subroutine number
+
   end subroutine pack_subproblem
 
   subroutine allocate_bodies(kernels, n_columns, sub)
@@ -289,7 +295,7 @@ contains
       sub%home(b) = view%home(k)
       sub%position(:, b) = view%bodies%position(:, k)
       sub%radius(b) = view%bodies%radius(k)
-      sub%v_free(:, b) = view%bodies%velocity(:, k)
+      sub%v_free(:, b) = view%bodies%velocity(1:kernels%nv, k)
       call physics%accelerate(view%bodies, k, sub%v_free(:, b))
       sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/view%bodies%mass(k)
       if (kernels%nw > kernels%nd .and. physics%rotation) sub%inverse_mass(kernels%nw, b) = 1.0_dp/view%bodies%inertia(k)
@@ -324,50 +330,70 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    integer :: c, p, b, i, j, nd
+    integer, allocatable :: pair(:, :), order(:)
+    integer :: c, f, p, b, i, j, q, g, nd
     real(dp) :: e
 
     nd = kernels%nd
-    allocate (sub%pair(2, found%n), sub%source(found%n), sub%gap(found%n))
-    allocate (sub%hot(kernels%nh, found%n), sub%impulse(kernels%nc, found%n), source=0.0_dp)
-    sub%source(:) = found%source(1:found%n)
-    sub%gap(:) = found%gap(1:found%n)
+    allocate (pair(2, found%n), order(found%n))
+    call find_pairs()
+    call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
+    allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
+    allocate (sub%source(found%n), sub%gap(found%n))
+    allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)), sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
     do c = 1, found%n
-      p = found%source(c)
+      f = order(c)
+      q = lane_of(c)
+      g = block_of(c)
+      sub%source(c) = found%source(f)
+      sub%gap(c) = found%gap(f)
+      sub%pair(:, c) = pair(:, f)
+      p = found%source(f)
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
       b = boundary_of(view, p)
       if (b > 0) then
         if (boundaries(b)%turns()) call add_column()
-        sub%pair(1, c) = merge(column(b), number_of(i), view%bodies%glued(i) > 0)
-        sub%pair(2, c) = column(b)
-        if (view%bodies%glued(i) > 0) sub%pair(2, c) = number_of(j)
-      else
-        sub%pair(1, c) = number_of(i)
-        sub%pair(2, c) = number_of(j)
       end if
-      sub%hot(1:nd, c) = found%normal(:, c)
+      sub%hot(q, 1:nd, g) = found%normal(:, f)
       e = restitution_of(view, boundaries, physics, p)
       if (e > 0.0_dp) then
-        sub%hot(nd + 1, c) = e*min(approach(), 0.0_dp)
+        sub%hot(q, nd + 1, g) = e*min(approach(), 0.0_dp)
       else
-        sub%hot(nd + 1, c) = max(found%gap(c), 0.0_dp)/physics%h
+        sub%hot(q, nd + 1, g) = max(found%gap(f), 0.0_dp)/physics%h
       end if
       if (kernels%nc == 1) cycle
-      if (view%bodies%glued(i) == 0) sub%hot(nd + 4, c) = view%bodies%radius(i)
+      if (view%bodies%glued(i) == 0) sub%hot(q, nd + 4, g) = view%bodies%radius(i)
       if (j > 0) then
-        if (view%bodies%glued(j) == 0) sub%hot(nd + 5, c) = view%bodies%radius(j)
+        if (view%bodies%glued(j) == 0) sub%hot(q, nd + 5, g) = view%bodies%radius(j)
       end if
-      sub%hot(nd + 6, c) = physics%friction
-      if (b > 0) sub%hot(nd + 6, c) = boundaries(b)%friction
+      sub%hot(q, nd + 6, g) = physics%friction
+      if (b > 0) sub%hot(q, nd + 6, g) = boundaries(b)%friction
     end do
 
   contains
 
-    pure integer function column(b)
-      integer, intent(in) :: b
-      column = merge(sub%n_columns, column_of(b), boundaries(b)%turns())
-    end function column
+    !> Columns of candidates and antagonists in the order in which contacts were found; of a boundary that turns, one that
+    !> cannot move stands for the columns that `add_column` makes.
+    subroutine find_pairs()
+      integer :: column
+
+      do f = 1, found%n
+        p = found%source(f)
+        i = view%list%candidate(p)
+        j = view%list%antagonist(p)
+        b = boundary_of(view, p)
+        if (b > 0) then
+          column = merge(sub%n_bodies + 1, column_of(b), boundaries(b)%turns())
+          pair(1, f) = merge(column, number_of(i), view%bodies%glued(i) > 0)
+          pair(2, f) = column
+          if (view%bodies%glued(i) > 0) pair(2, f) = number_of(j)
+        else
+          pair(1, f) = number_of(i)
+          pair(2, f) = number_of(j)
+        end if
+      end do
+    end subroutine find_pairs
 
     !> The point of a turning boundary that this contact touches, as a body of its own.
     subroutine add_column()
@@ -379,17 +405,18 @@ contains
       if (j < 0) then
         call find_surface_point(point)
       else if (view%bodies%glued(i) > 0) then
-        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*found%normal(:, c)
+        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*found%normal(:, f)
       else
-        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*found%normal(:, c)
+        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*found%normal(:, f)
       end if
       call boundaries(b)%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
+      sub%pair(merge(1, 2, view%bodies%glued(i) > 0), c) = sub%n_columns
     end subroutine add_column
 
     !> Point of the surface of a boundary that the candidate is nearest to.
     pure subroutine find_surface_point(point)
       real(dp), intent(out) :: point(nd)
-      point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(c))*found%normal(:, c)
+      point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(f))*found%normal(:, f)
     end subroutine find_surface_point
 
     !> Normal velocity at the start of the step.
@@ -404,7 +431,7 @@ contains
         call boundaries(b)%last_velocity_at(point, surface)
         v(:) = v - surface
       end if
-      approach = sum(v*found%normal(:, c))
+      approach = sum(v*found%normal(:, f))
     end function approach
 
   end subroutine pack_contacts
@@ -648,7 +675,7 @@ contains
     call return_velocities(decomposition, problem, received)
     do k = 1, size(received, 2)
       call find_home(decomposition, received(1:2, k), h, place)
-      do d = 1, decomposition%nv
+      do d = 1, problem%kernels%nv
         decomposition%home(h)%velocity(d, place) = transfer(received(2 + d, k), 0.0_dp)
       end do
     end do

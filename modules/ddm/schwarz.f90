@@ -4,7 +4,7 @@ module gravier_schwarz
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_velocities, sweep_all
+  use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
   implicit none
   private
   public :: schwarz_t, neighbour_load_t, start_neighbour_loads, shared_reactions, take_neighbour_loads
@@ -32,7 +32,7 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
-    call start_velocities(problem, shared_masses=.false.)
+    call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%load)
   end subroutine schwarz_start
 
@@ -76,7 +76,7 @@ contains
     end associate
   end subroutine shared_reactions
 
-  !> Loads that agree with the impulses at the start of a solve, which `start_velocities` has put into the velocities; none
+  !> Loads that agree with the impulses at the start of a solve, which `start_sweeps` has put into the velocities; none
   !> on components that cannot move.
   subroutine start_neighbour_loads(problem, load)
     type(contact_problem_t), intent(inout) :: problem

@@ -4,7 +4,7 @@ module gravier_schwarz_ec
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, work_t, start_velocities
+  use gravier_scheme, only: scheme_t, work_t, start_sweeps
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
   use gravier_schwarz, only: neighbour_load_t, start_neighbour_loads, shared_reactions, take_neighbour_loads
   implicit none
@@ -33,7 +33,7 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
-    call start_velocities(problem, shared_masses=.false.)
+    call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%load)
     call self%matrix%start(problem, error)
     self%prepared = .false.

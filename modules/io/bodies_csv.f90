@@ -3,6 +3,7 @@ module gravier_bodies_csv
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text, lower
+  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit
@@ -232,8 +233,8 @@ contains
     real(dp) :: ignored(3)
 
     call read_id(table, layout%id, bodies%id(i), error)
-    call read_numbers(table, layout%position, .true., bodies%position(:, i), error)
-    call read_numbers(table, layout%velocity, .false., bodies%velocity(:, i), error)
+    call read_quantities(table, layout%position, .true., bodies%position(:, i), error)
+    call read_quantities(table, layout%velocity, .false., bodies%velocity(:, i), error)
     call read_numbers(table, layout%normal, .false., ignored, error)
     call read_positive(table, layout%radius, "a radius > 0", bodies%radius(i), error)
     if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
@@ -251,7 +252,7 @@ contains
     logical :: possible
 
     call read_id(table, layout%id, bodies%wall_id(i), error)
-    call read_numbers(table, layout%position, .true., bodies%wall_point(:, i), error)
+    call read_quantities(table, layout%position, .true., bodies%wall_point(:, i), error)
     call read_numbers(table, layout%velocity, .false., ignored, error)
     if (.not. table%is_empty(layout%radius)) call table%get_real(layout%radius, ignored(1), error)
     if (.not. table%is_empty(layout%mass)) call table%get_real(layout%mass, ignored(1), error)
@@ -306,6 +307,7 @@ contains
     call table%get_real(column, value, error)
     if (allocated(error)) return
     if (value <= 0) call table%refuse(column, expected, error)
+    if (.not. is_size(value)) call table%refuse(column, size_text, error)
   end subroutine read_positive
 
   !> Read numbers from several columns; a cell that is empty or missing leaves its value, unless it is required.
@@ -322,6 +324,22 @@ contains
       call table%get_real(columns(k), values(k), error)
     end do
   end subroutine read_numbers
+
+  !> Read numbers that are places or velocities, in the same way.
+  subroutine read_quantities(table, columns, required, values, error)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: columns(:)
+    logical, intent(in) :: required
+    real(dp), intent(inout) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    call read_numbers(table, columns, required, values, error)
+    if (allocated(error)) return
+    do k = 1, size(columns)
+      if (.not. is_bounded(values(k))) call table%refuse(columns(k), bounded_text, error)
+    end do
+  end subroutine read_quantities
 
   !> All bodies have a mass or none has: with none the masses are left to the caller.
   subroutine settle_masses(comm, path, bodies, error)

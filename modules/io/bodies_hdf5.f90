@@ -4,6 +4,7 @@ module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
+  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
   use gravier_file_system, only: rename_file, remove_file
@@ -17,6 +18,8 @@ module gravier_bodies_hdf5
   character(len=*), parameter :: body_sets(6) = [character(len=8) :: "id", "position", "velocity", "radius", "mass", "group"]
   character(len=*), parameter :: wall_sets(3) = [character(len=8) :: "id", "point", "normal"]
   character(len=*), parameter :: box_sets(2) = [character(len=8) :: "origin", "period"]
+  !> kinds of numbers: any of which only ratios count; of a place or velocity; of a size above 0
+  integer, parameter :: direction = 0, quantity = 1, extent = 2
   !> room for the headers of the file
   integer(i8), parameter :: bytes_of_headers = 65536
   integer, parameter :: bytes_of_word = 8
@@ -98,17 +101,17 @@ contains
     call file%read_rows("/bodies/id", first, bodies%id, error)
     call check_ids(comm, path//": /bodies/id", first, bodies%id, error)
     call file%read_rows("/bodies/position", first, bodies%position, error)
-    call check_numbers(comm, path//": /bodies/position", dimension, bodies%id, bodies%position, .false., error)
+    call check_numbers(comm, path//": /bodies/position", dimension, bodies%id, bodies%position, quantity, error)
     call file%read_rows("/bodies/radius", first, bodies%radius, error)
-    call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, .true., error)
+    call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, extent, error)
     if (file%exists("/bodies/velocity")) then
       call file%read_rows("/bodies/velocity", first, bodies%velocity, error)
-      call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, .false., error)
+      call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, quantity, error)
     end if
     if (file%exists("/bodies/mass")) then
       allocate (bodies%mass(n))
       call file%read_rows("/bodies/mass", first, bodies%mass, error)
-      call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, .true., error)
+      call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, extent, error)
     end if
     if (file%exists("/bodies/group")) call read_groups(comm, file, path, first, bodies, error)
   end subroutine read_grains
@@ -177,8 +180,8 @@ contains
     call file%read_rows("/walls/normal", 0_i8, bodies%wall_normal, error)
     if (allocated(error)) return
     call check_own_ids(path//": /walls/id", 0_i8, bodies%wall_id, error)
-    call check_own_numbers(path//": /walls/point", dimension, bodies%wall_id, bodies%wall_point, .false., error)
-    call check_own_numbers(path//": /walls/normal", dimension, bodies%wall_id, bodies%wall_normal, .false., error)
+    call check_own_numbers(path//": /walls/point", dimension, bodies%wall_id, bodies%wall_point, quantity, error)
+    call check_own_numbers(path//": /walls/normal", dimension, bodies%wall_id, bodies%wall_normal, direction, error)
     if (allocated(error)) return
     do i = 1, bodies%n_walls
       call make_unit(bodies%wall_normal(:, i), possible)
@@ -245,27 +248,29 @@ contains
     end do
   end subroutine check_own_ids
 
-  subroutine check_numbers(comm, place, n_columns, id, values, positive, error)
+  subroutine check_numbers(comm, place, n_columns, id, values, kind, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: place
     integer, intent(in) :: n_columns
     integer(i8), intent(in), contiguous :: id(:)
     real(dp), intent(in) :: values(n_columns, size(id))
-    logical, intent(in) :: positive
+    !> direction, quantity or extent
+    integer, intent(in) :: kind
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(error)) return
-    call check_own_numbers(place, n_columns, id, values, positive, error)
+    call check_own_numbers(place, n_columns, id, values, kind, error)
     call comm%agree(error)
   end subroutine check_numbers
 
-  !> Refuse NaN and infinity, and where `positive` numbers that are not > 0.
-  subroutine check_own_numbers(place, n_columns, id, values, positive, error)
+  !> Refuse NaN and infinity, and numbers that are not of the kind.
+  subroutine check_own_numbers(place, n_columns, id, values, kind, error)
     character(len=*), intent(in) :: place
     integer, intent(in) :: n_columns
     integer(i8), intent(in), contiguous :: id(:)
     real(dp), intent(in) :: values(n_columns, size(id))
-    logical, intent(in) :: positive
+    !> direction, quantity or extent
+    integer, intent(in) :: kind
     type(error_t), allocatable, intent(inout) :: error
     integer :: i, k
 
@@ -275,9 +280,17 @@ contains
         if (.not. is_finite(values(k, i))) then
           call raise(error, status_input, place//": id "//to_text(id(i))//": NaN or infinity, but a finite number was expected")
           return
-        else if (positive .and. .not. values(k, i) > 0) then
+        else if (kind == extent .and. .not. values(k, i) > 0) then
           call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(values(k, i))// &
             & ", but a number > 0 was expected")
+          return
+        else if (kind == extent .and. .not. is_size(values(k, i))) then
+          call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(values(k, i))//", but "//size_text// &
+            & " was expected")
+          return
+        else if (kind == quantity .and. .not. is_bounded(values(k, i))) then
+          call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(values(k, i))//", but "//bounded_text// &
+            & " was expected")
           return
         end if
       end do
@@ -315,6 +328,12 @@ contains
     else if (any(bodies%period < 0)) then
       call raise(error, status_input, path//": /box/period: "//to_text(minval(bodies%period))// &
         & ", but a number >= 0 was expected")
+    else if (.not. all(is_bounded(bodies%origin))) then
+      call raise(error, status_input, path//": /box/origin: "//to_text(maxval(abs(bodies%origin)))//" in size, but "// &
+        & bounded_text//" was expected")
+    else if (.not. all(is_bounded(bodies%period))) then
+      call raise(error, status_input, path//": /box/period: "//to_text(maxval(bodies%period))//", but "//bounded_text// &
+        & " was expected")
     end if
   end subroutine check_box
 
@@ -443,16 +462,16 @@ contains
     integer(i8), allocatable :: group(:)
 
     call check_ids(comm, path//": /bodies/id", comm%offset(int(bodies%n, i8)), bodies%id, error)
-    call check_numbers(comm, path//": /bodies/position", bodies%dimension, bodies%id, bodies%position, .false., error)
-    call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, .false., error)
-    call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, .true., error)
-    if (allocated(bodies%mass)) call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, .true., error)
+    call check_numbers(comm, path//": /bodies/position", bodies%dimension, bodies%id, bodies%position, quantity, error)
+    call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, quantity, error)
+    call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, extent, error)
+    if (allocated(bodies%mass)) call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, extent, error)
     group = bodies%group
     call check_groups(comm, path//": /bodies/group", bodies%id, group, error)
     call check_box(path, bodies, error)
     call check_ids(comm, path//": /walls/id", 0_i8, bodies%wall_id, error)
-    call check_numbers(comm, path//": /walls/point", bodies%dimension, bodies%wall_id, bodies%wall_point, .false., error)
-    call check_numbers(comm, path//": /walls/normal", bodies%dimension, bodies%wall_id, bodies%wall_normal, .false., error)
+    call check_numbers(comm, path//": /walls/point", bodies%dimension, bodies%wall_id, bodies%wall_point, quantity, error)
+    call check_numbers(comm, path//": /walls/normal", bodies%dimension, bodies%wall_id, bodies%wall_normal, direction, error)
     if (allocated(error)) error%status = status_failure
   end subroutine refuse_bad_numbers
 

@@ -8,7 +8,7 @@ module gravier_file_system
   use gravier_text, only: to_text
   implicit none
   private
-  public :: make_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
+  public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
   public :: extend_file, replace_file
   public :: path_t, add_path, list_files, text_file_t, text_at
 
@@ -64,6 +64,11 @@ module gravier_file_system
       implicit none
       character(kind=c_char), intent(in) :: path(*)
     end function c_unlink
+    integer(c_int) function c_rmdir(path) bind(C, name="rmdir")
+      import :: c_int, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_rmdir
 
     integer(c_int) function c_open(path, flags) bind(C, name="open")
       import :: c_int, c_char
@@ -225,6 +230,13 @@ contains
       call raise(error, status_failure, from//": cannot rename to "//to//": "//reason(last_error()))
     end if
   end subroutine rename_file
+
+  !> Remove a directory that is empty, if it is there; any other stays.
+  subroutine remove_directory(path)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: ignored
+    ignored = c_rmdir(c_text(path))
+  end subroutine remove_directory
 
   !> Remove a file if it is there.
   subroutine remove_file(path)

@@ -1,10 +1,11 @@
 !> The communicator of a run and its collective operations. Results do not depend on the number of ranks:
 !> real sums are exact, and maxima and integer sums are exact by nature.
 module gravier_communicator
-  use mpi_f08, only: MPI_Comm, MPI_COMM_WORLD, MPI_Init, MPI_Initialized, MPI_Finalize, MPI_Comm_rank, MPI_Comm_size, &
-    & MPI_Comm_dup, MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Get_library_version, &
-    & MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, &
-    & MPI_SUM, MPI_MIN, MPI_MAX, MPI_LOR
+  use, intrinsic :: iso_c_binding, only: c_int
+  use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, MPI_Finalize, &
+    & MPI_Comm_rank, MPI_Comm_size, MPI_Comm_dup, MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, &
+    & MPI_Ibarrier, MPI_Test, MPI_Get_library_version, MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, &
+    & MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, MPI_SUM, MPI_MIN, MPI_MAX, MPI_LOR
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
@@ -24,6 +25,7 @@ module gravier_communicator
     procedure :: init => communicator_init
     procedure :: free => communicator_free
     procedure :: barrier => communicator_barrier
+    procedure :: barrier_asleep => communicator_barrier_asleep
     procedure :: total => communicator_total
     procedure :: offset => communicator_offset
     procedure :: highest => communicator_highest
@@ -39,6 +41,14 @@ module gravier_communicator
     procedure :: rank_of => communicator_rank_of
     procedure :: first_subdomain => communicator_first_subdomain
   end type communicator_t
+
+  interface
+    integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: microseconds
+    end function c_usleep
+  end interface
 
 contains
 
@@ -94,6 +104,22 @@ contains
     class(communicator_t), intent(in) :: self
     call MPI_Barrier(self%mpi)
   end subroutine communicator_barrier
+
+  !> A barrier in which a rank that waits leaves its processor to others. It takes up to some milliseconds longer.
+  subroutine communicator_barrier_asleep(self)
+    class(communicator_t), intent(in) :: self
+    integer(c_int), parameter :: nap = 2000_c_int
+    type(MPI_Request) :: request
+    integer(c_int) :: ignored
+    logical :: done
+
+    call MPI_Ibarrier(self%mpi, request)
+    do
+      call MPI_Test(request, done, MPI_STATUS_IGNORE)
+      if (done) exit
+      ignored = c_usleep(nap)
+    end do
+  end subroutine communicator_barrier_asleep
 
   !> Sum of `n` over the ranks.
   integer(i8) function communicator_total(self, n) result(total)

@@ -4,7 +4,8 @@
 !> message per pair of ranks. Whatever is summed over the copies is summed in subdomain order, so that all copies
 !> get the same bits on any number of ranks.
 module gravier_shared_exchange
-  use mpi_f08, only: MPI_Request, MPI_DOUBLE_PRECISION, MPI_STATUSES_IGNORE, MPI_Isend, MPI_Irecv, MPI_Waitall
+  use mpi_f08, only: MPI_Request, MPI_DOUBLE_PRECISION, MPI_STATUSES_IGNORE, MPI_Send_init, MPI_Recv_init, MPI_Startall, &
+    & MPI_Waitall, MPI_Request_free
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort
   use gravier_communicator, only: communicator_t
@@ -29,8 +30,8 @@ module gravier_shared_exchange
     !> place of this subdomain among the sharers of each shared body, from 1 (n_shared)
     integer, allocatable :: rung(:)
     integer :: n_slots = 0
-    !> shared body that each slot is a copy of (n_slots)
-    integer, allocatable :: slot_shared(:)
+    !> shared body that each slot is a copy of, and its local number (n_slots)
+    integer, allocatable :: slot_shared(:), slot_body(:)
     !> neighbouring subdomains, ascending, and the first slot of each (one more entry at the end)
     integer, allocatable :: neighbour(:), neighbour_first(:)
     !> (width, n_slots): what goes out and what came in
@@ -67,12 +68,20 @@ module gravier_shared_exchange
     !> stretches passed in memory: the outgoing one and the incoming one of the same pair
     type(segment_t), allocatable, private :: near_from(:), near_to(:)
     type(channel_t), allocatable, private :: channel(:)
+    !> which parts have slots in channels
+    logical, allocatable, private :: far(:)
+    !> persistent: one receive a channel, then one send a channel
     type(MPI_Request), allocatable, private :: requests(:)
   contains
     procedure :: init => shared_exchange_init
     procedure :: pass => shared_exchange_pass
+    procedure :: is_far => shared_exchange_is_far
+    procedure :: start => shared_exchange_start
+    procedure :: finish => shared_exchange_finish
     procedure :: load => shared_exchange_load
     procedure :: add_copies => shared_exchange_add_copies
+    procedure :: sum_copies => shared_exchange_sum_copies
+    procedure :: free => shared_exchange_free
   end type shared_exchange_t
 
   integer, parameter :: tag = 11
@@ -122,7 +131,7 @@ contains
     next(:) = part%neighbour_first(1:size(next))
     part%n_slots = part%neighbour_first(size(next) + 1) - 1
     allocate (part%slot(size(part%sharer)), source=0)
-    allocate (part%slot_shared(part%n_slots), part%rung(part%n_shared))
+    allocate (part%slot_shared(part%n_slots), part%slot_body(part%n_slots), part%rung(part%n_shared))
     allocate (part%send(width, part%n_slots), part%recv(width, part%n_slots), source=0.0_dp)
     do k = 1, part%n_shared
       do j = part%first(k), part%first(k + 1) - 1
@@ -132,6 +141,7 @@ contains
           s = place_of(part%neighbour, part%sharer(j))
           part%slot(j) = next(s)
           part%slot_shared(next(s)) = k
+          part%slot_body(next(s)) = part%body(k)
           next(s) = next(s) + 1
         end if
       end do
@@ -243,6 +253,18 @@ contains
     stretch%to = part%neighbour_first(j + 1) - 1
   end function stretch
 
+  !> Give back the channels and their persistent requests.
+  subroutine shared_exchange_free(self)
+    class(shared_exchange_t), intent(inout) :: self
+    integer :: r
+
+    if (.not. allocated(self%channel)) return
+    do r = 1, size(self%requests)
+      call MPI_Request_free(self%requests(r))
+    end do
+    deallocate (self%channel, self%requests)
+  end subroutine shared_exchange_free
+
   !> One channel per rank that owns a neighbour. Both ends list the pairs (sender, receiver) in ascending order.
   subroutine find_channels(self, n_subdomains)
     class(shared_exchange_t), intent(inout) :: self
@@ -257,10 +279,16 @@ contains
         if (r /= self%comm%rank) call insert(ranks, r)
       end do
     end do
-    if (allocated(self%channel)) deallocate (self%channel, self%requests)
+    call self%free()
+    if (allocated(self%far)) deallocate (self%far)
+    allocate (self%far(size(self%part)), source=.false.)
     allocate (self%channel(size(ranks)), self%requests(2*size(ranks)))
     do c = 1, size(ranks)
       call fill_channel(self%channel(c), ranks(c))
+      call MPI_Recv_init(self%channel(c)%recv, size(self%channel(c)%recv), MPI_DOUBLE_PRECISION, ranks(c), tag, self%comm%mpi, &
+        & self%requests(c))
+      call MPI_Send_init(self%channel(c)%send, size(self%channel(c)%send), MPI_DOUBLE_PRECISION, ranks(c), tag, self%comm%mpi, &
+        & self%requests(size(ranks) + c))
     end do
 
   contains
@@ -286,6 +314,7 @@ contains
           if (self%comm%rank_of(self%part(p)%neighbour(j), n_subdomains) /= rank) cycle
           k = k + 1
           channel%outgoing(k) = stretch(self%part(p), p, j)
+          self%far(p) = .true.
           far(k) = self%part(p)%neighbour(j)
         end do
       end do
@@ -302,32 +331,31 @@ contains
 
   !> Send `send` of all parts and fill `recv` of all parts. Collective over the ranks that share bodies.
   subroutine shared_exchange_pass(self)
-    class(shared_exchange_t), intent(inout), target :: self
-    type(channel_t), pointer :: channel
-    integer :: c, n, k
+    class(shared_exchange_t), intent(inout) :: self
+    call self%start()
+    call self%finish()
+  end subroutine shared_exchange_pass
+
+  !> Whether part `p` shares bodies with subdomains on other ranks.
+  pure logical function shared_exchange_is_far(self, p) result(is_far)
+    class(shared_exchange_t), intent(in) :: self
+    integer, intent(in) :: p
+    is_far = self%far(p)
+  end function shared_exchange_is_far
+
+  !> Begin to send what parts that share bodies with other ranks have loaded; `finish` ends it. In between, the other parts
+  !> may be loaded. Collective over the ranks that share bodies.
+  subroutine shared_exchange_start(self)
+    class(shared_exchange_t), intent(inout), target, asynchronous :: self
+    integer :: c, n
 
     n = size(self%channel)
     do c = 1, n
-      channel => self%channel(c)
-      call MPI_Irecv(channel%recv, size(channel%recv), MPI_DOUBLE_PRECISION, channel%rank, tag, self%comm%mpi, &
-        & self%requests(c))
-    end do
-    do c = 1, n
-      channel => self%channel(c)
-      call gather_channel(channel)
-      call MPI_Isend(channel%send, size(channel%send), MPI_DOUBLE_PRECISION, channel%rank, tag, self%comm%mpi, &
-        & self%requests(n + c))
+      call gather_channel(self%channel(c))
       self%messages = self%messages + 1
-      self%values = self%values + size(channel%send)
+      self%values = self%values + size(self%channel(c)%send)
     end do
-    do k = 1, size(self%near_from)
-      self%part(self%near_to(k)%part)%recv(:, self%near_to(k)%from:self%near_to(k)%to) = &
-        & self%part(self%near_from(k)%part)%send(:, self%near_from(k)%from:self%near_from(k)%to)
-    end do
-    call MPI_Waitall(2*n, self%requests, MPI_STATUSES_IGNORE)
-    do c = 1, n
-      call scatter_channel(self%channel(c))
-    end do
+    call MPI_Startall(2*n, self%requests)
 
   contains
 
@@ -343,6 +371,24 @@ contains
       end do
     end subroutine gather_channel
 
+  end subroutine shared_exchange_start
+
+  !> Fill `recv` of all parts once all are loaded and `start` was called. Collective over the ranks that share bodies.
+  subroutine shared_exchange_finish(self)
+    class(shared_exchange_t), intent(inout), target, asynchronous :: self
+    integer :: c, k
+
+    do k = 1, size(self%near_from)
+      self%part(self%near_to(k)%part)%recv(:, self%near_to(k)%from:self%near_to(k)%to) = &
+        & self%part(self%near_from(k)%part)%send(:, self%near_from(k)%from:self%near_from(k)%to)
+    end do
+    call MPI_Waitall(size(self%requests), self%requests, MPI_STATUSES_IGNORE)
+    do c = 1, size(self%channel)
+      call scatter_channel(self%channel(c))
+    end do
+
+  contains
+
     subroutine scatter_channel(channel)
       type(channel_t), intent(in) :: channel
       integer :: k, s, at
@@ -355,7 +401,7 @@ contains
       end do
     end subroutine scatter_channel
 
-  end subroutine shared_exchange_pass
+  end subroutine shared_exchange_finish
 
   !> Put the values of the shared bodies of part `p` into its outgoing slots.
   subroutine shared_exchange_load(self, p, field)
@@ -363,11 +409,16 @@ contains
     integer, intent(in) :: p
     !> (at least width, bodies of the subdomain)
     real(dp), intent(in), contiguous :: field(:, :)
-    integer :: s
+    integer :: s, d, b
 
     associate (part => self%part(p))
       do s = 1, part%n_slots
-        part%send(:, s) = field(1:self%width, part%body(part%slot_shared(s)))
+        b = part%slot_body(s)
+        ! too short to gain from vectors
+        !GCC$ novector
+        do d = 1, self%width
+          part%send(d, s) = field(d, b)
+        end do
       end do
     end associate
   end subroutine shared_exchange_load
@@ -393,5 +444,30 @@ contains
       end if
     end do
   end subroutine shared_exchange_add_copies
+
+  !> Replace the values of all shared bodies of part `p` by their sums over all copies, in subdomain order.
+  subroutine shared_exchange_sum_copies(self, p, field)
+    class(shared_exchange_t), intent(in) :: self
+    integer, intent(in) :: p
+    !> (at least width, bodies of the subdomain)
+    real(dp), intent(inout), contiguous :: field(:, :)
+    integer :: k, d, b, s
+
+    associate (part => self%part(p))
+      do k = 1, part%n_shared
+        b = part%body(k)
+        if (part%first(k + 1) - part%first(k) > 2) then
+          call self%add_copies(p, k, field(:, b))
+          cycle
+        end if
+        ! two copies, as almost always: the order does not matter, and the slot of this one is 0
+        s = part%slot(part%first(k)) + part%slot(part%first(k) + 1)
+        !GCC$ novector
+        do d = 1, self%width
+          field(d, b) = field(d, b) + part%recv(d, s)
+        end do
+      end do
+    end associate
+  end subroutine shared_exchange_sum_copies
 
 end module gravier_shared_exchange

@@ -4,7 +4,7 @@ module gravier_contact_problem
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_contact_kernels, only: kernels_t, local_operator
+  use gravier_contact_kernels, only: kernels_t, local_operator, lane_of, block_of
   implicit none
   private
   public :: subproblem_t, contact_problem_t
@@ -18,6 +18,8 @@ module gravier_contact_problem
     !> global number of the subdomain, from 1
     integer :: subdomain = 0
     integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
+    !> contacts in whole blocks without common bodies: the first ones
+    integer :: n_grouped = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
@@ -40,10 +42,10 @@ module gravier_contact_problem
     real(dp), allocatable :: inverse_mass(:, :)
     !> the same as the scheme shares masses out (nw, n_columns)
     real(dp), allocatable :: weight(:, :)
-    !> (2, n_contacts), (nh, n_contacts), (nc, n_contacts): see gravier_contact_kernels
+    !> (2, lanes*blocks), (lanes, nh, blocks), (lanes, nc, blocks): see gravier_contact_kernels
     integer, allocatable :: pair(:, :)
-    real(dp), allocatable :: hot(:, :)
-    real(dp), allocatable :: impulse(:, :)
+    real(dp), allocatable :: hot(:, :, :)
+    real(dp), allocatable :: impulse(:, :, :)
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
@@ -64,6 +66,9 @@ module gravier_contact_problem
     type(shared_exchange_t) :: shared
     !> subdomains of the scene
     integer :: n_subdomains = 1
+    !> of each subdomain, (sum of |r - y|^2, sum of |r|^2) of the first sweep of the last iteration, which started from y
+    !> (2, subdomains) [N^2 s^2]
+    real(dp), allocatable :: progress(:, :)
     !> contacts of the scene
     integer(i8) :: n_contacts = 0
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
@@ -72,6 +77,7 @@ module gravier_contact_problem
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
     procedure :: jump => contact_problem_jump
+    procedure :: received_jump => contact_problem_received_jump
     procedure :: own_reactions => contact_problem_own_reactions
     procedure :: any_impulse => contact_problem_any_impulse
   end type contact_problem_t
@@ -102,8 +108,8 @@ contains
     nd = size(self%position, 1)
     do c = 1, self%n_contacts
       call self%local_operator(c, self%weight, w)
-      self%hot(nd + 2, c) = 1.0_dp/w(1)
-      if (size(self%hot, 1) > nd + 2) self%hot(nd + 3, c) = 1.0_dp/w(2)
+      self%hot(lane_of(c), nd + 2, block_of(c)) = 1.0_dp/w(1)
+      if (size(self%hot, 2) > nd + 2) self%hot(lane_of(c), nd + 3, block_of(c)) = 1.0_dp/w(2)
     end do
   end subroutine subproblem_update_local_operator
 
@@ -114,14 +120,18 @@ contains
     !> (nw, n_columns)
     real(dp), intent(in), contiguous :: weight(:, :)
     real(dp), intent(out) :: w(2)
-    integer :: nd, i, j
+    real(dp) :: normal(size(self%position, 1))
+    integer :: nd, i, j, q, g
 
-    nd = size(self%position, 1)
+    nd = size(normal)
     i = self%pair(1, c)
     j = self%pair(2, c)
-    call local_operator(self%hot(1:nd, c), weight(:, i), weight(:, j), w(1), w(2))
-    if (size(self%hot, 1) > nd + 2) then
-      w(2) = w(2) + self%hot(nd + 4, c)**2*weight(nd + 1, i) + self%hot(nd + 5, c)**2*weight(nd + 1, j)
+    q = lane_of(c)
+    g = block_of(c)
+    normal(:) = self%hot(q, 1:nd, g)
+    call local_operator(normal, weight(:, i), weight(:, j), w(1), w(2))
+    if (size(self%hot, 2) > nd + 2) then
+      w(2) = w(2) + self%hot(q, nd + 4, g)**2*weight(nd + 1, i) + self%hot(q, nd + 5, g)**2*weight(nd + 1, j)
     else
       w(2) = w(1)
     end if
@@ -166,7 +176,7 @@ contains
   !> but the order of the sums. Collective.
   subroutine contact_problem_evaluate(self)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s, k, b, nv
+    integer :: s, nv
 
     nv = self%kernels%nv
     do s = 1, size(self%sub)
@@ -175,13 +185,8 @@ contains
     end do
     call self%shared%pass()
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s), part => self%shared%part(s))
-        do k = 1, part%n_shared
-          b = part%body(k)
-          call self%shared%add_copies(s, k, sub%reaction(:, b))
-        end do
-        call add_impulses(sub)
-      end associate
+      call self%shared%sum_copies(s, self%sub(s)%reaction)
+      call add_impulses(self%sub(s))
     end do
 
   contains
@@ -243,25 +248,33 @@ contains
   !> subdomains, relative to velocity_scale. Collective.
   real(dp) function contact_problem_jump(self) result(jump)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s, k, j, nd
+    integer :: s
 
-    nd = self%kernels%nd
     do s = 1, size(self%sub)
       call self%shared%load(s, self%sub(s)%velocity)
     end do
     call self%shared%pass()
+    jump = self%received_jump()
+  end function contact_problem_jump
+
+  !> The same where the copies' velocities have just been passed. Collective.
+  real(dp) function contact_problem_received_jump(self) result(jump)
+    class(contact_problem_t), intent(in) :: self
+    integer :: s, k, j, nd
+
+    nd = self%kernels%nd
     jump = 0.0_dp
     do s = 1, size(self%sub)
       associate (part => self%shared%part(s))
         do j = 1, part%n_slots
-          k = part%body(part%slot_shared(j))
+          k = part%slot_body(j)
           jump = max(jump, norm2(part%recv(1:nd, j) - self%sub(s)%velocity(1:nd, k)))
         end do
       end associate
     end do
     jump = self%comm%highest(jump)
     if (self%velocity_scale > 0.0_dp) jump = jump/self%velocity_scale
-  end function contact_problem_jump
+  end function contact_problem_received_jump
 
   !> Whether some impulse is not zero. Collective.
   logical function contact_problem_any_impulse(self) result(any_impulse)

@@ -3,7 +3,7 @@ module gravier_nlgs
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_velocities, sweep_all
+  use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
   implicit none
   private
   public :: nlgs_t
@@ -23,7 +23,7 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
-    call start_velocities(problem, shared_masses=.false.)
+    call start_sweeps(self, problem, shared_masses=.false.)
   end subroutine nlgs_start
 
   subroutine nlgs_iterate(self, problem, measure, jump, error)

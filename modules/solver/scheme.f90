@@ -2,11 +2,12 @@
 module gravier_scheme
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_sweep
+  use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
+  use gravier_communicator, only: communicator_t
   use gravier_contact_problem, only: contact_problem_t
   implicit none
   private
-  public :: scheme_t, work_t, start_velocities, sweep_all
+  public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, end_sweeps
 
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
@@ -17,15 +18,39 @@ module gravier_scheme
     integer(i8) :: analyses = 0, factorisations = 0
   end type work_t
 
+  !> What extrapolation keeps of the last iteration, for one subdomain.
+  type :: momentum_part_t
+    !> impulses (lanes, nc, blocks) [N s]
+    real(dp), allocatable :: impulse(:, :, :)
+    !> velocities under them (nv, n_columns) [m/s, rad/s]
+    real(dp), allocatable :: velocity(:, :)
+  end type momentum_part_t
+
+  !> Nesterov's extrapolation between iterations, with adaptive restart: iteration k starts from
+  !> y = r_k + beta (r_k - r_k-1), beta = (t_k - 1)/t_k+1, t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983; O'Donoghue and
+  !> Candes 2015). It forgets (t = 1) whenever the sweep moves impulses further from y than the last one did from its own.
+  type :: momentum_t
+    logical :: on = .false.
+    real(dp) :: t = 1.0_dp, beta = 0.0_dp
+    !> |r - y|^2 of the last iteration [N^2 s^2]
+    real(dp) :: change = huge(1.0_dp)
+    type(momentum_part_t), allocatable :: part(:)
+  end type momentum_t
+
   type, abstract :: scheme_t
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
+    type(momentum_t) :: momentum
+    !> spent in sweeps of each subdomain of this rank since `forget_times` [s]
+    real(dp), allocatable :: seconds(:)
     type(work_t) :: work
   contains
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
     procedure :: free => scheme_free
     procedure :: work_done => scheme_work_done
+    procedure :: measure_balance => scheme_measure_balance
+    procedure :: forget_times => scheme_forget_times
   end type scheme_t
 
   abstract interface
@@ -65,8 +90,43 @@ contains
     work = self%work
   end function scheme_work_done
 
-  !> Masses as the method wants them, and velocities that agree with the impulses in all copies.
-  subroutine start_velocities(problem, shared_masses)
+  !> How unevenly the seconds in sweeps lie, of the ranks and of the subdomains: the most over the mean, 1 without any.
+  !> Collective.
+  subroutine scheme_measure_balance(self, comm, n_subdomains, ranks, subdomains)
+    class(scheme_t), intent(in) :: self
+    type(communicator_t), intent(in) :: comm
+    !> of the scene
+    integer, intent(in) :: n_subdomains
+    real(dp), intent(out) :: ranks, subdomains
+    real(dp) :: own(1, 1), longest, mean, total(1)
+
+    own(:, :) = 0.0_dp
+    longest = 0.0_dp
+    if (allocated(self%seconds)) then
+      own(1, 1) = sum(self%seconds)
+      longest = maxval(self%seconds)
+    end if
+    call comm%sum_parts(own, total)
+    mean = total(1)
+    ranks = comm%highest(own(1, 1))
+    subdomains = comm%highest(longest)
+    if (mean > 0.0_dp) then
+      ranks = ranks*comm%size/mean
+      subdomains = subdomains*n_subdomains/mean
+    else
+      ranks = 1.0_dp
+      subdomains = 1.0_dp
+    end if
+  end subroutine scheme_measure_balance
+
+  subroutine scheme_forget_times(self)
+    class(scheme_t), intent(inout) :: self
+    if (allocated(self%seconds)) deallocate (self%seconds)
+  end subroutine scheme_forget_times
+
+  !> Masses as the method wants them, and velocities that agree with the impulses in all copies. Collective.
+  subroutine start_sweeps(scheme, problem, shared_masses)
+    class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
     !> masses shared between the copies of a body (dual Schur methods), or whole in each
     logical, intent(in) :: shared_masses
@@ -83,26 +143,158 @@ contains
         problem%sub(s)%velocity(:, :) = problem%sub(s)%v_free
       end if
     end do
-  end subroutine start_velocities
+    if (allocated(problem%progress)) deallocate (problem%progress)
+    allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)
+    if (.not. allocated(scheme%seconds)) allocate (scheme%seconds(size(problem%sub)), source=0.0_dp)
+    if (scheme%momentum%on) call start_momentum(scheme%momentum, problem)
+  end subroutine start_sweeps
 
-  !> Sweeps in every subdomain of this rank.
+  subroutine start_momentum(momentum, problem)
+    type(momentum_t), intent(inout) :: momentum
+    type(contact_problem_t), intent(in) :: problem
+    integer :: s
+
+    momentum%t = 1.0_dp
+    momentum%beta = 0.0_dp
+    momentum%change = huge(1.0_dp)
+    if (allocated(momentum%part)) deallocate (momentum%part)
+    allocate (momentum%part(size(problem%sub)))
+    do s = 1, size(problem%sub)
+      momentum%part(s)%impulse = problem%sub(s)%impulse
+      momentum%part(s)%velocity = problem%sub(s)%velocity
+    end do
+  end subroutine start_momentum
+
+  !> The sweeps of one iteration in every subdomain of this rank. Collective with momentum.
   subroutine sweep_all(scheme, problem)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, k
 
-    call start_timer(phase_sweep)
+    call begin_sweeps(scheme, problem)
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        do k = 1, scheme%sweeps
-          call problem%kernels%sweep(sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse)
-        end do
-        scheme%work%relaxations = scheme%work%relaxations + int(scheme%sweeps, i8)*sub%n_contacts
-      end associate
+      do k = 1, scheme%sweeps
+        call sweep_once(scheme, problem, s, k)
+      end do
     end do
+    call end_sweeps(scheme, problem)
+  end subroutine sweep_all
+
+  !> The same, passing on the velocities of shared bodies. Subdomains with neighbours on other ranks come first, so that
+  !> messages travel while the others are swept: no subdomain's sweeps depend on another's. Collective.
+  subroutine sweep_and_pass(scheme, problem)
+    class(scheme_t), intent(inout) :: scheme
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s, k, round
+
+    call begin_sweeps(scheme, problem)
+    do round = 1, 2
+      do s = 1, size(problem%sub)
+        if (problem%shared%is_far(s) .neqv. round == 1) cycle
+        do k = 1, scheme%sweeps
+          call sweep_once(scheme, problem, s, k)
+        end do
+      end do
+      call stop_timer(phase_sweep)
+      call start_timer(phase_exchange)
+      do s = 1, size(problem%sub)
+        if (problem%shared%is_far(s) .eqv. round == 1) call problem%shared%load(s, problem%sub(s)%velocity)
+      end do
+      if (round == 1) call problem%shared%start()
+      call stop_timer(phase_exchange)
+      call start_timer(phase_sweep)
+    end do
+    call end_sweeps(scheme, problem)
+    call start_timer(phase_exchange)
+    call problem%shared%finish()
+    call stop_timer(phase_exchange)
+  end subroutine sweep_and_pass
+
+  !> With momentum, bring the velocities to those under the extrapolated impulses, from which the first sweep starts:
+  !> V depends on r linearly.
+  subroutine begin_sweeps(scheme, problem)
+    class(scheme_t), intent(inout) :: scheme
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    call start_timer(phase_sweep)
+    if (.not. scheme%momentum%on) return
+    do s = 1, size(problem%sub)
+      call extrapolate(scheme%momentum%beta, problem%sub(s)%velocity, scheme%momentum%part(s)%velocity)
+    end do
+  end subroutine begin_sweeps
+
+  !> v := v + beta (v - previous), previous := v.
+  pure subroutine extrapolate(beta, velocity, previous)
+    real(dp), intent(in) :: beta
+    !> (nv, n_columns)
+    real(dp), intent(inout), contiguous :: velocity(:, :), previous(:, :)
+    real(dp) :: v
+    integer :: b, d
+
+    do b = 1, size(velocity, 2)
+      do d = 1, size(velocity, 1)
+        v = velocity(d, b)
+        velocity(d, b) = v + beta*(v - previous(d, b))
+        previous(d, b) = v
+      end do
+    end do
+  end subroutine extrapolate
+
+  !> Sweep `k` of an iteration in subdomain `s` of this rank.
+  subroutine sweep_once(scheme, problem, s, k, law_velocity)
+    class(scheme_t), intent(inout) :: scheme
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: s, k
+    !> takes the velocity that solves the law at each contact (lanes, nc, blocks) [m/s]
+    real(dp), intent(inout), contiguous, optional :: law_velocity(:, :, :)
+    real(dp) :: sums(2), start
+
+    start = clock()
+    associate (sub => problem%sub(s), kernels => problem%kernels)
+      if (scheme%momentum%on .and. k == 1) then
+        associate (part => scheme%momentum%part(s), beta => scheme%momentum%beta)
+          if (present(law_velocity)) then
+            call kernels%sweep_momentum_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+              & beta, part%impulse, law_velocity)
+          else
+            call kernels%sweep_momentum(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+              & beta, part%impulse)
+          end if
+        end associate
+      else if (present(law_velocity)) then
+        call kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, law_velocity)
+      else
+        call kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
+      end if
+      if (k == 1) problem%progress(:, s) = sums
+      scheme%work%relaxations = scheme%work%relaxations + sub%n_contacts
+    end associate
+    scheme%seconds(s) = scheme%seconds(s) + clock() - start
+  end subroutine sweep_once
+
+  !> Count the sweeps, and choose the extrapolation of the next iteration. Collective with momentum.
+  subroutine end_sweeps(scheme, problem)
+    class(scheme_t), intent(inout) :: scheme
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: sums(2), next
+
     scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
     scheme%work%iterations = scheme%work%iterations + 1
     call stop_timer(phase_sweep)
-  end subroutine sweep_all
+    if (.not. scheme%momentum%on) return
+    associate (momentum => scheme%momentum)
+      call problem%comm%sum_parts(problem%progress, sums)
+      if (sums(1) <= momentum%change) then
+        next = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*momentum%t**2))
+        momentum%beta = (momentum%t - 1.0_dp)/next
+        momentum%t = next
+      else
+        momentum%beta = 0.0_dp
+        momentum%t = 1.0_dp
+      end if
+      momentum%change = sums(1)
+    end associate
+  end subroutine end_sweeps
 
 end module gravier_scheme

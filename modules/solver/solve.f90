@@ -15,13 +15,16 @@ module gravier_solve
 
   !> growth of the defect, relative to that at the start or to the largest |R^d| of a body, taken for divergence
   real(dp), parameter :: growth_limit = 1.0e4_dp
+  !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
+  integer, parameter :: most_skips = 9
+  real(dp), parameter :: worth_a_check = 1.2_dp
 
   type :: solve_control_t
     real(dp) :: tolerance = 1.0e-4_dp
     integer :: max_iterations = 10000
-    !> iterations between two checks
+    !> iterations between two checks; of these, some that would tell nothing new are left out
     integer :: check_every = 10
-    !> keep the figures of every check
+    !> keep the figures of every check, and leave none out
     logical :: trace = .false.
   end type solve_control_t
 
@@ -56,7 +59,9 @@ module gravier_solve
 contains
 
   !> Solve. The state is checked at the start, every check_every iterations and at the end, by the residual, or by
-  !> the error where `exact` is given. Collective.
+  !> the error where `exact` is given. A residual costs as much as two sweeps; what sweeps move impulses by goes with it and
+  !> comes for nothing: a check is left out where that, times the ratio of the two at the last check, is far from the
+  !> tolerance. Collective.
   subroutine solve_contacts(problem, scheme, control, report, error, exact)
     type(contact_problem_t), intent(inout) :: problem
     class(scheme_t), intent(inout) :: scheme
@@ -65,23 +70,46 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> criterion 'error'
     class(exact_solution_t), intent(in), optional :: exact
-    real(dp) :: reference
+    real(dp) :: reference, progress, ratio
+    integer :: skips
     logical :: measure, done
 
     if (control%trace) allocate (report%trace(4, 64))
     reference = 0.0_dp
+    progress = 0.0_dp
+    ratio = 0.0_dp
+    skips = 0
     call scheme%start(problem, error)
     if (allocated(error)) return
     call check(done)
     do while (.not. done)
       report%iterations = report%iterations + 1
-      measure = mod(report%iterations, control%check_every) == 0 .or. report%iterations == control%max_iterations
+      measure = mod(report%iterations, control%check_every) == 0
+      if (measure .and. .not. (control%trace .or. present(exact))) measure = is_worth_a_check()
+      measure = measure .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) call check(done)
     end do
 
   contains
+
+    !> Whether the sweeps of the iteration before speak for a check. Collective.
+    logical function is_worth_a_check() result(is_worth)
+      real(dp) :: sums(2)
+
+      call start_timer(phase_check)
+      call problem%comm%sum_parts(problem%progress, sums)
+      progress = 0.0_dp
+      is_worth = .true.
+      if (all(ieee_is_finite(sums))) then
+        if (sums(2) > 0.0_dp) progress = sqrt(sums(1)/sums(2))
+        if (ratio > 0.0_dp .and. progress > 0.0_dp .and. skips < most_skips) &
+          & is_worth = ratio*progress <= worth_a_check*control%tolerance .or. sqrt(sums(1)) > growth_limit*reference
+      end if
+      skips = merge(0, skips + 1, is_worth)
+      call stop_timer(phase_check)
+    end function is_worth_a_check
 
     subroutine check(finished)
       logical, intent(out) :: finished
@@ -95,6 +123,7 @@ contains
         figure = report%error
       end if
       if (control%trace) call keep_trace(report)
+      if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%residual/progress
       call judge(figure, defect, finished)
       call stop_timer(phase_check)
     end subroutine check

@@ -12,6 +12,7 @@ from gravier_runs import RunTestCase, differences, each, merged, run_case, settl
 RADIUS = 0.01
 ALLOWED = 0.005 * RADIUS
 DENSITY = 2500.0
+PRESSURE = 2.0e4  # N/m
 KEPT = 1.5
 CASE = {
     "scene": {"dimension": 2, "bodies": "file", "friction": 0.3, "density": DENSITY, "overlap_allowed": ALLOWED},
@@ -58,6 +59,9 @@ class Drift(RunTestCase):
         with h5py.File(cls.packing) as file:
             cls.centres, cls.radii = file["bodies/position"][:], file["bodies/radius"][:]
             cls.planes = list(zip(file["walls/point"][:], file["walls/normal"][:]))
+        with h5py.File(settled_disks(cls.scratch + "/small", count=(14, 12))) as file:
+            cls.small_centres, cls.small_radii = file["bodies/position"][:], file["bodies/radius"][:]
+            cls.small_planes = list(zip(file["walls/point"][:], file["walls/normal"][:]))
         cls.unit = (DENSITY * np.pi * cls.radii**2).sum() * 9.81 * RADIUS
 
     def run_here(self, name, change=None, more=None, ranks=1):
@@ -115,43 +119,101 @@ class Drift(RunTestCase):
         # the projection has lifted the packing, and gave it no velocity
         self.assertGreater(history["potential_energy"][-1] - history["potential_energy"][0], self.unit)
 
-    def piston(self, name, more=None):
-        """Disks that overlap each other, glued ones below and a piston above that a pressure moves."""
+    def glued_piston(self, name, more=None, ranks=1):
+        """Disks that overlap each other, glued ones below and above: the upper ones are a piston that a force moves."""
         x, y = RADIUS * (2 * np.arange(10) + 1), 1.8 * RADIUS * np.arange(1, 7)
         free = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
-        centres = np.concatenate([np.stack([x, np.zeros(10)], axis=1), free])
-        path = grains_file(self.here(name + ".h5"), centres, np.full(70, RADIUS), np.repeat([3, 0], [10, 60]))
+        rows = [np.stack([x, np.full(10, height)], axis=1) for height in (0.0, y[-1] + 1.8 * RADIUS)]
+        path = grains_file(self.here(name + ".h5"), np.concatenate([*rows, free]), np.full(80, RADIUS),
+                           np.repeat([3, 4, 0], [10, 10, 60]))
         boundaries = [{"name": "bottom", "shape": "grains", "group": 3},
                       {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
                       {"name": "right", "shape": "plane", "normal": [-1.0, 0.0], "point": [20.0 * RADIUS, 0.0]},
-                      {"name": "lid", "shape": "plane", "normal": [0.0, -1.0], "point": [0.0, y[-1] + 0.8 * RADIUS],
-                       "free": [False, True], "pressure": 2000.0, "mass": 5.0}]
+                      {"name": "lid", "shape": "grains", "group": 4, "free": [False, True], "force": [0.0, -400.0], "mass": 5.0}]
         return self.run_here(name, {"scene": {"bodies_file": path}, "boundary": boundaries, "time": {"steps": 50},
-                                    "solver": {"tolerance": 1e-8, "max_iterations": 5000}, "output": {"every": 1}}, more)
+                                    "solver": {"tolerance": 1e-8, "max_iterations": 5000}, "output": {"every": 1}}, more, ranks)
 
-    def test_boundaries_stay(self):
-        """Projections move the free grains only. A piston moves by its velocity alone, glued grains not at all."""
-        run, without = each(self.piston, [("piston",), ("piston without", WITHOUT)])
+    def test_what_moves(self):
+        """Projections move free grains, and a piston with the grains glued to it, along what is free. What moves as prescribed
+        stays, here at rest."""
+        run, without = each(self.glued_piston, [("glued piston",), ("glued piston without", WITHOUT)])
         moved, unmoved = run.results(), without.results()
-        self.assertEqual(run.history()["projected"].min(), 1)
-        glued = slice(0, 10)
+        self.assertEqual(run.history()["projected"][:10].min(), 1)
+        bottom, lid, free = slice(0, 10), slice(10, 20), slice(20, 80)
+        ways = []
         for step in range(1, 51):
-            places = moved[f"/steps/{step}/bodies/position"]
-            self.assertTrue(np.array_equal(places[glued], moved["/steps/0/bodies/position"][glued]))
+            places, start = (moved[f"/steps/{k}/bodies/position"] for k in (step, 0))
+            self.assertTrue(np.array_equal(places[bottom], start[bottom]))
             before, now = (moved[f"/steps/{k}/boundaries/position"] for k in (step - 1, step))
             velocity = [moved[f"/steps/{k}/boundaries/velocity"] for k in (step - 1, step)]
-            np.testing.assert_allclose(now - before, 0.5e-3 * (velocity[0] + velocity[1])[:, :2], rtol=0.0, atol=1e-15)
-        self.assertTrue(np.array_equal(moved["/steps/1/boundaries/position"], unmoved["/steps/1/boundaries/position"]))
-        free = slice(10, 70)
+            by_velocity = 0.5e-3 * (velocity[0] + velocity[1])[:, :2]
+            np.testing.assert_allclose((now - before)[:3], by_velocity[:3], rtol=0.0, atol=1e-15)
+            np.testing.assert_allclose((now - before)[3, 0], 0.0, rtol=0.0, atol=0.0)
+            ways.append((now - before - by_velocity)[3, 1])
+            # rigid, the sum of two roundings a step
+            np.testing.assert_allclose(places[lid] - start[lid], np.tile(now[3] - moved["/steps/0/boundaries/position"][3], (10, 1)),
+                                       rtol=0.0, atol=1e-14)
+        # up, at most half the alert distance a step, a tenth of the radius
+        self.assertGreater(sum(ways), 0.2 * RADIUS)
+        self.assertLess(np.abs(ways).max(), 0.05 * RADIUS * (1.0 + 1e-9))
         first = [results["/steps/1/bodies/position"][free] for results in (moved, unmoved)]
         self.assertGreater(np.abs(first[0] - first[1]).max(), 0.02 * RADIUS)
-        # within sight: half the alert distance, a tenth of the radius
         self.assertLess(np.linalg.norm(first[0] - first[1], axis=1).max(), 0.05 * RADIUS * (1.0 + 1e-9))
-        self.assertTrue(np.array_equal(moved["/steps/1/bodies/velocity"], unmoved["/steps/1/bodies/velocity"]))
-        # nothing comes to lie behind the piston or the sides
-        places = moved["/steps/50/bodies/position"][free]
-        self.assertTrue(np.all((places[:, 0] > 0.0) & (places[:, 0] < 20.0 * RADIUS)))
-        self.assertLess(places[:, 1].max(), moved["/steps/50/boundaries/position"][3, 1])
+        for name in ("bodies", "boundaries"):
+            self.assertTrue(np.array_equal(moved[f"/steps/1/{name}/velocity"], unmoved[f"/steps/1/{name}/velocity"]))
+        places = moved["/steps/50/bodies/position"]
+        self.assertTrue(np.all((places[free, 0] > 0.0) & (places[free, 0] < 20.0 * RADIUS)))
+        self.assertLess(places[free, 1].max(), places[lid, 1].max())
+
+    def pressed(self, name, more=None, ranks=1):
+        """168 disks at rest between a floor, smooth sides and a lid that a pressure moves, which bears five times their weight."""
+        width, top = self.small_planes[2][0][0], (self.small_centres[:, 1] + self.small_radii).max()
+        path = grains_file(self.here(name + ".h5"), self.small_centres, self.small_radii)
+        boundaries = [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0], "friction": 0.3},
+                      {"name": "left", "shape": "plane", "normal": [1.0, 0.0], "friction": 0.0},
+                      {"name": "right", "shape": "plane", "normal": [-1.0, 0.0], "point": [width, 0.0], "friction": 0.0},
+                      {"name": "lid", "shape": "plane", "normal": [0.0, -1.0], "point": [0.0, top], "free": [False, True],
+                       "pressure": PRESSURE, "mass": 20.0}]
+        return self.run_here(name, {"scene": {"bodies_file": path, "overlap_allowed": 0.01 * RADIUS}, "boundary": boundaries,
+                                    "time": {"step": 2e-3, "steps": 3000}, "output": {"boundary_forces": True}}, more, ranks)
+
+    def test_pressed(self):
+        """Under a lid, for long, at a loose tolerance: overlaps stay as they do without one, and the lid bears what it did."""
+        kept, without = (run.history() for run in each(self.pressed, [("pressed",), ("pressed without", WITHOUT)]))
+        half, allowed = len(kept["step"]) // 2, 0.01 * RADIUS
+        late = slice(half, None)
+        self.assertGreater(without["max_overlap"][-1], 10.0 * allowed)
+        self.assertGreater(kept["projected"][late].mean(), 0.5)
+        self.assertLess(np.quantile(kept["max_overlap"][late], 0.95), KEPT * allowed)
+        # a solve that is accepted without a sweep may push some grain in, for a step or two
+        self.assertLess(kept["max_overlap"][late].max(), 6.0 * allowed)
+        # projections give no velocity: at rest, but for what a loose solve leaves, with and without
+        mass = DENSITY * np.pi * (self.small_radii**2).sum()
+        for history in (kept, without):
+            self.assertLess(history["kinetic_energy"][late].mean(), 0.01 * mass * 9.81 * RADIUS)
+            self.assertLess(np.abs(history["energy_error"]).max(), 1e-10 * mass * 9.81 * RADIUS)
+        self.assertLess(kept["kinetic_energy"][late].mean(), 4.0 * without["kinetic_energy"][late].mean())
+        # so the mean forces on lid and floor are those that keep the momentum: |change| <= sqrt(2 m E) at both ends
+        seconds = 2e-3 * (len(kept["step"]) - half)
+        width = self.small_planes[2][0][0]
+        change = np.sqrt(2.0 * mass * kept["kinetic_energy"]) + np.sqrt(2.0 * 20.0 * kept["kinetic_boundaries"])
+        slack = (change[half - 1] + change[-1]) / seconds + 1e-9
+        lid, floor = (kept[f"force_y:{name}"][late].mean() for name in ("lid", "floor"))
+        self.assertLess(abs(lid - PRESSURE * width), slack)
+        self.assertLess(abs(-floor - lid - mass * 9.81), slack)
+        self.assertLess(slack, 0.01 * PRESSURE * width)
+        # the lid is where it is without: the overlaps that are gone do not lift it by a radius
+        self.assertLess(abs(kept["position_y:lid"][-1] - without["position_y:lid"][-1]), RADIUS)
+
+    def test_ranks_under_pistons(self):
+        """The same bits on 1, 2 and 4 ranks, of which some know the lid by hearsay; a plane, and glued grains."""
+        grid = {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 8, "grid": [2, 4]}, "time": {"steps": 60}}
+        for build, more in ((self.glued_piston, {"solver": {"tolerance": 1e-3}, "time": {"steps": 30}}),
+                            (self.pressed, {"scene": {"overlap_allowed": 1e-3 * RADIUS}, "output": {"every": 10}})):
+            runs = each(build, [(f"{build.__name__} {ranks}", merged(grid, more), ranks) for ranks in (1, 2, 4)])
+            self.assertGreater(runs[0].history()["projected"].sum(), 10)
+            for run in runs[1:]:
+                self.assertEqual([name for name in differences(runs[0].results(), run.results()) if not name.startswith("/run")], [])
 
     def test_periodic(self):
         """Overlaps across the sides of a cell are undone as those within: a lattice of 10 by 6 disks that overlap by a tenth."""

@@ -26,7 +26,7 @@ DRUM = {
         {"shape": "plane", "name": "belt", "point": [0.0, -0.01], "normal": [0.0, 1.0], "velocity": [0.3, 0.0]},
         {"shape": "plane", "name": "lid", "point": [0.0, 0.31], "normal": [0.0, -1.0], "free": [False, True], "mass": 2.0,
          "force": [0.0, -50.0]},
-        {"shape": "circle", "name": "bubble", "point": [0.25, 0.1], "radius": 0.6, "table": "drive.csv"},
+        {"shape": "segment", "name": "paddle", "point": [0.46, 0.18], "end": [0.54, 0.2], "table": "drive.csv"},
         {"shape": "segment", "name": "blade", "point": [0.1, 0.05], "end": [0.15, 0.12], "remove_at": 0.065},
         {"shape": "grains", "name": "stirrer", "group": 1, "rotation": [3.0], "pivot": [0.3, 0.1]},
         {"shape": "outlet", "name": "hole", "point": [0.0, 0.27], "normal": [0.0, -1.0]},
@@ -229,6 +229,19 @@ class Restart(RunTestCase):
         ranks = [(1, 2), (2, 4), (4, 1), (2, 1), (1, 4), (4, 2), (1, 1), (2, 2)]
         each(lambda stop, number: self.one_restart(DRUM, stop, *number, straight, write_drum), list(zip(stops, ranks)))
 
+    def test_piston(self):
+        """Overlaps under a lid that a force moves, taken back step by step: grains and lid go on from where they were put."""
+        case = merged(BOX, {"scene": {"overlap_allowed": 1e-6},
+                            "boundary": [{"shape": "plane", "name": "lid", "point": [0.0, 0.21], "normal": [0.0, -1.0],
+                                          "free": [False, True], "mass": 5.0, "force": [0.0, -2000.0]}],
+                            "time": {"step": 2e-3, "steps": 80}, "decomposition": {"subdomains": 4},
+                            "output": {"every": 7, "boundary_forces": True}})
+        straight = self.straight("piston", case)
+        history = read_csv(os.path.join(straight, "results", "history.csv"))
+        self.assertGreater(history["projected"][30:].sum(), 40)
+        for stop, before, after in ((45, 1, 2), (61, 2, 1), (62, 2, 4)):
+            self.one_restart(case, stop, before, after, straight)
+
     def test_methods(self):
         """Every method, and without a warm start; in 3D with walls of another friction."""
         cases = {
@@ -262,15 +275,46 @@ class Restart(RunTestCase):
             self.assert_status(again, 0)
             self.assertNotIn("from the checkpoint of step 400\n", again.stdout)
             self.assert_same(straight, directory)
-        directory = self.here("usr1")
-        run = Going(case, 2, directory)
-        run.wait_for_rows(draw.randrange(1, 50))
-        run.process.send_signal(signal.SIGUSR1)
-        run.wait_for(lambda: os.path.exists(os.path.join(directory, "results", "checkpoint.h5")), "the checkpoint of SIGUSR1")
-        status, said = run.end()
-        self.assertEqual(status, 0, said)
-        self.assertEqual(said.count("checkpoint  of step"), 2, said)
-        self.assert_same(straight, directory)
+
+        def ask(name, *signals):
+            """A run that is asked once makes one checkpoint, and one at its end."""
+            directory = self.here(name)
+            run = Going(case, 2, directory)
+            run.wait_for_rows(draw.randrange(1, 50))
+            for send in signals:
+                send(run)
+                run.wait_for(lambda: os.path.exists(os.path.join(directory, "results", "checkpoint.h5")), "the checkpoint")
+                run.wait_for_rows(run.rows() + 2)
+            status, said = run.end()
+            self.assertEqual(status, 0, said)
+            self.assertEqual(said.count("checkpoint  of step"), 2, said)
+            self.assert_same(straight, directory)
+
+        ask("usr1", lambda run: run.process.send_signal(signal.SIGUSR1))
+        # a launcher that passes it on to one rank some steps after the other
+        ask("usr1 late", lambda run: os.kill(sorted(run.pids())[0], signal.SIGUSR1),
+            lambda run: os.kill(sorted(run.pids())[1], signal.SIGUSR1))
+
+    def test_imbalance_that_no_division_cures(self):
+        """Space is divided anew once, and again only when contacts lie more unevenly than the last division left them; a restart
+        in between does as the run that nothing stops."""
+        def chains(directory):
+            os.makedirs(directory, exist_ok=True)
+            # 11 grains that stay together, and 8 that part in the 7th step: 10 and 7 contacts, then 10 and none
+            rows = [f"{k + 1},{0.02 * k!r},0.0,0.01,0.0" for k in range(11)]
+            rows += [f"{k + 12},{1 + 0.02 * k!r},0.0,0.01,{0.02 * k!r}" for k in range(8)]
+            write(os.path.join(directory, "grains.csv"), "id,x,y,radius,vx\n" + "\n".join(rows) + "\n")
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "gravity": [0.0, 0.0]},
+            "time": {"step": 8e-3, "steps": 20}, "solver": {"method": "nscdd"},
+            "decomposition": {"grid": [2, 1], "repartition_imbalance": 1.1},
+            "output": {"every": 5, "checkpoint_every": 1}}
+        straight = self.straight("chains", case, chains)
+        history = read_csv(os.path.join(straight, "results", "history.csv"))
+        self.assertEqual(list(history["contacts"][[0, 5, 6, 19]]), [17, 17, 10, 10])
+        self.assertEqual(list(history["step"][history["divided"] == 1]), [2, 8])
+        for stop in (4, 7, 11):
+            self.one_restart(case, stop, 1, 2, straight, chains)
 
     def test_walltime(self):
         """The run stops before its time is over, and goes on."""
@@ -369,8 +413,13 @@ class Restart(RunTestCase):
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.012\n")
         case = merged(BOX, {"scene": {"bodies": "file", "bodies_file": "grains.csv", "lattice_count": None, "radius_min": None,
                                       "radius_max": None},
-                            "boundary": [{"shape": "plane", "normal": [0.0, 1.0]}],
+                            "boundary": [{"shape": "plane", "normal": [0.0, 1.0]},
+                                         {"shape": "plane", "normal": [1.0, 0.0], "point": [-0.1, 0.0], "table": "drive.csv"}],
                             "time": {"steps": 4}, "decomposition": {"subdomains": 1}, "output": {"every": 1}})
+        case["scene"]["gravity_table"] = "gravity.csv"
+        tables = {"drive.csv": "time,vx\n0,0\n1,0.1\n", "gravity.csv": "time,gx,gy\n0,0,-9\n1,0,-9.81\n"}
+        for name, text in tables.items():
+            write(os.path.join(directory, name), text)
         self.assert_status(run_case(case, 1, directory), 0)
         results = os.path.join(directory, "results")
 
@@ -387,7 +436,7 @@ class Restart(RunTestCase):
 
         now = before
         refused(merged(longer, {"scene": {"friction": 0.4}}), r"case\.nml: .*friction = 0\.4.*: expected friction = 0\.3")
-        refused(merged(longer, {"boundary": [{"shape": "plane", "normal": [0.0, 1.0], "velocity": [0.1, 0.0]}]}),
+        refused(merged(longer, {"boundary": [{"shape": "plane", "normal": [0.0, 1.0], "velocity": [0.1, 0.0]}, case["boundary"][1]]}),
                 r"case\.nml: .*velocity")
         refused(merged(longer, {"decomposition": {"subdomains": 2}}), r"case\.nml: &decomposition subdomains: expected 1", 2)
         refused(merged(longer, {"time": {"step": 2e-3}}), r"case\.nml: &time step: expected 0?\.?0?1?.*E?-?")
@@ -396,6 +445,12 @@ class Restart(RunTestCase):
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.011\n")
         refused(longer, r"checkpoint\.h5: the run began with 2 grains")
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.012\n")
+        for name, text in (("drive.csv", "time,vx\n0,0\n1,0.2\n"), ("drive.csv", "time,vy\n0,0\n1,0.1\n"),
+                           ("drive.csv", tables["drive.csv"] + "2,0\n"), ("gravity.csv", "time,gx,gy\n0,0,-9\n2,0,-9.81\n")):
+            write(os.path.join(directory, name), text)
+            for ranks in (1, 2):
+                refused(longer, rf"case\.nml: .*contents of {name}, digest \S+: expected contents of {name}, digest", ranks)
+            write(os.path.join(directory, name), tables[name])
         checkpoint = os.path.join(results, "checkpoint.h5")
         whole = before["checkpoint.h5"]
         for text in (b"", whole[:len(whole) // 2], b"no HDF5 file", before["results.h5"], whole[:-100]):

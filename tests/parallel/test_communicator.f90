@@ -23,6 +23,7 @@ program test_communicator
   call test_agree()
   call test_broadcast()
   call test_blocks()
+  call test_barrier_asleep()
   call test_self()
   call test_twice()
   call finish_checks()
@@ -181,6 +182,21 @@ contains
     end do
     call check(right, "blocks of subdomains")
   end subroutine test_blocks
+
+  !> No rank leaves before the last one has come, which takes its time. The ranks of a machine have one clock.
+  subroutine test_barrier_asleep()
+    integer(i8) :: start, came, left, second
+
+    call system_clock(start, second)
+    came = start
+    do while (comm%rank == comm%size - 1 .and. came - start < second/20)
+      call system_clock(came)
+    end do
+    call comm%barrier_asleep()
+    call system_clock(left)
+    call check(left >= comm%largest(came), "a barrier")
+    call comm%barrier_asleep()
+  end subroutine test_barrier_asleep
 
   !> A communicator of its own for each rank.
   subroutine test_self()

@@ -11,6 +11,8 @@ program test_contact_problem
   use gravier_contact_problem, only: contact_problem_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_test_contact_columns, only: contact_column, put_contact_column, pack_columns, pack_pairs
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -73,6 +75,7 @@ contains
   !> Impulses that follow from the pair, in the cone of friction.
   subroutine set_impulses(problem)
     type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: impulse(problem%kernels%nc)
     integer :: s, c, d
     integer(i8) :: pair
 
@@ -80,10 +83,11 @@ contains
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
           pair = 1000*sub%id(sub%pair(1, c)) + sub%id(sub%pair(2, c))
-          sub%impulse(1, c) = max(0.0_dp, hash_uniform(4, pair, 1) - 0.3_dp)
+          impulse(1) = max(0.0_dp, hash_uniform(4, pair, 1) - 0.3_dp)
           do d = 2, problem%kernels%nc
-            sub%impulse(d, c) = 0.2_dp*sub%impulse(1, c)*(hash_uniform(4, pair, d) - 0.5_dp)
+            impulse(d) = 0.2_dp*impulse(1)*(hash_uniform(4, pair, d) - 0.5_dp)
           end do
+          call put_contact_column(impulse, c, sub%impulse)
         end do
       end associate
     end do
@@ -179,8 +183,9 @@ contains
           do c = 1, sub%n_contacts
             call sub%local_operator(c, sub%weight, w)
             call compare_operator(sim%problem, s, c, w, right)
-            right = right .and. abs(sub%hot(dimension + 2, c)*w(1) - 1.0_dp) <= 2*epsilon(1.0_dp)
-            if (friction > 0.0_dp) right = right .and. abs(sub%hot(dimension + 3, c)*w(2) - 1.0_dp) <= 2*epsilon(1.0_dp)
+            right = right .and. abs(sub%hot(lane_of(c), dimension + 2, block_of(c))*w(1) - 1.0_dp) <= 2*epsilon(1.0_dp)
+            if (friction > 0.0_dp) right = right .and. &
+              & abs(sub%hot(lane_of(c), dimension + 3, block_of(c))*w(2) - 1.0_dp) <= 2*epsilon(1.0_dp)
           end do
         end associate
       end do
@@ -196,23 +201,32 @@ contains
     real(dp), intent(in) :: w(2)
     !> stays true where they agree
     logical, intent(inout) :: right
-    real(dp) :: impulse(problem%kernels%nc, 1), v(problem%kernels%nc, 1)
-    integer :: d, nd
+    real(dp) :: column(problem%kernels%nh, 1), unit(problem%kernels%nc, 1), v(problem%kernels%nc)
+    real(dp), allocatable :: hot(:, :, :), impulse(:, :, :), change(:, :, :)
+    integer, allocatable :: pair(:, :)
+    integer :: d, nd, side, b
 
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
+      call pack_pairs(sub%pair(:, c:c), pair)
+      column(:, 1) = contact_column(sub%hot, c)
+      call pack_columns(column, hot)
       do d = 1, problem%kernels%nc
-        impulse(:, :) = 0.0_dp
-        impulse(d, 1) = 1.0_dp
+        unit(:, :) = 0.0_dp
+        unit(d, 1) = 1.0_dp
+        call pack_columns(unit, impulse)
         sub%reaction(:, :) = 0.0_dp
-        call problem%kernels%add_reaction(sub%pair(:, c:c), sub%hot(:, c:c), impulse, sub%reaction)
-        sub%reaction(1:nd, sub%pair(1, c)) = sub%weight(1:nd, sub%pair(1, c))*sub%reaction(1:nd, sub%pair(1, c))
-        sub%reaction(nd + 1:, sub%pair(1, c)) = sub%weight(problem%kernels%nw, sub%pair(1, c))*sub%reaction(nd + 1:, sub%pair(1, c))
-        sub%reaction(1:nd, sub%pair(2, c)) = sub%weight(1:nd, sub%pair(2, c))*sub%reaction(1:nd, sub%pair(2, c))
-        sub%reaction(nd + 1:, sub%pair(2, c)) = sub%weight(problem%kernels%nw, sub%pair(2, c))*sub%reaction(nd + 1:, sub%pair(2, c))
-        call problem%kernels%contact_velocity(sub%pair(:, c:c), sub%hot(:, c:c), sub%reaction, v)
+        call problem%kernels%add_reaction(pair, hot, impulse, sub%reaction)
+        do side = 1, 2
+          b = sub%pair(side, c)
+          sub%reaction(1:nd, b) = sub%weight(1:nd, b)*sub%reaction(1:nd, b)
+          sub%reaction(nd + 1:, b) = sub%weight(problem%kernels%nw, b)*sub%reaction(nd + 1:, b)
+        end do
+        call pack_columns(unit, change)
+        call problem%kernels%contact_velocity(pair, hot, sub%reaction, change)
         ! some roundings, relative to the largest entry; the other components do not move
-        v(d, 1) = v(d, 1) - w(min(d, 2))
+        v(:) = contact_column(change, 1)
+        v(d) = v(d) - w(min(d, 2))
         right = right .and. all(abs(v) <= 32*epsilon(1.0_dp)*w(2))
       end do
     end associate
@@ -285,7 +299,7 @@ contains
     call make(2, 4, 0.3_dp, sim)
     call set_impulses(sim%problem)
     do s = 1, size(sim%problem%sub)
-      if (sim%problem%sub(s)%subdomain == 4) sim%problem%sub(s)%impulse(1, 1) = ieee_value(1.0_dp, ieee_quiet_nan)
+      if (sim%problem%sub(s)%subdomain == 4) sim%problem%sub(s)%impulse(1, 1, 1) = ieee_value(1.0_dp, ieee_quiet_nan)
     end do
     call sim%problem%residual(residual, defect)
     call check(ieee_is_nan(residual) .and. ieee_is_nan(defect), "residual of a NaN")

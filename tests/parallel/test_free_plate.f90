@@ -18,6 +18,7 @@ module free_plate
   use gravier_interface_direct, only: interface_direct_t
   use gravier_interface_cg, only: interface_cg_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged
+  use gravier_test_contact_columns, only: pack_columns, pack_pairs
   use gravier_check, only: check, check_close, check_equal
   implicit none
   private
@@ -38,7 +39,7 @@ contains
     integer :: s, first, last
 
     problem%comm => over
-    call problem%kernels%choose(dimension, friction > 0.0_dp, friction > 0.0_dp)
+    call problem%kernels%choose(dimension, friction > 0.0_dp)
     problem%n_subdomains = n_subdomains
     first = over%first_subdomain(over%rank, n_subdomains)
     last = over%first_subdomain(over%rank + 1, n_subdomains) - 1
@@ -60,6 +61,8 @@ contains
     real(dp), intent(in) :: friction
     type(subproblem_t), intent(inout) :: sub
     type(shared_part_t), intent(inout) :: part
+    real(dp), allocatable :: hot(:, :), impulse(:, :)
+    integer, allocatable :: pair(:, :)
     integer :: number_of(plate), pairs(2, 4*n_columns), c, k, n, g, b, d, nd, first, last, n_sharers
 
     nd = problem%kernels%nd
@@ -86,7 +89,7 @@ contains
     allocate (sub%velocity, sub%v_global, sub%reaction, mold=sub%v_free)
     allocate (sub%inverse_mass(problem%kernels%nw, sub%n_bodies), source=0.0_dp)
     allocate (sub%weight, mold=sub%inverse_mass)
-    allocate (sub%pair(2, n), sub%hot(problem%kernels%nh, n), sub%impulse(problem%kernels%nc, n), sub%gap(n))
+    allocate (pair(2, n), hot(problem%kernels%nh, n), impulse(problem%kernels%nc, n), sub%gap(n))
     part%subdomain = subdomain
     allocate (part%body(plate), part%first(plate + 1), part%sharer(n_parts*plate), source=1)
     n_sharers = 0
@@ -111,13 +114,16 @@ contains
         if (problem%kernels%nw > nd) sub%inverse_mass(nd + 1, b) = 2.5_dp*sub%inverse_mass(1, b)
       end if
     end do
-    sub%hot(:, :) = 0.0_dp
-    sub%impulse(:, :) = 0.0_dp
+    hot(:, :) = 0.0_dp
+    impulse(:, :) = 0.0_dp
     sub%gap(:) = 0.0_dp
     do c = 1, n
-      sub%pair(:, c) = number_of(pairs(:, c))
-      call set_contact(pairs(:, c), sub%hot(:, c))
+      pair(:, c) = number_of(pairs(:, c))
+      call set_contact(pairs(:, c), hot(:, c))
     end do
+    call pack_pairs(pair, sub%pair)
+    call pack_columns(hot, sub%hot)
+    call pack_columns(impulse, sub%impulse)
 
   contains
 
@@ -245,7 +251,7 @@ contains
     type(contact_problem_t) :: problem
     type(enriched_matrix_t) :: matrix
     type(error_t), allocatable :: error
-    real(dp), allocatable :: y(:, :), b(:, :), force(:, :), v(:, :)
+    real(dp), allocatable :: y(:, :), b(:, :), force(:, :), v(:, :, :)
     integer :: s, g, d
     logical :: changed
 
@@ -258,7 +264,7 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         allocate (y, b, force, mold=sub%v_free)
-        allocate (v(problem%kernels%nc, sub%n_contacts), source=0.0_dp)
+        allocate (v, mold=sub%impulse)
         do g = 1, sub%n_bodies
           do d = 1, problem%kernels%nv
             y(d, g) = merge(2*hash_uniform(9, sub%id(g), d) - 1.0_dp, 0.0_dp, sub%moves(d, g))
@@ -267,7 +273,7 @@ contains
           call sub%multiply_mass(g, b(:, g))
         end do
         call problem%kernels%contact_velocity(sub%pair, sub%hot, y, v)
-        v(:, :) = matrix%part(s)%direction*v
+        v(:, :, :) = matrix%part(s)%direction*v
         force(:, :) = 0.0_dp
         call problem%kernels%add_reaction(sub%pair, sub%hot, v, force)
         b(:, :) = b + force
@@ -285,7 +291,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer :: s
     do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :) = 1.1_dp*problem%sub(s)%impulse
+      problem%sub(s)%impulse(:, :, :) = 1.1_dp*problem%sub(s)%impulse
     end do
   end subroutine disturb
 

@@ -7,7 +7,7 @@ program test_impulse_memory
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_motion, only: advance_position
-  use gravier_contact_kernels, only: kernels_t, tangents
+  use gravier_contact_kernels, only: kernels_t, contact_tangents, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
@@ -17,6 +17,7 @@ program test_impulse_memory
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_test_scenes, only: cloud_t, draw_number => draw, make_decomposition
+  use gravier_test_contact_columns, only: contact_column, put_contact_column
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -105,7 +106,7 @@ contains
   subroutine give_impulses(sim, owner)
     type(simulation_t), intent(inout) :: sim
     integer(i8), intent(inout), contiguous :: owner(:, :)
-    real(dp) :: normal, along(3), t(3), u(3)
+    real(dp) :: normal, along(3), t(3), u(3), impulse(3)
     integer :: s, c, i, j
 
     owner(:, :) = 0
@@ -116,12 +117,14 @@ contains
           j = int(sub%id(sub%pair(2, c)))
           owner(i, j) = sub%subdomain
           call draw(i, j, normal, along)
-          sub%impulse(1, c) = normal
-          if (kernels%nc == 2) sub%impulse(2, c) = along(1)
-          if (kernels%nc < 3) cycle
-          call tangents(sub%hot(1:3, c), t, u)
-          sub%impulse(2, c) = sum(along*t)
-          sub%impulse(3, c) = sum(along*u)
+          impulse(1) = normal
+          impulse(2) = along(1)
+          if (kernels%nc == 3) then
+            call contact_tangents(sub%hot, c, t, u)
+            impulse(2) = sum(along*t)
+            impulse(3) = sum(along*u)
+          end if
+          call put_contact_column(impulse(1:kernels%nc), c, sub%impulse)
         end do
         sub%v_global(:, :) = sub%v_free
       end associate
@@ -170,6 +173,7 @@ contains
     integer(i8), intent(in) :: owner(:, :)
     real(dp), parameter :: rounding = 200*epsilon(1.0_dp)
     real(dp) :: normal, along(3), t(3), u(3), difference(3)
+    real(dp), allocatable :: impulse(:), hot(:)
     integer :: s, c, i, j
     integer(i8) :: fresh
     logical :: same, zero
@@ -183,17 +187,19 @@ contains
           i = int(sub%id(sub%pair(1, c)))
           j = int(sub%id(sub%pair(2, c)))
           call draw(i, j, normal, along)
+          impulse = contact_column(sub%impulse, c)
           if (owner(i, j) == 0 .or. .not. normal > 0.0_dp) then
-            zero = zero .and. all(abs(sub%impulse(:, c)) <= 0.0_dp)
+            zero = zero .and. all(abs(impulse) <= 0.0_dp)
             if (owner(i, j) == 0) fresh = fresh + 1
             cycle
           end if
           if (owner(i, j) /= sub%subdomain) moved = moved + 1
-          same = same .and. abs(sub%impulse(1, c) - normal) <= 0.0_dp
-          if (nc == 2) same = same .and. abs(sub%impulse(2, c) - along(1)) <= 0.0_dp
+          same = same .and. abs(impulse(1) - normal) <= 0.0_dp
+          if (nc == 2) same = same .and. abs(impulse(2) - along(1)) <= 0.0_dp
           if (nc < 3) cycle
-          call tangents(sub%hot(1:3, c), t, u)
-          difference(:) = sub%impulse(2, c)*t + sub%impulse(3, c)*u - (along - sum(along*sub%hot(1:3, c))*sub%hot(1:3, c))
+          call contact_tangents(sub%hot, c, t, u)
+          hot = contact_column(sub%hot, c)
+          difference(:) = impulse(2)*t + impulse(3)*u - (along - sum(along*hot(1:3))*hot(1:3))
           same = same .and. all(abs(difference) <= rounding)
         end do
       end associate
@@ -316,7 +322,7 @@ contains
     call cloud%init(3, 220, 0.03_dp, 0.1_dp, 91)
     decomposition%rule = cloud%rule(0.02_dp, 0.04_dp, rule_dual)
     call make_decomposition(comm, cloud, 5, 6, .false., decomposition)
-    call kernels%choose(3, .true., .true.)
+    call kernels%choose(3, .true.)
     call check_equal(impulse_entries(kernels), 4, "entries of an impulse in space with friction")
     call seen%build(decomposition, 4)
     call build_problem(decomposition, seen, kernels, physics, problem, figures)
@@ -343,7 +349,7 @@ contains
   subroutine set_tangential(problem, kept)
     type(contact_problem_t), intent(inout) :: problem
     real(dp), intent(inout) :: kept(:, :, :)
-    real(dp) :: t(3), u(3)
+    real(dp) :: t(3), u(3), impulse(3)
     integer :: s, c, i, j, e
 
     do s = 1, size(problem%sub)
@@ -352,10 +358,11 @@ contains
           i = int(sub%id(sub%pair(1, c)))
           j = int(sub%id(sub%pair(2, c)))
           do e = 1, 3
-            sub%impulse(e, c) = given(i, j, e)
+            impulse(e) = given(i, j, e)
           end do
-          call tangents(sub%hot(1:3, c), t, u)
-          kept(:, i, j) = sub%impulse(2, c)*t + sub%impulse(3, c)*u
+          call put_contact_column(impulse, c, sub%impulse)
+          call contact_tangents(sub%hot, c, t, u)
+          kept(:, i, j) = impulse(2)*t + impulse(3)*u
         end do
       end associate
     end do
@@ -365,7 +372,7 @@ contains
   subroutine check_projected(problem, kept)
     type(contact_problem_t), intent(in) :: problem
     real(dp), intent(in) :: kept(:, :, :)
-    real(dp) :: t(3), u(3), expected(3), found(3)
+    real(dp) :: t(3), u(3), expected(3), found(3), impulse(problem%kernels%nc), hot(problem%kernels%nh)
     integer(i8) :: turned, fresh
     integer :: s, c, i, j
     logical :: right
@@ -378,16 +385,18 @@ contains
         do c = 1, sub%n_contacts
           i = int(sub%id(sub%pair(1, c)))
           j = int(sub%id(sub%pair(2, c)))
+          impulse(:) = contact_column(sub%impulse, c)
+          hot(:) = contact_column(sub%hot, c)
           if (.not. any(abs(kept(:, i, j)) > 0.0_dp)) then
-            right = right .and. all(abs(sub%impulse(:, c)) <= 0.0_dp)
+            right = right .and. all(abs(impulse) <= 0.0_dp)
             fresh = fresh + 1
             cycle
           end if
-          call tangents(sub%hot(1:3, c), t, u)
-          found(:) = sub%impulse(2, c)*t + sub%impulse(3, c)*u
-          expected(:) = kept(:, i, j) - sum(kept(:, i, j)*sub%hot(1:3, c))*sub%hot(1:3, c)
+          call contact_tangents(sub%hot, c, t, u)
+          found(:) = impulse(2)*t + impulse(3)*u
+          expected(:) = kept(:, i, j) - sum(kept(:, i, j)*hot(1:3))*hot(1:3)
           right = right .and. norm2(found - expected) <= 32*epsilon(1.0_dp)
-          right = right .and. abs(sub%impulse(1, c) - given(i, j, 1)) <= 0.0_dp
+          right = right .and. abs(impulse(1) - given(i, j, 1)) <= 0.0_dp
           if (norm2(expected - kept(:, i, j)) > 1.0e-3_dp) turned = turned + 1
         end do
       end associate
@@ -402,7 +411,7 @@ contains
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
     integer(i8), allocatable :: records(:, :)
-    integer :: s
+    integer :: s, c
 
     call make(2, 3, 0.3_dp, "partition = 'grid'", sim)
     call sim%assemble(figures)
@@ -411,7 +420,9 @@ contains
     call gather_impulses(sim%decomposition, sim%neighbourhoods, records)
     call check_equal(size(records, 2), 0, "zero impulses are not gathered")
     do s = 1, size(sim%problem%sub)
-      sim%problem%sub(s)%impulse(1, :) = 1.0_dp
+      do c = 1, sim%problem%sub(s)%n_contacts
+        sim%problem%sub(s)%impulse(lane_of(c), 1, block_of(c)) = 1.0_dp
+      end do
     end do
     call keep_impulses(sim%problem, sim%neighbourhoods)
     call gather_impulses(sim%decomposition, sim%neighbourhoods, records)

@@ -2,17 +2,20 @@
 !> places and velocities following from identifiers.
 program test_problem_builder
   use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t, shape_grains
   use gravier_neighbour_search, only: rule_dual, rule_primal
-  use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_nlgs, only: nlgs_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities, n_multiplicities
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw_number => draw, plane, make_decomposition
+  use gravier_test_contact_columns, only: contact_column
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_grains = 130, n_walls = 2
@@ -34,13 +37,14 @@ program test_problem_builder
   end type truth_t
 
   type(communicator_t), target :: comm
-  integer :: nd, k, visitors, manifold
+  integer :: nd, k, visitors, manifold, grouped
   integer, parameter :: counts(*) = [1, 3, 7, 16]
 
   call start_parallel()
   call comm%init()
   visitors = 0
   manifold = 0
+  grouped = 0
   do nd = 2, 3
     do k = 1, size(counts)
       call test_problem(nd, 0, counts(k), .true., rule_dual, .false.)
@@ -53,7 +57,13 @@ program test_problem_builder
     call test_problem(nd, 2**(nd - 2), 7, .true., rule_primal, .false.)
   end do
   call check(manifold > 0, "some grains are in three subdomains and more")
+  call check(comm%total(int(grouped, i8)) > 0, "some contacts are relaxed together")
   call check(visitors > 0, "some shared grains carry no contact at home")
+  do nd = 2, 3
+    do k = 1, size(counts)
+      call test_spins(nd, counts(k))
+    end do
+  end do
   call test_free_flight()
   do k = 1, 2
     call test_boundaries(k, .false.)
@@ -159,7 +169,7 @@ contains
     integer :: s
 
     call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
-    call kernels%choose(nd, friction, friction)
+    call kernels%choose(nd, friction)
     physics%gravity(:) = gravity
     physics%friction = 0.25_dp
     physics%h = h
@@ -251,7 +261,37 @@ contains
       right = right .and. maxval(abs(sub%impulse)) <= 0.0_dp .or. sub%n_contacts == 0
     end associate
     call check(right, "contacts of a subdomain as packed")
+    call check_blocks(problem, s)
   end subroutine check_contacts
+
+  !> In the blocks that are relaxed together no body occurs twice that forces move; walls may. What fills the last block is
+  !> without effect.
+  subroutine check_blocks(problem, s)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    integer, allocatable :: last_block(:)
+    integer :: c, side
+    logical :: apart, padded
+
+    associate (sub => problem%sub(s))
+      allocate (last_block(sub%n_columns), source=0)
+      apart = mod(sub%n_grouped, lanes) == 0 .and. sub%n_grouped <= sub%n_contacts
+      do c = 1, sub%n_grouped
+        do side = 1, 2
+          if (sub%pair(side, c) > sub%n_bodies) cycle
+          apart = apart .and. last_block(sub%pair(side, c)) /= block_of(c)
+          last_block(sub%pair(side, c)) = block_of(c)
+        end do
+      end do
+      call check(apart, "blocks without common bodies")
+      padded = size(sub%pair, 2) == lanes*n_blocks(sub%n_contacts) .and. size(sub%hot, 3) == n_blocks(sub%n_contacts)
+      do c = sub%n_contacts + 1, size(sub%pair, 2)
+        padded = padded .and. all(sub%pair(:, c) == 1) .and. all(abs(sub%hot(lane_of(c), :, block_of(c))) <= 0.0_dp)
+      end do
+      call check(padded, "the last block is filled with contacts of no effect")
+      grouped = grouped + sub%n_grouped
+    end associate
+  end subroutine check_blocks
 
   !> Normal, gap, shift, levers and friction; a few roundings of numbers of size 1, of size 1/h for the shift.
   pure logical function right_contact(problem, s, c, i, j, truth) result(right)
@@ -259,7 +299,7 @@ contains
     integer, intent(in) :: s, c, i, j
     type(truth_t), intent(in) :: truth
     real(dp), parameter :: rounding = 32*epsilon(1.0_dp)
-    real(dp) :: branch(truth%nd), gap, lever
+    real(dp) :: branch(truth%nd), gap, lever, hot(problem%kernels%nh)
     integer :: nd
 
     nd = truth%nd
@@ -268,13 +308,14 @@ contains
       gap = truth%gap(i, j)
       lever = 0.0_dp
       if (j <= n_grains) lever = truth%cloud%radius(j)
-      right = all(abs(sub%hot(1:nd, c)*norm2(branch) - branch) <= rounding)
+      hot(:) = contact_column(sub%hot, c)
+      right = all(abs(hot(1:nd)*norm2(branch) - branch) <= rounding)
       right = right .and. abs(sub%gap(c) - gap) <= rounding
-      right = right .and. abs(sub%hot(nd + 1, c) - max(gap, 0.0_dp)/h) <= rounding/h
+      right = right .and. abs(hot(nd + 1) - max(gap, 0.0_dp)/h) <= rounding/h
       if (problem%kernels%nc == 1) return
-      right = right .and. abs(sub%hot(nd + 4, c) - truth%cloud%radius(i)) <= 0.0_dp
-      right = right .and. abs(sub%hot(nd + 5, c) - lever) <= 0.0_dp
-      right = right .and. abs(sub%hot(nd + 6, c) - merge(0.75_dp, 0.25_dp, j > n_grains)) <= 0.0_dp
+      right = right .and. abs(hot(nd + 4) - truth%cloud%radius(i)) <= 0.0_dp
+      right = right .and. abs(hot(nd + 5) - lever) <= 0.0_dp
+      right = right .and. abs(hot(nd + 6) - merge(0.75_dp, 0.25_dp, j > n_grains)) <= 0.0_dp
     end associate
   end function right_contact
 
@@ -394,6 +435,62 @@ contains
     visitors = int(comm%total(int(visitors, i8)))
   end subroutine check_velocities
 
+  !> Without friction grains that turn keep their spins, bit for bit, and no spin is among the unknowns: the problem holds
+  !> velocities of nd components, whatever the bodies have, and its impulses change translations.
+  subroutine test_spins(nd, n_subdomains)
+    integer, intent(in) :: nd, n_subdomains
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
+    type(truth_t) :: truth
+    type(kernels_t) :: kernels
+    type(physics_t) :: physics
+    type(contact_problem_t) :: problem
+    type(interface_figures_t) :: figures
+    type(nlgs_t) :: nlgs
+    type(error_t), allocatable :: error
+    real(dp) :: jump
+    integer :: s, k, d, g, pushed
+    logical :: small, kept
+
+    call make_scene(nd, 0, n_subdomains, .true., rule_dual, .true., decomposition, truth)
+    call check_equal(decomposition%nv, 3*nd - 3, "spins: bodies have them")
+    call kernels%choose(nd, .false.)
+    physics%gravity(:) = gravity
+    physics%h = h
+    call neighbourhoods%build(decomposition, 4)
+    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call check_equal(problem%kernels%nv, nd, "spins: unknowns of a body")
+    small = .true.
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        small = small .and. size(sub%v_free, 1) == nd .and. size(sub%velocity, 1) == nd .and. size(sub%v_global, 1) == nd
+        small = small .and. size(sub%reaction, 1) == nd .and. size(sub%weight, 1) == nd .and. size(sub%inverse_mass, 1) == nd
+      end associate
+    end do
+    call check(small, "spins: none stored among the unknowns")
+    call nlgs%start(problem, error)
+    call nlgs%iterate(problem, .false., jump, error)
+    call problem%evaluate()
+    call take_velocities(decomposition, physics, problem)
+    kept = .true.
+    pushed = 0
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          g = int(home%id(k))
+          do d = nd + 1, 3*nd - 3
+            kept = kept .and. abs(home%velocity(d, k) - (draw(g, 6 + d) - 0.5_dp)) <= 0.0_dp
+          end do
+          do d = 1, nd
+            if (abs(home%velocity(d, k) - free_velocity(g, d, nd)) > 0.01_dp) pushed = pushed + 1
+          end do
+        end do
+      end associate
+    end do
+    call check(kept, "spins: the bits that they had")
+    call check(comm%total(int(pushed, i8)) > n_grains, "spins: contacts push grains")
+  end subroutine test_spins
+
   !> Without contacts: no bodies in the problem, figures of nothing, free velocities.
   subroutine test_free_flight()
     type(decomposition_t) :: decomposition
@@ -411,7 +508,7 @@ contains
     do s = 1, size(decomposition%home)
       decomposition%home(s)%radius(:) = 1.0e-6_dp
     end do
-    call kernels%choose(2, .false., .false.)
+    call kernels%choose(2, .false.)
     physics%gravity(:) = gravity
     physics%h = h
     call neighbourhoods%build(decomposition, 4)
@@ -492,7 +589,7 @@ contains
     integer(i8) :: id
 
     call make_boundary_scene(n_subdomains, 0.0_dp, turning, decomposition)
-    call kernels%choose(2, .true., .true.)
+    call kernels%choose(2, .true.)
     physics%friction = 0.1_dp
     physics%h = h
     call neighbourhoods%build(decomposition, 2)
@@ -511,7 +608,7 @@ contains
             call check_glued(problem, s, c, turning)
           end select
           ! impulses of 2, 3, 4
-          sub%impulse(1, c) = id - 9
+          sub%impulse(lane_of(c), 1, block_of(c)) = id - 9
         end do
       end associate
     end do
@@ -522,19 +619,21 @@ contains
   subroutine check_floor(problem, s, c)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c
+    real(dp) :: hot(problem%kernels%nh)
     integer :: j
 
     associate (sub => problem%sub(s))
       j = sub%pair(2, c)
+      hot(:) = contact_column(sub%hot, c)
       call check(j > sub%n_bodies, "floor: moves as prescribed")
       call check_equal(sub%boundary(j), 1, "floor: its number")
       call check_close(sub%v_free(1, j), 0.5_dp, 8*epsilon(1.0_dp), "floor: velocity along")
       call check_close(sub%v_free(2, j), 0.4_dp, 8*epsilon(1.0_dp), "floor: velocity of the point touched")
       call check_close(maxval(abs(sub%inverse_mass(:, j))), 0.0_dp, 0.0_dp, "floor: cannot be moved")
       ! e (v - v of the floor before) = 0.5 (-0.7 - 0.3 - 0.2)
-      call check_close(sub%hot(3, c), -0.6_dp, 8*epsilon(1.0_dp), "floor: shift of the law by restitution")
-      call check_close(sub%hot(6, c), 0.1_dp, 0.0_dp, "floor: lever of the grain")
-      call check_close(sub%hot(7, c), 0.0_dp, 0.0_dp, "floor: no lever")
+      call check_close(hot(3), -0.6_dp, 8*epsilon(1.0_dp), "floor: shift of the law by restitution")
+      call check_close(hot(6), 0.1_dp, 0.0_dp, "floor: lever of the grain")
+      call check_close(hot(7), 0.0_dp, 0.0_dp, "floor: no lever")
     end associate
   end subroutine check_floor
 
@@ -560,18 +659,20 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c
     logical, intent(in) :: turning
+    real(dp) :: hot(problem%kernels%nh)
     integer :: i
 
     associate (sub => problem%sub(s))
       i = sub%pair(1, c)
+      hot(:) = contact_column(sub%hot, c)
       call check(i > sub%n_bodies .and. sub%id(sub%pair(2, c)) == 3, "glued: its boundary is the candidate")
-      call check_close(sub%hot(2, c), -1.0_dp, 8*epsilon(1.0_dp), "glued: normal towards the candidate")
+      call check_close(hot(2), -1.0_dp, 8*epsilon(1.0_dp), "glued: normal towards the candidate")
       call check_close(sub%gap(c), -0.01_dp, 8*epsilon(1.0_dp), "glued: gap")
       call check_close(sub%v_free(1, i), merge(-0.075_dp, 0.125_dp, turning), 8*epsilon(1.0_dp), "glued: velocity along")
       call check_close(sub%v_free(2, i), 0.5_dp, 8*epsilon(1.0_dp), "glued: velocity")
-      call check_close(sub%hot(6, c), 0.0_dp, 0.0_dp, "glued: no lever")
-      call check_close(sub%hot(7, c), 0.1_dp, 0.0_dp, "glued: lever of the free grain")
-      call check_close(sub%hot(8, c), 0.3_dp, 0.0_dp, "glued: friction of the boundary")
+      call check_close(hot(6), 0.0_dp, 0.0_dp, "glued: no lever")
+      call check_close(hot(7), 0.1_dp, 0.0_dp, "glued: lever of the free grain")
+      call check_close(hot(8), 0.3_dp, 0.0_dp, "glued: friction of the boundary")
     end associate
   end subroutine check_glued
 
@@ -620,7 +721,7 @@ contains
     type(interface_figures_t) :: figures
 
     call make_boundary_scene(n_subdomains, 0.01_dp, .false., decomposition)
-    call kernels%choose(2, .true., .true.)
+    call kernels%choose(2, .true.)
     call neighbourhoods%build(decomposition, 2)
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")

@@ -7,14 +7,15 @@ program test_schwarz
   use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_contact_kernels, only: contact_jacobian
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_contact_kernels, only: contact_jacobian, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_nlgs, only: nlgs_t
   use gravier_schwarz, only: schwarz_t, neighbour_load_t
   use gravier_schwarz_ec, only: schwarz_ec_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_test_contact_columns, only: same_contacts
   use gravier_check, only: check, check_close, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -115,6 +116,12 @@ contains
     end do
   end function same_bits
 
+  !> Whether two copies of a subdomain have the same impulses, contact by contact, bit for bit.
+  pure logical function same_impulses(a, b)
+    type(subproblem_t), intent(in) :: a, b
+    same_impulses = a%n_contacts == b%n_contacts .and. same_contacts(a%impulse, b%impulse, a%n_contacts)
+  end function same_impulses
+
   !> Whether the subdomains of this rank have the bits that one rank alone gives them.
   subroutine compare_with_one_rank(dimension, n_subdomains, friction, keys, n, name)
     integer, intent(in) :: dimension, n_subdomains, n
@@ -131,7 +138,7 @@ contains
     first = many%decomposition%first
     same = .true.
     do s = 1, size(many%problem%sub)
-      same = same .and. same_bits(many%problem%sub(s)%impulse, one%problem%sub(first + s - 1)%impulse)
+      same = same .and. same_impulses(many%problem%sub(s), one%problem%sub(first + s - 1))
       same = same .and. same_bits(many%problem%sub(s)%velocity, one%problem%sub(first + s - 1)%velocity)
     end do
     call check(same, name//": the bits of one rank alone")
@@ -293,7 +300,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer :: s
     do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :) = 0.0_dp
+      problem%sub(s)%impulse(:, :, :) = 0.0_dp
     end do
   end subroutine reset
 
@@ -326,8 +333,8 @@ contains
       old = method%load
       call method%iterate(sim%problem, .false., jump, error)
       do s = 1, size(sim%problem%sub)
-        if (method%matrix%direction%active_only) call check(all((method%matrix%part(s)%direction(1, :) > 0.0_dp) .eqv. &
-          & (sim%problem%sub(s)%impulse(1, :) > 0.0_dp)), "l follows the active contacts")
+        if (method%matrix%direction%active_only) call check(all((method%matrix%part(s)%direction(:, 1, :) > 0.0_dp) .eqv. &
+          & (sim%problem%sub(s)%impulse(:, 1, :) > 0.0_dp)), "l follows the active contacts")
         call find_reactions(sim%problem, s, old(s), method%matrix)
         call sim%problem%shared%load(s, sim%problem%sub(s)%reaction)
       end do
@@ -374,8 +381,8 @@ contains
       allocate (l(size(h, 2)), carried(size(h, 2)))
       do d = 1, size(l)
         associate (c => 1 + (d - 1)/problem%kernels%nc, i => 1 + mod(d - 1, problem%kernels%nc))
-          l(d) = matrix%part(s)%direction(i, c)
-          carried(d) = sub%impulse(i, c) + l(d)*matrix%part(s)%law_velocity(i, c)
+          l(d) = matrix%part(s)%direction(lane_of(c), i, block_of(c))
+          carried(d) = sub%impulse(lane_of(c), i, block_of(c)) + l(d)*matrix%part(s)%law_velocity(lane_of(c), i, block_of(c))
         end associate
       end do
       do b = 1, n
@@ -410,7 +417,7 @@ contains
     associate (sub => problem%sub(s))
       allocate (h(nv*sub%n_bodies, nc*sub%n_contacts), source=0.0_dp)
       do c = 1, sub%n_contacts
-        call contact_jacobian(problem%kernels%nd, nc, sub%hot(:, c), jacobian(:, :, 1), jacobian(:, :, 2))
+        call contact_jacobian(problem%kernels, sub%hot, c, jacobian(:, :, 1), jacobian(:, :, 2))
         do side = 1, 2
           if (sub%pair(side, c) > sub%n_bodies) cycle
           do j = 1, nc

@@ -30,6 +30,21 @@ def key(group, name, value, *words, also=None, kind=None):
     return f"{group} {name} = {value} {sorted((also or {}).items()) or ''}", text, ("&" + group, f"{name} = {value}", *words)
 
 
+PLANE = {"shape": "plane", "point": [0.0, -0.1], "normal": [0.0, 1.0]}
+CASE_3D = merged(CASE, {"scene": {"dimension": 3, "lattice_count": [2, 2, 2]}})
+
+
+def boundary_key(name, value, *words, also):
+    """The good case with a boundary that has one bad key."""
+    text = namelist(merged(CASE, {"boundary": {**also, name: "@"}})).replace(f"{name} = '@'", f"{name} = {value}")
+    return f"boundary {name} = {value}", text, ("&boundary", f"{name} = {value}", *words)
+
+
+def bodies_case(path, boundary=(), **scene):
+    return namelist({"scene": {"bodies": "file", "bodies_file": path, **scene}, "boundary": list(boundary), "time": CASE["time"],
+                     "output": CASE["output"]})
+
+
 # title, content of the input file, what the message must have besides the name of the file
 FILES = [
     ("empty", "", ("empty file", "&scene")),
@@ -106,6 +121,62 @@ FILES = [
     key("enriched", "direction", "-1", ">= 0"),
     key("enriched", "cg_tolerance", "1", "(0, 1)"),
     key("output", "every", "-1", ">= 0"),
+    # boundaries
+    ("a group of two boundaries", bodies_case("bodies.csv", boundary=[{"name": name, "shape": "grains", "group": group}
+                                                                      for name, group in (("a", 2), ("b", 3), ("c", 2))]),
+     ("&boundary (the 3rd, 'c') group = 2", "a group of its own, but the 1st has it too")),
+    *(boundary_key(name, value, *words, also=also) for name, value, words, also in (
+        ("force", "0, 1", ("0 along each component that is not free",), {**PLANE, "free": [True, False], "mass": 1.0}),
+        ("pressure", "1", ("0 where no component along normal is free",), {**PLANE, "free": [True, False], "mass": 1.0}),
+        ("normal", "0, 0", ("not all 0",), {"shape": "plane"}),
+    )),
+    *((title, case({"scene": {"period": [1.0, 0.0]}, "boundary": boundary}), ("boundary 'boundary 1': expected", *words, "axis x"))
+      for title, boundary, words in (
+        ("plane across a period", {"shape": "plane", "point": [-0.1, 0.0], "normal": [1.0, 0.0]}, ("a normal at right angles",)),
+        ("outlet across a period", {"shape": "outlet", "point": [-0.1, 0.0], "normal": [0.1, 1.0]}, ("a normal at right angles",)),
+        ("plane that tilts in a period", {**PLANE, "rotation": [0.1]}, ("no rotation but about",)),
+        ("segment longer than a period", {"shape": "segment", "point": [0.0, -0.1], "end": [0.98, -0.1]}, ("a width", "period of 1.000")),
+        ("segment that turns", {"shape": "segment", "point": [0.0, -0.1], "end": [0.0, 0.88], "rotation": [0.1]}, ("a width",)),
+        ("circle larger than a period", {"shape": "circle", "point": [0.5, 0.0], "radius": 0.51}, ("a width", "here 1.020")),
+      )),
+    *((title, namelist(merged(CASE_3D, {"scene": {"period": [1.0, 0.0, 0.0]}, "boundary": boundary})),
+       ("boundary 'boundary 1': expected", words, "axis x"))
+      for title, boundary, words in (
+        ("oblique cylinder", {"shape": "cylinder", "axis": [1.0, 1.0, 0.0], "radius": 0.3}, "an axis along, or at right angles"),
+        ("wide cylinder", {"shape": "cylinder", "axis": [0.0, 1.0, 0.0], "radius": 0.6}, "a width"),
+        ("cylinder that tilts", {"shape": "cylinder", "axis": [0.0, 1.0, 0.0], "radius": 0.3, "rotation": [0.0, 0.0, 1.0]},
+         "no rotation but about its axis"),
+        ("belt that turns", {"shape": "plane", "normal": [0.0, 0.0, 1.0], "rotation": [0.0, 0.0, 1.0]}, "no rotation but about"),
+      )),
+    # the magnitude
+    key("time", "step", "1e-200", "expected a number from 1e-30 to 1e30"),
+    key("time", "step", "1e31", "expected a number of at most 1e30 in size"),
+    key("scene", "gravity", "0, -1e200", "expected entries of at most 1e30 in size"),
+    key("scene", "period_origin", "1e300, 0", "expected entries of at most 1e30 in size", also={"scene": {"period": [1.0, 0.0]}}),
+    key("scene", "density", "1e300", "expected a number of at most 1e30 in size"),
+    key("scene", "friction", "1e300", "expected a number of at most 1e30 in size"),
+    key("scene", "radius_max", "1e200", "expected a number of at most 1e30 in size"),
+    key("scene", "radius_min", "1e-200", "expected a number from 1e-30 to 1e30"),
+    key("scene", "mass", "1e-200", "expected a number from 1e-30 to 1e30", kind="column"),
+    *(boundary_key(name, value, *words, also=also) for name, value, words, also in (
+        ("velocity", "1e300, 0", ("entries of at most 1e30 in size",), PLANE),
+        ("rotation", "-1e300", ("entries of at most 1e30 in size",), PLANE),
+        ("point", "0, 1e300", ("entries of at most 1e30 in size",), {"shape": "plane", "normal": [0.0, 1.0]}),
+        ("mass", "1e-300", ("a number from 1e-30 to 1e30",), {**PLANE, "free": [True, False]}),
+        ("force", "1e300, 0", ("entries of at most 1e30 in size",), {**PLANE, "free": [True, False], "mass": 1.0}),
+        ("radius", "1e-200", ("a number from 1e-30 to 1e30",), {"shape": "circle"}),
+        ("end", "1e-200, 0", ("a point at least 1e-30 m from point",), {"shape": "segment"}),
+    )),
+    ("edge_a = 1e-200", namelist({**CASE_3D, "boundary": {"shape": "rectangle", "edge_a": [1e-200, 0.0], "edge_b": [0.0, 1.0]}}),
+     ("edge_a = 1e-200, 0.0", "expected a length of at least 1e-30 m")),
+    ("edge_b = 1e-200", namelist({**CASE_3D, "boundary": {"shape": "rectangle", "edge_a": [1.0, 0.0], "edge_b": [0.0, 1e-200]}}),
+     ("edge_b = 0.0, 1e-200", "expected a length of at least 1e-30 m")),
+    # places that grains of 1 cm cannot tell apart from others
+    ("far period", case({"scene": {"period": [1.0, 0.0], "period_origin": [1e20, 0.0]}}),
+     ("&scene period_origin: a box as far as 1.000E+020 m", "at most 1.000E+008 m", "1e10 radii of the smallest grain")),
+    ("far boundary", case({"boundary": {**PLANE, "point": [0.0, -1e20]}}),
+     ("boundary 'boundary 1': a coordinate or length of 1.000E+020 m", "at most 1.000E+008 m")),
+    ("huge circle", case({"boundary": {"shape": "circle", "radius": 1e20}}), ("a coordinate or length of 1.000E+020 m",)),
     key("output", "directory", "''", "not empty"),
     # the choice
     key("scene", "bodies", "'cubes'", "'column', 'lattice', 'file' or 'sample'"),
@@ -133,6 +204,20 @@ FILES = [
         also={"solver": {"method": "nscdd"}, "decomposition": {"partition": "metis"}}),
     key("solver", "criterion", "'error'", "bodies = 'column' only"),
     key("scene", "column_count", "5", "belongs to bodies = 'column'"),
+]
+
+FREE_X = {"free": [True, False], "mass": 1.0}
+# title, content of table.csv, keys of the plane that it drives, what the message must have
+TABLES = [
+    ("vx where x is free", "time,vx\n0,1\n", FREE_X, ("column vx", "'boundary 1'", "no such column where this component is free")),
+    ("fy where y is not free", "time,fx,fy\n0,1,1\n", FREE_X, ("column fy", "no such column where this component is not free")),
+    ("fx where nothing is free", "time,fx\n0,1\n", {}, ("column fx", "no such column where this component is not free")),
+    ("omega where x is free", "time,omega\n0,1\n", FREE_X, ("a rotation rate", "where a component of the translation is free")),
+    ("pressure across the free axis", "time,pressure\n0,1\n", FREE_X,
+     ("column pressure", "no such column but for a plane of which a component along normal is free")),
+    ("pressure where nothing is free", "time,pressure\n0,1\n", {}, ("column pressure", "no such column but for a plane")),
+    ("speed", "time,vx\n0,0\n1,1e300\n", {}, ("table.csv", "line 3", "column vx", '"1e300"', "a number of at most 1e30 in size")),
+    ("time", "time,vx\n0,0\n1e300,1\n", {}, ("table.csv", "line 3", "column time", '"1e300"', "a number of at most 1e30 in size")),
 ]
 
 BODIES = """id,x,y,radius,vx,mass,shape,nx,ny
@@ -173,6 +258,11 @@ CSV_FILES = [
     ("radius negative", changed("1,0.0,0.1,0.1", "1,0.0,0.1,-2"), ("line 2", "column radius", '"-2"', "radius > 0")),
     ("mass 0", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,0"), ("line 5", "column mass", '"0"', "mass > 0")),
     ("mass of some", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,"), ("id 4", "column mass", "for all or for none")),
+    ("radius 1e-200", changed("4,0.9,0.1,0.1", "4,0.9,0.1,1e-200"), ("line 5", "column radius", "a number from 1e-30 to 1e30")),
+    ("mass 1e200", changed("4,0.9,0.1,0.1,0.0,1.0", "4,0.9,0.1,0.1,0.0,1e200"), ("line 5", "column mass", "from 1e-30 to 1e30")),
+    ("speed 1e200", changed("1,0.0,0.1,0.1,0.0", "1,0.0,0.1,0.1,-1e200"), ("line 2", "column vx", "at most 1e30 in size")),
+    ("place 1e200", changed("4,0.9", "4,1e200"), ("line 5", "column x", "at most 1e30 in size")),
+    ("plane at 1e200", changed("9,0.0,0.0", "9,0.0,1e200"), ("line 6", "column y", "at most 1e30 in size")),
     ("unknown shape", changed("1.0,grain,,\n9", "1.0,cube,,\n9"), ("line 5", "column shape", '"cube"', "grain or plane")),
     ("plane without normal", changed("plane,0.0,1.0", "plane,,"), ("line 6", "column nx", "empty")),
     ("plane with a zero normal", changed("plane,0.0,1.0", "plane,0.0,0.0"), ("line 6", "column nx", "not zero")),
@@ -204,6 +294,12 @@ HDF5_FILES = [
     ("infinity", {"velocity": put(ROWS["velocity"], (0, 2), np.inf)}, {}, ("/bodies/velocity", "id 1", "infinity", "finite")),
     ("radius 0", {"radius": put(ROWS["radius"], 4, 0)}, {}, ("/bodies/radius", "id 5", "> 0")),
     ("mass negative", {"mass": put(ROWS["mass"], 1, -1)}, {}, ("/bodies/mass", "id 2", "> 0")),
+    ("radius 1e-200", {"radius": put(ROWS["radius"], 4, 1e-200)}, {}, ("/bodies/radius", "id 5", "from 1e-30 to 1e30")),
+    ("radius 1e200", {"radius": put(ROWS["radius"], 4, 1e200)}, {}, ("/bodies/radius", "id 5", "from 1e-30 to 1e30")),
+    ("mass 1e200", {"mass": put(ROWS["mass"], 1, 1e200)}, {}, ("/bodies/mass", "id 2", "from 1e-30 to 1e30")),
+    ("speed 1e200", {"velocity": put(ROWS["velocity"], (0, 2), -1e200)}, {}, ("/bodies/velocity", "id 1", "at most 1e30")),
+    ("place 1e200", {"position": put(ROWS["position"], (4, 0), 1e200)}, {}, ("/bodies/position", "id 5", "at most 1e30")),
+    ("plane at 1e200", {}, {"point": np.array([[0.0, 1e200]])}, ("/walls/point", "id 9", "at most 1e30")),
     ("zero normal", {}, {"normal": np.zeros((1, 2))}, ("/walls/normal", "id 9", "not zero")),
     ("three dimensions", {"position": np.zeros((5, 3)), "velocity": np.zeros((5, 6))}, {}, ("/bodies/position",)),
     ("rows missing", {"radius": np.full(4, 0.1)}, {}, ("/bodies/radius", "4 rows", "5")),
@@ -219,10 +315,6 @@ def write_bodies(path, bodies, walls):
                 if value is not None:
                     file[f"{group}/{name}"] = value
     return path
-
-
-def bodies_case(path, **scene):
-    return namelist({"scene": {"bodies": "file", "bodies_file": path, **scene}, "time": CASE["time"], "output": CASE["output"]})
 
 
 class BadInput(RunTestCase):
@@ -272,6 +364,34 @@ class BadInput(RunTestCase):
             write(os.path.join(directory, "case.nml"), text)
             return "case.nml"
         self.refuse_all(FILES, prepare_input)
+
+    def test_tables(self):
+        def prepare_table(directory, text, drive):
+            write(os.path.join(directory, "table.csv"), text)
+            boundary = {**PLANE, **drive, "table": "table.csv"}
+            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"boundary": boundary})))
+            return "table.csv"
+        self.refuse_all(TABLES, prepare_table)
+
+    def test_turning_glued_bodies(self):
+        """Glued grains that turn and reach half round a periodic cell, in the rows of the second rank."""
+        def prepare_turning(directory, period):
+            write(os.path.join(directory, "bodies.csv"), "id,x,y,radius,group\n1,0.1,0,0.05,1\n2,0.3,0,0.05,1\n3,0.55,0,0.05,1\n")
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv", period=[period, 0.0], boundary=[
+                {"shape": "grains", "group": 1, "pivot": [0.1, 0.0], "rotation": [1.0]}]))
+            return "case.nml"
+        self.refuse_all([("wide", 1.0, ("boundary 'boundary 1'", "nearer to an image of the pivot than half the period", "axis x"))],
+                        prepare_turning)
+
+    def test_far_bodies(self):
+        def prepare_far(directory, text, scene):
+            write(os.path.join(directory, "bodies.csv"), text)
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv", **scene))
+            return "case.nml"
+        words = ("a coordinate or length of 1.000E+010 m", "at most 1.000E+009 m")
+        self.refuse_all([("grain", changed("4,0.9", "4,1e10"), {}, ("id 4", *words)),
+                         ("wall", changed("9,0.0,0.0", "9,0.0,-1e10"), {}, ("boundary 'wall 9'", *words)),
+                         ("period", BODIES, {"period": [2.0, 0.0], "period_origin": [1e10, 0.0]}, ("period", *words))], prepare_far)
 
     def test_csv_bodies(self):
         def prepare_csv(directory, text):

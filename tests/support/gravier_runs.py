@@ -202,11 +202,11 @@ class RunTestCase(unittest.TestCase):
                 self.assertTrue(np.all(np.isfinite(value)), f"{name} has NaN or infinity")
 
 
-def settled_disks(directory, steps=400):
-    """Fill a box with 600 disks: path of the bodies file of the packing. After 250 steps of 1 ms the disks lie on each other
-    and still move (kinetic energy 1 % of its peak), after 400 steps they are at rest (0.01 %)."""
+def settled_disks(directory, steps=400, count=(24, 25)):
+    """Fill a box with disks, 600 of them: path of the bodies file of the packing. After 250 steps of 1 ms the disks lie on each
+    other and still move (kinetic energy 1 % of its peak), after 400 steps they are at rest (0.01 %)."""
     run = run_case({
-        "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [24, 25], "radius_min": 0.008, "radius_max": 0.012,
+        "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": list(count), "radius_min": 0.008, "radius_max": 0.012,
                   "friction": 0.3},
         "time": {"step": 1e-3, "steps": steps},
         "solver": {"tolerance": 1e-3, "max_iterations": 2000},

@@ -27,6 +27,7 @@ program test_boundary
   call test_drives(2)
   call test_drives(3)
   call test_forces()
+  call test_shift()
   call test_state()
   call finish_checks()
   call MPI_Finalize()
@@ -406,5 +407,21 @@ contains
     call check(.not. back%present, "state: removed")
     call check_close(back%friction, 0.5_dp, 0.0_dp, "properties stay")
   end subroutine test_state
+
+  !> Put elsewhere, it keeps its directions and velocities.
+  subroutine test_shift()
+    type(boundary_t) :: b
+
+    b%shape = shape_segment
+    b%point(1:2) = [2.0_dp, 0.5_dp]
+    b%edge(1:2, 1) = [1.0_dp, 0.0_dp]
+    b%pivot(1:2) = [1.0_dp, 0.25_dp]
+    b%velocity(1:2) = [4.0_dp, 8.0_dp]
+    call b%shift([0.5_dp, -1.0_dp])
+    call check_vector(b%point, [2.5_dp, -0.5_dp, 0.0_dp], 0.0_dp, "shift: point")
+    call check_vector(b%pivot, [1.5_dp, -0.75_dp, 0.0_dp], 0.0_dp, "shift: pivot")
+    call check_vector(b%edge(:, 1), [1.0_dp, 0.0_dp, 0.0_dp], 0.0_dp, "shift: edge")
+    call check_vector(b%velocity, [4.0_dp, 8.0_dp, 0.0_dp], 0.0_dp, "shift: velocity")
+  end subroutine test_shift
 
 end program test_boundary

@@ -1003,7 +1003,8 @@ contains
     call refuse(file // rectangle // "edge_b = 2e-6, 1 /", &
       first // "edge_b = 2e-6, 1: expected an edge at right angles to edge_a = 1, 0, within 1e-6")
     call accept(file // rectangle // "edge_b = 0.5e-6, 1 /", "edges at right angles within 1e-6", config)
-    call accept(file // rectangle // "edge_b = 0, 1e-300 /", "a very short edge", config)
+    call accept(file // rectangle // "edge_b = 0, 1e-29 /", "a very short edge", config)
+    call refuse(file // rectangle // "edge_b = 0, 1e-300 /", first // "edge_b = 0, 1e-300: expected a length of at least 1e-30 m")
     call refuse(file // "&boundary shape = 'cylinder' axis = 0 radius = 1 /", first // "axis = 0: " // numbers)
     call refuse(file // "&boundary shape = 'cylinder' axis = 1 radius = 0 /", first // "radius = 0: " // positive // " (m)")
     call refuse(column // "&boundary shape = 'circle' radius = 0 /", first // "radius = 0: " // positive // " (m)")

@@ -3,8 +3,8 @@ program test_io_file_system
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, status_input, status_failure
-  use gravier_file_system, only: make_directory, rename_file, replace_file, remove_file, check_readable, check_creatable, &
-    & reserve_space, extend_file, text_file_t
+  use gravier_file_system, only: make_directory, remove_directory, rename_file, replace_file, remove_file, check_readable, &
+    & check_creatable, reserve_space, extend_file, text_file_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=:), allocatable :: here
@@ -14,6 +14,7 @@ program test_io_file_system
   call test_directories()
   call test_text_files()
   call test_renames()
+  call test_removing_directories()
   call test_replacing()
   call test_reservation()
   call finish_checks()
@@ -130,6 +131,23 @@ contains
     call check_readable(here//"/old", error)
     call expect(error, status_input, "No such file", "removed")
   end subroutine test_renames
+
+  !> A directory goes when it is empty.
+  subroutine test_removing_directories()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+
+    call make_directory(here//"/gone", error)
+    call file%create(here//"/gone/text", error)
+    call file%close(error)
+    call remove_directory(here//"/gone")
+    call check_readable(here//"/gone/text", error)
+    call expect_none(error, "a directory with a file stays")
+    call remove_file(here//"/gone/text")
+    call remove_directory(here//"/gone")
+    call file%create(here//"/gone/text", error)
+    call expect(error, status_failure, "No such file", "an empty directory goes")
+  end subroutine test_removing_directories
 
   !> A file takes the place of another and can still be written to; a failure leaves both.
   subroutine test_replacing()

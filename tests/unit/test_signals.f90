@@ -1,7 +1,8 @@
-!> Signals become notes that are taken once, and the process lives on.
+!> Signals become notes, and the process lives on: a request to stop is taken once, those for checkpoints are counted.
 program test_signals
   use, intrinsic :: iso_c_binding, only: c_int
-  use gravier_signals, only: catch_signals, take_signal
+  use gravier_kinds, only: i8
+  use gravier_signals, only: catch_signals, take_signals
   use gravier_check, only: check, finish_checks
   implicit none
   integer(c_int), parameter :: sigusr1 = 10, sigterm = 15
@@ -15,17 +16,17 @@ program test_signals
   end interface
 
   call catch_signals()
-  call expect(.false., .false., "nothing before a signal")
+  call expect(.false., 0_i8, "nothing before a signal")
   call send(sigusr1)
-  call expect(.false., .true., "SIGUSR1")
-  call expect(.false., .false., "a note is taken once")
+  call expect(.false., 1_i8, "SIGUSR1")
+  call expect(.false., 1_i8, "the count stays")
   call send(sigterm)
   call send(sigterm)
-  call expect(.true., .false., "SIGTERM twice before it is taken")
-  call expect(.false., .false., "both are taken at once")
+  call expect(.true., 1_i8, "SIGTERM twice before it is taken")
+  call expect(.false., 1_i8, "both are taken at once")
   call send(sigterm)
   call send(sigusr1)
-  call expect(.true., .true., "both signals, a second time each")
+  call expect(.true., 2_i8, "both signals, a second time each")
   call finish_checks()
 
 contains
@@ -35,14 +36,16 @@ contains
     call check(c_raise(number) == 0, "sending a signal")
   end subroutine send
 
-  subroutine expect(stop, checkpoint, name)
-    logical, intent(in) :: stop, checkpoint
+  subroutine expect(stop, checkpoints, name)
+    logical, intent(in) :: stop
+    integer(i8), intent(in) :: checkpoints
     character(len=*), intent(in) :: name
-    logical :: found_stop, found_checkpoint
+    logical :: found_stop
+    integer(i8) :: found_checkpoints
 
-    call take_signal(found_stop, found_checkpoint)
+    call take_signals(found_stop, found_checkpoints)
     call check(found_stop .eqv. stop, name//": stop")
-    call check(found_checkpoint .eqv. checkpoint, name//": checkpoint")
+    call check(found_checkpoints == checkpoints, name//": checkpoints")
   end subroutine expect
 
 end program test_signals

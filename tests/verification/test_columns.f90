@@ -8,6 +8,7 @@ program test_columns
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_solve, only: solve_converged
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -134,7 +135,8 @@ contains
           do c = 1, sub%n_contacts
             upper = int(sub%id(sub%pair(1, c)))
             if (sub%pair(2, c) <= sub%n_bodies) upper = int(max(sub%id(sub%pair(1, c)), sub%id(sub%pair(2, c))))
-            call check_close(sub%impulse(1, c), real(problem + 3 - upper, dp), 1.0e-10_dp, "impulse below disk "//to_text(upper))
+            call check_close(sub%impulse(lane_of(c), 1, block_of(c)), real(problem + 3 - upper, dp), 1.0e-10_dp, &
+              & "impulse below disk "//to_text(upper))
           end do
         end associate
       end do

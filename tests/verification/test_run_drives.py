@@ -198,6 +198,19 @@ class Shapes(SmallScene):
                       ([-0.03, -0.02, 0.045], [0.0, 0.0, 0.0]), ([1.03, 0.62, -0.045], [1.0, 0.6, 0.0])],
                      {"shape": "rectangle", "point": [0.0, 0.0, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 0.6, 0.0]})
 
+    def test_directions_of_any_length(self):
+        """The square of a normal or of an axis may be beyond the range of numbers: only its direction counts."""
+        down = np.array([0.6, 0.0, -0.8])
+        for title, boundary in (("plane", lambda length: plane([0, 0, 0], -length * down)),
+                                ("cylinder", lambda length: {"shape": "cylinder", "point": [0.0, 0.0, 0.0], "radius": 0.3,
+                                                             "axis": floats(length * np.array([0.8, 0.0, 0.6]))})):
+            wanted = None
+            for length in (1.0, 1e-200, 1e200):
+                record = self.play(f"{title} of {length}", [Grain(-0.1 * down)], [boundary(length)], G * down, 150)
+                wanted = record.position if wanted is None else wanted
+                self.verify(f"{title}, direction of length {length}", "place of a grain [m]", record.position, wanted, 1e-14)
+            self.assertGreater(np.abs(wanted[-1] - wanted[0]).max(), 0.04)
+
     def test_removal(self):
         """A ball at rest falls from the time on when its ground is taken away."""
         def check(dimension):

@@ -1,4 +1,4 @@
-"""Periodic cells, and scenes on one domain and on several: what is one scene gives one result."""
+"""Periodic cells, and scenes on one domain and on several: what is one scene gives one result, as far as the law has one."""
 import os
 import unittest
 
@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 
 from gravier_runs import RunTestCase, differences, merged, run_case, settled_disks, write
+from small_scenes import G, Grain, SmallScene, floats, plane
 
 LENGTH = 0.504
 STEP = 1e-3
@@ -69,11 +70,13 @@ class Periodic(RunTestCase):
     def test_subdomains_and_ranks(self):
         """Same bits on any number of ranks; the same step within the tolerance in any number of subdomains."""
         wanted = run_case(self.case, directory=self.here("one domain"))
-        for partition in ("grid", "metis"):
+        # a pair that belongs to its candidate is met with its antagonist as far beyond the side as a pair may be
+        for partition, kind in (("grid", "dual"), ("metis", "dual"), ("grid", "primal")):
             for n in (2, 4, 7):
-                case = merged(self.case, {"decomposition": {"subdomains": n, "partition": partition}, "solver": {"method": "nscdd"}})
-                runs = [run_case(case, ranks, self.here(f"{partition} {n} {ranks}")) for ranks in (1, 2)]
-                with self.subTest(partition, subdomains=n):
+                case = merged(self.case, {"decomposition": {"subdomains": n, "partition": partition, "kind": kind},
+                                          "solver": {"method": "nscdd"}})
+                runs = [run_case(case, ranks, self.here(f"{partition} {kind} {n} {ranks}")) for ranks in (1, 2)]
+                with self.subTest(partition, kind=kind, subdomains=n):
                     for run in runs:
                         self.assert_status(run, 0)
                     self.assertEqual(differences(runs[0].results(), runs[1].results()), [])
@@ -99,6 +102,95 @@ class Periodic(RunTestCase):
         self.assertLess(abs(one["solid_fraction"][0] - other["solid_fraction"][0]), 1e-10)
 
 
+class Boundaries(SmallScene):
+    """Boundaries of a finite extent act through the sides of the cell: a scene in the middle of the cell and the same scene moved
+    until it lies across a side, or beyond it, go the same way."""
+    length = 1.0
+
+    def compare(self, title, dimension, grains, boundaries, gravity=None, steps=300, ranks=1, **groups):
+        """Grains are (place, velocity, group), boundaries have a point or a pivot; the middle of the scene is x = 0.5."""
+        def run(shift):
+            way = shift * np.eye(dimension)[0]
+            moved = [{**one, **{key: floats(np.array(one[key]) + np.append(way, [0.0] * (len(one[key]) - dimension)))
+                                for key in ("point", "end", "pivot") if key in one}} for one in boundaries]
+            period = {"scene": {"period": [self.length, 0.0, 0.0], "friction": 0.5, "skin": 0.004}}
+            return self.play(f"{title} {dimension} {shift}", [Grain(np.array(place) + way, speed, radius=0.04, group=group)
+                                                              for place, speed, group in grains],
+                             moved, gravity, steps, ranks, output={"every": 10}, **merged(period, groups))
+        wanted = run(0.0)
+        for shift in (0.43, 2.5):
+            record = run(shift)
+            with self.subTest(title, dimension=dimension, shift=shift):
+                apart = record.position - wanted.position
+                apart[..., 0] -= shift
+                apart[..., 0] -= self.length * np.round(apart[..., 0] / self.length)
+                self.verify(f"{title} across a side, {dimension}D", "places [m]", apart, 0.0, 1e-9)
+                self.verify(f"{title} across a side, {dimension}D", "speeds [m/s]", record.velocity, wanted.velocity, 1e-7)
+                self.verify(f"{title} across a side, {dimension}D", "forces on it [N]", record.boundary["force"],
+                            wanted.boundary["force"], 1e-5)
+        # grains that are not glued come first; those that nothing stops and gravity does not move keep their velocity
+        met = wanted.velocity[:, :sum(group == 0 for _, _, group in grains)]
+        met = met - wanted.time[:, None, None] * (np.zeros(dimension) if gravity is None else np.array(gravity))
+        self.assertGreater(np.ptp(met, axis=0).max(), 0.05)
+        return wanted
+
+    def test_glued_blade(self):
+        """A blade of glued grains turns through the side and strikes grains on its way."""
+        def check(dimension):
+            rest = [0.0] * (dimension - 2)
+            blade = [([0.5 + 0.08 * k, 0.0, *rest], None, 1) for k in range(-3, 4)]
+            free = [([0.5 + x, y, *rest], None, 0) for x, y in ((0.2, 0.15), (-0.2, -0.15), (0.05, 0.2))]
+            rate = [3.0] if dimension == 2 else [0.0, 0.0, 3.0]
+            wanted = self.compare("glued blade", dimension, free + blade,
+                                  [{"shape": "grains", "group": 1, "pivot": [0.5, 0.0, *rest], "rotation": rate}])
+            # rigid, and where it should be
+            angle = 3.0 * wanted.time
+            for k in range(-3, 4):
+                place = wanted.position[:, 6 + k] + self.length * np.pad(wanted.image[:, 6 + k, :1], ((0, 0), (0, dimension - 1)))
+                self.verify("glued blade", "places of the turn [m]", place[:, :2],
+                            np.column_stack([0.5 + 0.08 * k * np.cos(angle), 0.08 * k * np.sin(angle)]), 1e-12)
+        self.both(check)
+
+    def test_roller_of_glued_grains_about_the_periodic_axis(self):
+        """A rough drum of glued grains along the whole cell turns about the periodic axis."""
+        angles = np.arange(8) * np.pi / 4
+        drum = [([x, 0.1 * np.cos(a), 0.1 * np.sin(a)], None, 1) for a in angles for x in np.arange(0.05, 1.0, 0.1)]
+        wanted = self.compare("roller", 3, [([0.5, 0.02, 0.2], None, 0)] + drum,
+                              [{"shape": "grains", "group": 1, "pivot": [0.3, 0.0, 0.0], "rotation": [2.0, 0.0, 0.0]}],
+                              -G * np.eye(3)[2], steps=100)
+        arm = np.hypot(wanted.position[:, 1:, 1], wanted.position[:, 1:, 2])
+        self.verify("roller", "distance from the axis [m]", arm, 0.1, 1e-12)
+
+    def test_segment(self):
+        """Grains fall on a segment that lies across the side, slip to its ends and fall on."""
+        free = [([0.5 + x, y], None, 0) for x, y in ((-0.12, 0.06), (0.02, 0.05), (0.14, 0.08))]
+        self.compare("segment", 2, free, [{"shape": "segment", "point": [0.35, 0.03], "end": [0.65, -0.03]}], [0.0, -G])
+
+    def test_turning_paddle(self):
+        """A segment that turns about one of its ends and moves."""
+        free = [([0.5 + x, y], None, 0) for x, y in ((0.1, 0.09), (0.0, 0.15), (-0.1, -0.1))]
+        self.compare("paddle", 2, free, [{"shape": "segment", "point": [0.5, 0.0], "end": [0.7, 0.0], "rotation": [4.0],
+                                          "velocity": [-0.2, 0.0]}])
+
+    def test_circle(self):
+        """Grains in a drum that turns."""
+        free = [([0.5 + x, y], None, 0) for x, y in ((-0.2, 0.0), (0.0, -0.1), (0.15, 0.1))]
+        self.compare("circle", 2, free, [{"shape": "circle", "point": [0.5, 0.0], "radius": 0.3, "rotation": [2.0]}], [0.0, -G],
+                     ranks=2, solver={"method": "nscdd", "tolerance": 1e-13}, decomposition={"subdomains": 2})
+
+    def test_rectangle(self):
+        free = [([0.5 + x, y, z], None, 0) for x, y, z in ((-0.12, 0.1, 0.06), (0.02, 0.2, 0.05), (0.14, 0.3, 0.08))]
+        self.compare("rectangle", 3, free, [{"shape": "rectangle", "point": [0.35, 0.0, 0.03], "edge_a": [0.3, 0.0, -0.06],
+                                             "edge_b": [0.0, 0.4, 0.0]}], [0.0, 0.0, -G])
+
+    def test_cylinders(self):
+        """Across the periodic axis, and along it."""
+        free = [([0.5 + x, y, z], None, 0) for x, y, z in ((-0.2, 0.0, 0.0), (0.0, 0.1, -0.1), (0.15, 0.2, 0.1))]
+        for title, axis, rate in (("cylinder across", [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]), ("cylinder along", [1.0, 0.0, 0.0], [2.0, 0.0, 0.0])):
+            self.compare(title, 3, free, [{"shape": "cylinder", "point": [0.5, 0.0, 0.0], "axis": axis, "radius": 0.3,
+                                           "rotation": rate}], [0.0, 0.0, -G])
+
+
 class Domains(RunTestCase):
     """600 disks that still settle, on one domain and on several."""
 
@@ -118,6 +210,40 @@ class Domains(RunTestCase):
                 one, other = wanted.history(), run.history()
                 for column in ("stress_xx", "stress_yy", "pressure", "kinetic_energy", "dissipated_normal"):
                     self.assertLess(abs(one[column][0] - other[column][0]), 1e-6 * abs(one[column][0]), column)
+
+
+class Jammed(RunTestCase):
+    """33 disks in a triangular lattice that a box just holds, under a lid with 50 N: nothing can move, and the law leaves the forces on
+    the sides open. Methods agree on velocities and on what balance imposes, and not on the rest."""
+
+    def test_forces_that_are_not_unique(self):
+        n, r = 6, 0.01
+        places = [(r * (1 + 2 * i + j % 2), r * (1 + np.sqrt(3) * j)) for j in range(n) for i in range(n - j % 2)]
+        write(self.here("jammed.csv"), "id,x,y,radius\n" + "\n".join(f"{k},{x!r},{y!r},{r}" for k, (x, y) in enumerate(places, 1)) + "\n")
+        top = r * (2 + np.sqrt(3) * (n - 1))
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.here("jammed.csv"), "friction": 0.5},
+            "boundary": [{"name": "floor", **plane([0, 0], [0, 1])}, {"name": "left", **plane([0, 0], [1, 0])},
+                         {"name": "right", **plane([2 * n * r, 0], [-1, 0])},
+                         {"name": "lid", **plane([0, top], [0, -1], free=[False, True], mass=1e-3, force=[0.0, -50.0])}],
+            "time": {"step": STEP, "steps": 1},
+            "solver": {"tolerance": 1e-12, "max_iterations": 200000, "warm_start": False},
+            "output": {"directory": "results", "boundary_forces": True}}
+        side = []
+        for method, subdomains in (("nlgs", 1), ("nscdd", 4)):
+            run = run_case(merged(case, {"solver": {"method": method}, "decomposition": {"subdomains": subdomains}}),
+                           directory=self.here(method))
+            self.assert_status(run, 0)
+            history = {name: column[0] for name, column in run.history().items()}
+            # a residual of 1e-12 in units of the largest load, 50 N
+            self.assertLess(np.abs(run.results()["/steps/1/bodies/velocity"]).max(), 1e-9)
+            self.assertLess(abs(history["force_y:lid"] - 50.0), 1e-8)
+            self.assertLess(abs(history["force_x:left"] + history["force_x:right"] + history["force_x:floor"]
+                                + history["force_x:lid"]), 1e-8)
+            weight = 9.81 * 2500 * np.pi * r ** 2 * len(places)
+            self.assertLess(abs(sum(history[f"force_y:{name}"] for name in ("floor", "left", "right", "lid")) + weight), 1e-8)
+            side.append(history["force_x:right"])
+        self.assertGreater(abs(side[1] - side[0]), 1.0)
 
 
 if __name__ == "__main__":

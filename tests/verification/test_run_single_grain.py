@@ -170,15 +170,15 @@ class SingleGrain(RunTestCase):
         self.both(check)
 
     def test_inclined_plane(self):
-        """As test_roll_down, with the plane tilted and not gravity, and a normal of any length."""
-        def check(dimension):
+        """As test_roll_down, with the plane tilted and not gravity, and a normal of any length, also one whose square is no number."""
+        def check(dimension, length):
             angle = np.radians(20)
             axes = np.eye(dimension)
             down = np.cos(angle) * axes[0] - np.sin(angle) * axes[-1]
             normal = np.sin(angle) * axes[0] + np.cos(angle) * axes[-1]
             point = 0.3 * axes[0] - 0.2 * axes[-1]
-            motion = self.move("incline", dimension, [(point + 0.7 * down + RADIUS * normal, self.start(dimension))],
-                               [(point, 12.3 * normal)], 0.5, -G * axes[-1])
+            motion = self.move(f"incline {length}", dimension, [(point + 0.7 * down + RADIUS * normal, self.start(dimension))],
+                               [(point, length * normal)], 0.5, -G * axes[-1])
             acceleration = G * np.sin(angle) * {2: 2 / 3, 3: 5 / 7}[dimension]
             speed = motion.velocity[:, 0, :dimension]
             # the place is off the plane by its rounding, and a gap of eps R is closed with the speed eps R / h
@@ -186,7 +186,9 @@ class SingleGrain(RunTestCase):
             np.testing.assert_allclose(speed @ down, acceleration * motion.time, rtol=0, atol=rounding)
             np.testing.assert_allclose(speed @ normal, 0.0, rtol=0, atol=rounding)
             np.testing.assert_allclose(self.rim(motion, dimension), acceleration * motion.time, rtol=0, atol=rounding)
-        self.both(check)
+        for length in (12.3, 1e-200, 1e200):
+            with self.subTest(length=length):
+                self.both(lambda dimension, length=length: check(dimension, length))
 
     def test_slip_then_roll(self):
         """Thrown along the flat without spin: slips until t = v0 k / (mu g), k = I / (I + m R^2), then rolls with (1 - k) v0: 2/3 of

@@ -1,0 +1,232 @@
+!> The loops over contacts: relaxations a second of each kernel, in cache and out of it, and the bytes that they stream.
+module gravier_bench_kernels
+  use mpi_f08, only: MPI_Wtime, MPI_COMM_SELF
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_communicator, only: communicator_t
+  use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_problem, only: subproblem_t
+  use gravier_scheme, only: start_sweeps
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_bench_machine, only: last_cache
+  use gravier_bench_options, only: options_t
+  use gravier_bench_packing, only: packing_t, make_packing, make_simulation
+  use gravier_bench_record, only: record_t, case_t
+  implicit none
+  private
+  public :: kernel_problem_t, kernel_names, make_kernels, measure_kernels, sweep_kernel
+
+  integer, parameter :: name_length = 32
+  character(len=name_length), parameter :: kernel_names(*) = [character(len=name_length) :: &
+    & "2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
+  !> versions of a kernel: as it is; recording the velocities which solved the laws; from extrapolated impulses
+  integer, parameter :: plain = 1, recording = 2, momentum = 3
+  !> what each adds to the name of a kernel
+  character(len=*), parameter :: version_names(3) = [character(len=10) :: "", "_recording", "_momentum"]
+  character(len=*), parameter :: places(3) = [character(len=12) :: "core_cache", "last_cache", "memory"]
+
+  !> contacts a grain in packings of some size, walls included
+  real(dp), parameter :: contacts_2d = 1.95_dp, contacts_3d = 3.35_dp
+  !> contacts of a problem in the first caches of a core, and share of the last cache that one beyond them takes
+  integer, parameter :: few_contacts = 2000
+  real(dp), parameter :: share_of_cache = 0.1_dp
+  !> the largest problem streams so many times the last cache
+  integer, parameter :: times_cache = 4
+
+  !> One kernel, in its versions, and contacts for it.
+  type :: kernel_problem_t
+    character(len=name_length) :: name
+    character(len=12) :: place
+    type(kernels_t) :: kernels
+    !> one
+    type(subproblem_t), allocatable :: sub(:)
+    !> what recording writes, and what momentum reads and writes (lanes, nc, blocks)
+    real(dp), allocatable :: law_velocity(:, :, :), previous(:, :, :)
+  contains
+    procedure :: sweep_once
+    procedure :: streamed
+  end type kernel_problem_t
+
+contains
+
+  !> One sweep over all contacts.
+  subroutine sweep_once(self, version)
+    class(kernel_problem_t), intent(inout) :: self
+    integer, intent(in) :: version
+    real(dp) :: sums(2)
+
+    associate (sub => self%sub(1))
+      select case (version)
+      case (recording)
+        call self%kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+          & self%law_velocity)
+      case (momentum)
+        call self%kernels%sweep_momentum(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+          & 0.0_dp, self%previous)
+      case default
+        call self%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
+      end select
+    end associate
+  end subroutine sweep_once
+
+  !> Bytes that one sweep moves at least, each array once: of a contact pair and hot read, impulses read and written, law
+  !> velocities written, previous impulses read and written; of a body velocities read and written, weights read. Lanes of
+  !> the last block that hold no contact count too.
+  pure integer(i8) function streamed(self, version) result(bytes)
+    class(kernel_problem_t), intent(in) :: self
+    integer, intent(in) :: version
+    integer(i8) :: words
+
+    associate (sub => self%sub(1))
+      words = size(sub%hot, kind=i8) + 2*size(sub%impulse, kind=i8) + 2*size(sub%velocity, kind=i8) + size(sub%weight, kind=i8)
+      if (version == recording) words = words + size(self%law_velocity, kind=i8)
+      if (version == momentum) words = words + 2*size(self%previous, kind=i8)
+      bytes = words*(storage_size(sub%hot)/8) + size(sub%pair, kind=i8)*(storage_size(sub%pair)/8)
+    end associate
+  end function streamed
+
+  !> All kernels, each with three problems, on this rank. Not collective.
+  subroutine make_kernels(options, problems, error)
+    type(options_t), intent(in) :: options
+    type(kernel_problem_t), allocatable, intent(out) :: problems(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k, p, n
+
+    allocate (problems(size(places)*size(kernel_names)))
+    do k = 1, size(kernel_names)
+      do p = 1, size(places)
+        n = few_contacts
+        if (options%contacts > 0) n = min(n, options%contacts)
+        if (p > 1) n = wanted_contacts(options, problems(3*k - 2), p == 3)
+        call make_problem(trim(kernel_names(k)), n, problems(3*k - 3 + p), error)
+        if (allocated(error)) return
+        problems(3*k - 3 + p)%place = places(p)
+      end do
+    end do
+  end subroutine make_kernels
+
+  !> Contacts of the problems out of the first caches, from the bytes of a small one.
+  integer function wanted_contacts(options, small, largest) result(n)
+    type(options_t), intent(in) :: options
+    type(kernel_problem_t), intent(in) :: small
+    !> out of all caches
+    logical, intent(in) :: largest
+    real(dp) :: per_cache
+
+    per_cache = real(last_cache(), dp)*small%sub(1)%n_contacts/small%streamed(plain)
+    if (.not. largest) then
+      n = nint(share_of_cache*per_cache)
+      if (options%contacts > 0) n = min(n, options%contacts)
+    else if (options%contacts > 0) then
+      n = options%contacts
+    else
+      n = max(1000000, nint(times_cache*per_cache))
+    end if
+  end function wanted_contacts
+
+  !> A problem of about `n` contacts for the kernel of a name, with the masses and velocities that a solve starts from.
+  subroutine make_problem(name, n, problem, error)
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: n
+    type(kernel_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    type(communicator_t), target :: alone
+    type(packing_t) :: packing
+    type(simulation_t) :: simulation
+    type(step_figures_t) :: figures
+
+    if (index(name, "2d") == 1) then
+      packing = make_packing(2, nint(n/contacts_2d))
+    else
+      packing = make_packing(3, nint(n/contacts_3d))
+    end if
+    packing%friction = index(name, "frictionless") == 0
+    call alone%init(MPI_COMM_SELF)
+    call make_simulation(packing, alone, simulation, error)
+    if (.not. allocated(error)) then
+      call simulation%assemble(figures)
+      call start_sweeps(simulation%scheme, simulation%problem, shared_masses=.false.)
+      problem%name = name
+      problem%kernels = simulation%problem%kernels
+      call move_alloc(simulation%problem%sub, problem%sub)
+      allocate (problem%law_velocity, problem%previous, source=problem%sub(1)%impulse)
+    end if
+    call simulation%free()
+    call alone%free()
+  end subroutine make_problem
+
+  !> One round over all problems: rates, and what they are of the bandwidth of this round. Not collective.
+  subroutine measure_kernels(options, problems, bandwidth, record)
+    type(options_t), intent(in) :: options
+    type(kernel_problem_t), intent(inout) :: problems(:)
+    !> of the triad on one core [B/s]
+    real(dp), intent(in) :: bandwidth
+    type(record_t), intent(inout) :: record
+    type(case_t) :: of
+    real(dp) :: rate, bytes
+    integer :: k, version
+
+    do k = 1, size(problems)
+      associate (problem => problems(k))
+        do version = 1, size(version_names)
+          of = case_t("kernel_"//trim(problem%place), trim(problem%name)//version_names(version), &
+            & int(problem%sub(1)%n_contacts, i8), 1)
+          rate = relaxation_rate(problem, version, options%seconds)
+          bytes = real(problem%streamed(version), dp)/problem%sub(1)%n_contacts
+          call record%note(of, "relaxations", "1/s", rate)
+          call record%note(of, "bytes_per_relaxation", "B", bytes)
+          call record%note(of, "ratio_to_triad", "1", rate*bytes/bandwidth)
+          call record%note(of, "bodies", "1", real(problem%sub(1)%n_columns, dp))
+          call record%note(of, "share_of_pressing_contacts", "1", &
+            & real(count(problem%sub(1)%impulse(:, 1, :) > 0.0_dp), dp)/problem%sub(1)%n_contacts)
+        end do
+      end associate
+    end do
+  end subroutine measure_kernels
+
+  !> Relaxations a second, over at least so many seconds after one sweep that brings the data near.
+  real(dp) function relaxation_rate(problem, version, seconds) result(rate)
+    type(kernel_problem_t), intent(inout) :: problem
+    integer, intent(in) :: version
+    real(dp), intent(in) :: seconds
+    real(dp) :: start, now
+    integer :: k, together, n
+
+    call problem%sweep_once(version)
+    ! the clock is read once in so many relaxations
+    together = 1 + 100000/problem%sub(1)%n_contacts
+    n = 0
+    start = MPI_Wtime()
+    do
+      do k = 1, together
+        call problem%sweep_once(version)
+      end do
+      n = n + together
+      now = MPI_Wtime()
+      if (now - start >= seconds .and. now > start) exit
+    end do
+    rate = real(problem%sub(1)%n_contacts, dp)*n/(now - start)
+  end function relaxation_rate
+
+  !> So many sweeps of one kernel and nothing else: what counts instructions compares two numbers of sweeps.
+  subroutine sweep_kernel(options, contacts, error)
+    !> with a kernel and a number of sweeps
+    type(options_t), intent(in) :: options
+    !> contacts there are
+    integer, intent(out) :: contacts
+    type(error_t), allocatable, intent(inout) :: error
+    type(kernel_problem_t) :: problem
+    integer :: k, n
+
+    n = few_contacts
+    if (options%contacts > 0) n = options%contacts
+    contacts = 0
+    call make_problem(options%kernel, n, problem, error)
+    if (allocated(error)) return
+    contacts = problem%sub(1)%n_contacts
+    do k = 1, options%sweeps
+      call problem%sweep_once(merge(recording, plain, options%recording))
+    end do
+  end subroutine sweep_kernel
+
+end module gravier_bench_kernels

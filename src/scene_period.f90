@@ -1,0 +1,114 @@
+!> Boundaries of scenes that repeat themselves: those that would meet their own images are refused.
+module gravier_scene_period
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_boundary, only: boundary_t, shape_plane, shape_outlet, shape_grains, shape_circle, shape_cylinder
+  use gravier_config_types, only: config_t
+  use gravier_scene, only: scene_t
+  implicit none
+  private
+  public :: check_in_period
+
+  character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+  !> smallest component of a direction that counts
+  real(dp), parameter :: straight = 1.0e-9_dp
+
+contains
+
+  !> Refuse boundaries that are not the same one period farther: planes across a periodic axis, what turns an endless surface
+  !> across one, finite shapes and turning glued grains that take more than a period. Glued grains of this rank are checked.
+  subroutine check_in_period(config, scene, reach, error)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    !> diameter of the largest grain and range of the lists [m]
+    real(dp), intent(in) :: reach
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: b, d
+
+    do d = 1, config%scene%dimension
+      if (.not. scene%period%length(d) > 0.0_dp) cycle
+      do b = 1, size(scene%boundaries)
+        associate (boundary => scene%boundaries(b))
+          select case (boundary%shape)
+          case (shape_plane, shape_outlet)
+            if (abs(boundary%axis(d)) > straight) call refuse(boundary, "a normal at right angles to")
+            if (turns_across(boundary, d)) call refuse(boundary, "no rotation but about")
+          case (shape_grains)
+            if (turns_across(boundary, d)) call check_glued(b)
+          case (shape_cylinder)
+            call check_cylinder(boundary)
+          case default
+            call check_width(boundary)
+          end select
+        end associate
+      end do
+    end do
+
+  contains
+
+    subroutine check_width(boundary)
+      type(boundary_t), intent(in) :: boundary
+      real(dp) :: width
+
+      width = 2.0_dp*boundary%half_width(d)
+      ! grains are inside of circles and cylinders
+      if (boundary%shape /= shape_circle .and. boundary%shape /= shape_cylinder) width = width + reach
+      if (width > scene%period%length(d)) call refuse(boundary, "a width, with a diameter of the largest grain "// &
+        & "and the range of the lists, of at most the period of "//to_text(scene%period%length(d), 4)//" m, here "// &
+        & to_text(width, 4)//" m, along")
+    end subroutine check_width
+
+    !> A cylinder lies along the axis or across it, and does not tilt.
+    subroutine check_cylinder(boundary)
+      type(boundary_t), intent(in) :: boundary
+      integer :: k
+
+      do k = 1, 3
+        if (boundary%turns_about(k) .and. abs(boundary%axis(k)) < 1.0_dp - straight) &
+          & call refuse(boundary, "no rotation but about its axis, near")
+      end do
+      if (abs(boundary%axis(d)) >= 1.0_dp - straight) return
+      if (abs(boundary%axis(d)) > straight) call refuse(boundary, "an axis along, or at right angles to,")
+      call check_width(boundary)
+    end subroutine check_cylinder
+
+    !> Grains that turn with their boundary stay within half a period of its pivot.
+    subroutine check_glued(b)
+      integer, intent(in) :: b
+      real(dp) :: arm, length
+      integer :: k
+
+      length = scene%period%length(d)
+      do k = 1, scene%grains%n
+        if (scene%grains%glued(k) /= b) cycle
+        arm = scene%grains%position(d, k) - scene%boundaries(b)%pivot(d)
+        arm = abs(arm - length*anint(arm/length)) + 0.5_dp*reach
+        if (arm >= 0.5_dp*length) call refuse(scene%boundaries(b), "turning grains nearer to an image of the pivot "// &
+          & "than half the period of "//to_text(length, 4)//" m, less a radius and the range of the lists, along")
+      end do
+    end subroutine check_glued
+
+    subroutine refuse(boundary, expected)
+      type(boundary_t), intent(in) :: boundary
+      character(len=*), intent(in) :: expected
+
+      call raise(error, status_input, config%file//": boundary '"//boundary%name//"': expected "//expected// &
+        & " the periodic axis "//axes(d))
+    end subroutine refuse
+
+  end subroutine check_in_period
+
+  !> Whether a boundary turns, now or later, so that places along axis `d` count.
+  pure logical function turns_across(boundary, d)
+    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: d
+    integer :: k
+
+    turns_across = .false.
+    do k = 1, 3
+      if (k /= d .and. boundary%turns_about(k)) turns_across = .true.
+    end do
+  end function turns_across
+
+end module gravier_scene_period
