@@ -7,7 +7,7 @@ program gravier_columns
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory
   use gravier_solve, only: solve_report_t, solve_converged
-  use gravier_command_line, only: argument, leave
+  use gravier_command_line, only: argument, positive_integer, positive_real, leave
   use gravier_columns_study, only: column_t, paper_columns, solve_columns
   use gravier_columns_report, only: write_table, write_csv, draw_figure
   implicit none
@@ -112,32 +112,10 @@ contains
       if (options%subdomains == 0) call raise(error, status_input, "--subdomains '"//word//"': expected an integer >= 1")
     case default
       options%tolerance = word
-      if (.not. is_positive_real(word)) call raise(error, status_input, "--tolerance '"//word// &
+      if (positive_real(word) <= 0.0_dp) call raise(error, status_input, "--tolerance '"//word// &
         & "': expected a finite real number > 0")
     end select
   end subroutine read_value
-
-  !> The number that a word of digits means; 0 for anything else.
-  integer function positive_integer(word) result(value)
-    character(len=*), intent(in) :: word
-    integer :: stat
-
-    value = 0
-    if (word == "" .or. verify(word, "0123456789") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat /= 0) value = 0
-  end function positive_integer
-
-  logical function is_positive_real(word)
-    character(len=*), intent(in) :: word
-    real(dp) :: value
-    integer :: stat
-
-    is_positive_real = .false.
-    if (word == "" .or. verify(word, "0123456789.eEdD+-") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat == 0) is_positive_real = value > 0.0_dp .and. value <= huge(value)
-  end function is_positive_real
 
   !> Solve, print the table and write the CSV files. Collective.
   subroutine run_study(options, status, error)

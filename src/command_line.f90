@@ -1,10 +1,11 @@
 !> The command line of the program, and how it ends.
 module gravier_command_line
   use, intrinsic :: iso_c_binding, only: c_int
+  use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   implicit none
   private
-  public :: arguments_t, read_arguments, argument, leave
+  public :: arguments_t, read_arguments, argument, positive_integer, positive_real, leave
   public :: action_run, action_check, action_help, action_version, action_keys
 
   integer, parameter :: action_run = 1, action_check = 2, action_help = 3, action_version = 4, action_keys = 5
@@ -86,6 +87,28 @@ contains
     allocate (character(len=length) :: word)
     call get_command_argument(k, word)
   end function argument
+
+  !> The number that a word of digits means; 0 for anything else.
+  integer function positive_integer(word) result(value)
+    character(len=*), intent(in) :: word
+    integer :: stat
+
+    value = 0
+    if (word == "" .or. verify(word, "0123456789") > 0) return
+    read (word, *, iostat=stat) value
+    if (stat /= 0) value = 0
+  end function positive_integer
+
+  !> The finite number > 0 that a word means; 0 for anything else.
+  real(dp) function positive_real(word) result(value)
+    character(len=*), intent(in) :: word
+    integer :: stat
+
+    value = 0.0_dp
+    if (word == "" .or. verify(word, "0123456789.eEdD+-") > 0) return
+    read (word, *, iostat=stat) value
+    if (stat /= 0 .or. .not. (value > 0.0_dp .and. value <= huge(value))) value = 0.0_dp
+  end function positive_real
 
   !> End the process with an exit status, without the lines that STOP prints.
   subroutine leave(status)

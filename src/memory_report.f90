@@ -76,6 +76,7 @@ contains
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
       call items(3)%add("home", 4, 1)
+      call items(3)%add("place", 4, 1)
       call items(3)%add("multiplicity", 4, 1)
       call items(3)%add("position", 8, nd)
       call items(3)%add("radius", 8, 1)

@@ -259,12 +259,25 @@ contains
     write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3)") simulation%step, simulation%time, figures%contacts, &
       & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, seconds
     call self%line(trim(row), error)
+    if (figures%divided) call self%line("balance     "//balance_text(figures%rank_balance, figures%subdomain_balance)// &
+      & " of the mean until this partition", error)
     if (figures%refused) call self%line("warning     the grains fill fewer cells than there are subdomains: "// &
       & "the old partition stays", error)
     if (figures%fast > 0 .and. simulation%fast == figures%fast) call self%line("warning     "//to_text(figures%fast)// &
       & " grains move by more than their radius in a step (said once; history.csv counts them)", error)
     if (figures%solve%status /= solve_converged) call self%line("  *** "//failure_text(simulation, figures), error)
   end subroutine run_log_write_step
+
+  !> How unevenly sweeps took time.
+  function balance_text(ranks, subdomains) result(text)
+    !> most over mean seconds of the ranks, and of the subdomains
+    real(dp), intent(in) :: ranks, subdomains
+    character(len=:), allocatable :: text
+    character(len=24) :: row(2)
+
+    write (row, "(f0.3)") ranks, subdomains
+    text = "seconds in sweeps: slowest rank "//trim(row(1))//", slowest subdomain "//trim(row(2))
+  end function balance_text
 
   !> What went wrong in a step.
   function failure_text(simulation, figures) result(text)
@@ -312,6 +325,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(work_t) :: work
     integer(i8) :: counts(5)
+    real(dp) :: ranks, subdomains
 
     work = simulation%scheme%work_done()
     counts(1) = work%relaxations
@@ -325,6 +339,10 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    if (simulation%decomposition%n_subdomains > 1) then
+      call simulation%scheme%measure_balance(self%comm, simulation%decomposition%n_subdomains, ranks, subdomains)
+      call self%line("balance     "//balance_text(ranks, subdomains)//" of the mean since the last partition", error)
+    end if
     call self%line("lists       made "//to_text(simulation%neighbourhoods%builds)//" times", error)
     call self%line("memory      at most "//to_text(nint(self%comm%highest(peak_memory())))//" MiB on a rank", error)
     call self%line("messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB", error)

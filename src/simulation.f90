@@ -20,7 +20,7 @@ module gravier_simulation
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
-  use gravier_overlap_projection, only: project_overlaps, overlap_remainder
+  use gravier_overlap_projection, only: project_overlaps
   use gravier_diagnostics, only: diagnostics_t
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
@@ -44,6 +44,9 @@ module gravier_simulation
     integer(i8) :: left = 0, fast = 0
     !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
     logical :: listed = .false., divided = .false., refused = .false.
+    !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
+    !> space was divided anew
+    real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
@@ -371,7 +374,11 @@ contains
     self%largest_overlap = figures%max_overlap
     if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
-    if (figures%divided) self%reached_imbalance = self%imbalance
+    if (figures%divided) then
+      self%reached_imbalance = self%imbalance
+      call self%scheme%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
+      call self%scheme%forget_times()
+    end if
   end subroutine simulation_assemble
 
   !> q_m of grains and boundaries; boundaries whose time has come are taken away.
@@ -597,8 +604,10 @@ contains
     call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
       & self%time, figures%left > 0)
     call move_to_end(self)
-    figures%projected = figures%max_overlap - self%overlap_allowed > overlap_remainder*self%overlap_allowed
+    call stop_timer(phase_bodies)
+    figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
+    call start_timer(phase_bodies)
     if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     call stop_timer(phase_bodies)
     self%step = self%step + 1

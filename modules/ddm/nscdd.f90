@@ -4,7 +4,7 @@ module gravier_nscdd
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
+  use gravier_scheme, only: scheme_t, start_sweeps, sweep_and_pass
   implicit none
   private
   public :: nscdd_t, average_copies
@@ -36,9 +36,11 @@ contains
 
     jump = 0.0_dp
     if (allocated(error)) return
-    call sweep_all(self, problem)
-    if (measure) jump = problem%jump()
-    call average_copies(problem)
+    call sweep_and_pass(self, problem)
+    if (measure) jump = problem%received_jump()
+    call start_timer(phase_exchange)
+    call take_averages(problem)
+    call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
   end subroutine nscdd_iterate
 
@@ -46,13 +48,20 @@ contains
   !> every copy of a body takes the mean of its copies' velocities. Collective.
   subroutine average_copies(problem)
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, k, b
+    integer :: s
 
-    call start_timer(phase_exchange)
     do s = 1, size(problem%sub)
       call problem%shared%load(s, problem%sub(s)%velocity)
     end do
     call problem%shared%pass()
+    call take_averages(problem)
+  end subroutine average_copies
+
+  !> The same where the copies' velocities have just been passed.
+  subroutine take_averages(problem)
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s, k, b
+
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), velocity => problem%sub(s)%velocity)
         call problem%shared%sum_copies(s, velocity)
@@ -62,7 +71,6 @@ contains
         end do
       end associate
     end do
-    call stop_timer(phase_exchange)
-  end subroutine average_copies
+  end subroutine take_averages
 
 end module gravier_nscdd

@@ -3,7 +3,7 @@
 !> the time step.
 module gravier_overlap_projection
   use gravier_kinds, only: dp
-  use gravier_timers, only: start_timer, stop_timer, phase_bodies
+  use gravier_timers, only: start_timer, stop_timer, phase_projection
   use gravier_contact_kernels, only: lanes, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
@@ -12,12 +12,12 @@ module gravier_overlap_projection
   use gravier_boundary_loads, only: take_boundary_displacements
   implicit none
   private
-  public :: project_overlaps, overlap_remainder
+  public :: project_overlaps
 
   !> sweeps between two looks at what is left, and at most in one projection: what they leave is for the next steps
   integer, parameter :: check_every = 10, max_sweeps = 200
   !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
-  real(dp), parameter :: overlap_remainder = 0.1_dp
+  real(dp), parameter :: remainder = 0.1_dp
 
   !> What a projection borrows of a subproblem, and its work space; src/memory_report.f90 counts them.
   type :: borrowed_t
@@ -46,14 +46,14 @@ contains
     integer :: s, k
     logical :: has_driven
 
-    call start_timer(phase_bodies)
+    call start_timer(phase_projection)
     has_driven = any(decomposition%boundaries%free(1)) .or. any(decomposition%boundaries%free(2)) .or. &
       & any(decomposition%boundaries%free(3))
     do s = 1, size(problem%sub)
       call lend(problem, s, h, allowed, borrowed(s))
     end do
     if (has_driven) call weigh_boundaries(problem, size(decomposition%boundaries))
-    enough = overlap_remainder*max(allowed, excess(problem, borrowed))
+    enough = remainder*max(allowed, excess(problem, borrowed))
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
@@ -71,7 +71,7 @@ contains
     end do
     call take_displacements(decomposition, problem)
     if (has_driven) call take_boundary_displacements(decomposition, problem)
-    call stop_timer(phase_bodies)
+    call stop_timer(phase_projection)
   end subroutine project_overlaps
 
   !> Largest overlap beyond what is allowed under the displacements of now [m]. Collective.

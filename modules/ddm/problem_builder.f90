@@ -64,6 +64,17 @@ module gravier_problem_builder
     real(dp), allocatable :: gap(:), normal(:, :)
   end type found_t
 
+  !> Columns of a subproblem by what else is known of a body.
+  type :: columns_t
+    !> column of each grain at home in the subdomain, 0 where no contact touches it
+    integer, allocatable :: at_home(:)
+    !> columns of the other bodies, and their identifiers, ascending
+    integer, allocatable :: away(:)
+    integer(i8), allocatable :: away_id(:)
+  contains
+    procedure :: init => columns_init
+  end type columns_t
+
 contains
 
   !> Turn the velocity of grain `k` at the start of a step into that without contacts, M^-1 R^d = V_i + h M^-1 F
@@ -272,7 +283,8 @@ contains
     integer, intent(in) :: n_columns
     type(subproblem_t), intent(inout) :: sub
 
-    allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%position(kernels%nd, sub%n_grains), sub%radius(sub%n_grains))
+    allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%place(sub%n_grains))
+    allocate (sub%position(kernels%nd, sub%n_grains), sub%radius(sub%n_grains))
     allocate (sub%v_free(kernels%nv, n_columns), sub%velocity(kernels%nv, n_columns), sub%v_global(kernels%nv, n_columns), &
       & sub%reaction(kernels%nv, n_columns), sub%inverse_mass(kernels%nw, n_columns), sub%weight(kernels%nw, n_columns), &
       & source=0.0_dp)
@@ -293,6 +305,7 @@ contains
       if (b == 0) cycle
       sub%id(b) = view%bodies%id(k)
       sub%home(b) = view%home(k)
+      sub%place(b) = view%origin(k)
       sub%position(:, b) = view%bodies%position(:, k)
       sub%radius(b) = view%bodies%radius(k)
       sub%v_free(:, b) = view%bodies%velocity(1:kernels%nv, k)
@@ -436,39 +449,116 @@ contains
 
   end subroutine pack_contacts
 
-  !> Find out which subdomains hold a copy of each grain: every subdomain tells the owner of a grain that it
-  !> touches it, the owner tells all of them of each other. Collective.
+  !> Find out which subdomains hold a copy of each body: every subdomain tells the owner of a grain at home elsewhere that it
+  !> touches it, and so of boundaries that forces move; the owner tells all of them, itself included, of each other. Most
+  !> grains are touched at home only, and are in no record. Collective.
   subroutine find_interface(decomposition, problem)
     type(decomposition_t), intent(in) :: decomposition
     type(contact_problem_t), intent(inout) :: problem
     integer(i8), allocatable :: records(:, :), received(:, :), answers(:, :)
     integer, allocatable :: destination(:)
     type(shared_part_t), allocatable :: part(:)
-    integer :: s, b, n
+    type(columns_t) :: columns(size(problem%sub))
+    integer :: s, b, n, round
 
-    n = 0
-    do s = 1, size(problem%sub)
-      n = n + problem%sub(s)%n_bodies
-    end do
-    allocate (records(2, n), destination(n))
-    n = 0
-    do s = 1, size(problem%sub)
-      do b = 1, problem%sub(s)%n_bodies
-        n = n + 1
-        records(1, n) = problem%sub(s)%id(b)
-        records(2, n) = problem%sub(s)%subdomain
-        destination(n) = decomposition%comm%rank_of(problem%sub(s)%home(b), decomposition%n_subdomains)
+    do round = 1, 2
+      n = 0
+      do s = 1, size(problem%sub)
+        associate (sub => problem%sub(s))
+          if (round == 1) call columns(s)%init(sub, decomposition%home(s)%n)
+          do b = 1, sub%n_bodies
+            if (b <= sub%n_grains) then
+              if (sub%place(b) > 0) cycle
+            end if
+            n = n + 1
+            if (round == 1) cycle
+            records(1, n) = sub%id(b)
+            records(2, n) = sub%subdomain
+            records(3, n) = merge(sub%home(b), 0, b <= sub%n_grains)
+            destination(n) = decomposition%comm%rank_of(sub%home(b), decomposition%n_subdomains)
+          end do
+        end associate
       end do
+      if (round == 1) allocate (records(3, n), destination(n))
     end do
     call sparse_exchange(decomposition%comm, records, destination, received)
+    call add_owners(decomposition, columns, received)
     call answer_sharers(decomposition, received, answers, destination)
     call sparse_exchange(decomposition%comm, answers, destination, received)
     allocate (part(size(problem%sub)))
-    call sort_out_sharers(received, problem, part)
+    call sort_out_sharers(received, decomposition, columns, problem, part)
     call problem%shared%init(decomposition%comm, part, decomposition%n_subdomains, problem%kernels%nv)
   end subroutine find_interface
 
-  !> Of the touches (grain, subdomain) of the grains of this rank, tell each subdomain of a shared grain of all
+  subroutine columns_init(self, sub, n_home)
+    class(columns_t), intent(inout) :: self
+    type(subproblem_t), intent(in) :: sub
+    !> grains at home in the subdomain
+    integer, intent(in) :: n_home
+    integer, allocatable :: away(:), order(:)
+    integer :: b, n
+
+    allocate (self%at_home(n_home), source=0)
+    n = 0
+    do b = 1, sub%n_grains
+      if (sub%place(b) > 0) then
+        self%at_home(sub%place(b)) = b
+      else
+        n = n + 1
+      end if
+    end do
+    n = n + sub%n_bodies - sub%n_grains
+    allocate (self%away(n), self%away_id(n), away(n), order(n))
+    n = 0
+    do b = 1, sub%n_bodies
+      if (b <= sub%n_grains) then
+        if (sub%place(b) > 0) cycle
+      end if
+      n = n + 1
+      away(n) = b
+      self%away_id(n) = sub%id(b)
+    end do
+    call argsort(self%away_id, order)
+    do n = 1, size(order)
+      self%away(n) = away(order(n))
+      self%away_id(n) = sub%id(self%away(n))
+    end do
+  end subroutine columns_init
+
+  !> Add the touches of owners to those (body, subdomain, owner) of others.
+  subroutine add_owners(decomposition, columns, touches)
+    type(decomposition_t), intent(in) :: decomposition
+    type(columns_t), intent(in) :: columns(:)
+    !> (3, n)
+    integer(i8), allocatable, intent(inout) :: touches(:, :)
+    integer(i8), allocatable :: longer(:, :)
+    integer(i8) :: key(2)
+    integer, allocatable :: order(:)
+    integer :: k, n, h, place
+
+    allocate (longer(3, 2*size(touches, 2)), order(size(touches, 2)))
+    n = size(touches, 2)
+    longer(:, 1:n) = touches
+    call argsort_rows(touches, order)
+    do k = 1, size(order)
+      associate (touch => touches(:, order(k)))
+        if (touch(3) == 0) cycle
+        if (k > 1) then
+          if (touches(1, order(k - 1)) == touch(1)) cycle
+        end if
+        key(1) = touch(3)
+        key(2) = touch(1)
+        call find_home(decomposition, key, h, place)
+        if (columns(h)%at_home(place) == 0) cycle
+        n = n + 1
+        longer(1, n) = touch(1)
+        longer(2:3, n) = touch(3)
+      end associate
+    end do
+    touches = longer(:, 1:n)
+  end subroutine add_owners
+
+  !> Of the touches (body, subdomain, owner) of the bodies of this rank, tell each subdomain of a shared grain of all
   !> sharers: records (subdomain told, grain, sharer).
   subroutine answer_sharers(decomposition, touches, answers, destination)
     type(decomposition_t), intent(in) :: decomposition
@@ -508,9 +598,11 @@ contains
   end subroutine answer_sharers
 
   !> Write the sharers of each subdomain of this rank into its part of the exchange, by ascending identifier.
-  subroutine sort_out_sharers(received, problem, part)
-    !> (subdomain told, grain, sharer)
+  subroutine sort_out_sharers(received, decomposition, columns, problem, part)
+    !> (subdomain told, body, sharer)
     integer(i8), intent(in), contiguous :: received(:, :)
+    type(decomposition_t), intent(in) :: decomposition
+    type(columns_t), intent(in) :: columns(:)
     type(contact_problem_t), intent(inout) :: problem
     type(shared_part_t), intent(inout) :: part(:)
     integer, allocatable :: order(:)
@@ -526,27 +618,25 @@ contains
         last = last + 1
       end do
       part(s)%subdomain = problem%sub(s)%subdomain
-      call fill_part(received, order(k:last), problem%sub(s), part(s))
+      associate (home => decomposition%home(s))
+        call fill_part(received, order(k:last), home%id(1:home%n), columns(s), problem%sub(s), part(s))
+      end associate
       k = last + 1
     end do
   end subroutine sort_out_sharers
 
-  subroutine fill_part(received, order, sub, part)
+  subroutine fill_part(received, order, home_id, columns, sub, part)
     integer(i8), intent(in), contiguous :: received(:, :)
-    !> places in `received` of the records of this subdomain, by grain and sharer
+    !> places in `received` of the records of this subdomain, by body and sharer
     integer, intent(in), contiguous :: order(:)
+    !> identifiers of the grains at home here, ascending
+    integer(i8), intent(in), contiguous :: home_id(:)
+    type(columns_t), intent(in) :: columns
     type(subproblem_t), intent(inout) :: sub
     type(shared_part_t), intent(inout) :: part
-    integer, allocatable :: by_id(:)
-    integer(i8), allocatable :: sorted_id(:)
     integer(i8) :: id
-    integer :: k, b
+    integer :: k, place
 
-    allocate (by_id(sub%n_bodies), sorted_id(sub%n_bodies))
-    call argsort(sub%id(1:sub%n_bodies), by_id)
-    do b = 1, sub%n_bodies
-      sorted_id(b) = sub%id(by_id(b))
-    end do
     allocate (part%body(size(order)), part%first(size(order) + 1), part%sharer(size(order)))
     part%n_shared = 0
     id = -1
@@ -554,7 +644,12 @@ contains
       if (received(2, order(k)) /= id) then
         id = received(2, order(k))
         part%n_shared = part%n_shared + 1
-        part%body(part%n_shared) = by_id(find_sorted(sorted_id, id))
+        place = find_sorted(columns%away_id, id)
+        if (place > 0) then
+          part%body(part%n_shared) = columns%away(place)
+        else
+          part%body(part%n_shared) = columns%at_home(find_sorted(home_id, id))
+        end if
         part%first(part%n_shared) = k
       end if
       part%sharer(k) = int(received(3, order(k)))
@@ -662,8 +757,7 @@ contains
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(in) :: problem
-    integer(i8), allocatable :: received(:, :)
-    integer :: s, k, d, h, place
+    integer :: s, k
 
     do s = 1, size(decomposition%home)
       associate (home => decomposition%home(s))
@@ -672,44 +766,63 @@ contains
         end do
       end associate
     end do
-    call return_velocities(decomposition, problem, received)
-    do k = 1, size(received, 2)
-      call find_home(decomposition, received(1:2, k), h, place)
-      do d = 1, problem%kernels%nv
-        decomposition%home(h)%velocity(d, place) = transfer(received(2 + d, k), 0.0_dp)
-      end do
-    end do
+    call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 
   !> Move the grains in contact by what v_global holds in the place of velocities [m]. Collective.
   subroutine take_displacements(decomposition, problem)
     type(decomposition_t), intent(inout) :: decomposition
     type(contact_problem_t), intent(in) :: problem
-    integer(i8), allocatable :: received(:, :)
-    integer :: k, d, h, place
+    call bring_home(decomposition, problem, displace=.true.)
+  end subroutine take_displacements
 
-    call return_velocities(decomposition, problem, received)
-    do k = 1, size(received, 2)
-      call find_home(decomposition, received(1:2, k), h, place)
-      associate (position => decomposition%home(h)%position)
-        do d = 1, decomposition%nd
-          position(d, place) = position(d, place) + transfer(received(2 + d, k), 0.0_dp)
+  !> Bring v_global of the grains in contact to where they are at home: in this subdomain by their places, in others by
+  !> records (owner, grain, velocity). Collective.
+  subroutine bring_home(decomposition, problem, displace)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    !> they are displacements, not velocities
+    logical, intent(in) :: displace
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer, allocatable :: destination(:)
+    real(dp) :: v(problem%kernels%nv)
+    integer :: s, b, k, d, h, place
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = 1, sub%n_grains
+          if (sub%place(b) > 0) call put(s, sub%place(b), sub%v_global(:, b))
         end do
       end associate
     end do
-  end subroutine take_displacements
-
-  !> Send v_global of the grains in contact to the ranks of their owners: records (owner, grain, velocity). Collective.
-  subroutine return_velocities(decomposition, problem, received)
-    type(decomposition_t), intent(in) :: decomposition
-    type(contact_problem_t), intent(in) :: problem
-    integer(i8), allocatable, intent(out) :: received(:, :)
-    integer(i8), allocatable :: records(:, :)
-    integer, allocatable :: destination(:)
-
     call list_returns(decomposition, problem, records, destination)
     call sparse_exchange(decomposition%comm, records, destination, received)
-  end subroutine return_velocities
+    do k = 1, size(received, 2)
+      call find_home(decomposition, received(1:2, k), h, place)
+      do d = 1, size(v)
+        v(d) = transfer(received(2 + d, k), 0.0_dp)
+      end do
+      call put(h, place, v)
+    end do
+
+  contains
+
+    subroutine put(h, place, v)
+      !> subdomain of this rank, and place there
+      integer, intent(in) :: h, place
+      !> (nv)
+      real(dp), intent(in) :: v(:)
+
+      associate (home => decomposition%home(h))
+        if (displace) then
+          home%position(:, place) = home%position(:, place) + v(1:decomposition%nd)
+        else
+          home%velocity(1:size(v), place) = v
+        end if
+      end associate
+    end subroutine put
+
+  end subroutine bring_home
 
   !> Subdomain of this rank and place in its home of a grain.
   pure subroutine find_home(decomposition, key, h, place)
@@ -722,8 +835,8 @@ contains
     place = find_sorted(decomposition%home(h)%id, key(2))
   end subroutine find_home
 
-  !> Records (owner, grain, velocity) of the grains in contact, one per grain: from its owner where that is a
-  !> sharer, else from the first sharer.
+  !> Records (owner, grain, velocity) of the grains in contact that are at home in none of their sharers, from the first of
+  !> them.
   subroutine list_returns(decomposition, problem, records, destination)
     type(decomposition_t), intent(in) :: decomposition
     type(contact_problem_t), intent(in) :: problem
@@ -736,14 +849,14 @@ contains
       n = 0
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s), part => problem%shared%part(s))
-          allocate (sends(sub%n_bodies), source=.true.)
-          sends(sub%n_grains + 1:) = .false.
+          allocate (sends(sub%n_bodies), source=.false.)
+          do b = 1, sub%n_grains
+            sends(b) = sub%place(b) == 0
+          end do
           do k = 1, part%n_shared
             b = part%body(k)
             if (b > sub%n_grains) cycle
-            sends(b) = sub%home(b) == sub%subdomain
-            if (part%rung(k) == 1) sends(b) = sends(b) .or. &
-              & .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%home(b))
+            sends(b) = part%rung(k) == 1 .and. .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%home(b))
           end do
           do b = 1, sub%n_grains
             if (.not. sends(b)) cycle

@@ -1,7 +1,8 @@
 !> What Fortran leaves to the operating system: directories, atomic renames, reserved disk space, and text files
 !> whose every write is checked. The only file with bindings to the C library.
 module gravier_file_system
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_f_pointer, c_associated
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
+    & c_f_pointer, c_associated
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
@@ -9,7 +10,12 @@ module gravier_file_system
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
   public :: extend_file, replace_file
-  public :: text_file_t, text_at
+  public :: path_t, add_path, list_files, text_file_t, text_at
+
+  !> A path of any length.
+  type :: path_t
+    character(len=:), allocatable :: text
+  end type path_t
 
   !> A text file written piece by piece; after a failed write it ends with the last complete piece.
   type :: text_file_t
@@ -34,6 +40,8 @@ module gravier_file_system
   integer(c_int), parameter :: eintr = 4, eexist = 17, enospc = 28, enosys = 38, eopnotsupp = 95, edquot = 122
   !> more than the length of struct statvfs of 64-bit Linux
   integer, parameter :: statvfs_words = 32
+  !> more than the length of struct glob_t of 64-bit Linux, which begins with the number of paths and their address
+  integer, parameter :: glob_words = 16
   !> permissions before the user's umask
   integer(c_int), parameter :: file_mode = int(o"666", c_int), directory_mode = int(o"777", c_int)
 
@@ -124,6 +132,21 @@ module gravier_file_system
       integer(c_int), value :: descriptor
       integer(c_int64_t), intent(inout) :: status(*)
     end function c_fstatvfs
+
+    integer(c_int) function c_glob(pattern, flags, on_error, found) bind(C, name="glob")
+      import :: c_int, c_int64_t, c_char, c_ptr
+      implicit none
+      character(kind=c_char), intent(in) :: pattern(*)
+      integer(c_int), value :: flags
+      type(c_ptr), value :: on_error
+      integer(c_int64_t), intent(inout) :: found(*)
+    end function c_glob
+
+    subroutine c_globfree(found) bind(C, name="globfree")
+      import :: c_int64_t
+      implicit none
+      integer(c_int64_t), intent(inout) :: found(*)
+    end subroutine c_globfree
 
     integer(c_int) function c_getpid() bind(C, name="getpid")
       import :: c_int
@@ -498,6 +521,53 @@ contains
       text = text_at(c_strerror(number))
     end select
   end function reason
+
+  !> Add the paths of the files in a directory whose names end with `suffix`, in the order of their bytes.
+  subroutine list_files(directory, suffix, paths)
+    character(len=*), intent(in) :: directory, suffix
+    type(path_t), allocatable, intent(inout) :: paths(:)
+    integer(c_int64_t) :: found(glob_words)
+    type(c_ptr), pointer :: address(:)
+    integer :: k, n(1)
+
+    found(:) = 0
+    n = 0
+    nullify (address)
+    if (c_glob(escaped(directory)//"/*"//suffix//c_null_char, 0_c_int, c_null_ptr, found) == 0) n(1) = int(found(1))
+    if (n(1) > 0) call c_f_pointer(transfer(found(2), c_null_ptr), address, n)
+    do k = 1, n(1)
+      call add_path(text_at(address(k)), paths)
+    end do
+    call c_globfree(found)
+  end subroutine list_files
+
+  !> Add a path at the end of a list.
+  subroutine add_path(path, paths)
+    character(len=*), intent(in) :: path
+    type(path_t), allocatable, intent(inout) :: paths(:)
+    type(path_t), allocatable :: longer(:)
+    integer :: k
+
+    allocate (longer(size(paths) + 1))
+    do k = 1, size(paths)
+      call move_alloc(paths(k)%text, longer(k)%text)
+    end do
+    longer(size(longer))%text = path
+    call move_alloc(longer, paths)
+  end subroutine add_path
+
+  !> A path in which no letter is a pattern.
+  pure function escaped(path) result(pattern)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: pattern
+    integer :: i
+
+    pattern = ""
+    do i = 1, len(path)
+      if (index("*?[\", path(i:i)) > 0) pattern = pattern//"\"
+      pattern = pattern//path(i:i)
+    end do
+  end function escaped
 
   !> The text that C keeps at an address, empty for the null address.
   function text_at(address) result(text)

@@ -68,11 +68,16 @@ module gravier_shared_exchange
     !> stretches passed in memory: the outgoing one and the incoming one of the same pair
     type(segment_t), allocatable, private :: near_from(:), near_to(:)
     type(channel_t), allocatable, private :: channel(:)
+    !> which parts have slots in channels
+    logical, allocatable, private :: far(:)
     !> persistent: one receive a channel, then one send a channel
     type(MPI_Request), allocatable, private :: requests(:)
   contains
     procedure :: init => shared_exchange_init
     procedure :: pass => shared_exchange_pass
+    procedure :: is_far => shared_exchange_is_far
+    procedure :: start => shared_exchange_start
+    procedure :: finish => shared_exchange_finish
     procedure :: load => shared_exchange_load
     procedure :: add_copies => shared_exchange_add_copies
     procedure :: sum_copies => shared_exchange_sum_copies
@@ -275,6 +280,8 @@ contains
       end do
     end do
     call self%free()
+    if (allocated(self%far)) deallocate (self%far)
+    allocate (self%far(size(self%part)), source=.false.)
     allocate (self%channel(size(ranks)), self%requests(2*size(ranks)))
     do c = 1, size(ranks)
       call fill_channel(self%channel(c), ranks(c))
@@ -307,6 +314,7 @@ contains
           if (self%comm%rank_of(self%part(p)%neighbour(j), n_subdomains) /= rank) cycle
           k = k + 1
           channel%outgoing(k) = stretch(self%part(p), p, j)
+          self%far(p) = .true.
           far(k) = self%part(p)%neighbour(j)
         end do
       end do
@@ -323,8 +331,23 @@ contains
 
   !> Send `send` of all parts and fill `recv` of all parts. Collective over the ranks that share bodies.
   subroutine shared_exchange_pass(self)
+    class(shared_exchange_t), intent(inout) :: self
+    call self%start()
+    call self%finish()
+  end subroutine shared_exchange_pass
+
+  !> Whether part `p` shares bodies with subdomains on other ranks.
+  pure logical function shared_exchange_is_far(self, p) result(is_far)
+    class(shared_exchange_t), intent(in) :: self
+    integer, intent(in) :: p
+    is_far = self%far(p)
+  end function shared_exchange_is_far
+
+  !> Begin to send what parts that share bodies with other ranks have loaded; `finish` ends it. In between, the other parts
+  !> may be loaded. Collective over the ranks that share bodies.
+  subroutine shared_exchange_start(self)
     class(shared_exchange_t), intent(inout), target, asynchronous :: self
-    integer :: c, n, k
+    integer :: c, n
 
     n = size(self%channel)
     do c = 1, n
@@ -333,14 +356,6 @@ contains
       self%values = self%values + size(self%channel(c)%send)
     end do
     call MPI_Startall(2*n, self%requests)
-    do k = 1, size(self%near_from)
-      self%part(self%near_to(k)%part)%recv(:, self%near_to(k)%from:self%near_to(k)%to) = &
-        & self%part(self%near_from(k)%part)%send(:, self%near_from(k)%from:self%near_from(k)%to)
-    end do
-    call MPI_Waitall(2*n, self%requests, MPI_STATUSES_IGNORE)
-    do c = 1, n
-      call scatter_channel(self%channel(c))
-    end do
 
   contains
 
@@ -356,6 +371,24 @@ contains
       end do
     end subroutine gather_channel
 
+  end subroutine shared_exchange_start
+
+  !> Fill `recv` of all parts once all are loaded and `start` was called. Collective over the ranks that share bodies.
+  subroutine shared_exchange_finish(self)
+    class(shared_exchange_t), intent(inout), target, asynchronous :: self
+    integer :: c, k
+
+    do k = 1, size(self%near_from)
+      self%part(self%near_to(k)%part)%recv(:, self%near_to(k)%from:self%near_to(k)%to) = &
+        & self%part(self%near_from(k)%part)%send(:, self%near_from(k)%from:self%near_from(k)%to)
+    end do
+    call MPI_Waitall(size(self%requests), self%requests, MPI_STATUSES_IGNORE)
+    do c = 1, size(self%channel)
+      call scatter_channel(self%channel(c))
+    end do
+
+  contains
+
     subroutine scatter_channel(channel)
       type(channel_t), intent(in) :: channel
       integer :: k, s, at
@@ -368,7 +401,7 @@ contains
       end do
     end subroutine scatter_channel
 
-  end subroutine shared_exchange_pass
+  end subroutine shared_exchange_finish
 
   !> Put the values of the shared bodies of part `p` into its outgoing slots.
   subroutine shared_exchange_load(self, p, field)

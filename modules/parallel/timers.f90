@@ -5,22 +5,29 @@ module gravier_timers
   use gravier_communicator, only: communicator_t
   implicit none
   private
-  public :: start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases
+  public :: clock, start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases
   public :: phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, phase_sweep, phase_exchange, &
-    & phase_interface_solve, phase_factorise, phase_check, phase_output
+    & phase_interface_solve, phase_factorise, phase_check, phase_projection, phase_output
 
   integer, parameter :: phase_bodies = 1, phase_neighbourhood = 2, phase_detection = 3, phase_interface = 4, phase_setup = 5, &
-    & phase_sweep = 6, phase_exchange = 7, phase_factorise = 8, phase_interface_solve = 9, phase_check = 10, phase_output = 11
-  integer, parameter :: n_phases = 11
+    & phase_sweep = 6, phase_exchange = 7, phase_factorise = 8, phase_interface_solve = 9, phase_check = 10, &
+    & phase_projection = 11, phase_output = 12
+  integer, parameter :: n_phases = 12
   !> what the log calls the phases
   character(len=28), parameter :: phase_names(n_phases) = [character(len=28) :: "bodies: move, migrate", &
     & "neighbour lists and ghosts", "detection of contacts", "interface: who shares whom", &
-    & "set-up of the solve", "sweeps", "exchange", "factorisation", "interface solve", "residual checks", "output"]
+    & "set-up of the solve", "sweeps", "exchange", "factorisation", "interface solve", "residual checks", &
+    & "projection of overlaps", "output"]
 
   real(dp) :: elapsed(n_phases) = 0.0_dp
   real(dp) :: started(n_phases) = 0.0_dp
 
 contains
+
+  !> Seconds on the clock of this rank.
+  real(dp) function clock()
+    clock = MPI_Wtime()
+  end function clock
 
   subroutine start_timer(phase)
     integer, intent(in) :: phase

@@ -24,6 +24,8 @@ module gravier_contact_problem
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
     integer, allocatable :: home(:)
+    !> place of each grain among those at home in this subdomain, 0 for those at home elsewhere (n_grains)
+    integer, allocatable :: place(:)
     !> subdomains in which each body carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
     !> number of the boundary behind a column (n_grains + 1 to n_columns)
@@ -77,6 +79,7 @@ module gravier_contact_problem
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
     procedure :: jump => contact_problem_jump
+    procedure :: received_jump => contact_problem_received_jump
     procedure :: own_reactions => contact_problem_own_reactions
     procedure :: any_impulse => contact_problem_any_impulse
   end type contact_problem_t
@@ -247,25 +250,33 @@ contains
   !> subdomains, relative to velocity_scale. Collective.
   real(dp) function contact_problem_jump(self) result(jump)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s, k, j, nd
+    integer :: s
 
-    nd = self%kernels%nd
     do s = 1, size(self%sub)
       call self%shared%load(s, self%sub(s)%velocity)
     end do
     call self%shared%pass()
+    jump = self%received_jump()
+  end function contact_problem_jump
+
+  !> The same where the copies' velocities have just been passed. Collective.
+  real(dp) function contact_problem_received_jump(self) result(jump)
+    class(contact_problem_t), intent(in) :: self
+    integer :: s, k, j, nd
+
+    nd = self%kernels%nd
     jump = 0.0_dp
     do s = 1, size(self%sub)
       associate (part => self%shared%part(s))
         do j = 1, part%n_slots
-          k = part%body(part%slot_shared(j))
+          k = part%slot_body(j)
           jump = max(jump, norm2(part%recv(1:nd, j) - self%sub(s)%velocity(1:nd, k)))
         end do
       end associate
     end do
     jump = self%comm%highest(jump)
     if (self%velocity_scale > 0.0_dp) jump = jump/self%velocity_scale
-  end function contact_problem_jump
+  end function contact_problem_received_jump
 
   !> Whether some impulse is not zero. Collective.
   logical function contact_problem_any_impulse(self) result(any_impulse)

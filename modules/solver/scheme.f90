@@ -2,11 +2,12 @@
 module gravier_scheme
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_sweep
+  use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
+  use gravier_communicator, only: communicator_t
   use gravier_contact_problem, only: contact_problem_t
   implicit none
   private
-  public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, begin_sweeps, sweep_once, end_sweeps
+  public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, end_sweeps
 
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
   real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)
@@ -37,7 +38,7 @@ module gravier_scheme
 
   !> Nesterov's extrapolation between iterations: iteration k starts from y = r_k + beta (r_k - r_k-1) with
   !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
-  !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 21: growth from one iteration to the next shortens the
+  !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 22: growth from one iteration to the next shortens the
   !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
   !> without progress come as many plain iterations as the solve has had.
   type :: momentum_t
@@ -56,12 +57,16 @@ module gravier_scheme
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
     type(momentum_t) :: momentum
+    !> spent in sweeps of each subdomain of this rank since `forget_times` [s]
+    real(dp), allocatable :: seconds(:)
     type(work_t) :: work
   contains
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
     procedure :: free => scheme_free
     procedure :: work_done => scheme_work_done
+    procedure :: measure_balance => scheme_measure_balance
+    procedure :: forget_times => scheme_forget_times
   end type scheme_t
 
   abstract interface
@@ -101,6 +106,40 @@ contains
     work = self%work
   end function scheme_work_done
 
+  !> How unevenly the seconds in sweeps lie, of the ranks and of the subdomains: the most over the mean, 1 without any.
+  !> Collective.
+  subroutine scheme_measure_balance(self, comm, n_subdomains, ranks, subdomains)
+    class(scheme_t), intent(in) :: self
+    type(communicator_t), intent(in) :: comm
+    !> of the scene
+    integer, intent(in) :: n_subdomains
+    real(dp), intent(out) :: ranks, subdomains
+    real(dp) :: own(1, 1), longest, mean, total(1)
+
+    own(:, :) = 0.0_dp
+    longest = 0.0_dp
+    if (allocated(self%seconds)) then
+      own(1, 1) = sum(self%seconds)
+      longest = maxval(self%seconds)
+    end if
+    call comm%sum_parts(own, total)
+    mean = total(1)
+    ranks = comm%highest(own(1, 1))
+    subdomains = comm%highest(longest)
+    if (mean > 0.0_dp) then
+      ranks = ranks*comm%size/mean
+      subdomains = subdomains*n_subdomains/mean
+    else
+      ranks = 1.0_dp
+      subdomains = 1.0_dp
+    end if
+  end subroutine scheme_measure_balance
+
+  subroutine scheme_forget_times(self)
+    class(scheme_t), intent(inout) :: self
+    if (allocated(self%seconds)) deallocate (self%seconds)
+  end subroutine scheme_forget_times
+
   !> Masses as the method wants them, and velocities that agree with the impulses in all copies. Collective.
   subroutine start_sweeps(scheme, problem, shared_masses)
     class(scheme_t), intent(inout) :: scheme
@@ -122,6 +161,7 @@ contains
     end do
     if (allocated(problem%progress)) deallocate (problem%progress)
     allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)
+    if (.not. allocated(scheme%seconds)) allocate (scheme%seconds(size(problem%sub)), source=0.0_dp)
     if (scheme%momentum%on) call start_momentum(scheme%momentum, problem)
   end subroutine start_sweeps
 
@@ -152,6 +192,36 @@ contains
     end do
     call end_sweeps(scheme, problem)
   end subroutine sweep_all
+
+  !> The same, passing on the velocities of shared bodies. Subdomains with neighbours on other ranks come first, so that
+  !> messages travel while the others are swept: no subdomain's sweeps depend on another's. Collective.
+  subroutine sweep_and_pass(scheme, problem)
+    class(scheme_t), intent(inout) :: scheme
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s, k, round
+
+    call begin_sweeps(scheme, problem)
+    do round = 1, 2
+      do s = 1, size(problem%sub)
+        if (problem%shared%is_far(s) .neqv. round == 1) cycle
+        do k = 1, scheme%sweeps
+          call sweep_once(scheme, problem, s, k)
+        end do
+      end do
+      call stop_timer(phase_sweep)
+      call start_timer(phase_exchange)
+      do s = 1, size(problem%sub)
+        if (problem%shared%is_far(s) .eqv. round == 1) call problem%shared%load(s, problem%sub(s)%velocity)
+      end do
+      if (round == 1) call problem%shared%start()
+      call stop_timer(phase_exchange)
+      call start_timer(phase_sweep)
+    end do
+    call end_sweeps(scheme, problem)
+    call start_timer(phase_exchange)
+    call problem%shared%finish()
+    call stop_timer(phase_exchange)
+  end subroutine sweep_and_pass
 
   !> With momentum, bring the velocities to those under the extrapolated impulses, from which the first sweep starts:
   !> V depends on r linearly.
@@ -191,8 +261,9 @@ contains
     integer, intent(in) :: s, k
     !> takes the velocity that solves the law at each contact (lanes, nc, blocks) [m/s]
     real(dp), intent(inout), contiguous, optional :: law_velocity(:, :, :)
-    real(dp) :: sums(2)
+    real(dp) :: sums(2), start
 
+    start = clock()
     associate (sub => problem%sub(s), kernels => problem%kernels)
       if (scheme%momentum%on .and. k == 1) then
         associate (part => scheme%momentum%part(s), beta => scheme%momentum%beta)
@@ -212,6 +283,7 @@ contains
       if (k == 1) problem%progress(:, s) = sums
       scheme%work%relaxations = scheme%work%relaxations + sub%n_contacts
     end associate
+    scheme%seconds(s) = scheme%seconds(s) + clock() - start
   end subroutine sweep_once
 
   !> Count the sweeps, and choose the extrapolation of the next iteration. Collective with momentum.

@@ -1,4 +1,5 @@
-!> Sparse direct solution of symmetric positive definite systems: the only module that knows MUMPS.
+!> Sparse direct solution of linear systems, symmetric positive definite or, on one rank, general: the only module that
+!> knows MUMPS.
 module gravier_sparse_direct
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
@@ -49,13 +50,17 @@ module gravier_sparse_direct
 contains
 
   !> A matrix that lives on this rank alone.
-  subroutine sparse_factor_init_local(self, error)
+  subroutine sparse_factor_init_local(self, error, general)
     class(sparse_factor_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
+    !> the matrix is not symmetric, or not definite, and given by all of its entries; default: false
+    logical, intent(in), optional :: general
 
     call self%free()
     allocate (self%id)
     self%id%comm = MPI_COMM_SELF%mpi_val
+    self%id%sym = 1
+    if (present(general)) self%id%sym = merge(0, 1, general)
     call start(self, error)
   end subroutine sparse_factor_init_local
 
@@ -69,6 +74,7 @@ contains
     allocate (self%id)
     self%comm => comm
     self%id%comm = comm%mpi%mpi_val
+    self%id%sym = 1
     call start(self, error)
   end subroutine sparse_factor_init_distributed
 
@@ -80,7 +86,6 @@ contains
     self%analyses = 0
     self%factorisations = 0
     self%solves = 0
-    self%id%sym = 1
     self%id%par = 1
     call run(self, job_start, "start", error)
     if (allocated(error)) return
@@ -108,7 +113,7 @@ contains
     class(sparse_factor_t), intent(inout) :: self
     !> order of the matrix
     integer, intent(in) :: n
-    !> entries of the lower triangle given by this rank; entries of the same place add up
+    !> entries given by this rank, of the lower triangle where the matrix is symmetric; entries of the same place add up
     integer, intent(in), contiguous :: row(:), column(:)
     real(dp), intent(in), contiguous :: value(:)
     type(error_t), allocatable, intent(inout) :: error

@@ -1,11 +1,12 @@
-!> Sparse direct solution on one rank, against a dense Cholesky factorisation: values, right-hand sides, what is
-!> factorised again and what is not, errors.
+!> Sparse direct solution on one rank, against a dense Cholesky factorisation, and of general matrices, sparse and dense:
+!> values, right-hand sides, what is factorised again and what is not, errors.
 program test_sparse_direct
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, status_failure
   use gravier_random_hash, only: hash_uniform
   use gravier_sparse_direct, only: sparse_factor_t
+  use gravier_dense_direct, only: solve_general => solve_dense
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer :: k
@@ -17,6 +18,7 @@ program test_sparse_direct
     call test_solution(orders(k), 3)
     call test_solution(orders(k), 70)
   end do
+  call test_general()
   call test_counters()
   call test_singular()
   call test_free()
@@ -118,6 +120,49 @@ contains
     call check_close(maxval(abs(b)), 0.0_dp, 0.0_dp, "no right-hand side, no solution")
     call factor%free()
   end subroutine test_solution
+
+  !> A matrix without a diagonal, heavy beside it, and its solution by sparse and by dense factors; a singular one.
+  subroutine test_general()
+    integer, parameter :: n = 40
+    type(sparse_factor_t) :: factor
+    type(error_t), allocatable :: error
+    real(dp) :: dense(n, n), value(n**2), expected(n), b(n, 1), x(n)
+    integer :: row(n**2), column(n**2), i, j, m
+    logical :: regular
+
+    m = 0
+    dense = 0.0_dp
+    do j = 1, n
+      expected(j) = j
+      do i = 1, n
+        if (i == j) cycle
+        if (i == 1 + mod(j, n)) dense(i, j) = n
+        dense(i, j) = dense(i, j) + hash_uniform(5, int(i, i8), j) - 0.5_dp
+        m = m + 1
+        row(m) = i
+        column(m) = j
+        value(m) = dense(i, j)
+      end do
+    end do
+    b = 0.0_dp
+    do j = 1, n
+      b(:, 1) = b(:, 1) + dense(:, j)*expected(j)
+    end do
+    x = b(:, 1)
+    call factor%init_local(error, general=.true.)
+    call factor%factorise(n, row(1:m), column(1:m), value(1:m), error)
+    call factor%solve(b, error)
+    call check(.not. allocated(error), "general: no error")
+    ! the heavy entries dominate: condition below 10
+    call check_close(maxval(abs(b(:, 1) - expected)), 0.0_dp, 100*n*epsilon(1.0_dp)*n, "general: solution")
+    call factor%free()
+    call solve_general(dense, x, regular)
+    call check(regular, "dense: regular")
+    call check_close(maxval(abs(x - expected)), 0.0_dp, 100*n*epsilon(1.0_dp)*n, "dense: solution")
+    dense = 1.0_dp
+    call solve_general(dense, x, regular)
+    call check(.not. regular, "dense: singular")
+  end subroutine test_general
 
   subroutine check_counts(factor, analyses, factorisations, name)
     type(sparse_factor_t), intent(in) :: factor

@@ -48,7 +48,8 @@ class MethodInvariance(RunTestCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.packing = settled_disks(cls.scratch)
+        # after 400 steps nonlinear Gauss-Seidel stalls at 5e-10 with friction 0.1, as it may (see above); after 450 it does not
+        cls.packing = settled_disks(cls.scratch, steps=450)
 
     def step(self, title, friction, method, part=None):
         subdomains, partition, kind = part or (1, "grid", "dual")

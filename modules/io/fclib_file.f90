@@ -1,0 +1,386 @@
+!> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + q read and
+!> written, global ones (M, H and G) read. What is wrong with a file ends in status_input and one line that names the dataset.
+module gravier_fclib_file
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns
+  use gravier_communicator, only: communicator_t
+  use gravier_finite, only: is_finite
+  use gravier_hdf5_file, only: h5_file_t
+  implicit none
+  private
+  public :: fclib_local_t, fclib_global_t, read_fclib, write_fclib_local
+
+  !> v = W r + q, of each contact (n, t) or (n, t, s).
+  type :: fclib_local_t
+    !> of space: 2 or 3
+    integer :: dimension = 0
+    !> (dimension*contacts, dimension*contacts)
+    type(sparse_rows_t) :: w
+    !> (dimension*contacts)
+    real(dp), allocatable :: q(:)
+    !> (contacts)
+    real(dp), allocatable :: mu(:)
+    !> (dimension, contacts) impulses of the solution, or of the first guess, where the file has one
+    real(dp), allocatable :: r(:, :)
+  end type fclib_local_t
+
+  !> M V = H r + G l + f, G^T V + b = 0, v = H^T V + w.
+  type :: fclib_global_t
+    integer :: dimension = 0
+    !> (n, n), (n, dimension*contacts) and (n, p), p = 0 where the file has no G
+    type(sparse_rows_t) :: m, h, g
+    !> (n), (p), (dimension*contacts), (contacts)
+    real(dp), allocatable :: f(:), b(:), w(:), mu(:)
+  end type fclib_global_t
+
+  !> An open file and where it is, for messages.
+  type :: source_t
+    type(h5_file_t) :: file
+    character(len=:), allocatable :: path
+  contains
+    procedure :: refuse => source_refuse
+  end type source_t
+
+  !> values of nz that tell how a matrix is stored; others count the entries of triplets
+  integer, parameter :: by_columns = -1, by_rows = -2
+
+contains
+
+  !> Read the problem of a file: `local` or `global` is allocated. Collective; errors are the same on all ranks.
+  subroutine read_fclib(comm, path, local, global, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(fclib_local_t), allocatable, intent(out) :: local
+    type(fclib_global_t), allocatable, intent(out) :: global
+    type(error_t), allocatable, intent(inout) :: error
+    type(source_t) :: source
+    type(error_t), allocatable :: ignored
+
+    if (allocated(error)) return
+    source%path = path
+    call source%file%open(comm, path, error)
+    if (allocated(error)) return
+    if (source%file%exists("/fclib_local")) then
+      allocate (local)
+      call read_local(source, local, error)
+    else if (source%file%exists("/fclib_global")) then
+      allocate (global)
+      call read_global(source, global, error)
+    else
+      call source%refuse("expected a group /fclib_local or /fclib_global", error)
+    end if
+    call source%file%close(ignored)
+  end subroutine read_fclib
+
+  !> Raise an error that names the file.
+  pure subroutine source_refuse(self, what, error)
+    class(source_t), intent(in) :: self
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    call raise(error, status_input, self%path//": "//what)
+  end subroutine source_refuse
+
+  subroutine read_local(source, local, error)
+    type(source_t), intent(inout) :: source
+    type(fclib_local_t), intent(inout) :: local
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    call read_contacts(source, "/fclib_local", local%dimension, local%mu, error)
+    if (allocated(error)) return
+    n = local%dimension*size(local%mu)
+    if (source%file%exists("/fclib_local/V")) call source%refuse( &
+      & "/fclib_local/V: expected a problem without bilateral constraints", error)
+    call read_matrix(source, "/fclib_local/W", n, n, local%w, error)
+    call read_vector(source, "/fclib_local/vectors/q", n, local%q, error)
+    if (source%file%exists("/fclib_local/solution/r")) then
+      call read_impulses(source, "/fclib_local/solution/r", local, error)
+    else if (source%file%exists("/fclib_local/guesses/1/r")) then
+      call read_impulses(source, "/fclib_local/guesses/1/r", local, error)
+    end if
+  end subroutine read_local
+
+  subroutine read_impulses(source, dataset, local, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: dataset
+    type(fclib_local_t), intent(inout) :: local
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: values(:)
+    integer :: a
+
+    call read_vector(source, dataset, local%dimension*size(local%mu), values, error)
+    if (allocated(error)) return
+    allocate (local%r(local%dimension, size(local%mu)))
+    do a = 1, size(local%mu)
+      local%r(:, a) = values((a - 1)*local%dimension + 1:a*local%dimension)
+    end do
+  end subroutine read_impulses
+
+  subroutine read_global(source, global, error)
+    type(source_t), intent(inout) :: source
+    type(fclib_global_t), intent(inout) :: global
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n, n_constraints
+
+    call read_contacts(source, "/fclib_global", global%dimension, global%mu, error)
+    call read_vector(source, "/fclib_global/vectors/f", -1, global%f, error)
+    if (allocated(error)) return
+    n = size(global%f)
+    n_constraints = 0
+    if (source%file%exists("/fclib_global/G")) then
+      call read_vector(source, "/fclib_global/vectors/b", -1, global%b, error)
+      if (allocated(error)) return
+      n_constraints = size(global%b)
+      call read_matrix(source, "/fclib_global/G", n, n_constraints, global%g, error)
+    else
+      global%g = no_columns(n)
+      allocate (global%b(0))
+    end if
+    call read_matrix(source, "/fclib_global/M", n, n, global%m, error)
+    call read_matrix(source, "/fclib_global/H", n, global%dimension*size(global%mu), global%h, error)
+    call read_vector(source, "/fclib_global/vectors/w", global%dimension*size(global%mu), global%w, error)
+  end subroutine read_global
+
+  !> Dimension of space and coefficients of friction, which tell the number of contacts.
+  subroutine read_contacts(source, group, dimension, mu, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: group
+    integer, intent(out) :: dimension
+    real(dp), allocatable, intent(inout) :: mu(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: found
+
+    dimension = 0
+    call read_integer(source, group//"/spacedim", found, error)
+    if (allocated(error)) return
+    if (found /= 2 .and. found /= 3) call source%refuse(group//"/spacedim = "//to_text(found)// &
+      & ": expected 2 or 3", error)
+    call read_vector(source, group//"/vectors/mu", -1, mu, error)
+    if (allocated(error)) return
+    dimension = int(found)
+    if (size(mu) == 0) then
+      call source%refuse(group//"/vectors/mu: expected at least one contact", error)
+    else if (minval(mu) < 0.0_dp) then
+      call source%refuse(group//"/vectors/mu: expected coefficients of friction >= 0", error)
+    end if
+  end subroutine read_contacts
+
+  !> A dataset that holds one integer.
+  subroutine read_integer(source, dataset, value, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: dataset
+    integer(i8), intent(out) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: one(1)
+
+    one = 0
+    call source%file%read_rows(dataset, 0_i8, one, error)
+    value = one(1)
+  end subroutine read_integer
+
+  !> A vector of finite numbers.
+  subroutine read_vector(source, dataset, n, values, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: dataset
+    !> its length; negative: any
+    integer, intent(in) :: n
+    real(dp), allocatable, intent(inout) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: found
+
+    call source%file%row_count(dataset, found, error)
+    if (allocated(error)) return
+    if (n >= 0 .and. found /= n .or. found > huge(n)) then
+      call source%refuse(dataset//": "//to_text(found)//" numbers: expected "//to_text(n), error)
+      return
+    end if
+    allocate (values(found))
+    values(:) = 0.0_dp
+    call source%file%read_rows(dataset, 0_i8, values, error)
+    if (allocated(error)) return
+    if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
+  end subroutine read_vector
+
+  !> A vector of at least n integers, of which the first n are kept, each in [lowest, highest].
+  subroutine read_indices(source, dataset, n, lowest, highest, values, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: dataset
+    integer, intent(in) :: n, lowest, highest
+    integer, allocatable, intent(inout) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: found(:)
+    integer(i8) :: length
+
+    call source%file%row_count(dataset, length, error)
+    if (allocated(error)) return
+    if (length < n) then
+      call source%refuse(dataset//": "//to_text(length)//" numbers: expected "//to_text(n), error)
+      return
+    end if
+    allocate (found(n))
+    found(:) = lowest
+    call source%file%read_rows(dataset, 0_i8, found, error)
+    if (allocated(error)) return
+    if (any(found < lowest .or. found > highest)) then
+      call source%refuse(dataset//": expected numbers from "//to_text(lowest)//" to "//to_text(highest), error)
+      return
+    end if
+    values = int(found)
+  end subroutine read_indices
+
+  !> A matrix stored in any of the three ways.
+  subroutine read_matrix(source, group, n_rows, n_columns, matrix, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: n_rows, n_columns
+    type(sparse_rows_t), intent(inout) :: matrix
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: row(:), column(:)
+    real(dp), allocatable :: value(:)
+    integer(i8) :: m, n, nz
+
+    if (allocated(error)) return
+    call read_integer(source, group//"/m", m, error)
+    call read_integer(source, group//"/n", n, error)
+    call read_integer(source, group//"/nz", nz, error)
+    if (allocated(error)) return
+    if (m /= n_rows .or. n /= n_columns) then
+      call source%refuse(group//": a matrix of "//to_text(m)//" rows and "//to_text(n)// &
+        & " columns: expected "//to_text(n_rows)//" and "//to_text(n_columns), error)
+    else if (nz < by_rows .or. nz > huge(n_rows)) then
+      call source%refuse(group//"/nz = "//to_text(nz)// &
+        & ": expected -2 (rows), -1 (columns) or the number of triplets", error)
+    end if
+    if (allocated(error)) return
+    select case (int(nz))
+    case (by_rows)
+      call read_compressed(source, group, n_rows, n_columns, row, column, error)
+    case (by_columns)
+      call read_compressed(source, group, n_columns, n_rows, column, row, error)
+    case default
+      call read_indices(source, group//"/i", int(nz), 0, n_rows - 1, row, error)
+      call read_indices(source, group//"/p", int(nz), 0, n_columns - 1, column, error)
+      if (.not. allocated(error)) then
+        row(:) = row + 1
+        column(:) = column + 1
+      end if
+    end select
+    if (.not. allocated(error)) call read_entries(source, group//"/x", size(row), value, error)
+    if (.not. allocated(error)) matrix = compressed_rows(n_rows, n_columns, row, column, value)
+  end subroutine read_matrix
+
+  !> Numbers of the line (row or column) and of the place in it, from 1, of the entries of a matrix compressed by lines.
+  subroutine read_compressed(source, group, n_lines, n_places, line, place, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: n_lines, n_places
+    integer, allocatable, intent(inout) :: line(:), place(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: start(:)
+    integer :: i
+
+    call read_indices(source, group//"/p", n_lines + 1, 0, huge(0), start, error)
+    if (allocated(error)) return
+    if (start(1) /= 0 .or. any(start(2:) < start(:n_lines))) then
+      call source%refuse(group//"/p: expected numbers that rise from 0", error)
+      return
+    end if
+    call read_indices(source, group//"/i", start(n_lines + 1), 0, n_places - 1, place, error)
+    if (allocated(error)) return
+    place(:) = place + 1
+    allocate (line(size(place)))
+    do i = 1, n_lines
+      line(start(i) + 1:start(i + 1)) = i
+    end do
+  end subroutine read_compressed
+
+  !> The first n of a vector of at least n finite numbers.
+  subroutine read_entries(source, dataset, n, values, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: dataset
+    integer, intent(in) :: n
+    real(dp), allocatable, intent(inout) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+
+    allocate (values(n))
+    values(:) = 0.0_dp
+    call source%file%read_rows(dataset, 0_i8, values, error)
+    if (allocated(error)) return
+    if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
+  end subroutine read_entries
+
+  !> Write a local problem, W by compressed rows, and its solution if there is one. Collective, the same on all ranks.
+  subroutine write_fclib_local(comm, path, local, error, velocity)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    !> where `r` is allocated it is written as the solution
+    type(fclib_local_t), intent(in) :: local
+    type(error_t), allocatable, intent(inout) :: error
+    !> (dimension, contacts) W r + q
+    real(dp), intent(in), contiguous, optional :: velocity(:, :)
+    type(h5_file_t) :: file
+    logical :: mine
+
+    if (allocated(error)) return
+    mine = comm%rank == 0
+    call file%create(comm, path, error)
+    call file%reserve(16_i8*size(local%w%value) + 32_i8*size(local%q) + 65536_i8, error)
+    call write_integer("/fclib_local/spacedim", local%dimension)
+    call write_integer("/fclib_local/W/m", local%w%n_rows)
+    call write_integer("/fclib_local/W/n", local%w%n_columns)
+    call write_integer("/fclib_local/W/nzmax", size(local%w%value))
+    call write_integer("/fclib_local/W/nz", by_rows)
+    call write_indices("/fclib_local/W/p", local%w%start)
+    call write_indices("/fclib_local/W/i", local%w%column)
+    call write_reals("/fclib_local/W/x", local%w%value)
+    call write_reals("/fclib_local/vectors/q", local%q)
+    call write_reals("/fclib_local/vectors/mu", local%mu)
+    if (allocated(local%r)) call write_columns("/fclib_local/solution/r", local%r)
+    if (present(velocity)) call write_columns("/fclib_local/solution/u", velocity)
+    call file%close(error)
+
+  contains
+
+    subroutine write_integer(dataset, value)
+      character(len=*), intent(in) :: dataset
+      integer, intent(in) :: value
+      integer(i8) :: rows(1)
+      rows(1) = value
+      call file%write_rows(dataset, rows(1:merge(1, 0, mine)), error)
+    end subroutine write_integer
+
+    !> Numbers that count from 1 here and from 0 in the file.
+    subroutine write_indices(dataset, values)
+      character(len=*), intent(in) :: dataset
+      integer, intent(in), contiguous :: values(:)
+      integer(i8), allocatable :: rows(:)
+
+      allocate (rows(size(values)))
+      rows(:) = values - 1
+      call file%write_rows(dataset, rows(1:merge(size(rows), 0, mine)), error)
+    end subroutine write_indices
+
+    subroutine write_reals(dataset, values)
+      character(len=*), intent(in) :: dataset
+      real(dp), intent(in), contiguous :: values(:)
+      call file%write_rows(dataset, values(1:merge(size(values), 0, mine)), error)
+    end subroutine write_reals
+
+    subroutine write_columns(dataset, values)
+      character(len=*), intent(in) :: dataset
+      real(dp), intent(in), contiguous :: values(:, :)
+      real(dp), allocatable :: flat(:)
+      integer :: a
+
+      allocate (flat(size(values)))
+      do a = 1, size(values, 2)
+        flat((a - 1)*size(values, 1) + 1:a*size(values, 1)) = values(:, a)
+      end do
+      call write_reals(dataset, flat)
+    end subroutine write_columns
+
+  end subroutine write_fclib_local
+
+end module gravier_fclib_file

@@ -1,0 +1,329 @@
+"""gravier_fclib: problems in every storage form, local and global, judged again here; statuses, tables and bad input."""
+import csv
+import os
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+from gravier_runs import RunTestCase, gravier
+
+
+def box_stack(boxes=3, slope=0.5, friction=0.3):
+    """Bodies and contacts of unit cubes on an inclined plane: M, H, f and mu; frame (n, t, s) = (z, x, y)."""
+    mass, step, gravity = 2.0, 0.01, 10.0
+    h = np.zeros((6 * boxes, 12 * boxes))
+    m = np.diag(np.tile([mass] * 3 + [mass / 6] * 3, boxes))
+    pull = step * gravity * mass / np.hypot(1, slope)
+    f = np.tile([pull * slope, 0, -pull, 0, 0, 0], boxes)
+    for b in range(boxes):
+        for c, (x, y) in enumerate([(0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)]):
+            columns = slice(12 * b + 3 * c, 12 * b + 3 * c + 3)
+            for body, z, sign in ((b, -0.5, 1), (b - 1, 0.5, -1)):
+                if body >= 0:
+                    axes = sign * np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]).T
+                    h[6 * body:6 * body + 6, columns] = np.vstack([axes, np.cross([x, y, z], axes.T).T])
+    # at the same friction everywhere, boxes that slide as one would be about to slide on each other
+    return m, h, f, np.repeat([friction, 2 * friction], [4, 4 * boxes - 4])
+
+
+def local_problem(**arguments):
+    m, h, f, mu = box_stack(**arguments)
+    inverse = np.linalg.inv(m)
+    return h.T @ inverse @ h, h.T @ inverse @ f, mu
+
+
+def random_problem(dimension, contacts, seed=1):
+    random = np.random.default_rng(seed)
+    a = random.uniform(-1, 1, (dimension * contacts, dimension * contacts + 4))
+    return a @ a.T, random.uniform(-1, 1, dimension * contacts), random.uniform(0, 1, contacts)
+
+
+def write_matrix(group, matrix, form="rows"):
+    """Rows, columns, or triplets in any order, one entry in two parts, with room to spare."""
+    i, j = np.nonzero(matrix)
+    x = matrix[i, j]
+    group["m"], group["n"] = np.array([matrix.shape[0]], "i4"), np.array([matrix.shape[1]], "i4")
+    if form == "triplets":
+        order = np.random.default_rng(0).permutation(len(x))
+        i, j, x = np.append(i[order], i[0]), np.append(j[order], j[0]), np.append(x[order], 0.25 * x[0])
+        x[np.flatnonzero((i == i[-1]) & (j == j[-1]))[0]] -= x[-1]
+        group["nz"], group["i"], group["p"] = np.array([len(x)], "i4"), i.astype("i4"), j.astype("i4")
+        group["nzmax"] = np.array([len(x) + 3], "i4")
+        group["x"] = np.append(x, [7.0, 7.0, 7.0])
+        return
+    if form == "columns":
+        order = np.lexsort((i, j))
+        i, j, x = j[order], i[order], x[order]
+    lines = matrix.shape[1 if form == "columns" else 0]
+    group["nz"] = np.array([-1 if form == "columns" else -2], "i4")
+    group["nzmax"] = np.array([len(x)], "i4")
+    group["p"] = np.searchsorted(i, np.arange(lines + 1)).astype("i4")
+    group["i"], group["x"] = j.astype("i4"), x
+
+
+def write_local(path, w, q, mu, form="rows", dimension=3):
+    with h5py.File(path, "w") as file:
+        local = file.create_group("fclib_local")
+        local["spacedim"] = np.array([dimension], "i4")
+        write_matrix(local.create_group("W"), w, form)
+        local["vectors/q"], local["vectors/mu"] = q, mu
+
+
+def write_global(path, m, h, f, mu, g=None, b=None, w=None):
+    with h5py.File(path, "w") as file:
+        group = file.create_group("fclib_global")
+        group["spacedim"] = np.array([3], "i4")
+        write_matrix(group.create_group("M"), m, "columns")
+        write_matrix(group.create_group("H"), h, "triplets")
+        if g is not None:
+            write_matrix(group.create_group("G"), g)
+            group["vectors/b"] = b
+        group["vectors/f"], group["vectors/mu"] = f, mu
+        group["vectors/w"] = np.zeros(h.shape[1]) if w is None else w
+
+
+def measures(w, q, mu, r):
+    """e and es of the impulses, from their definition."""
+    d = len(q) // len(mu)
+    v = (w @ r + q).reshape(-1, d)
+    r = r.reshape(-1, d)
+    v_hat = v.copy()
+    v_hat[:, 0] += mu * np.linalg.norm(v[:, 1:], axis=1)
+    stiffness = np.array([np.diag(w)[d * a:d * a + d].mean() for a in range(len(mu))])
+
+    def project(x):
+        p = x.copy()
+        for a in range(len(mu)):
+            t = np.linalg.norm(x[a, 1:])
+            if t > mu[a] * x[a, 0]:
+                n = max(0, (x[a, 0] + mu[a] * t) / (1 + mu[a]**2))
+                p[a, 0], p[a, 1:] = n, x[a, 1:] * (mu[a] * n / t) if n > 0 else 0
+        return p
+
+    e = np.linalg.norm(r - project(r - v_hat)) / max(np.linalg.norm(q), np.linalg.norm(r), np.linalg.norm(v))
+    s = stiffness[:, None]
+    return e, np.linalg.norm(s * (r - project(r - v_hat / s))) / np.linalg.norm(q)
+
+
+def read_table(path):
+    """A table as {column: list of texts}."""
+    with open(path, newline="", encoding="ascii") as file:
+        rows = list(csv.DictReader(file))
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+class Fclib(RunTestCase):
+    def setUp(self):
+        self.directory = tempfile.mkdtemp(dir=self.scratch)
+
+    def solve(self, *arguments, status=0, ranks=1):
+        run = gravier(*arguments, ranks=ranks, directory=self.directory, program="gravier_fclib")
+        self.assert_status(run, status)
+        return run
+
+    def path(self, name):
+        return os.path.join(self.directory, name)
+
+    def impulses(self, name):
+        with h5py.File(self.path(name)) as file:
+            return file["fclib_local/solution/r"][()], file["fclib_local/solution/u"][()]
+
+    def test_storage_forms_are_one_problem(self):
+        w, q, mu = random_problem(3, 12)
+        w[3, 4] += 0.01  # not symmetric: rows and columns are told apart
+        for form in ("rows", "columns", "triplets"):
+            write_local(self.path(f"{form}.hdf5"), w, q, mu, form)
+        self.solve("rows.hdf5", "columns.hdf5", "triplets.hdf5", "--write", "out", "--tolerance", "1e-11")
+        for form in ("rows", "columns", "triplets"):
+            r, u = self.impulses(f"out/{form}.hdf5")
+            # the measure counts what the sums of an entry in two parts and of other orders round differently
+            self.assertLess(measures(w, q, mu, r)[1], 1.01e-11)
+            np.testing.assert_allclose(u, w @ r + q, atol=1e-12)
+
+    def test_every_method_and_the_measures(self):
+        problems = {"boxes": local_problem(), "plane": random_problem(2, 10), "space": random_problem(3, 10)}
+        for name, (w, q, mu) in problems.items():
+            write_local(self.path(f"{name}.h5"), w, q, mu, dimension=len(q) // len(mu))
+        for method in ("auto", "nlgs", "momentum", "newton"):
+            self.solve(".", "--method", method, "--csv", "results.csv", "--write", method)
+            rows = read_table(self.path("results.csv"))
+            self.assertEqual(list(rows["problem"]), ["boxes.h5", "plane.h5", "space.h5"])
+            for k, name in enumerate(problems):
+                w, q, mu = problems[name]
+                e, es = measures(w, q, mu, self.impulses(f"{method}/{name}.h5")[0])
+                self.assertLess(es, 1e-8)
+                # both sides lose what |q| rounds to
+                np.testing.assert_allclose([float(rows["e"][k]), float(rows["es"][k])], [e, es], rtol=1e-3, atol=1e-14)
+                self.assertEqual(int(rows["converged"][k]), 1)
+                self.assertEqual(int(rows["contacts"][k]), len(mu))
+
+    def test_written_problem_is_the_problem(self):
+        w, q, mu = random_problem(2, 6)
+        write_local(self.path("a.h5"), w, q, mu, "columns", dimension=2)
+        self.solve("a.h5", "--write", "out")
+        with h5py.File(self.path("out/a.h5")) as file:
+            local = file["fclib_local"]
+            back = np.zeros_like(w)
+            for i in range(len(q)):
+                for k in range(local["W/p"][i], local["W/p"][i + 1]):
+                    back[i, local["W/i"][k]] += local["W/x"][k]
+            np.testing.assert_array_equal(back, w)
+            np.testing.assert_array_equal(local["vectors/q"], q)
+            np.testing.assert_array_equal(local["vectors/mu"], mu)
+            self.assertEqual([int(local[f"W/{key}"][0]) for key in ("m", "n", "nz", "nzmax")], [12, 12, -2, len(local["W/x"])])
+            self.assertEqual(int(local["spacedim"][0]), 2)
+
+    def test_warm_start(self):
+        write_local(self.path("a.h5"), *local_problem())
+        self.solve("a.h5", "--write", "solved", "--tolerance", "1e-9")
+        with h5py.File(self.path("solved/a.h5")) as file, h5py.File(self.path("a.h5"), "a") as cold:
+            cold["fclib_local/guesses/1/r"] = file["fclib_local/solution/r"][()]
+        for path in ("solved/a.h5", "a.h5"):
+            self.solve(path, "--csv", "cold.csv")
+            self.solve(path, "--warm", "--csv", "warm.csv")
+            self.assertGreater(int(read_table(self.path("cold.csv"))["sweeps"][0]), 10)
+            # the first check of a start that is a solution already
+            self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"])
+
+    def test_global_problems_are_reduced(self):
+        m, h, f, mu = box_stack()
+        shift = np.tile([1e-3, 2e-3, -1e-3], len(mu))
+        # the lowest cube slides as if on a rail along y: a bilateral constraint on its velocity along x
+        g = np.zeros((len(f), 1))
+        g[0, 0] = 1
+        write_global(self.path("free.h5"), m, h, f, mu, w=shift)
+        write_global(self.path("rail.h5"), m, h, f, mu, g, np.array([-0.02]))
+        self.solve("free.h5", "rail.h5", "--write", "out")
+        saddle = np.block([[m, -g], [g.T, np.zeros((1, 1))]])
+        h_rail = np.vstack([h, np.zeros((1, h.shape[1]))])
+        expected = {"free": (h.T @ np.linalg.solve(m, h), h.T @ np.linalg.solve(m, f) + shift),
+                    "rail": (h_rail.T @ np.linalg.solve(saddle, h_rail),
+                             h_rail.T @ np.linalg.solve(saddle, np.append(f, 0.02)))}
+        for name, (w, q) in expected.items():
+            with h5py.File(self.path(f"out/{name}.h5")) as file:
+                np.testing.assert_allclose(file["fclib_local/vectors/q"], q, atol=1e-13)
+            r, u = self.impulses(f"out/{name}.h5")
+            np.testing.assert_allclose(u, w @ r + q, atol=1e-12)
+            self.assertLess(measures(w, q, mu, r)[1], 1.01e-8)
+        # u of the rail: the velocity that b prescribes, whatever the impulses
+        np.testing.assert_allclose(u[1:12:3].mean(), 0.02, atol=1e-12)
+
+    def test_ranks_do_not_matter(self):
+        w, q, mu = local_problem()
+        write_local(self.path("a.h5"), w, q, mu)
+        self.solve("a.h5", "--write", "one", "--csv", "one.csv")
+        self.solve("a.h5", "--write", "two", "--csv", "two.csv", ranks=2)
+        np.testing.assert_array_equal(self.impulses("one/a.h5")[0], self.impulses("two/a.h5")[0])
+        self.assertEqual(len(read_table(self.path("two.csv"))["problem"]), 1)
+
+    def test_directory_of_any_name(self):
+        os.mkdir(self.path("a[b]*?"))
+        for name in ("2.h5", "1.hdf5", "10.hdf5", "notes.txt"):
+            write_local(self.path(f"a[b]*?/{name}"), *random_problem(2, 2), dimension=2)
+        self.solve("a[b]*?", "--csv", "results.csv")
+        self.assertEqual(read_table(self.path("results.csv"))["problem"], ["1.hdf5", "10.hdf5", "2.h5"])
+
+    def test_unsolved_is_status_3(self):
+        write_local(self.path("a.h5"), *local_problem())
+        run = self.solve("a.h5", "--max-iterations", "2", "--csv", "results.csv", status=3)
+        self.assertIn("NOT CONVERGED", run.stdout)
+        self.assertIn("1 of 1 solves did NOT reach the tolerance", run.stdout)
+        self.assertEqual(int(read_table(self.path("results.csv"))["converged"][0]), 0)
+
+    def test_profile(self):
+        for name, problem in {"a": random_problem(3, 8), "b": random_problem(3, 30, 2), "c": local_problem()}.items():
+            write_local(self.path(f"{name}.h5"), *problem)
+        # plain sweeps do not solve them all
+        self.solve(".", "--method", "all", "--max-iterations", "60", "--csv", "results.csv", "--profile", "profile.csv", status=3)
+        rows = read_table(self.path("results.csv"))
+        seconds = np.where(np.array(rows["converged"]) == "1", np.array(rows["seconds"], float), np.inf).reshape(3, 4)
+        self.assertTrue(np.isinf(seconds).any() and np.isfinite(seconds).any(axis=1).all(), seconds)
+        profile = read_table(self.path("profile.csv"))
+        for k, ratio in enumerate(np.array(profile["ratio"], float)):
+            solved = seconds <= ratio * (1 + 1e-12) * seconds.min(axis=1, keepdims=True)
+            expected = np.mean(solved & np.isfinite(seconds), axis=0)
+            found = [float(profile[method][k]) for method in ("auto", "nlgs", "momentum", "newton")]
+            np.testing.assert_allclose(found, expected, err_msg=f"ratio {ratio}")
+
+    def test_bad_files(self):
+        w, q, mu = random_problem(3, 4)
+
+        def spoil(change):
+            write_local(self.path("bad.h5"), w, q, mu)
+            with h5py.File(self.path("bad.h5"), "a") as file:
+                change(file["fclib_local"])
+
+        def replace(name, value):
+            def change(group):
+                del group[name]
+                if value is not None:
+                    group[name] = value
+            return change
+
+        cases = [
+            (replace("vectors/q", None), "/fclib_local/vectors/q: missing"),
+            (replace("vectors/q", q[:-1]), "/fclib_local/vectors/q: 11 numbers: expected 12"),
+            (replace("vectors/q", np.append(q[:-1], np.nan)), "/fclib_local/vectors/q: expected finite numbers"),
+            (replace("vectors/mu", -mu), "/fclib_local/vectors/mu: expected coefficients of friction >= 0"),
+            (replace("vectors/mu", mu[:0]), "/fclib_local/vectors/mu: expected at least one contact"),
+            (replace("spacedim", np.array([4])), "/fclib_local/spacedim = 4: expected 2 or 3"),
+            (replace("spacedim", np.array([2.5])), "/fclib_local/spacedim: not made of integers"),
+            (replace("W", None), "/fclib_local/W/m: missing"),
+            (replace("W/x", None), "/fclib_local/W/x: missing"),
+            (replace("W/x", np.full(144, np.inf)), "/fclib_local/W/x: expected finite numbers"),
+            (replace("W/x", np.ones(100)), "/fclib_local/W/x"),
+            (replace("W/m", np.array([11])), "/fclib_local/W: a matrix of 11 rows and 12 columns: expected 12 and 12"),
+            (replace("W/nz", np.array([-3])), "/fclib_local/W/nz = -3: expected -2 (rows), -1 (columns)"),
+            (replace("W/i", np.full(144, 12)), "/fclib_local/W/i: expected numbers from 0 to 11"),
+            (replace("W/p", np.arange(13)[::-1]), "/fclib_local/W/p: expected numbers that rise from 0"),
+            (replace("W/p", np.arange(5)), "/fclib_local/W/p: 5 numbers: expected 13"),
+            (replace("W/x", np.zeros(144)), "contact 1: normal and mean diagonal of W"),
+            (lambda group: group.create_dataset("V/m", data=[1]), "/fclib_local/V: expected a problem without bilateral constraints"),
+        ]
+        write_local(self.path("good.h5"), w, q, mu)
+        for change, message in cases:
+            with self.subTest(message):
+                spoil(change)
+                run = self.solve("good.h5", "bad.h5", "--csv", "results.csv", status=2)
+                self.assertEqual(run.stderr.count("\n"), 1, str(run))
+                self.assertIn(f"gravier_fclib: error: bad.h5: {message}", run.stderr)
+                # nothing is solved or written before all is read
+                self.assertEqual(run.stdout, "")
+                self.assertFalse(os.path.exists(self.path("results.csv")))
+
+    def test_singular_masses(self):
+        m, h, f, mu = box_stack()
+        m[0, 0] = 0
+        write_global(self.path("a.h5"), m, h, f, mu)
+        run = self.solve("a.h5", status=2)
+        self.assertIn("a.h5: the matrix of masses and constraints: expected a regular one", run.stderr)
+
+    def test_bad_usage(self):
+        write_local(self.path("a.h5"), *random_problem(3, 4))
+        with h5py.File(self.path("empty.h5"), "w"):
+            pass
+        os.mkdir(self.path("nothing"))
+        for arguments, message in [
+            ((), "no file given"),
+            (("missing.h5",), "missing.h5"),
+            (("empty.h5",), "empty.h5: expected a group /fclib_local or /fclib_global"),
+            (("nothing",), "nothing: expected a directory with files *.hdf5 or *.h5"),
+            (("a.h5", "--method", "simplex"), "--method 'simplex': expected auto, nlgs, momentum, newton, or all"),
+            (("a.h5", "--method", "nlgs,"), "--method 'nlgs,': expected auto"),
+            (("a.h5", "--tolerance", "0"), "--tolerance '0': expected a finite real number > 0"),
+            (("a.h5", "--max-iterations", "-1"), "--max-iterations '-1': expected an integer >= 1"),
+            (("a.h5", "--csv"), "--csv '': expected a path"),
+            (("a.h5", "--write", "."), "--write '.': expected another directory than that of a.h5"),
+            (("nothing/../a.h5", "--write", "nothing/.."), "expected another directory than that of nothing/../a.h5"),
+            (("a.h5", "--speed"), "unknown option '--speed'"),
+        ]:
+            with self.subTest(message):
+                run = self.solve(*arguments, status=2)
+                self.assertEqual(run.stderr.count("\n"), 1, str(run))
+                self.assertIn(message, run.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

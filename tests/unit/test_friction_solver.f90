@@ -1,0 +1,398 @@
+!> Packed contact problems with full blocks: evaluation, measures, and every method on a stack of boxes, whose contacts are more
+!> than its bodies can tell apart, and on random problems.
+program test_friction_solver
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows
+  use gravier_random_hash, only: hash_uniform
+  use gravier_delassus, only: delassus_t
+  use gravier_alart_curnier, only: alart_curnier_t
+  use gravier_friction_solver, only: friction_control_t, friction_methods, friction_report_t, solve_friction
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  real(dp), parameter :: gravity = 10.0_dp, step = 0.01_dp, mass = 2.0_dp
+  ! a higher stack topples on the slopes below
+  integer, parameter :: boxes = 3
+
+  call MPI_Init()
+  call check_packing()
+  call check_units()
+  call check_jacobian(2)
+  call check_jacobian(3)
+  call check_stack(0.2_dp, 0.3_dp)
+  call check_stack(0.5_dp, 0.3_dp)
+  call check_turns()
+  call check_start_is_kept()
+  call check_random(2, 24)
+  call check_random(3, 24)
+  ! beyond the order of dense factors
+  call check_random(3, 60)
+  call check_refusals()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  !> Unit cubes one on the other on a plane that rises by the angle whose tangent is `slope`: four contacts at the corners of
+  !> each face, of frame n = z, t = x, s = y, W and q from the bodies.
+  subroutine make_stack(slope, friction, between, problem)
+    !> between: friction of the boxes on each other
+    real(dp), intent(in) :: slope, friction, between
+    type(delassus_t), intent(inout) :: problem
+    real(dp) :: h(6*boxes, 12*boxes), w(12*boxes, 12*boxes), free(6*boxes), q(12*boxes), mu(4*boxes)
+    real(dp) :: corner(3)
+    integer :: b, c, k
+
+    h = 0.0_dp
+    free = 0.0_dp
+    do b = 1, boxes
+      free(6*b - 5) = step*gravity*slope/sqrt(1.0_dp + slope**2)
+      free(6*b - 3) = -step*gravity/sqrt(1.0_dp + slope**2)
+      do c = 1, 4
+        k = 12*(b - 1) + 3*(c - 1)
+        corner(1) = merge(0.5_dp, -0.5_dp, c <= 2)
+        corner(2) = merge(0.5_dp, -0.5_dp, mod(c, 2) == 0)
+        corner(3) = -0.5_dp
+        call add_wrench(h(6*b - 5:6*b, k + 1:k + 3), corner, 1.0_dp)
+        corner(3) = 0.5_dp
+        if (b > 1) call add_wrench(h(6*b - 11:6*b - 6, k + 1:k + 3), corner, -1.0_dp)
+      end do
+    end do
+    mu = between
+    mu(1:4) = friction
+    ! the inertia of a cube of side 1 is m/6
+    w = 0.0_dp
+    do k = 1, size(w, 2)
+      do c = 1, size(w, 1)
+        do b = 1, size(h, 1)
+          w(c, k) = w(c, k) + h(b, c)*h(b, k)*merge(1.0_dp, 6.0_dp, mod(b - 1, 6) < 3)/mass
+        end do
+      end do
+    end do
+    do c = 1, size(q)
+      q(c) = sum(h(:, c)*free)
+    end do
+    call pack(3, w, q, mu, problem)
+  end subroutine make_stack
+
+  !> Force along z, x and y, and its moment, at a point.
+  subroutine add_wrench(h, at, sign)
+    real(dp), intent(inout) :: h(:, :)
+    real(dp), intent(in) :: at(3), sign
+    real(dp) :: along(3)
+    integer :: i
+
+    do i = 1, 3
+      along = 0.0_dp
+      along(1 + mod(i + 1, 3)) = sign
+      h(1:3, i) = along
+      h(4, i) = at(2)*along(3) - at(3)*along(2)
+      h(5, i) = at(3)*along(1) - at(1)*along(3)
+      h(6, i) = at(1)*along(2) - at(2)*along(1)
+    end do
+  end subroutine add_wrench
+
+  !> Hand a full matrix over row by row.
+  subroutine pack(dimension, w, q, mu, problem)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: w(:, :)
+    real(dp), intent(in), contiguous :: q(:), mu(:)
+    type(delassus_t), intent(inout) :: problem
+    type(error_t), allocatable :: error
+    type(sparse_rows_t) :: rows
+    integer :: row(size(w)), column(size(w)), i, j, k
+    real(dp) :: value(size(w))
+
+    k = 0
+    do j = 1, size(w, 2)
+      do i = 1, size(w, 1)
+        k = k + 1
+        row(k) = i
+        column(k) = j
+        value(k) = w(i, j)
+      end do
+    end do
+    rows = compressed_rows(size(w, 1), size(w, 2), row, column, value)
+    call problem%init(dimension, rows, q, mu, error)
+    call check(.not. allocated(error), "a problem of contacts is packed")
+  end subroutine pack
+
+  !> W = A A^T of more columns than rows where `surplus` > 0, of deficient rank where it is < 0, and slightly skew.
+  subroutine make_random(seed, dimension, contacts, surplus, skew, problem)
+    integer, intent(in) :: seed, dimension, contacts, surplus
+    real(dp), intent(in) :: skew
+    type(delassus_t), intent(inout) :: problem
+    real(dp) :: a(dimension*contacts, dimension*contacts + surplus), w(dimension*contacts, dimension*contacts)
+    real(dp) :: q(dimension*contacts), mu(contacts), v(size(a, 2))
+    integer :: i, j, n
+
+    n = dimension*contacts
+    do j = 1, size(a, 2)
+      v(j) = hash_uniform(seed, int(j, i8), 1) - 0.5_dp
+      do i = 1, n
+        a(i, j) = hash_uniform(seed, int(i + n*j, i8), 2) - 0.5_dp
+      end do
+    end do
+    w = matmul(a, transpose(a))
+    ! velocities that bodies have: the problem has a solution
+    q = matmul(a, v)
+    do i = 1, n - 1
+      w(i, i + 1) = w(i, i + 1) + skew*w(i, i)
+      w(i + 1, i) = w(i + 1, i) - skew*w(i, i)
+    end do
+    do i = 1, contacts
+      mu(i) = hash_uniform(seed, int(i, i8), 3)
+    end do
+    call pack(dimension, w, q, mu, problem)
+  end subroutine make_random
+
+  !> v = W r + q of the packed problem.
+  subroutine check_packing()
+    type(delassus_t) :: problem
+    type(sparse_rows_t) :: w
+    type(error_t), allocatable :: error
+    real(dp) :: r(2, 2), v(2, 2)
+
+    ! an entry in two parts, a coupling that is 0
+    w = compressed_rows(4, 4, [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4], [1, 2, 1, 1, 2, 4, 1, 3, 4, 3, 4], &
+      & [1.0_dp, 0.5_dp, 1.0_dp, 0.5_dp, 3.0_dp, 7.0_dp, 0.0_dp, 4.0_dp, 0.0_dp, 0.0_dp, 5.0_dp])
+    call problem%init(2, w, [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp], [0.3_dp, 0.3_dp], error)
+    call check(.not. allocated(error), "a matrix by rows is packed")
+    r(:, 1) = [1.0_dp, 10.0_dp]
+    r(:, 2) = [100.0_dp, 1000.0_dp]
+    call problem%velocity(r, v)
+    call check_close(maxval(abs(v(:, 1) - [8.0_dp, 7032.5_dp])), 0.0_dp, 1.0e-10_dp, "W r + q with a coupling")
+    call check_close(maxval(abs(v(:, 2) - [403.0_dp, 5004.0_dp])), 0.0_dp, 1.0e-10_dp, "W r + q without")
+    call check_equal(size(problem%other), 1, "entries that are 0 couple nothing")
+    call check_close(problem%stiffness(1), 2.5_dp, 0.0_dp, "mean diagonal")
+  end subroutine check_packing
+
+  !> A change of the units of impulses changes e, not es.
+  subroutine check_units()
+    type(delassus_t) :: problem, scaled
+    real(dp) :: r(3, 5), v(3, 5), e, es, e_scaled, es_scaled
+    integer :: a
+
+    call make_random(1, 3, 5, 3, 0.0_dp, problem)
+    do a = 1, 5
+      r(1, a) = a
+      r(2, a) = 0.1_dp*a
+      r(3, a) = -0.2_dp*a
+    end do
+    call problem%velocity(r, v)
+    call problem%measure(r, v, e, es)
+    scaled = problem
+    scaled%own = 1.0e-5_dp*problem%own
+    scaled%coupling = 1.0e-5_dp*problem%coupling
+    scaled%stiffness = 1.0e-5_dp*problem%stiffness
+    r = 1.0e5_dp*r
+    call scaled%velocity(r, v)
+    call scaled%measure(r, v, e_scaled, es_scaled)
+    call check_close(es_scaled, es, 1.0e-12_dp*es, "es does not depend on units")
+    call check(abs(e_scaled - e) > 0.1_dp*e, "e does")
+  end subroutine check_units
+
+  !> The blocks of the Jacobian against a central difference.
+  subroutine check_jacobian(dimension)
+    integer, intent(in) :: dimension
+    real(dp), parameter :: h = 1.0e-6_dp
+    type(delassus_t) :: problem
+    type(alart_curnier_t) :: law
+    real(dp) :: r(dimension, 30), dr(dimension, 30), difference(dimension, 30), product(dimension, 30), ignored
+    integer :: a, i
+
+    call make_random(2, dimension, 30, 5, 0.1_dp, problem)
+    do a = 1, 30
+      do i = 1, dimension
+        r(i, a) = hash_uniform(3, int(a, i8), i) - merge(0.2_dp, 0.5_dp, i == 1)
+        dr(i, a) = hash_uniform(4, int(a, i8), i) - 0.5_dp
+      end do
+    end do
+    call law%init(problem)
+    difference = r + h*dr
+    call law%evaluate(problem, difference, ignored)
+    product = law%f
+    difference = r - h*dr
+    call law%evaluate(problem, difference, ignored)
+    difference = (product - law%f)/(2.0_dp*h)
+    call law%evaluate(problem, r, ignored)
+    call law%differentiate(problem)
+    do a = 1, 30
+      product(:, a) = 0.0_dp
+      call add_product(law%own(:, a), dr(:, a), product(:, a))
+      do i = problem%first(a), problem%first(a + 1) - 1
+        call add_product(law%coupling(:, i), dr(:, problem%other(i)), product(:, a))
+      end do
+    end do
+    ! the difference of second order leaves h^2 times third derivatives, rounding 1e-16/h
+    call check_close(maxval(abs(product - difference)), 0.0_dp, 1.0e-7_dp*maxval(abs(product)), "Jacobian of F")
+  end subroutine check_jacobian
+
+  !> y + A x, A by columns.
+  subroutine add_product(a, x, y)
+    real(dp), intent(in) :: a(:), x(:)
+    real(dp), intent(inout) :: y(:)
+    integer :: j
+
+    do j = 1, size(x)
+      y = y + a((j - 1)*size(x) + 1:j*size(x))*x(j)
+    end do
+  end subroutine add_product
+
+  !> Below the angle of friction the stack stays, above it slides as one; every face bears the boxes above it.
+  subroutine check_stack(slope, friction)
+    real(dp), intent(in) :: slope, friction
+    real(dp), parameter :: tolerance = 1.0e-11_dp
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    real(dp) :: r(3, 4*boxes), v(3, 4*boxes), weight, sliding
+    integer :: b, m, plain
+
+    ! at the same friction everywhere, boxes that slide as one would be about to slide on each other
+    call make_stack(slope, friction, 2.0_dp*friction, problem)
+    weight = step*gravity/sqrt(1.0_dp + slope**2)
+    sliding = weight*max(0.0_dp, slope - friction)
+    plain = 0
+    do m = 1, size(friction_methods)
+      call solve(problem, trim(friction_methods(m)), tolerance, r, report)
+      if (friction_methods(m) == "nlgs") plain = report%sweeps
+      if (friction_methods(m) == "momentum") call check(report%sweeps < plain, "stack: momentum spares sweeps")
+      call check(report%converged, "stack: "//trim(friction_methods(m))//" converges")
+      call problem%velocity(r, v)
+      ! |defect| <= tolerance |q|, and the sum over a face is as well conditioned as the stack is high
+      do b = 1, boxes
+        call check_close(sum(r(1, 4*b - 3:4*b)), mass*weight*(boxes + 1 - b), 1.0e-8_dp*mass*weight, "stack: weight on a face")
+      end do
+      ! contacts at the limit of friction miss the law by less than they slip
+      call check_close(maxval(abs(v(2, 1:4) - sliding)), 0.0_dp, 1.0e-7_dp*weight, "stack: velocity on the plane")
+      call check_close(maxval(abs(v(:, 5:))), 0.0_dp, 1.0e-7_dp*weight, "stack: boxes rest on each other")
+    end do
+  end subroutine check_stack
+
+  !> Boxes about to slide on each other while they slide as one: sweeps creep, the default goes on with Newton's method.
+  subroutine check_turns()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    real(dp) :: r(3, 4*boxes)
+
+    call make_stack(0.5_dp, 0.3_dp, 0.3_dp, problem)
+    call solve(problem, "nlgs", 1.0e-11_dp, r, report)
+    call check(.not. report%converged, "sweeps creep")
+    call solve(problem, "auto", 1.0e-11_dp, r, report)
+    call check(report%converged, "sweeps and Newton's steps in turn converge")
+    call check(report%newton_steps > 0, "by Newton's steps")
+    call check(report%sweeps + report%newton_steps < 5000, "soon")
+  end subroutine check_turns
+
+  !> Proximal points: of the many solutions of a stack, that near the start is found, self-stress included.
+  subroutine check_start_is_kept()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    type(friction_control_t) :: control
+    type(error_t), allocatable :: error
+    real(dp) :: r(3, 4*boxes), first(3, 4*boxes), weightless(3, 4*boxes)
+    integer :: a, i
+
+    call make_stack(0.1_dp, 0.5_dp, 0.5_dp, problem)
+    do a = 1, 4*boxes
+      do i = 1, 3
+        r(i, a) = 0.05_dp*merge(1.0_dp, 0.5_dp, i == 1)*hash_uniform(6, int(a, i8), i)
+      end do
+    end do
+    control%method = "newton"
+    control%tolerance = 1.0e-7_dp
+    call solve_friction(problem, control, r, report, error)
+    call check(report%converged, "a stack under self-stress")
+    first = r
+    control%tolerance = 1.0e-11_dp
+    call solve_friction(problem, control, r, report, error)
+    call check(report%converged, "the same, more exactly")
+    call check_close(maxval(abs(r - first)), 0.0_dp, 1.0e-4_dp*maxval(abs(first)), "self-stress stays")
+    weightless = 0.0_dp
+    call solve_friction(problem, control, weightless, report, error)
+    call check(maxval(abs(weightless - first)) > 1.0e-2_dp*maxval(abs(first)), "another start, another self-stress")
+  end subroutine check_start_is_kept
+
+  !> Every method on problems with more and with less motions than impulses, symmetric or not: the law itself.
+  subroutine check_random(dimension, contacts)
+    integer, intent(in) :: dimension, contacts
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    real(dp) :: r(dimension, contacts)
+    integer :: k, m
+
+    do k = 1, 4
+      call make_random(10 + k, dimension, contacts, merge(6, -10, k <= 2), merge(1.0e-3_dp, 0.0_dp, mod(k, 2) == 0), problem)
+      do m = 1, size(friction_methods)
+        call solve(problem, trim(friction_methods(m)), 1.0e-11_dp, r, report)
+        call check(report%converged, "random problem: "//trim(friction_methods(m))//" converges")
+        call check_law(problem, r)
+      end do
+    end do
+  end subroutine check_random
+
+  !> Signorini's condition and Coulomb's law of each contact. The measure bounds s |r - P|, and so velocities to 1e-11 |q| and
+  !> impulses to 1e-11 |q|/s, up to a factor of some units.
+  subroutine check_law(problem, r)
+    type(delassus_t), intent(in) :: problem
+    real(dp), intent(in), contiguous :: r(:, :)
+    real(dp) :: v(size(r, 1), size(r, 2)), scale, worst
+    integer :: a
+
+    call problem%velocity(r, v)
+    scale = norm2(problem%q)
+    worst = 0.0_dp
+    do a = 1, problem%n_contacts
+      worst = max(worst, -v(1, a), -problem%stiffness(a)*r(1, a), min(v(1, a), problem%stiffness(a)*r(1, a)), &
+        & problem%stiffness(a)*(norm2(r(2:, a)) - problem%mu(a)*r(1, a)), &
+        & min(norm2(v(2:, a)), problem%stiffness(a)*(problem%mu(a)*r(1, a) - norm2(r(2:, a)))))
+      ! power of friction: against the velocity
+      worst = max(worst, (dot_product(v(2:, a), r(2:, a)) + problem%mu(a)*r(1, a)*norm2(v(2:, a)))/max(norm2(r(:, a)), 1.0_dp))
+    end do
+    call check_close(worst, 0.0_dp, 1.0e-9_dp*scale, "Coulomb's law on every contact")
+  end subroutine check_law
+
+  subroutine solve(problem, method, tolerance, r, report)
+    type(delassus_t), intent(in) :: problem
+    character(len=*), intent(in) :: method
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(out), contiguous :: r(:, :)
+    type(friction_report_t), intent(out) :: report
+    type(friction_control_t) :: control
+    type(error_t), allocatable :: error
+
+    control%method = method
+    control%tolerance = tolerance
+    r = 0.0_dp
+    call solve_friction(problem, control, r, report, error)
+    call check(.not. allocated(error), method//" runs")
+  end subroutine solve
+
+  !> A method that does not exist, a budget too small, a contact that nothing moves.
+  subroutine check_refusals()
+    type(delassus_t) :: problem
+    type(friction_control_t) :: control
+    type(friction_report_t) :: report
+    type(sparse_rows_t) :: w
+    type(error_t), allocatable :: error
+    real(dp) :: r(3, 4*boxes)
+
+    call make_stack(0.2_dp, 0.3_dp, 0.6_dp, problem)
+    control%method = "auto"
+    control%max_iterations = 3
+    r = 0.0_dp
+    call solve_friction(problem, control, r, report, error)
+    call check(.not. report%converged, "a budget of 3 sweeps is too small")
+    call check_equal(report%sweeps + report%newton_steps, 3, "and is kept")
+    control%method = "simplex"
+    call solve_friction(problem, control, r, report, error)
+    call check(allocated(error), "a method that does not exist")
+    deallocate (error)
+    w = compressed_rows(2, 2, [1, 2], [1, 2], [0.0_dp, 1.0_dp])
+    call problem%init(2, w, [1.0_dp, 1.0_dp], [0.3_dp], error)
+    call check(allocated(error), "a contact whose normal impulse moves nothing")
+  end subroutine check_refusals
+
+end program test_friction_solver
