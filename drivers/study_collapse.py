@@ -15,7 +15,7 @@ import numpy as np
 from study_support import draw_disks, lattice, plt, read_bodies, run, states, write_csv, write_hdf5
 
 STEP = 5.0e-4  # s
-# radii [m], grains of a column, aspect ratios as they are aimed at, flat columns below the one and tall ones above the other measured
+# radii [m], grains of a column, aspect ratios aimed at, flat columns below the one and tall ones above the other measured
 # ratio, time until the gate is taken away [s], times that a fall from the height of the column is waited for, width of the bins in
 # which a heap is measured [mean radii], alert distance [m], about the way of the fastest grain in a step
 PLANE = SimpleNamespace(smallest=0.004, largest=0.006, grains=1000, aspects=(0.5, 0.75, 1.1, 1.6, 3.5, 5.0, 7.0, 10.0), flat=2.0,
@@ -150,6 +150,10 @@ def draw(path, ratio, run_out, slopes, heaps):
             centres, radii = centres[order][:, [0, 2]], radii[order]
             axes[panel].axvline(-1.0, color="#b2182b", linewidth=0.8)
         draw_disks(axes[panel], centres / width, radii / width)
+        if space:
+            # without the few that roll away
+            axes[panel].set_xlim(-1.3 * (1.0 + run_out[k]), 1.3 * (1.0 + run_out[k]))
+            axes[panel].locator_params(axis="y", nbins=3)
         axes[panel].axvline(1.0, color="#b2182b", linewidth=0.8)
         axes[panel].set_title(f"$a$ = {ratio[k]:.2g}", fontsize=10)
         axes[panel].set_xlabel("$x/r_0$")

@@ -89,7 +89,7 @@ def main():
     exponent = np.polyfit(np.log(width - BEVERLOO_K * diameter), np.log(rates), 1)[0]
     slope, shift = np.polyfit(width, rates**(1.0 / case.exponent), 1)
     fitted = -shift / slope / diameter
-    constant = slope**case.exponent / ({2: 0.8, 3: 0.58}[d] * DENSITY * np.sqrt(9.81))
+    constant = slope**case.exponent / ({2: 0.8, 3: 0.56}[d] * DENSITY * np.sqrt(9.81))
     write_csv(options.out / f"{case.name}.csv", {"opening_diameters": case.openings, "opening": width, "mass_rate": rates})
     write_csv(options.out / f"{case.name}_summary.csv", {"quantity": ["exponent", "k", "C"],
                                                    "value": [float(exponent), float(fitted), float(constant)]})
