@@ -68,6 +68,7 @@ contains
         call items(1)%add("impulse of projections", 8, kernels%nc)
         call items(1)%add("velocity of projections", 8, kernels%nc)
       end if
+      if (simulation%scheme%momentum%on) call items(1)%add("impulse of momentum", 8, kernels%nc)
       items(2)%name = "near pair"
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
@@ -84,6 +85,7 @@ contains
       call items(3)%add("velocity", 8, nv)
       call items(3)%add("v_global", 8, nv)
       call items(3)%add("reaction", 8, nv)
+      if (simulation%scheme%momentum%on) call items(3)%add("velocity of momentum", 8, nv)
       call items(3)%add("inverse_mass", 8, nw)
       call items(3)%add("weight", 8, nw)
       items(4)%name = "grain seen, ghosts included"
