@@ -118,7 +118,8 @@ def compress(options, centres, radii, size, mass):
     run(options.out / "shear", {
         "scene": scene("../compact.h5", 0.5, 0.2 * SMALLEST),
         "time": {"step": SLOW_STEP, "steps": steps},
-        "solver": {**SOLVER, "tolerance": options.tolerance, "max_iterations": options.max_iterations},
+        "solver": {**SOLVER, "tolerance": options.tolerance, "max_iterations": options.max_iterations,
+                   "acceleration": options.acceleration},
         "output": {"directory": ".", "every": max(1, steps // 250), "final_bodies": True}},
         walls(size, mass, {"velocity": [0.0, -speed]}))
 
@@ -133,6 +134,7 @@ def main():
     parser.add_argument("--rate", type=float, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
     parser.add_argument("--tolerance", type=float, default=3.0e-5, help="of the solves while the lid comes down")
     parser.add_argument("--max-iterations", type=int, default=1000)
+    parser.add_argument("--acceleration", choices=["none", "momentum"], default="momentum", help="of the same solves")
     parser.add_argument("--strain", type=float, default=0.15, help="vertical strain at the end")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
