@@ -2,7 +2,7 @@
 module gravier_bench_options
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_command_line, only: argument
+  use gravier_command_line, only: argument, option_value
   implicit none
   private
   public :: options_t, read_options, usage
@@ -83,9 +83,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: word
 
-    word = ""
-    if (k < command_argument_count()) word = argument(k + 1)
-    if (index(word, "--") == 1) word = ""
+    word = option_value(k)
     select case (argument(k))
     case ("--csv")
       options%csv = word

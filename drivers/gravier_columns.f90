@@ -7,7 +7,7 @@ program gravier_columns
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory
   use gravier_solve, only: solve_report_t, solve_converged
-  use gravier_command_line, only: argument, positive_integer, positive_real, leave
+  use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
   use gravier_columns_study, only: column_t, paper_columns, solve_columns
   use gravier_columns_report, only: write_table, write_csv, draw_figure
   implicit none
@@ -97,9 +97,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: word
 
-    word = ""
-    if (k < command_argument_count()) word = argument(k + 1)
-    if (index(word, "--") == 1) word = ""
+    word = option_value(k)
     select case (argument(k))
     case ("--out")
       options%directory = word

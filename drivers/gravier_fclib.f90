@@ -7,7 +7,7 @@ program gravier_fclib
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: path_t, add_path, list_files, make_directory
   use gravier_csv_writer, only: csv_writer_t
-  use gravier_command_line, only: argument, positive_integer, positive_real, leave
+  use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
   use gravier_fclib_file, only: fclib_local_t, write_fclib_local
   use gravier_delassus, only: delassus_t
   use gravier_friction_solver, only: friction_control_t, friction_methods
@@ -121,9 +121,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: word
 
-    word = ""
-    if (k < command_argument_count()) word = argument(k + 1)
-    if (index(word, "--") == 1) word = ""
+    word = option_value(k)
     select case (argument(k))
     case ("--method")
       call read_methods(word, options%methods, error)

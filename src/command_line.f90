@@ -5,7 +5,7 @@ module gravier_command_line
   use gravier_errors, only: error_t, raise, status_input
   implicit none
   private
-  public :: arguments_t, read_arguments, argument, positive_integer, positive_real, leave
+  public :: arguments_t, read_arguments, argument, option_value, positive_integer, positive_real, leave
   public :: action_run, action_check, action_help, action_version, action_keys
 
   integer, parameter :: action_run = 1, action_check = 2, action_help = 3, action_version = 4, action_keys = 5
@@ -87,6 +87,16 @@ contains
     allocate (character(len=length) :: word)
     call get_command_argument(k, word)
   end function argument
+
+  !> The word after word `k` of the command line; empty where there is none or another option follows.
+  function option_value(k) result(word)
+    integer, intent(in) :: k
+    character(len=:), allocatable :: word
+
+    word = ""
+    if (k < command_argument_count()) word = argument(k + 1)
+    if (index(word, "--") == 1) word = ""
+  end function option_value
 
   !> The number that a word of digits means; 0 for anything else.
   integer function positive_integer(word) result(value)

@@ -388,151 +388,20 @@ contains
     antagonist(:, 1:nd) = -candidate(:, 1:nd)
   end subroutine contact_jacobian
 
-  pure subroutine add_reaction_2d_frictionless(pair, hot, impulse, reaction)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :)
-    real(dp), intent(inout), contiguous :: reaction(:, :)
-    integer :: g
+#define OF(name) name/**/_2d_frictionless
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_3d_frictionless
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_2d_friction
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_3d_friction
+#include "contact_loops.inc"
+#undef OF
 
-    do g = 1, size(hot, 3)
-      call react_2d_frictionless(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), impulse(:, :, g), reaction)
-    end do
-  end subroutine add_reaction_2d_frictionless
-
-  pure subroutine contact_velocity_2d_frictionless(pair, hot, velocity, contact_velocity)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
-    real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call velocity_2d_frictionless(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), velocity, contact_velocity(:, :, g))
-    end do
-  end subroutine contact_velocity_2d_frictionless
-
-  pure subroutine residual_2d_frictionless(pair, hot, weight, velocity, impulse, sums)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-    real(dp), intent(out) :: sums(2)
-    real(dp) :: parts(lanes, 2)
-    integer :: g
-
-    parts(:, :) = 0.0_dp
-    do g = 1, size(hot, 3)
-      call defect_2d_frictionless(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), weight, velocity, impulse(:, :, g), parts)
-    end do
-    sums(:) = sum(parts, dim=1)
-  end subroutine residual_2d_frictionless
-
-  pure subroutine add_reaction_3d_frictionless(pair, hot, impulse, reaction)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :)
-    real(dp), intent(inout), contiguous :: reaction(:, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call react_3d_frictionless(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), impulse(:, :, g), reaction)
-    end do
-  end subroutine add_reaction_3d_frictionless
-
-  pure subroutine contact_velocity_3d_frictionless(pair, hot, velocity, contact_velocity)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
-    real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call velocity_3d_frictionless(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), velocity, contact_velocity(:, :, g))
-    end do
-  end subroutine contact_velocity_3d_frictionless
-
-  pure subroutine residual_3d_frictionless(pair, hot, weight, velocity, impulse, sums)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-    real(dp), intent(out) :: sums(2)
-    real(dp) :: parts(lanes, 2)
-    integer :: g
-
-    parts(:, :) = 0.0_dp
-    do g = 1, size(hot, 3)
-      call defect_3d_frictionless(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), weight, velocity, impulse(:, :, g), parts)
-    end do
-    sums(:) = sum(parts, dim=1)
-  end subroutine residual_3d_frictionless
-
-  pure subroutine add_reaction_2d_friction(pair, hot, impulse, reaction)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :)
-    real(dp), intent(inout), contiguous :: reaction(:, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call react_2d_friction(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), impulse(:, :, g), reaction)
-    end do
-  end subroutine add_reaction_2d_friction
-
-  pure subroutine contact_velocity_2d_friction(pair, hot, velocity, contact_velocity)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
-    real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call velocity_2d_friction(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), velocity, contact_velocity(:, :, g))
-    end do
-  end subroutine contact_velocity_2d_friction
-
-  pure subroutine residual_2d_friction(pair, hot, weight, velocity, impulse, sums)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-    real(dp), intent(out) :: sums(2)
-    real(dp) :: parts(lanes, 2)
-    integer :: g
-
-    parts(:, :) = 0.0_dp
-    do g = 1, size(hot, 3)
-      call defect_2d_friction(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), weight, velocity, impulse(:, :, g), parts)
-    end do
-    sums(:) = sum(parts, dim=1)
-  end subroutine residual_2d_friction
-
-  pure subroutine add_reaction_3d_friction(pair, hot, impulse, reaction)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :)
-    real(dp), intent(inout), contiguous :: reaction(:, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call react_3d_friction(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), impulse(:, :, g), reaction)
-    end do
-  end subroutine add_reaction_3d_friction
-
-  pure subroutine contact_velocity_3d_friction(pair, hot, velocity, contact_velocity)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
-    real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
-    integer :: g
-
-    do g = 1, size(hot, 3)
-      call velocity_3d_friction(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), velocity, contact_velocity(:, :, g))
-    end do
-  end subroutine contact_velocity_3d_friction
-
-  pure subroutine residual_3d_friction(pair, hot, weight, velocity, impulse, sums)
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-    real(dp), intent(out) :: sums(2)
-    real(dp) :: parts(lanes, 2)
-    integer :: g
-
-    parts(:, :) = 0.0_dp
-    do g = 1, size(hot, 3)
-      call defect_3d_friction(pair(:, (g - 1)*lanes + 1:g*lanes), hot(:, :, g), weight, velocity, impulse(:, :, g), parts)
-    end do
-    sums(:) = sum(parts, dim=1)
-  end subroutine residual_3d_friction
-
-  ! The same for one block, with the shapes of each law.
+  ! What the loops of contact_loops.inc do with one block, with the shapes of each law.
 
   pure subroutine react_2d_frictionless(pair, hot, impulse, reaction)
     integer, intent(in) :: pair(2, lanes)
