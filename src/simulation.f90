@@ -1,6 +1,7 @@
 !> A scene in time: what it takes to make one step after the other, without output.
 module gravier_simulation
   use gravier_kinds, only: dp, i8
+  use gravier_heap, only: keep_heap
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_finite, only: is_finite
@@ -132,6 +133,7 @@ contains
     type(scene_t) :: scene
     type(time_table_t) :: none
 
+    call keep_heap()
     call self%free()
     self%comm => comm
     self%config = config
