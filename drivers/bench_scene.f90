@@ -5,7 +5,8 @@ module gravier_bench_scene
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: reset_timers, gather_timers, n_phases, phase_bodies, phase_neighbourhood, phase_detection, &
-    & phase_interface, phase_setup, phase_sweep, phase_exchange, phase_interface_solve, phase_factorise, phase_check
+    & phase_interface, phase_setup, phase_sweep, phase_exchange, phase_interface_solve, phase_factorise, phase_check, &
+    & phase_reduction
   use gravier_impulse_memory, only: impulse_entries
   use gravier_nscdd, only: average_copies
   use gravier_scheme, only: work_t
@@ -140,6 +141,7 @@ contains
     call record%note(of, "share_sweeps", "1", mean(phase_sweep)/step)
     call record%note(of, "share_exchange", "1", (mean(phase_exchange) + mean(phase_interface_solve) + mean(phase_factorise))/step)
     call record%note(of, "share_checks", "1", mean(phase_check)/step)
+    call record%note(of, "share_reductions", "1", mean(phase_reduction)/step)
     call record%note(of, "share_detection", "1", mean(phase_detection)/step)
     call record%note(of, "share_lists_and_ghosts", "1", mean(phase_neighbourhood)/step)
     call record%note(of, "share_setup", "1", (mean(phase_setup) + mean(phase_interface))/step)

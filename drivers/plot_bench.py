@@ -17,6 +17,7 @@ import matplotlib.pyplot as plt
 PLACES = {"kernel_core_cache": ("caches of the core", "#56B4E9"), "kernel_last_cache": ("last cache", "#009E73"),
           "kernel_memory": ("memory", "#0072B2")}
 PHASES = {"share_sweeps": ("sweeps", "#0072B2"), "share_exchange": ("exchange", "#56B4E9"), "share_checks": ("checks", "#E69F00"),
+          "share_reductions": ("reductions", "#8B4513"),
           "share_detection": ("detection", "#D55E00"), "share_lists_and_ghosts": ("lists and ghosts", "#CC79A7"),
           "share_setup": ("set-up", "#F0E442"), "share_bodies": ("bodies", "#009E73"), "share_rest": ("rest", "#999999")}
 DETECTION = ["list_build", "list_check_and_ghosts", "contact_search", "contact_packing", "interface_search"]

@@ -4,7 +4,7 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: shift_of_code
-  use gravier_contact_kernels, only: kernels_t, contact_tangents, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
@@ -26,23 +26,25 @@ contains
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
     integer :: s, c, q, g
-    real(dp) :: t(3), u(3)
+    real(dp) :: vector(lanes, 3)
 
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
         list%impulse(:, :) = 0.0_dp
-        do c = 1, sub%n_contacts
-          ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart
-          q = lane_of(c)
-          g = block_of(c)
-          if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
-          if (problem%kernels%nc < 3) then
-            list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
-          else
-            call contact_tangents(sub%hot, c, t, u)
-            list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
-            list%impulse(2:4, sub%source(c)) = sub%impulse(q, 2, g)*t + sub%impulse(q, 3, g)*u
-          end if
+        do g = 1, n_blocks(sub%n_contacts)
+          if (problem%kernels%nc == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          do q = 1, lanes
+            ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart; contacts of
+            ! no effect have none
+            if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
+            c = (g - 1)*lanes + q
+            if (problem%kernels%nc < 3) then
+              list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
+            else
+              list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
+              list%impulse(2:4, sub%source(c)) = vector(q, :)
+            end if
+          end do
         end do
       end associate
     end do
@@ -53,21 +55,24 @@ contains
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, c, q, g
-    real(dp) :: t(3), u(3)
+    real(dp) :: vector(lanes, 3)
 
+    vector(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
-        do c = 1, sub%n_contacts
-          q = lane_of(c)
-          g = block_of(c)
-          if (problem%kernels%nc < 3) then
-            sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
-          else
-            call contact_tangents(sub%hot, c, t, u)
-            sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
-            sub%impulse(q, 2, g) = sum(list%impulse(2:4, sub%source(c))*t)
-            sub%impulse(q, 3, g) = sum(list%impulse(2:4, sub%source(c))*u)
-          end if
+        do g = 1, n_blocks(sub%n_contacts)
+          do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
+            c = (g - 1)*lanes + q
+            if (problem%kernels%nc < 3) then
+              sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
+            else
+              sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
+              vector(q, :) = list%impulse(2:4, sub%source(c))
+            end if
+          end do
+          ! contacts of no effect have no normal, and no frame
+          if (problem%kernels%nc == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          sub%impulse(q:, :, g) = 0.0_dp
         end do
       end associate
     end do

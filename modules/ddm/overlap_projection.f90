@@ -136,7 +136,7 @@ contains
       end if
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :, :) = 0.0_dp
-      call sub%share_masses(.true.)
+      call sub%share_masses(problem%kernels, .true.)
     end associate
   end subroutine lend
 
@@ -182,7 +182,7 @@ contains
         do b = sub%n_grains + 1, sub%n_bodies
           where (sub%inverse_mass(:, b) > 0.0_dp) sub%weight(:, b) = sub%multiplicity(b)/masses(sub%boundary(b))
         end do
-        call sub%update_local_operator()
+        call sub%update_local_operator(problem%kernels)
       end associate
     end do
   end subroutine weigh_boundaries

@@ -218,8 +218,9 @@ contains
   end function restitution_of
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
-  !> meet them, so that a sweep walks through memory; then boundaries that forces move, then columns of bodies with prescribed
-  !> velocities: one a boundary, or one a contact where the boundary turns.
+  !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
+  !> boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, or one a contact where
+  !> the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
     type(neighbourhood_t), intent(in) :: view
     type(found_t), intent(in) :: found
@@ -353,7 +354,9 @@ contains
     call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
-    allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)), sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
+    allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
+    allocate (sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
+    if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
     do c = 1, found%n
       f = order(c)
       q = lane_of(c)
@@ -376,10 +379,9 @@ contains
         sub%hot(q, nd + 1, g) = max(found%gap(f), 0.0_dp)/physics%h
       end if
       if (kernels%nc == 1) cycle
-      if (view%bodies%glued(i) == 0) sub%hot(q, nd + 4, g) = view%bodies%radius(i)
-      if (j > 0) then
-        if (view%bodies%glued(j) == 0) sub%hot(q, nd + 5, g) = view%bodies%radius(j)
-      end if
+      sub%hot(q, nd + 4, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
+      sub%hot(q, nd + 5, g) = 0.0_dp
+      if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
       sub%hot(q, nd + 6, g) = physics%friction
       if (b > 0) sub%hot(q, nd + 6, g) = boundaries(b)%friction
     end do
@@ -487,6 +489,9 @@ contains
     call sparse_exchange(decomposition%comm, answers, destination, received)
     allocate (part(size(problem%sub)))
     call sort_out_sharers(received, decomposition, columns, problem, part)
+    do s = 1, size(part)
+      call number_shared_first(problem%sub(s), part(s)%body(1:part(s)%n_shared))
+    end do
     call problem%shared%init(decomposition%comm, part, decomposition%n_subdomains, problem%kernels%nv)
   end subroutine find_interface
 
@@ -659,6 +664,81 @@ contains
       sub%multiplicity(part%body(k)) = part%first(k + 1) - part%first(k)
     end do
   end subroutine fill_part
+
+  !> Give the shared grains the first numbers, in the order of the exchange, so that it reads and writes their velocities in a
+  !> row. The others keep their order.
+  subroutine number_shared_first(sub, shared)
+    type(subproblem_t), intent(inout) :: sub
+    !> numbers of the shared bodies; boundaries among them keep theirs
+    integer, intent(inout), contiguous :: shared(:)
+    integer :: number(sub%n_columns), grain(sub%n_grains)
+    integer :: b, c, k, n
+
+    if (size(shared) == 0) return
+    number(:) = 0
+    n = 0
+    do k = 1, size(shared)
+      if (shared(k) <= sub%n_grains) call give_number(shared(k))
+    end do
+    do b = 1, sub%n_grains
+      if (number(b) == 0) call give_number(b)
+    end do
+    do b = sub%n_grains + 1, sub%n_columns
+      number(b) = b
+    end do
+    do k = 1, size(shared)
+      shared(k) = number(shared(k))
+    end do
+    do c = 1, sub%n_contacts
+      sub%pair(1, c) = number(sub%pair(1, c))
+      sub%pair(2, c) = number(sub%pair(2, c))
+    end do
+    call reorder()
+
+  contains
+
+    subroutine give_number(b)
+      integer, intent(in) :: b
+
+      n = n + 1
+      number(b) = n
+      grain(n) = b
+    end subroutine give_number
+
+    !> What is known of the grains.
+    subroutine reorder()
+      type(subproblem_t) :: old
+
+      call move_alloc(sub%id, old%id)
+      call move_alloc(sub%home, old%home)
+      call move_alloc(sub%place, old%place)
+      call move_alloc(sub%multiplicity, old%multiplicity)
+      call move_alloc(sub%position, old%position)
+      call move_alloc(sub%radius, old%radius)
+      call move_alloc(sub%v_free, old%v_free)
+      call move_alloc(sub%inverse_mass, old%inverse_mass)
+      allocate (sub%id, source=old%id)
+      allocate (sub%home, source=old%home)
+      allocate (sub%place, mold=old%place)
+      allocate (sub%multiplicity, source=old%multiplicity)
+      allocate (sub%position, mold=old%position)
+      allocate (sub%radius, mold=old%radius)
+      allocate (sub%v_free, source=old%v_free)
+      allocate (sub%inverse_mass, source=old%inverse_mass)
+      do n = 1, sub%n_grains
+        b = grain(n)
+        sub%id(n) = old%id(b)
+        sub%home(n) = old%home(b)
+        sub%place(n) = old%place(b)
+        sub%multiplicity(n) = old%multiplicity(b)
+        sub%position(:, n) = old%position(:, b)
+        sub%radius(n) = old%radius(b)
+        sub%v_free(:, n) = old%v_free(:, b)
+        sub%inverse_mass(:, n) = old%inverse_mass(:, b)
+      end do
+    end subroutine reorder
+
+  end subroutine number_shared_first
 
   !> Count the interface. Each grain is counted in the first of the subdomains that share it. Collective.
   subroutine count_figures(decomposition, neighbourhoods, problem, figures)

@@ -22,7 +22,7 @@ module gravier_contact_kernels
   implicit none
   private
   public :: kernels_t, contact_jacobian, global_impulse, tangents, local_operator
-  public :: lanes, n_blocks, block_of, lane_of, contact_tangents
+  public :: lanes, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
@@ -95,6 +95,14 @@ module gravier_contact_kernels
       real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
       real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
     end subroutine velocity_kernel
+    !> 1/W_nn and 1/W_tt into `hot`.
+    pure subroutine operator_kernel(pair, hot, weight)
+      import :: dp
+      implicit none
+      integer, intent(in), contiguous :: pair(:, :)
+      real(dp), intent(inout), contiguous :: hot(:, :, :)
+      real(dp), intent(in), contiguous :: weight(:, :)
+    end subroutine operator_kernel
     !> sums = (sum of |r - P|^2, sum of |r|^2), P being the local solve with the undivided local operator.
     pure subroutine residual_kernel(pair, hot, weight, velocity, impulse, sums)
       import :: dp
@@ -114,6 +122,7 @@ module gravier_contact_kernels
     procedure(momentum_recording_kernel), pointer, nopass :: sweep_momentum_recording => null()
     procedure(reaction_kernel), pointer, nopass :: add_reaction => null()
     procedure(velocity_kernel), pointer, nopass :: contact_velocity => null()
+    procedure(operator_kernel), pointer, nopass :: set_operators => null()
     procedure(residual_kernel), pointer, nopass :: residual => null()
   contains
     procedure :: choose => kernels_choose
@@ -142,6 +151,7 @@ contains
       self%sweep_momentum_recording => sweep_2d_friction_momentum_recording
       self%add_reaction => add_reaction_2d_friction
       self%contact_velocity => contact_velocity_2d_friction
+      self%set_operators => set_operators_2d_friction
       self%residual => residual_2d_friction
     else if (friction) then
       self%sweep => sweep_3d_friction
@@ -150,6 +160,7 @@ contains
       self%sweep_momentum_recording => sweep_3d_friction_momentum_recording
       self%add_reaction => add_reaction_3d_friction
       self%contact_velocity => contact_velocity_3d_friction
+      self%set_operators => set_operators_3d_friction
       self%residual => residual_3d_friction
     else if (dimension == 2) then
       self%sweep => sweep_2d_frictionless
@@ -158,6 +169,7 @@ contains
       self%sweep_momentum_recording => sweep_2d_frictionless_momentum_recording
       self%add_reaction => add_reaction_2d_frictionless
       self%contact_velocity => contact_velocity_2d_frictionless
+      self%set_operators => set_operators_2d_frictionless
       self%residual => residual_2d_frictionless
     else
       self%sweep => sweep_3d_frictionless
@@ -166,6 +178,7 @@ contains
       self%sweep_momentum_recording => sweep_3d_frictionless_momentum_recording
       self%add_reaction => add_reaction_3d_frictionless
       self%contact_velocity => contact_velocity_3d_frictionless
+      self%set_operators => set_operators_3d_frictionless
       self%residual => residual_3d_frictionless
     end if
   end subroutine kernels_choose
@@ -355,6 +368,36 @@ contains
     call tangents(n, t, s)
   end subroutine contact_tangents
 
+  !> The tangential parts of the impulses of a block of spheres, from vectors in global axes of which they are projections.
+  pure subroutine project_tangential(hot, vector, impulse)
+    real(dp), intent(in) :: hot(lanes, 9), vector(lanes, 3)
+    !> its normal parts are left
+    real(dp), intent(inout) :: impulse(lanes, 3)
+    real(dp) :: tx, ty, tz, sx, sy, sz
+    integer :: q
+
+    do q = 1, lanes
+      call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
+      impulse(q, 2) = vector(q, 1)*tx + vector(q, 2)*ty + vector(q, 3)*tz
+      impulse(q, 3) = vector(q, 1)*sx + vector(q, 2)*sy + vector(q, 3)*sz
+    end do
+  end subroutine project_tangential
+
+  !> The tangential parts of the impulses of a block of spheres as vectors in global axes.
+  pure subroutine tangential_vectors(hot, impulse, vector)
+    real(dp), intent(in) :: hot(lanes, 9), impulse(lanes, 3)
+    real(dp), intent(out) :: vector(lanes, 3)
+    real(dp) :: tx, ty, tz, sx, sy, sz
+    integer :: q
+
+    do q = 1, lanes
+      call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
+      vector(q, 1) = impulse(q, 2)*tx + impulse(q, 3)*sx
+      vector(q, 2) = impulse(q, 2)*ty + impulse(q, 3)*sy
+      vector(q, 3) = impulse(q, 2)*tz + impulse(q, 3)*sz
+    end do
+  end subroutine tangential_vectors
+
   !> Rows of H^T of contact `c`: v = candidate . V_i + antagonist . V_j.
   pure subroutine contact_jacobian(kernels, hot, c, candidate, antagonist)
     type(kernels_t), intent(in) :: kernels
@@ -469,30 +512,37 @@ contains
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 9), impulse(lanes, 3)
     real(dp), intent(inout) :: reaction(6, *)
-    integer :: q, i, j, d
-    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz, p(lanes, 3), turn(lanes, 3)
+    integer :: q, i, j
+    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz
+    real(dp), dimension(lanes) :: px, py, pz, qx, qy, qz
 
     do q = 1, lanes
       nx = hot(q, 1)
       ny = hot(q, 2)
       nz = hot(q, 3)
       call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
-      p(q, 1) = impulse(q, 1)*nx + impulse(q, 2)*tx + impulse(q, 3)*sx
-      p(q, 2) = impulse(q, 1)*ny + impulse(q, 2)*ty + impulse(q, 3)*sy
-      p(q, 3) = impulse(q, 1)*nz + impulse(q, 2)*tz + impulse(q, 3)*sz
-      turn(q, 1) = impulse(q, 2)*sx - impulse(q, 3)*tx
-      turn(q, 2) = impulse(q, 2)*sy - impulse(q, 3)*ty
-      turn(q, 3) = impulse(q, 2)*sz - impulse(q, 3)*tz
+      px(q) = impulse(q, 1)*nx + impulse(q, 2)*tx + impulse(q, 3)*sx
+      py(q) = impulse(q, 1)*ny + impulse(q, 2)*ty + impulse(q, 3)*sy
+      pz(q) = impulse(q, 1)*nz + impulse(q, 2)*tz + impulse(q, 3)*sz
+      qx(q) = impulse(q, 2)*sx - impulse(q, 3)*tx
+      qy(q) = impulse(q, 2)*sy - impulse(q, 3)*ty
+      qz(q) = impulse(q, 2)*sz - impulse(q, 3)*tz
     end do
     do q = 1, lanes
       i = pair(1, q)
       j = pair(2, q)
-      do d = 1, 3
-        reaction(d, i) = reaction(d, i) + p(q, d)
-        reaction(3 + d, i) = reaction(3 + d, i) - hot(q, 7)*turn(q, d)
-        reaction(d, j) = reaction(d, j) - p(q, d)
-        reaction(3 + d, j) = reaction(3 + d, j) - hot(q, 8)*turn(q, d)
-      end do
+      reaction(1, i) = reaction(1, i) + px(q)
+      reaction(2, i) = reaction(2, i) + py(q)
+      reaction(3, i) = reaction(3, i) + pz(q)
+      reaction(4, i) = reaction(4, i) - hot(q, 7)*qx(q)
+      reaction(5, i) = reaction(5, i) - hot(q, 7)*qy(q)
+      reaction(6, i) = reaction(6, i) - hot(q, 7)*qz(q)
+      reaction(1, j) = reaction(1, j) - px(q)
+      reaction(2, j) = reaction(2, j) - py(q)
+      reaction(3, j) = reaction(3, j) - pz(q)
+      reaction(4, j) = reaction(4, j) - hot(q, 8)*qx(q)
+      reaction(5, j) = reaction(5, j) - hot(q, 8)*qy(q)
+      reaction(6, j) = reaction(6, j) - hot(q, 8)*qz(q)
     end do
   end subroutine react_3d_friction
 
@@ -568,19 +618,125 @@ contains
     end do
   end subroutine velocity_3d_friction
 
-  ! |r - P|^2 and |r|^2 added lane by lane. Contacts of no effect between bodies that cannot move have W = 0.
+  ! W_nn and W_tt of a block [1/kg], at least the least positive number: contacts of no effect between bodies that cannot move
+  ! have W = 0.
+
+  pure subroutine weigh_2d_frictionless(pair, hot, weight, wn)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(in) :: hot(lanes, 4), weight(2, *)
+    real(dp), intent(out) :: wn(lanes)
+    integer :: q
+
+    do q = 1, lanes
+      wn(q) = max(normal_2d(hot(q, 2), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
+    end do
+  end subroutine weigh_2d_frictionless
+
+  pure subroutine weigh_3d_frictionless(pair, hot, weight, wn)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(in) :: hot(lanes, 5), weight(3, *)
+    real(dp), intent(out) :: wn(lanes)
+    integer :: q
+
+    do q = 1, lanes
+      wn(q) = max(normal_3d(hot(q, 2), hot(q, 3), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
+    end do
+  end subroutine weigh_3d_frictionless
+
+  pure subroutine weigh_2d_friction(pair, hot, weight, wn, wt)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(in) :: hot(lanes, 8), weight(3, *)
+    real(dp), intent(out) :: wn(lanes), wt(lanes)
+    integer :: q, i, j
+
+    do q = 1, lanes
+      i = pair(1, q)
+      j = pair(2, q)
+      wn(q) = max(normal_2d(hot(q, 2), weight(1:2, i), weight(1:2, j)), tiny(1.0_dp))
+      wt(q) = max(tangential_2d(hot(q, 1), weight(1:2, i), weight(1:2, j)) + weight(3, i)*hot(q, 6)**2 &
+        & + weight(3, j)*hot(q, 7)**2, tiny(1.0_dp))
+    end do
+  end subroutine weigh_2d_friction
+
+  pure subroutine weigh_3d_friction(pair, hot, weight, wn, wt)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(in) :: hot(lanes, 9), weight(4, *)
+    real(dp), intent(out) :: wn(lanes), wt(lanes)
+    integer :: q, i, j
+    real(dp) :: tx, ty, tz, sx, sy, sz, w, y, z, tt, ss, ts
+
+    do q = 1, lanes
+      i = pair(1, q)
+      j = pair(2, q)
+      call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
+      ! as normal_3d and tangential_3d, written out: arrays of three would keep the lanes from becoming vectors
+      w = weight(1, i) + weight(1, j)
+      y = (weight(2, i) - weight(1, i)) + (weight(2, j) - weight(1, j))
+      z = (weight(3, i) - weight(1, i)) + (weight(3, j) - weight(1, j))
+      tt = ty**2*y + tz**2*z
+      ss = sy**2*y + sz**2*z
+      ts = ty*sy*y + tz*sz*z
+      wn(q) = max(w + (hot(q, 2)**2*y + hot(q, 3)**2*z), tiny(1.0_dp))
+      wt(q) = max(w + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2)) + weight(4, i)*hot(q, 7)**2 &
+        & + weight(4, j)*hot(q, 8)**2, tiny(1.0_dp))
+    end do
+  end subroutine weigh_3d_friction
+
+  pure subroutine invert_2d_frictionless(pair, hot, weight)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(inout) :: hot(lanes, 4)
+    real(dp), intent(in) :: weight(2, *)
+    real(dp) :: wn(lanes)
+
+    call weigh_2d_frictionless(pair, hot, weight, wn)
+    hot(:, 4) = 1.0_dp/wn
+  end subroutine invert_2d_frictionless
+
+  pure subroutine invert_3d_frictionless(pair, hot, weight)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(inout) :: hot(lanes, 5)
+    real(dp), intent(in) :: weight(3, *)
+    real(dp) :: wn(lanes)
+
+    call weigh_3d_frictionless(pair, hot, weight, wn)
+    hot(:, 5) = 1.0_dp/wn
+  end subroutine invert_3d_frictionless
+
+  pure subroutine invert_2d_friction(pair, hot, weight)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(inout) :: hot(lanes, 8)
+    real(dp), intent(in) :: weight(3, *)
+    real(dp) :: wn(lanes), wt(lanes)
+
+    call weigh_2d_friction(pair, hot, weight, wn, wt)
+    hot(:, 4) = 1.0_dp/wn
+    hot(:, 5) = 1.0_dp/wt
+  end subroutine invert_2d_friction
+
+  pure subroutine invert_3d_friction(pair, hot, weight)
+    integer, intent(in) :: pair(2, lanes)
+    real(dp), intent(inout) :: hot(lanes, 9)
+    real(dp), intent(in) :: weight(4, *)
+    real(dp) :: wn(lanes), wt(lanes)
+
+    call weigh_3d_friction(pair, hot, weight, wn, wt)
+    hot(:, 5) = 1.0_dp/wn
+    hot(:, 6) = 1.0_dp/wt
+  end subroutine invert_3d_friction
+
+  ! |r - P|^2 and |r|^2 added lane by lane.
 
   pure subroutine defect_2d_frictionless(pair, hot, weight, velocity, impulse, parts)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 4), weight(2, *), velocity(2, *), impulse(lanes, 1)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q
-    real(dp) :: v(lanes, 1), wn, rn
+    real(dp) :: v(lanes, 1), wn(lanes), rn
 
     call velocity_2d_frictionless(pair, hot, velocity, v)
+    call weigh_2d_frictionless(pair, hot, weight, wn)
     do q = 1, lanes
-      wn = normal_2d(hot(q, 2), weight(:, pair(1, q)), weight(:, pair(2, q)))
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/max(wn, tiny(1.0_dp)))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/wn(q))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2
     end do
@@ -591,12 +747,12 @@ contains
     real(dp), intent(in) :: hot(lanes, 5), weight(3, *), velocity(3, *), impulse(lanes, 1)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q
-    real(dp) :: v(lanes, 1), wn, rn
+    real(dp) :: v(lanes, 1), wn(lanes), rn
 
     call velocity_3d_frictionless(pair, hot, velocity, v)
+    call weigh_3d_frictionless(pair, hot, weight, wn)
     do q = 1, lanes
-      wn = normal_3d(hot(q, 2), hot(q, 3), weight(:, pair(1, q)), weight(:, pair(2, q)))
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/max(wn, tiny(1.0_dp)))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/wn(q))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2
     end do
@@ -606,17 +762,14 @@ contains
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 8), weight(3, *), velocity(3, *), impulse(lanes, 2)
     real(dp), intent(inout) :: parts(lanes, 2)
-    integer :: q, i, j
-    real(dp) :: v(lanes, 2), wn, wt, rn, rt
+    integer :: q
+    real(dp) :: v(lanes, 2), wn(lanes), wt(lanes), rn, rt
 
     call velocity_2d_friction(pair, hot, velocity, v)
+    call weigh_2d_friction(pair, hot, weight, wn, wt)
     do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      wn = normal_2d(hot(q, 2), weight(1:2, i), weight(1:2, j))
-      wt = tangential_2d(hot(q, 1), weight(1:2, i), weight(1:2, j)) + weight(3, i)*hot(q, 6)**2 + weight(3, j)*hot(q, 7)**2
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/max(wn, tiny(1.0_dp)))
-      rt = max(-hot(q, 8)*rn, min(hot(q, 8)*rn, impulse(q, 2) - v(q, 2)/max(wt, tiny(1.0_dp))))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/wn(q))
+      rt = max(-hot(q, 8)*rn, min(hot(q, 8)*rn, impulse(q, 2) - v(q, 2)/wt(q)))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2 + (rt - impulse(q, 2))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2 + impulse(q, 2)**2
     end do
@@ -626,32 +779,16 @@ contains
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 9), weight(4, *), velocity(6, *), impulse(lanes, 3)
     real(dp), intent(inout) :: parts(lanes, 2)
-    integer :: q, i, j
-    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz, v(lanes, 3), wn, wt, rn, rt, rs, bound, reduction, y, z, tt, ss, ts
+    integer :: q
+    real(dp) :: v(lanes, 3), wn(lanes), wt(lanes), rn, rt, rs, bound, reduction
 
     call velocity_3d_friction(pair, hot, velocity, v)
+    call weigh_3d_friction(pair, hot, weight, wn, wt)
     do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      nx = hot(q, 1)
-      ny = hot(q, 2)
-      nz = hot(q, 3)
-      call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
-      ! as normal_3d and tangential_3d, written out: arrays of three would keep the lanes from becoming vectors
-      wn = weight(1, i) + weight(1, j)
-      y = (weight(2, i) - weight(1, i)) + (weight(2, j) - weight(1, j))
-      z = (weight(3, i) - weight(1, i)) + (weight(3, j) - weight(1, j))
-      tt = ty**2*y + tz**2*z
-      ss = sy**2*y + sz**2*z
-      ts = ty*sy*y + tz*sz*z
-      wt = wn + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2))
-      wn = wn + (ny**2*y + nz**2*z)
-      wt = wt + weight(4, i)*hot(q, 7)**2 + weight(4, j)*hot(q, 8)**2
-      wt = max(wt, tiny(1.0_dp))
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/max(wn, tiny(1.0_dp)))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/wn(q))
       bound = hot(q, 9)*rn
-      rt = impulse(q, 2) - v(q, 2)/wt
-      rs = impulse(q, 3) - v(q, 3)/wt
+      rt = impulse(q, 2) - v(q, 2)/wt(q)
+      rs = impulse(q, 3) - v(q, 3)/wt(q)
       reduction = bound/max(sqrt(rt*rt + rs*rs), bound, tiny(1.0_dp))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2 + (rt*reduction - impulse(q, 2))**2 + (rs*reduction - impulse(q, 3))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2 + impulse(q, 2)**2 + impulse(q, 3)**2

@@ -2,6 +2,7 @@
 module gravier_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
   use gravier_kinds, only: dp, i8
+  use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
   use gravier_contact_kernels, only: kernels_t, local_operator, lane_of, block_of
@@ -87,8 +88,9 @@ module gravier_contact_problem
 contains
 
   !> Set the masses that sweeps work with: undivided, or shared equally between the copies, M~ = M/m (7)-(8).
-  subroutine subproblem_share_masses(self, shared)
+  subroutine subproblem_share_masses(self, kernels, shared)
     class(subproblem_t), intent(inout) :: self
+    type(kernels_t), intent(in) :: kernels
     logical, intent(in) :: shared
     integer :: b
 
@@ -98,21 +100,20 @@ contains
         self%weight(:, b) = self%multiplicity(b)*self%inverse_mass(:, b)
       end do
     end if
-    call self%update_local_operator()
+    call self%update_local_operator(kernels)
   end subroutine subproblem_share_masses
 
   !> Diagonal of the local operators from `weight`, into `hot`.
-  pure subroutine subproblem_update_local_operator(self)
+  pure subroutine subproblem_update_local_operator(self, kernels)
     class(subproblem_t), intent(inout) :: self
-    integer :: c, nd
-    real(dp) :: w(2)
+    type(kernels_t), intent(in) :: kernels
+    integer :: nd
 
-    nd = size(self%position, 1)
-    do c = 1, self%n_contacts
-      call self%local_operator(c, self%weight, w)
-      self%hot(lane_of(c), nd + 2, block_of(c)) = 1.0_dp/w(1)
-      if (size(self%hot, 2) > nd + 2) self%hot(lane_of(c), nd + 3, block_of(c)) = 1.0_dp/w(2)
-    end do
+    if (self%n_contacts == 0) return
+    call kernels%set_operators(self%pair, self%hot, self%weight)
+    ! contacts of no effect are all zero
+    nd = kernels%nd
+    self%hot(lane_of(self%n_contacts) + 1:, nd + 2:nd + min(kernels%nc, 2) + 1, block_of(self%n_contacts)) = 0.0_dp
   end subroutine subproblem_update_local_operator
 
   !> W_nn and W_tt of contact `c` [1/kg], see gravier_contact_kernels; W_tt = W_nn without friction.
@@ -207,9 +208,9 @@ contains
 
   end subroutine contact_problem_evaluate
 
-  !> The residual of the impulses: how far each is from its own exact local solve under all others, relative to
-  !> the norm of all impulses (or to force_scale where all are zero). It knows of no method. NaN where some
-  !> impulse is not finite. Collective.
+  !> The residual of the impulses, with v_global as `evaluate` has made it: how far each is from its own exact local solve under
+  !> all others, relative to the norm of all impulses (or to force_scale where all are zero). It knows of no method. NaN where
+  !> some impulse is not finite. Collective.
   subroutine contact_problem_residual(self, residual, defect)
     class(contact_problem_t), intent(inout) :: self
     real(dp), intent(out) :: residual
@@ -219,14 +220,15 @@ contains
     real(dp) :: sums(2)
     integer :: s
 
-    call self%evaluate()
     allocate (parts(2, size(self%sub)))
     do s = 1, size(self%sub)
       associate (sub => self%sub(s))
         call self%kernels%residual(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, parts(:, s))
       end associate
     end do
+    call start_timer(phase_reduction)
     call self%comm%sum_parts(parts, sums)
+    call stop_timer(phase_reduction)
     if (.not. all(ieee_is_finite(sums))) then
       residual = ieee_value(residual, ieee_quiet_nan)
       defect = residual
@@ -274,7 +276,9 @@ contains
         end do
       end associate
     end do
+    call start_timer(phase_reduction)
     jump = self%comm%highest(jump)
+    call stop_timer(phase_reduction)
     if (self%velocity_scale > 0.0_dp) jump = jump/self%velocity_scale
   end function contact_problem_received_jump
 

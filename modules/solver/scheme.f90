@@ -2,7 +2,7 @@
 module gravier_scheme
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
+  use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, phase_reduction, clock
   use gravier_communicator, only: communicator_t
   use gravier_contact_problem, only: contact_problem_t
   implicit none
@@ -70,7 +70,7 @@ module gravier_scheme
   end type scheme_t
 
   abstract interface
-    !> Make ready for a new problem, from the impulses it holds. Collective; an error is the same on all ranks.
+    !> Make ready for a new problem, from the impulses it holds, and evaluate v_global. Collective; an error is the same on all ranks.
     subroutine start_solve(self, problem, error)
       import :: scheme_t, contact_problem_t, error_t
       implicit none
@@ -140,24 +140,24 @@ contains
     if (allocated(self%seconds)) deallocate (self%seconds)
   end subroutine scheme_forget_times
 
-  !> Masses as the method wants them, and velocities that agree with the impulses in all copies. Collective.
+  !> Masses as the method wants them, and velocities that agree with the impulses in all copies, v_global too. Collective.
   subroutine start_sweeps(scheme, problem, shared_masses)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
     !> masses shared between the copies of a body (dual Schur methods), or whole in each
     logical, intent(in) :: shared_masses
-    logical :: warm
     integer :: s
 
-    warm = problem%any_impulse()
-    if (warm) call problem%evaluate()
+    if (problem%any_impulse()) then
+      call problem%evaluate()
+    else
+      do s = 1, size(problem%sub)
+        problem%sub(s)%v_global(:, :) = problem%sub(s)%v_free
+      end do
+    end if
     do s = 1, size(problem%sub)
-      call problem%sub(s)%share_masses(shared_masses)
-      if (warm) then
-        problem%sub(s)%velocity(:, :) = problem%sub(s)%v_global
-      else
-        problem%sub(s)%velocity(:, :) = problem%sub(s)%v_free
-      end if
+      call problem%sub(s)%share_masses(problem%kernels, shared_masses)
+      problem%sub(s)%velocity(:, :) = problem%sub(s)%v_global
     end do
     if (allocated(problem%progress)) deallocate (problem%progress)
     allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)
@@ -296,7 +296,9 @@ contains
     scheme%work%iterations = scheme%work%iterations + 1
     call stop_timer(phase_sweep)
     if (.not. scheme%momentum%on) return
+    call start_timer(phase_reduction)
     call problem%comm%sum_parts(problem%progress, sums)
+    call stop_timer(phase_reduction)
     call scheme%momentum%steer(sums(1))
   end subroutine end_sweeps
 

@@ -3,7 +3,7 @@ module gravier_solve
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_check
+  use gravier_timers, only: start_timer, stop_timer, phase_check, phase_reduction
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   implicit none
@@ -98,8 +98,9 @@ contains
     logical function is_worth_a_check() result(is_worth)
       real(dp) :: sums(2)
 
-      call start_timer(phase_check)
+      call start_timer(phase_reduction)
       call problem%comm%sum_parts(problem%progress, sums)
+      call stop_timer(phase_reduction)
       progress = 0.0_dp
       is_worth = .true.
       if (all(ieee_is_finite(sums))) then
@@ -108,7 +109,6 @@ contains
           & is_worth = ratio*progress <= worth_a_check*control%tolerance .or. sqrt(sums(1)) > growth_limit*reference
       end if
       skips = merge(0, skips + 1, is_worth)
-      call stop_timer(phase_check)
     end function is_worth_a_check
 
     subroutine check(finished)
@@ -116,6 +116,7 @@ contains
       real(dp) :: defect, figure
 
       call start_timer(phase_check)
+      if (report%iterations > 0) call problem%evaluate()
       call problem%residual(report%residual, defect)
       figure = report%residual
       if (present(exact)) then

@@ -210,7 +210,7 @@ contains
     call make(comm, dimension, 9, friction, keys, sim)
     mine = 0
     do s = 1, size(sim%problem%sub)
-      call sim%problem%sub(s)%share_masses(.true.)
+      call sim%problem%sub(s)%share_masses(sim%problem%kernels, .true.)
       if (sim%problem%sub(s)%n_bodies > 0) mine = mine + 1
     end do
     call matrix%start(sim%problem, error)
@@ -237,7 +237,7 @@ contains
     call matrix%update(sim%problem, changed, error)
     call expect(matrix, changed, mine, 3*mine + min(mine, 1_i8), mine > 0, "one more active contact")
     do s = 1, size(sim%problem%sub)
-      call sim%problem%sub(s)%share_masses(.false.)
+      call sim%problem%sub(s)%share_masses(sim%problem%kernels, .false.)
     end do
     call matrix%update(sim%problem, changed, error)
     call check(changed .or. mine == 0, "other masses: changed")

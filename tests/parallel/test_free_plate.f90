@@ -257,7 +257,7 @@ contains
 
     call make(comm, dimension, n_parts, friction, problem)
     do s = 1, size(problem%sub)
-      call problem%sub(s)%share_masses(.true.)
+      call problem%sub(s)%share_masses(problem%kernels, .true.)
     end do
     call matrix%start(problem, error)
     call matrix%update(problem, changed, error)

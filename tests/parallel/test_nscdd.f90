@@ -149,7 +149,7 @@ contains
     call make(comm, dimension, 9, friction, keys, sim)
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
-        call sub%share_masses(.true.)
+        call sub%share_masses(sim%problem%kernels, .true.)
         do b = 1, sub%n_bodies
           do d = 1, sim%problem%kernels%nv
             sub%velocity(d, b) = copy_of(sub%id(b), sub%subdomain, d)

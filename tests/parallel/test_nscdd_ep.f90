@@ -312,6 +312,7 @@ contains
     end do
     call iterate(ep, 10)
     call check_close(distance(nscdd%problem, ep%problem), 0.0_dp, 1.0e-7_dp, "the solution is a fixed point")
+    call ep%problem%evaluate()
     call ep%problem%residual(residual, defect)
     call check_close(residual, 0.0_dp, 1.0e-8_dp, "residual at a fixed point")
     call nscdd%free()

@@ -5,7 +5,7 @@ program test_timers
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_timers, only: start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases, &
     & phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, phase_sweep, phase_exchange, &
-    & phase_factorise, phase_interface_solve, phase_check, phase_projection, phase_output
+    & phase_factorise, phase_interface_solve, phase_check, phase_reduction, phase_projection, phase_output
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   !> seconds that a phase takes at least on rank 0
@@ -16,6 +16,7 @@ program test_timers
   call comm%init()
   call test_phases()
   call test_figures()
+  call test_nesting()
   call test_reset()
   call finish_checks()
   call comm%free()
@@ -34,7 +35,8 @@ contains
   !> Numbers and names, each once.
   subroutine test_phases()
     integer, parameter :: phases(*) = [phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, &
-      & phase_sweep, phase_exchange, phase_factorise, phase_interface_solve, phase_check, phase_projection, phase_output]
+      & phase_sweep, phase_exchange, phase_factorise, phase_interface_solve, phase_check, phase_reduction, phase_projection, &
+      & phase_output]
     integer :: k, j
 
     call check_equal(size(phases), n_phases, "number of phases")
@@ -86,6 +88,29 @@ contains
     call check(most(phase_check) <= comm%highest(outer), "a phase within a phase")
     call check_close(most(phase_output), 0.0_dp, 0.0_dp, "a phase that has not run")
   end subroutine test_figures
+
+  !> The time of a phase within another is its own alone, and a phase that an error has left ends with the one around it.
+  subroutine test_nesting()
+    real(dp), dimension(n_phases) :: mean, least, most
+    real(dp) :: whole
+
+    call reset_timers()
+    whole = MPI_Wtime()
+    call start_timer(phase_setup)
+    call start_timer(phase_check)
+    call wait_for(4.0_dp*unit)
+    call start_timer(phase_reduction)
+    call stop_timer(phase_setup)
+    whole = MPI_Wtime() - whole
+    call start_timer(phase_output)
+    call wait_for(unit)
+    call stop_timer(phase_output)
+    call gather_timers(comm, mean, least, most)
+    call check(least(phase_check) >= 4.0_dp*unit, "the phase within")
+    call check(most(phase_setup) < comm%highest(whole) - 4.0_dp*unit + 1.0e-6_dp, "the phase around, less the one within")
+    call check(most(phase_setup) + most(phase_check) < comm%highest(whole) + 1.0e-6_dp .or. comm%size > 1, "no more than both")
+    call check(most(phase_check) < comm%highest(whole) + 1.0e-6_dp, "the phase within ends with the one around")
+  end subroutine test_nesting
 
   real(dp) function sum_over_ranks(x)
     real(dp), intent(in) :: x

@@ -46,6 +46,7 @@ contains
     do c = 1, problem%sub(1)%n_contacts
       problem%sub(1)%impulse(lane_of(c), 1, block_of(c)) = 1.0_dp
     end do
+    call problem%evaluate()
   end subroutine growing_start
 
   subroutine growing_iterate(self, problem, measure, jump, error)
