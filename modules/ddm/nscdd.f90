@@ -60,16 +60,10 @@ contains
   !> The same where the copies' velocities have just been passed.
   subroutine take_averages(problem)
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, k, b
+    integer :: s
 
     do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), velocity => problem%sub(s)%velocity)
-        call problem%shared%sum_copies(s, velocity)
-        do k = 1, part%n_shared
-          b = part%body(k)
-          velocity(:, b) = velocity(:, b)/part%multiplicity(k)
-        end do
-      end associate
+      call problem%shared%sum_copies(s, problem%sub(s)%velocity, mean=.true.)
     end do
   end subroutine take_averages
 

@@ -286,9 +286,10 @@ contains
 
     allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%place(sub%n_grains))
     allocate (sub%position(kernels%nd, sub%n_grains), sub%radius(sub%n_grains))
-    allocate (sub%v_free(kernels%nv, n_columns), sub%velocity(kernels%nv, n_columns), sub%v_global(kernels%nv, n_columns), &
-      & sub%reaction(kernels%nv, n_columns), sub%inverse_mass(kernels%nw, n_columns), sub%weight(kernels%nw, n_columns), &
-      & source=0.0_dp)
+    allocate (sub%v_free(kernels%nv, n_columns), sub%inverse_mass(kernels%nw, n_columns), source=0.0_dp)
+    ! what the solve sets before it reads them
+    allocate (sub%velocity(kernels%nv, n_columns), sub%v_global(kernels%nv, n_columns), sub%reaction(kernels%nv, n_columns), &
+      & sub%weight(kernels%nw, n_columns))
     allocate (sub%multiplicity(sub%n_bodies), source=1)
     allocate (sub%boundary(sub%n_grains + 1:n_columns), source=0)
   end subroutine allocate_bodies

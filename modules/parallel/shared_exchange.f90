@@ -445,26 +445,32 @@ contains
     end do
   end subroutine shared_exchange_add_copies
 
-  !> Replace the values of all shared bodies of part `p` by their sums over all copies, in subdomain order.
-  subroutine shared_exchange_sum_copies(self, p, field)
+  !> Replace the values of all shared bodies of part `p` by their sums over all copies, in subdomain order, or by their means.
+  subroutine shared_exchange_sum_copies(self, p, field, mean)
     class(shared_exchange_t), intent(in) :: self
     integer, intent(in) :: p
     !> (at least width, bodies of the subdomain)
     real(dp), intent(inout), contiguous :: field(:, :)
-    integer :: k, d, b, s
+    logical, intent(in) :: mean
+    real(dp) :: half
+    integer :: k, d, b, s, copies
 
+    half = merge(0.5_dp, 1.0_dp, mean)
     associate (part => self%part(p))
       do k = 1, part%n_shared
         b = part%body(k)
-        if (part%first(k + 1) - part%first(k) > 2) then
+        copies = part%first(k + 1) - part%first(k)
+        if (copies > 2) then
           call self%add_copies(p, k, field(:, b))
+          if (mean) field(1:self%width, b) = field(1:self%width, b)/copies
           cycle
         end if
         ! two copies, as almost always: the order does not matter, and the slot of this one is 0
         s = part%slot(part%first(k)) + part%slot(part%first(k) + 1)
+        ! too short to gain from vectors
         !GCC$ novector
         do d = 1, self%width
-          field(d, b) = field(d, b) + part%recv(d, s)
+          field(d, b) = half*(field(d, b) + part%recv(d, s))
         end do
       end do
     end associate

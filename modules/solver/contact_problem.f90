@@ -188,7 +188,7 @@ contains
     end do
     call self%shared%pass()
     do s = 1, size(self%sub)
-      call self%shared%sum_copies(s, self%sub(s)%reaction)
+      call self%shared%sum_copies(s, self%sub(s)%reaction, mean=.false.)
       call add_impulses(self%sub(s))
     end do
 

@@ -3,7 +3,7 @@ module gravier_solve
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_check, phase_reduction
+  use gravier_timers, only: start_timer, stop_timer, phase_setup, phase_check, phase_reduction
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   implicit none
@@ -79,7 +79,9 @@ contains
     progress = 0.0_dp
     ratio = 0.0_dp
     skips = 0
+    call start_timer(phase_setup)
     call scheme%start(problem, error)
+    call stop_timer(phase_setup)
     if (allocated(error)) return
     call check(done)
     do while (.not. done)
