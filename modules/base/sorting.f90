@@ -5,9 +5,12 @@ module gravier_sorting
   private
   public :: argsort, argsort_rows, find_sorted
 
+  !> bits of a digit; it divides those of a key
+  integer, parameter :: digit = 8
+
 contains
 
-  !> Permutation that sorts `keys` in ascending order; equal keys keep their order (merge sort).
+  !> Permutation that sorts `keys` in ascending order; equal keys keep their order.
   subroutine argsort(keys, order)
     integer(i8), intent(in), contiguous :: keys(:)
     !> order(k) is the place in `keys` of the k-th smallest; size(keys)
@@ -60,23 +63,45 @@ contains
     end do
   end function find_sorted
 
-  !> Rearrange `order` so that keys(order) ascends, stably: bottom-up merges of runs of doubling length.
+  !> Rearrange `order` so that keys(order) ascends, stably: by one digit after the other, from the lowest; those that all
+  !> keys have in common take no pass (radix sort).
   subroutine sort_stably(keys, order)
     integer(i8), intent(in), contiguous :: keys(:)
     integer, intent(inout), contiguous :: order(:)
-    integer, allocatable :: work(:)
-    integer :: n, length, first
+    integer(i8), allocatable :: word(:), sorted(:)
+    integer, allocatable :: sorted_order(:)
+    integer :: next(0:2**digit - 1), i, lowest, d, below, here
+    integer(i8) :: differing
 
-    n = size(order)
     if (is_sorted(keys, order)) return
-    allocate (work(n))
-    length = 1
-    do while (length < n)
-      do first = 1, n, 2*length
-        call merge_runs(keys, order, work, first, min(first + length, n + 1), min(first + 2*length, n + 1))
+    allocate (word(size(order)), sorted(size(order)), sorted_order(size(order)))
+    differing = 0
+    do i = 1, size(order)
+      ! with the sign turned, words without a sign are in the order of the keys
+      word(i) = ieor(keys(order(i)), ibset(0_i8, bit_size(0_i8) - 1))
+      differing = ior(differing, ieor(word(i), word(1)))
+    end do
+    do lowest = 0, bit_size(0_i8) - digit, digit
+      if (ibits(differing, lowest, digit) == 0) cycle
+      next(:) = 0
+      do i = 1, size(word)
+        d = int(ibits(word(i), lowest, digit))
+        next(d) = next(d) + 1
       end do
-      order(:) = work
-      length = 2*length
+      below = 0
+      do d = 0, 2**digit - 1
+        here = next(d)
+        next(d) = below + 1
+        below = below + here
+      end do
+      do i = 1, size(word)
+        d = int(ibits(word(i), lowest, digit))
+        sorted(next(d)) = word(i)
+        sorted_order(next(d)) = order(i)
+        next(d) = next(d) + 1
+      end do
+      word(:) = sorted
+      order(:) = sorted_order
     end do
   end subroutine sort_stably
 
@@ -93,32 +118,5 @@ contains
       end if
     end do
   end function is_sorted
-
-  !> Merge the runs [first, second) and [second, last) of `order` into `work`.
-  pure subroutine merge_runs(keys, order, work, first, second, last)
-    integer(i8), intent(in), contiguous :: keys(:)
-    integer, intent(in), contiguous :: order(:)
-    integer, intent(inout), contiguous :: work(:)
-    integer, intent(in) :: first, second, last
-    integer :: a, b, k
-
-    a = first
-    b = second
-    do k = first, last - 1
-      if (b >= last) then
-        work(k) = order(a)
-        a = a + 1
-      else if (a >= second) then
-        work(k) = order(b)
-        b = b + 1
-      else if (keys(order(b)) < keys(order(a))) then
-        work(k) = order(b)
-        b = b + 1
-      else
-        work(k) = order(a)
-        a = a + 1
-      end if
-    end do
-  end subroutine merge_runs
 
 end module gravier_sorting

@@ -144,10 +144,11 @@ contains
     type(neighbour_list_t), intent(inout) :: list
     type(entries_t) :: entries
     type(cell_hash_t) :: hash
-    real(dp) :: lower(bodies%nd)
+    real(dp) :: lower(bodies%nd), range
     logical :: periodic
 
     periodic = period%on()
+    range = rule%range()
     call list%init(periodic, 4*bodies%n + 16)
     if (bodies%n > 0) then
       lower(:) = minval(bodies%position, dim=2)
@@ -191,7 +192,7 @@ contains
         do b = 1, size(boundaries)
           if (.not. boundaries(b)%touches()) cycle
           call boundaries(b)%locate(bodies%position(:, k), distance, normal)
-          if (distance - bodies%radius(k) <= rule%range()) call list%add(k, -b, no_shift)
+          if (distance - bodies%radius(k) <= range) call list%add(k, -b, no_shift)
         end do
       end do
     end subroutine search_boundaries
@@ -252,12 +253,17 @@ contains
     subroutine test_pair(a, b)
       integer, intent(in) :: a, b
       integer :: i, j, shift(3), periods(3)
-      real(dp) :: branch(bodies%nd), antagonist(bodies%nd), point(bodies%nd)
+      real(dp) :: antagonist(3), point(3), square
+      integer :: d, nd
 
       i = entries%body(a)
       j = entries%body(b)
-      branch(:) = entries%position(:, a) - entries%position(:, b)
-      if (dot_product(branch, branch) > (bodies%radius(i) + bodies%radius(j) + rule%range())**2) return
+      nd = bodies%nd
+      square = 0.0_dp
+      do d = 1, nd
+        square = square + (entries%position(d, a) - entries%position(d, b))**2
+      end do
+      if (square > (bodies%radius(i) + bodies%radius(j) + range)**2) return
       if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
       shift(:) = 0
       if (periodic) then
@@ -273,13 +279,13 @@ contains
         i = entries%body(b)
         j = entries%body(a)
       end if
-      antagonist(:) = bodies%position(:, j)
-      if (periodic) antagonist(:) = antagonist + shift(1:bodies%nd)*period%length(1:bodies%nd)
-      point(:) = owner_point(rule%kind, bodies%position(:, i), antagonist)
+      antagonist(1:nd) = bodies%position(:, j)
+      if (periodic) antagonist(1:nd) = antagonist(1:nd) + shift(1:nd)*period%length(1:nd)
+      point(1:nd) = owner_point(rule%kind, bodies%position(:, i), antagonist(1:nd))
       if (periodic) then
-        if (.not. is_where_owned(period, point, periods)) return
+        if (.not. is_where_owned(period, point(1:nd), periods)) return
       end if
-      if (region%owner(point) /= subdomain) return
+      if (region%owner(point(1:nd)) /= subdomain) return
       call list%add(i, j, merge(shift_code(shift), no_shift, periodic))
     end subroutine test_pair
 

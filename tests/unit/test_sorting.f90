@@ -61,6 +61,15 @@ contains
     end do
     call argsort(keys, order)
     call check_order(keys, order, "descending keys")
+    do i = 1, n
+      keys(i) = ishft(int(mod(7*i, 11), i8) - 5, 8*mod(i, 8))
+    end do
+    if (n > 2) then
+      keys(2) = -huge(1_i8) - 1
+      keys(n) = huge(1_i8)
+    end if
+    call argsort(keys, order)
+    call check_order(keys, order, "keys of all magnitudes")
   end subroutine test_runs
 
   !> A stable sort has one result: a permutation along which (key, place) ascends strictly.
