@@ -70,7 +70,8 @@ module gravier_scheme
   end type scheme_t
 
   abstract interface
-    !> Make ready for a new problem, from the impulses it holds, and evaluate v_global. Collective; an error is the same on all ranks.
+    !> Make ready for a new problem, from the impulses it holds, and evaluate v_global. Collective; an error is the same on all
+    !> ranks.
     subroutine start_solve(self, problem, error)
       import :: scheme_t, contact_problem_t, error_t
       implicit none
