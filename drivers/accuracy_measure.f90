@@ -189,10 +189,10 @@ contains
   end subroutine judge
 
   !> `unknown` where there is nothing to relate to.
-  pure real(dp) function relative(difference, size)
-    real(dp), intent(in) :: difference, size
+  pure real(dp) function relative(difference, reference)
+    real(dp), intent(in) :: difference, reference
     relative = unknown
-    if (size > 0.0_dp) relative = difference/size
+    if (reference > 0.0_dp) relative = difference/reference
   end function relative
 
   !> A line on the terminal.
