@@ -11,7 +11,7 @@ module gravier_descent
   !> what is not known
   real(dp), parameter :: unknown_effort = -1.0_dp
   !> iterations spent below ten times the tolerance, over all of them: less is too little to judge a decay by
-  real(dp), parameter :: least_share = 0.1_dp
+  real(dp), parameter :: least_share = 0.2_dp
 
   !> One solve.
   type :: descent_t
