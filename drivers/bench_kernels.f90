@@ -8,7 +8,7 @@ module gravier_bench_kernels
   use gravier_contact_problem, only: subproblem_t
   use gravier_scheme, only: start_sweeps
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_bench_machine, only: last_cache
+  use gravier_machine, only: last_cache
   use gravier_bench_options, only: options_t
   use gravier_bench_packing, only: packing_t, make_packing, make_simulation
   use gravier_bench_record, only: record_t, case_t

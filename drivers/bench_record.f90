@@ -2,9 +2,10 @@
 module gravier_bench_record
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_statistics, only: median
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version, revision, compiler, build_type
-  use gravier_bench_machine, only: processor_model, compiler_flags, date_text
+  use gravier_machine, only: processor_model, compiler_flags, date_text
   implicit none
   private
   public :: record_t, case_t
@@ -137,26 +138,5 @@ contains
     end do
     call table%close(error)
   end subroutine record_write
-
-  !> The middle one of the values, of an even number the mean of the two in the middle.
-  pure real(dp) function median(values)
-    real(dp), intent(in) :: values(:)
-    real(dp) :: sorted(size(values)), one
-    integer :: k, j, n
-
-    n = size(values)
-    sorted(:) = values
-    do k = 2, n
-      one = sorted(k)
-      j = k - 1
-      do while (j >= 1)
-        if (sorted(j) <= one) exit
-        sorted(j + 1) = sorted(j)
-        j = j - 1
-      end do
-      sorted(j + 1) = one
-    end do
-    median = 0.5_dp*(sorted((n + 1)/2) + sorted(n/2 + 1))
-  end function median
 
 end module gravier_bench_record

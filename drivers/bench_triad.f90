@@ -2,7 +2,7 @@
 module gravier_bench_triad
   use mpi_f08, only: MPI_Wtime
   use gravier_kinds, only: dp, i8
-  use gravier_bench_machine, only: last_cache, free_memory
+  use gravier_machine, only: last_cache, free_memory
   implicit none
   private
   public :: triad_t, triad_bytes

@@ -1,22 +1,18 @@
-!> What the study of the columns leaves: a table for the reader, two tables as CSV, and a figure.
+!> What the study of the columns leaves: a table for the reader and two tables as CSV.
 module gravier_columns_report
-  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_errors, only: error_t
   use gravier_text, only: to_text
-  use gravier_file_system, only: remove_file
   use gravier_csv_writer, only: csv_writer_t
   use gravier_solve, only: solve_report_t, solve_converged, solve_diverged
-  use gravier_build_info, only: drivers_directory, share_directory
   use gravier_columns_study, only: column_t, method_t, methods, sweep_counts
   implicit none
   private
-  public :: write_table, write_csv, draw_figure
+  public :: write_table, write_csv
 
   !> widths in the table: of the names of methods, and of a number
   integer, parameter :: name_width = 24, number_width = 10
   !> significant digits of errors and residuals: few enough to be the same on any machine
   integer, parameter :: digits = 4
-  !> exit status of the shell that found no Python to draw with
-  integer, parameter :: no_python = 126
 
 contains
 
@@ -150,51 +146,5 @@ contains
       call errors%end_row(error)
     end do
   end subroutine write_trace
-
-  !> Draw columns.png and columns.svg from the tables in a directory, by a Python that has matplotlib. Call it on one
-  !> rank, after the end of MPI, which need not bear the start of another process. Failure: status_failure.
-  subroutine draw_figure(directory, error)
-    character(len=*), intent(in) :: directory
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: script
-    integer :: failed, status
-    logical :: found
-
-    ! none is better than that of other tables
-    call remove_file(directory//"/columns.png")
-    call remove_file(directory//"/columns.svg")
-    script = drivers_directory//"/plot_columns.py"
-    inquire (file=script, exist=found)
-    if (.not. found) script = share_directory//"/plot_columns.py"
-    status = 0
-    call execute_command_line("for python in ""$GRAVIER_PYTHON"" python3 /usr/bin/python3; do "// &
-      & """$python"" -c 'import matplotlib' >/dev/null 2>&1 && exec ""$python"" "//quoted(script)//" "//quoted(directory)// &
-      & "; done; exit "//to_text(no_python), exitstat=status, cmdstat=failed)
-    if (failed /= 0) then
-      call raise(error, status_failure, "the figure is NOT drawn: no shell could be started")
-    else if (status == no_python) then
-      call raise(error, status_failure, "the figure is NOT drawn: neither $GRAVIER_PYTHON nor python3 has matplotlib")
-    else if (status /= 0) then
-      call raise(error, status_failure, "the figure is NOT drawn: "//script//" "//directory//" ended with status "// &
-        & to_text(status))
-    end if
-  end subroutine draw_figure
-
-  !> A text as one word of the shell.
-  pure function quoted(text) result(word)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: word
-    integer :: i
-
-    word = "'"
-    do i = 1, len(text)
-      if (text(i:i) == "'") then
-        word = word//"'\''"
-      else
-        word = word//text(i:i)
-      end if
-    end do
-    word = word//"'"
-  end function quoted
 
 end module gravier_columns_report

@@ -8,8 +8,9 @@ program gravier_columns
   use gravier_file_system, only: make_directory
   use gravier_solve, only: solve_report_t, solve_converged
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
+  use gravier_drawing, only: draw_figure
   use gravier_columns_study, only: column_t, paper_columns, solve_columns
-  use gravier_columns_report, only: write_table, write_csv, draw_figure
+  use gravier_columns_report, only: write_table, write_csv
   implicit none
 
   character(len=*), parameter :: nl = new_line("a")
@@ -50,7 +51,7 @@ program gravier_columns
   if (.not. (allocated(error) .or. options%help)) then
     ! rank 0 alone speaks for all: an MPI that sees another rank fail would end it while it draws
     if (comm%rank /= 0) call leave(status_ok)
-    call draw_figure(options%directory, error)
+    call draw_figure("columns", options%directory, error)
     call report_failure()
     if (.not. allocated(error)) write (output_unit, "(2x,a)") options%directory//"/columns.png", options%directory//"/columns.svg"
   end if

@@ -23,7 +23,7 @@ contains
 
   !> Reads and checks the text of an input file.
   !> Fails (status_input) with one line that names the file, the group, the key, the value and what was expected.
-  subroutine parse_config(file, text, config, error)
+  subroutine parse_config(file, text, config, error, changes)
     !> path, for messages
     character(len=*), intent(in) :: file
     !> content of the file
@@ -31,6 +31,8 @@ contains
     !> complete when there is no error, defaults included
     type(config_t), target, intent(out) :: config
     type(error_t), allocatable, intent(out) :: error
+    !> assignments to groups that stand once at most, in place of those that the text has for the same keys
+    type(assignment_t), intent(in), optional :: changes(:)
     type(scan_t) :: found
     type(report_t) :: report
 
@@ -38,6 +40,7 @@ contains
     config%text = text
     report%file = file
     call scan_groups(file, text, found, error)
+    if (present(changes) .and. .not. allocated(error)) call found%change(changes)
     if (.not. allocated(error)) call check_names(file, found, error)
     if (allocated(error)) return
     allocate (config%boundaries(number_of_groups(found, "boundary")))

@@ -33,6 +33,8 @@ module gravier_config_scan
     integer :: n_groups = 0, n_assignments = 0
     type(group_text_t), allocatable :: groups(:)
     type(assignment_t), allocatable :: assignments(:)
+  contains
+    procedure :: change => scan_change
   end type scan_t
 
   !> The text under way and the position of the next character.
@@ -73,6 +75,48 @@ contains
     end do
     if (found%n_groups == 0) call fail(cursor, "empty file: expected namelist groups, &scene and &time at least", error)
   end subroutine scan_groups
+
+  !> Puts assignments in place of those to the same keys, into groups that are made where they are missing.
+  subroutine scan_change(self, changes)
+    class(scan_t), intent(inout) :: self
+    type(assignment_t), intent(in) :: changes(:)
+    type(scan_t) :: changed
+    integer :: i, k
+
+    allocate (changed%groups(self%n_groups + size(changes)), changed%assignments(self%n_assignments + size(changes)))
+    do i = 1, self%n_groups
+      changed%groups(i) = self%groups(i)
+    end do
+    changed%n_groups = self%n_groups
+    do i = 1, self%n_assignments
+      if (is_changed(self%assignments(i), changes)) cycle
+      changed%n_assignments = changed%n_assignments + 1
+      changed%assignments(changed%n_assignments) = self%assignments(i)
+    end do
+    do k = 1, size(changes)
+      do i = 1, changed%n_groups
+        if (changed%groups(i)%name == changes(k)%group) exit
+      end do
+      changed%groups(i)%name = changes(k)%group
+      changed%n_groups = max(i, changed%n_groups)
+      changed%n_assignments = changed%n_assignments + 1
+      changed%assignments(changed%n_assignments) = changes(k)
+    end do
+    self%n_groups = changed%n_groups
+    self%n_assignments = changed%n_assignments
+    call move_alloc(changed%groups, self%groups)
+    call move_alloc(changed%assignments, self%assignments)
+  end subroutine scan_change
+
+  !> Does one of the changes set the same key?
+  pure logical function is_changed(item, changes)
+    type(assignment_t), intent(in) :: item, changes(:)
+    integer :: k
+    is_changed = .false.
+    do k = 1, size(changes)
+      if (item%group == changes(k)%group .and. item%key == changes(k)%key) is_changed = .true.
+    end do
+  end function is_changed
 
   subroutine start(cursor, found, file, text)
     type(cursor_t), intent(out) :: cursor

@@ -18,7 +18,7 @@ module gravier_run
   use gravier_run_output, only: run_output_t
   implicit none
   private
-  public :: run_case, check_case, read_config, report_error
+  public :: run_case, check_case, read_config, read_input, report_error
 
   !> times overlap_allowed: an overlap that is no longer one of rounding and tolerance
   real(dp), parameter :: worth_a_warning = 5.0_dp
@@ -126,14 +126,25 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
+    call read_input(comm, path, text, error)
+    if (allocated(error)) return
+    call parse_config(path, text, config, error)
+    call comm%agree(error)
+  end subroutine read_config
+
+  !> The whole of a file as text, on all ranks. Collective; errors are the same on all ranks.
+  subroutine read_input(comm, path, text, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(inout) :: error
+
     text = ""
     if (comm%rank == 0) call read_text(path, text, error)
     call comm%agree(error)
     if (allocated(error)) return
     call comm%broadcast_text(text, 0)
-    call parse_config(path, text, config, error)
-    call comm%agree(error)
-  end subroutine read_config
+  end subroutine read_input
 
   !> The whole of a file as text.
   subroutine read_text(path, text, error)

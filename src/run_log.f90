@@ -9,6 +9,7 @@ module gravier_run_log
   use gravier_file_system, only: text_file_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
   use gravier_scheme, only: work_t
+  use gravier_descent, only: effort_t, tenfold
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_problem_builder, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
@@ -317,6 +318,7 @@ contains
     write (row, "(a28,f12.4)") "whole run                   ", seconds
     call self%line(trim(row), error)
     call write_work(self, simulation, error)
+    call write_accuracy(self, simulation, error)
   end subroutine run_log_write_end
 
   subroutine write_work(self, simulation, error)
@@ -347,6 +349,66 @@ contains
     call self%line("memory      at most "//to_text(nint(self%comm%highest(peak_memory())))//" MiB on a rank", error)
     call self%line("messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB", error)
   end subroutine write_work
+
+  !> What the accuracy of the run was, what its solves took, and what they would have taken with other tolerances. Collective.
+  subroutine write_accuracy(self, simulation, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: text
+    real(dp) :: radius, seconds
+
+    associate (effort => simulation%effort, solver => simulation%config%solver)
+      radius = simulation%decomposition%rule%mean_radius
+      text = "accuracy    "//trim(solver%criterion)//" at most "//to_text(effort%worst, 3)//" at the end of a solve, tolerance "// &
+        & to_text(solver%tolerance, 3)//"; overlap at most "//to_text(simulation%worst_overlap, 3)//" m"
+      if (radius > 0.0_dp) text = text//", "//to_text(simulation%worst_overlap/radius, 2)//" of the mean radius"
+      call self%line(text, error)
+      call self%line("            "//energy_text(simulation), error)
+      seconds = self%comm%highest(effort%seconds)
+      call self%line("cost        "//to_text(seconds, 3)//" s in "//to_text(effort%solves)//" solves of "// &
+        & to_text(effort%iterations)//" iterations in all", error)
+      if (effort%iterations == 0) return
+      text = "            at ten times the tolerance "//estimate_text(self%comm, effort, effort%looser())
+      if (effort%unreached(tenfold) > 0) text = text//": "//to_text(effort%unreached(tenfold))//" solves did not reach that"
+      call self%line(text, error)
+      text = "            at a tenth of the tolerance "//estimate_text(self%comm, effort, effort%tighter())
+      if (simulation%failed > 0) then
+        text = text//": "//to_text(simulation%failed)//" solves did not reach the tolerance itself"
+      else if (effort%tighter() < 0.0_dp) then
+        text = text//": most solves end at their first check"
+      end if
+      call self%line(text, error)
+    end associate
+  end subroutine write_accuracy
+
+  !> How far energies balance, where they are measured.
+  function energy_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    if (.not. allocated(simulation%diagnostics%energy)) then
+      text = "energy balance not measured; &output energy = .true. does"
+      return
+    end if
+    associate (energy => simulation%diagnostics%energy)
+      text = "energy balance off by "//to_text(abs(energy%error()), 2)//" J, of "//to_text(energy%turnover(), 3)//" J turned over"
+    end associate
+  end function energy_text
+
+  !> What so many iterations would have taken. Collective.
+  function estimate_text(comm, effort, iterations) result(text)
+    type(communicator_t), intent(in) :: comm
+    type(effort_t), intent(in) :: effort
+    real(dp), intent(in) :: iterations
+    character(len=:), allocatable :: text
+    real(dp) :: seconds
+
+    text = "not known"
+    if (iterations < 0.0_dp) return
+    seconds = comm%highest(effort%seconds_of(iterations))
+    text = "about "//to_text(seconds, 2)//" s, "//to_text(nint(iterations, i8))//" iterations (estimated)"
+  end function estimate_text
 
   subroutine run_log_close(self, error)
     class(run_log_t), intent(inout) :: self

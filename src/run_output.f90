@@ -85,7 +85,8 @@ contains
     integer :: k
 
     header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
-      & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,most_messages,most_values,ghosts"
+      & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,most_messages,most_values,"// &
+      & "ghosts,solve_seconds"
     do k = 1, diagnostics%n_columns
       header = header//","//trim(diagnostics%name(k))
     end do
@@ -157,6 +158,7 @@ contains
       call self%history%add(figures%sharing%most_neighbours)
       call self%history%add(figures%sharing%most_values)
       call self%history%add(figures%sharing%ghosts)
+      call self%history%add(figures%solve%seconds)
       do k = 1, simulation%diagnostics%n_columns
         call self%history%add(simulation%diagnostics%value(k))
       end do

@@ -14,6 +14,7 @@ module gravier_simulation
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
+  use gravier_descent, only: effort_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged
   use gravier_partition, only: partition_t, choose_boxes, check_subdomains
   use gravier_body_store, only: body_set_t
@@ -88,6 +89,9 @@ module gravier_simulation
     logical :: restarted = .false.
     !> of the last step [m]
     real(dp) :: largest_overlap = 0.0_dp
+    !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
+    real(dp) :: worst_overlap = 0.0_dp
+    type(effort_t) :: effort
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     !> largest over mean number of contacts of a subdomain in the last step
@@ -374,6 +378,7 @@ contains
     end do
     figures%max_overlap = self%comm%highest(figures%max_overlap)
     self%largest_overlap = figures%max_overlap
+    self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
     if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
     if (figures%divided) then
@@ -599,6 +604,9 @@ contains
     self%values = self%values + self%problem%shared%values
     if (allocated(error)) return
     if (figures%solve%status == solve_diverged) return
+    associate (solve => figures%solve)
+      call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
+    end associate
     call start_timer(phase_bodies)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
@@ -724,6 +732,8 @@ contains
     self%fast = 0
     self%last_written = -1
     self%restarted = .false.
+    self%worst_overlap = 0.0_dp
+    self%effort = effort_t()
     self%imbalance = 1.0_dp
     self%reached_imbalance = 0.0_dp
   end subroutine simulation_free

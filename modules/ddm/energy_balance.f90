@@ -34,6 +34,7 @@ module gravier_energy_balance
     procedure :: take_step => energy_take_step
     procedure :: take_places => energy_take_places
     procedure :: error => energy_error
+    procedure :: turnover => energy_turnover
     procedure :: get_state => energy_get_state
     procedure :: set_state => energy_set_state
   end type energy_balance_t
@@ -306,6 +307,13 @@ contains
     error = ((self%translation + self%rotation + self%boundaries) - self%start) - self%load_work - self%boundary_work + &
       & self%dissipated_normal + self%dissipated_friction + self%carried_away
   end function energy_error
+
+  !> Energy that the terms of the balance stand for: sum of their sizes [J].
+  pure real(dp) function energy_turnover(self) result(turnover)
+    class(energy_balance_t), intent(in) :: self
+    turnover = self%translation + self%rotation + self%boundaries + self%start + abs(self%load_work) + abs(self%boundary_work) + &
+      & abs(self%dissipated_normal) + abs(self%dissipated_friction) + abs(self%carried_away)
+  end function energy_turnover
 
   !> All of the balance, bit for bit.
   pure subroutine energy_get_state(self, words)

@@ -3,9 +3,10 @@ module gravier_solve
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_setup, phase_check, phase_reduction
+  use gravier_timers, only: start_timer, stop_timer, phase_setup, phase_check, phase_reduction, clock
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
+  use gravier_descent, only: descent_t
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
@@ -18,6 +19,8 @@ module gravier_solve
   !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
+  !> figures of a check that a trace keeps
+  integer, parameter :: n_traced = 5
 
   type :: solve_control_t
     real(dp) :: tolerance = 1.0e-4_dp
@@ -51,7 +54,13 @@ module gravier_solve
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
     !> relative error on the impulses, negative where no exact solution is known
     real(dp) :: error = -1.0_dp
-    !> one column a check: iteration, residual, jump, error (4, n_trace)
+    !> what the tolerance is compared with at the end: residual or error
+    real(dp) :: figure = 0.0_dp
+    !> how the figure came down
+    type(descent_t) :: descent
+    !> on this rank: the whole solve, and what comes before its first check [s]
+    real(dp) :: seconds = 0.0_dp, start_seconds = 0.0_dp
+    !> one column a check: iteration, residual, jump, error, seconds of this rank without those of checks (5, n_trace)
     integer :: n_trace = 0
     real(dp), allocatable :: trace(:, :)
   end type solve_report_t
@@ -70,11 +79,13 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> criterion 'error'
     class(exact_solution_t), intent(in), optional :: exact
-    real(dp) :: reference, progress, ratio
+    real(dp) :: reference, progress, ratio, began, checking
     integer :: skips
     logical :: measure, done
 
-    if (control%trace) allocate (report%trace(4, 64))
+    began = clock()
+    checking = 0.0_dp
+    if (control%trace) allocate (report%trace(n_traced, 64))
     reference = 0.0_dp
     progress = 0.0_dp
     ratio = 0.0_dp
@@ -83,6 +94,7 @@ contains
     call scheme%start(problem, error)
     call stop_timer(phase_setup)
     if (allocated(error)) return
+    report%start_seconds = clock() - began
     call check(done)
     do while (.not. done)
       report%iterations = report%iterations + 1
@@ -93,6 +105,7 @@ contains
       if (allocated(error)) return
       if (measure) call check(done)
     end do
+    report%seconds = clock() - began
 
   contains
 
@@ -111,37 +124,41 @@ contains
           & is_worth = ratio*progress <= worth_a_check*control%tolerance .or. sqrt(sums(1)) > growth_limit*reference
       end if
       skips = merge(0, skips + 1, is_worth)
+      if (.not. is_worth) call report%descent%note(report%iterations, ratio*progress, control%tolerance)
     end function is_worth_a_check
 
     subroutine check(finished)
       logical, intent(out) :: finished
-      real(dp) :: defect, figure
+      real(dp) :: defect, start
 
       call start_timer(phase_check)
+      start = clock()
       if (report%iterations > 0) call problem%evaluate()
       call problem%residual(report%residual, defect)
-      figure = report%residual
+      report%figure = report%residual
       if (present(exact)) then
         report%error = exact%error(problem)
-        figure = report%error
+        report%figure = report%error
       end if
-      if (control%trace) call keep_trace(report)
+      if (control%trace) call keep_trace(report, start - began - checking)
+      if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, control%tolerance)
       if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%residual/progress
-      call judge(figure, defect, finished)
+      call judge(defect, finished)
+      checking = checking + clock() - start
       call stop_timer(phase_check)
     end subroutine check
 
-    subroutine judge(figure, defect, finished)
-      real(dp), intent(in) :: figure, defect
+    subroutine judge(defect, finished)
+      real(dp), intent(in) :: defect
       logical, intent(out) :: finished
 
       finished = .true.
-      if (.not. (ieee_is_finite(figure) .and. ieee_is_finite(defect))) then
+      if (.not. (ieee_is_finite(report%figure) .and. ieee_is_finite(defect))) then
         report%status = solve_diverged
         return
       end if
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
-      if (figure <= control%tolerance) then
+      if (report%figure <= control%tolerance) then
         report%status = solve_converged
       else if (defect > growth_limit*reference) then
         report%status = solve_diverged
@@ -154,12 +171,14 @@ contains
 
   end subroutine solve_contacts
 
-  subroutine keep_trace(report)
+  subroutine keep_trace(report, seconds)
     type(solve_report_t), intent(inout) :: report
+    !> since the start of the solve, without those of checks [s]
+    real(dp), intent(in) :: seconds
     real(dp), allocatable :: longer(:, :)
 
     if (report%n_trace == size(report%trace, 2)) then
-      allocate (longer(4, 2*report%n_trace))
+      allocate (longer(n_traced, 2*report%n_trace))
       longer(:, 1:report%n_trace) = report%trace
       call move_alloc(longer, report%trace)
     end if
@@ -168,6 +187,7 @@ contains
     report%trace(2, report%n_trace) = report%residual
     report%trace(3, report%n_trace) = report%jump
     report%trace(4, report%n_trace) = report%error
+    report%trace(5, report%n_trace) = seconds
   end subroutine keep_trace
 
 end module gravier_solve

@@ -170,7 +170,7 @@ class Restart(RunTestCase):
         for table in ("history", "trace"):
             if os.path.exists(os.path.join(path, f"{table}.csv")):
                 rows = read_csv(os.path.join(path, f"{table}.csv"))
-                found.update({f"{table} {name}": value for name, value in rows.items() if name != "wall_seconds"})
+                found.update({f"{table} {name}": value for name, value in rows.items() if not name.endswith("_seconds")})
         found.update({f"checkpoint{name}": value for name, value in
                       contents(os.path.join(path, "checkpoint.h5")).items()})
         return found

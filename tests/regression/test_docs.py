@@ -200,7 +200,7 @@ class Words(unittest.TestCase):
 
     def test_options_of_the_programs_exist(self):
         count = 0
-        for program in ("gravier", "gravier_columns", "gravier_fclib", "gravier_sample"):
+        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_fclib", "gravier_sample"):
             usage = run([str(PROGRAMS / program), "--help"], ".")[1]
             for page in PAGES:
                 for option in re.findall(rf"(?<!/)\b{program} [^`\n]*?(--[a-z]+)", page.read_text(encoding="utf-8")):

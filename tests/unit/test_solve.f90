@@ -105,6 +105,7 @@ program test_solve
   call test_impact()
   call test_gap()
   call test_checks()
+  call test_descent()
   call test_at_the_start()
   call test_warm_start()
   call test_work()
@@ -314,6 +315,40 @@ contains
     call check(report%n_trace == 0 .and. .not. allocated(report%trace), "no trace unless asked for")
     call sim%free()
   end subroutine test_checks
+
+  !> Checks that are left out are known from what the sweeps moved: the levels are passed within a check of where a trace, which
+  !> leaves none out, has them.
+  subroutine test_descent()
+    type(simulation_t) :: sim
+    type(nlgs_t) :: nlgs
+    type(solve_control_t) :: control
+    type(solve_report_t) :: traced, report
+    type(error_t), allocatable :: error
+    integer :: k
+
+    control%tolerance = 1.0e-8_dp
+    control%trace = .true.
+    call make_column(sim, 2, 20, 0.0_dp)
+    call solve_contacts(sim%problem, nlgs, control, traced, error)
+    call sim%free()
+    control%trace = .false.
+    call make_column(sim, 2, 20, 0.0_dp)
+    call solve_contacts(sim%problem, nlgs, control, report, error)
+    call sim%free()
+    call check_equal(report%iterations, traced%iterations, "descent: iterations")
+    call check_equal(report%descent%first(0), report%iterations, "descent: the tolerance")
+    call check(traced%descent%first(0) - traced%descent%first(2) > 10*control%check_every, "descent: a decade takes many checks")
+    do k = 1, 2
+      call check(abs(report%descent%first(k) - traced%descent%first(k)) <= control%check_every, "descent: levels")
+    end do
+    call check_close(report%figure, report%residual, 0.0_dp, "descent: the figure is the residual")
+    call check(report%start_seconds > 0.0_dp .and. report%seconds > report%start_seconds, "seconds of the solve")
+    ! of a check: not before the one before it, and not after the solve
+    do k = 2, traced%n_trace
+      if (traced%trace(5, k) < traced%trace(5, k - 1)) exit
+    end do
+    call check(k > traced%n_trace .and. traced%trace(5, traced%n_trace) <= traced%seconds, "seconds of the checks")
+  end subroutine test_descent
 
   !> Impulses that are right already take no iteration, and a tolerance is met when the residual equals it.
   subroutine test_at_the_start()

@@ -1,5 +1,5 @@
 !> What a measurement ran on: processor, cache and memory as Linux tells, compiler and its flags.
-module gravier_bench_machine
+module gravier_machine
   use, intrinsic :: iso_fortran_env, only: compiler_options
   use gravier_kinds, only: i8
   implicit none
@@ -114,4 +114,4 @@ contains
     text = day(1:4)//"-"//day(5:6)//"-"//day(7:8)
   end function date_text
 
-end module gravier_bench_machine
+end module gravier_machine

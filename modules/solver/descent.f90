@@ -1,0 +1,120 @@
+!> How solves come down to their tolerance, in a record of fixed size, and what ten times looser and tighter tolerances would
+!> have taken.
+module gravier_descent
+  use gravier_kinds, only: dp, i8
+  implicit none
+  private
+  public :: descent_t, effort_t, tenfold, unknown_effort
+
+  !> places of the levels: tolerance 10^(k/2), so that the last one is ten times the tolerance
+  integer, parameter :: at_tolerance = 0, half_a_decade = 1, tenfold = 2
+  !> what is not known
+  real(dp), parameter :: unknown_effort = -1.0_dp
+  !> iterations spent below ten times the tolerance, over all of them: less is too little to judge a decay by
+  real(dp), parameter :: least_share = 0.2_dp
+
+  !> One solve.
+  type :: descent_t
+    !> iteration of the first figure at or below each level, -1 for none
+    integer :: first(at_tolerance:tenfold) = -1
+    !> iteration of the first figure after the start, 0 for none
+    integer :: first_check = 0
+  contains
+    procedure :: note => descent_note
+  end type descent_t
+
+  !> Many solves with one tolerance.
+  type :: effort_t
+    integer(i8) :: solves = 0, iterations = 0
+    !> solves that did not get down to each level
+    integer(i8) :: unreached(at_tolerance:tenfold) = 0
+    !> iterations of the others down to it
+    integer(i8) :: reached(at_tolerance:tenfold) = 0
+    !> largest figure at the end of a solve
+    real(dp) :: worst = 0.0_dp
+    !> on this rank: in all, and before the first iterations [s]
+    real(dp) :: seconds = 0.0_dp, start_seconds = 0.0_dp
+  contains
+    procedure :: add => effort_add
+    procedure :: looser => effort_looser
+    procedure :: tighter => effort_tighter
+    procedure :: seconds_of => effort_seconds_of
+  end type effort_t
+
+contains
+
+  !> Note a figure of the iteration, measured or expected from what sweeps move impulses by.
+  pure subroutine descent_note(self, iteration, figure, tolerance)
+    class(descent_t), intent(inout) :: self
+    integer, intent(in) :: iteration
+    real(dp), intent(in) :: figure, tolerance
+    integer :: k
+
+    if (self%first_check == 0) self%first_check = iteration
+    do k = at_tolerance, tenfold
+      if (self%first(k) < 0 .and. figure <= tolerance*10.0_dp**(0.5_dp*k)) self%first(k) = iteration
+    end do
+  end subroutine descent_note
+
+  !> Add a solve. One that took iterations to its tolerance would have taken those to its first check at a looser one: what a
+  !> looser tolerance leaves adds up from step to step, until it is too much for that one too.
+  pure subroutine effort_add(self, descent, iterations, figure, seconds, start_seconds)
+    class(effort_t), intent(inout) :: self
+    type(descent_t), intent(in) :: descent
+    integer, intent(in) :: iterations
+    !> at its end
+    real(dp), intent(in) :: figure
+    !> in all, and before the first iteration [s]
+    real(dp), intent(in) :: seconds, start_seconds
+    integer :: k
+
+    self%solves = self%solves + 1
+    self%iterations = self%iterations + iterations
+    self%worst = max(self%worst, figure)
+    self%seconds = self%seconds + seconds
+    self%start_seconds = self%start_seconds + start_seconds
+    do k = at_tolerance, tenfold
+      if (descent%first(k) < 0) then
+        self%unreached(k) = self%unreached(k) + 1
+      else if (iterations > 0) then
+        self%reached(k) = self%reached(k) + max(descent%first(k), descent%first_check)
+      end if
+    end do
+  end subroutine effort_add
+
+  !> Iterations to ten times the tolerance; `unknown_effort` where a solve did not get down to that.
+  pure real(dp) function effort_looser(self) result(iterations)
+    class(effort_t), intent(in) :: self
+
+    iterations = unknown_effort
+    if (self%unreached(tenfold) == 0) iterations = real(self%reached(tenfold), dp)
+  end function effort_looser
+
+  !> Iterations to a tenth of the tolerance, if each decade takes as many times the iterations as the last one did: the
+  !> geometric mean of what the last decade and its second half say. `unknown_effort` where a solve missed the tolerance, or
+  !> where most end at their first check, so that nothing is seen of their decay.
+  pure real(dp) function effort_tighter(self) result(iterations)
+    class(effort_t), intent(in) :: self
+    real(dp) :: all, decade, half
+
+    iterations = unknown_effort
+    if (self%unreached(at_tolerance) > 0) return
+    all = real(self%reached(at_tolerance), dp)
+    half = real(self%reached(half_a_decade), dp)
+    decade = real(self%reached(tenfold), dp)
+    if (all - decade < least_share*all .or. .not. decade > 0.0_dp) return
+    iterations = all*sqrt(all/decade)*(all/half)
+  end function effort_tighter
+
+  !> Seconds that so many iterations would have taken on this rank; `unknown_effort` for unknown ones.
+  pure real(dp) function effort_seconds_of(self, iterations) result(seconds)
+    class(effort_t), intent(in) :: self
+    real(dp), intent(in) :: iterations
+
+    seconds = unknown_effort
+    if (iterations < 0.0_dp) return
+    seconds = self%start_seconds
+    if (self%iterations > 0) seconds = seconds + (self%seconds - self%start_seconds)*(iterations/real(self%iterations, dp))
+  end function effort_seconds_of
+
+end module gravier_descent

@@ -1,0 +1,63 @@
+!> Figures, drawn by the Python scripts of the drivers.
+module gravier_drawing
+  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_text, only: to_text
+  use gravier_file_system, only: remove_file
+  use gravier_build_info, only: drivers_directory, share_directory
+  implicit none
+  private
+  public :: draw_figure
+
+  !> exit status of the shell that found no Python to draw with
+  integer, parameter :: no_python = 126
+
+contains
+
+  !> Draw DIRECTORY/NAME.png and DIRECTORY/NAME.svg from the tables in a directory, by the script plot_NAME.py and a Python that
+  !> has matplotlib. Call it on one rank, after the end of MPI, which need not bear the start of another process. Failure:
+  !> status_failure.
+  subroutine draw_figure(name, directory, error)
+    character(len=*), intent(in) :: name, directory
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: script
+    integer :: failed, status
+    logical :: found
+
+    ! none is better than that of other tables
+    call remove_file(directory//"/"//name//".png")
+    call remove_file(directory//"/"//name//".svg")
+    script = drivers_directory//"/plot_"//name//".py"
+    inquire (file=script, exist=found)
+    if (.not. found) script = share_directory//"/plot_"//name//".py"
+    status = 0
+    call execute_command_line("for python in ""$GRAVIER_PYTHON"" python3 /usr/bin/python3; do "// &
+      & """$python"" -c 'import matplotlib' >/dev/null 2>&1 && exec ""$python"" "//quoted(script)//" "//quoted(directory)// &
+      & "; done; exit "//to_text(no_python), exitstat=status, cmdstat=failed)
+    if (failed /= 0) then
+      call raise(error, status_failure, "the figure is NOT drawn: no shell could be started")
+    else if (status == no_python) then
+      call raise(error, status_failure, "the figure is NOT drawn: neither $GRAVIER_PYTHON nor python3 has matplotlib")
+    else if (status /= 0) then
+      call raise(error, status_failure, "the figure is NOT drawn: "//script//" "//directory//" ended with status "// &
+        & to_text(status))
+    end if
+  end subroutine draw_figure
+
+  !> A text as one word of the shell.
+  pure function quoted(text) result(word)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: word
+    integer :: i
+
+    word = "'"
+    do i = 1, len(text)
+      if (text(i:i) == "'") then
+        word = word//"'\''"
+      else
+        word = word//text(i:i)
+      end if
+    end do
+    word = word//"'"
+  end function quoted
+
+end module gravier_drawing

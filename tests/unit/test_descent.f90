@@ -1,0 +1,162 @@
+!> What a run notes of the descent of its solves, and what it makes of it for other tolerances.
+program test_descent
+  use mpi_f08, only: MPI_Init, MPI_Finalize
+  use gravier_kinds, only: dp, i8
+  use gravier_descent, only: descent_t, effort_t, tenfold, unknown_effort
+  use gravier_check, only: check_close, check_equal, finish_checks
+  implicit none
+
+  real(dp), parameter :: rounding = 1.0e-12_dp
+
+  call MPI_Init()
+  call test_levels()
+  call test_exponential()
+  call test_power_law()
+  call test_warm_solves()
+  call test_failed_solves()
+  call test_first_checks_only()
+  call test_seconds()
+  call finish_checks()
+  call MPI_Finalize()
+
+contains
+
+  !> A figure at a level counts, the first one stays, and what lies above all levels is the start.
+  subroutine test_levels()
+    type(descent_t) :: descent
+
+    call descent%note(0, 1.0_dp, 1.0e-3_dp)
+    call check_equal(descent%first(tenfold), -1, "above all levels")
+    call descent%note(10, 2.0e-2_dp, 1.0e-3_dp)
+    call descent%note(20, 1.0e-2_dp, 1.0e-3_dp)
+    call descent%note(30, 5.0e-2_dp, 1.0e-3_dp)
+    call descent%note(40, 2.0e-3_dp, 1.0e-3_dp)
+    call descent%note(50, 9.0e-4_dp, 1.0e-3_dp)
+    call check_equal(descent%first(tenfold), 20, "ten times the tolerance")
+    call check_equal(descent%first(1), 40, "half a decade above it")
+    call check_equal(descent%first(0), 50, "the tolerance")
+    call check_equal(descent%first_check, 10, "the first check after the start")
+  end subroutine test_levels
+
+  !> Add solves whose figure at iteration i, checked every `every` of them, is `figure`(i); they give up after 10^5.
+  subroutine add_solves(effort, number, every, figure)
+    type(effort_t), intent(inout) :: effort
+    integer, intent(in) :: number, every
+    interface
+      pure real(dp) function figure(i)
+        import :: dp
+        implicit none
+        integer, intent(in) :: i
+      end function figure
+    end interface
+    type(descent_t) :: descent
+    integer :: k, i
+
+    do k = 1, number
+      descent = descent_t()
+      i = 0
+      do
+        call descent%note(i, figure(i), 1.0e-4_dp)
+        if (figure(i) <= 1.0e-4_dp .or. i >= 100000) exit
+        i = i + every
+      end do
+      call effort%add(descent, i, figure(i), 1.0_dp, 0.25_dp)
+    end do
+  end subroutine add_solves
+
+  !> A decade in 100 iterations: 400 to 1e-4, 300 to 1e-3, and by the fit 400 (4/3)^(1/2) 400/350 to 1e-5.
+  subroutine test_exponential()
+    type(effort_t) :: effort
+
+    call add_solves(effort, 3, 1, exponential)
+    call check_equal(effort%iterations, 1200_i8, "exponential: iterations")
+    call check_close(effort%looser(), 900.0_dp, rounding, "exponential: looser")
+    call check_close(effort%tighter()/3.0_dp, 400.0_dp*sqrt(4.0_dp/3.0_dp)*400.0_dp/350.0_dp, rounding, "exponential: tighter")
+  end subroutine test_exponential
+
+  pure real(dp) function exponential(i)
+    integer, intent(in) :: i
+    exponential = 10.0_dp**(-0.01_dp*i)*(1.0_dp + rounding)**(-10)
+  end function exponential
+
+  !> Iterations as the inverse of the figure: ten times as many for each decade, which the fit has as it is.
+  subroutine test_power_law()
+    type(effort_t) :: effort
+
+    call add_solves(effort, 2, 1, power_law)
+    call check_close(effort%looser(), 2.0_dp*999.0_dp, rounding, "power law: looser")
+    call check_close(effort%tighter()/2.0e5_dp, 1.0_dp, 1.0e-3_dp, "power law: tighter")
+    call check_close(effort%worst, 1.0e-4_dp, 1.0e-8_dp, "power law: largest figure at the end")
+  end subroutine test_power_law
+
+  pure real(dp) function power_law(i)
+    integer, intent(in) :: i
+    power_law = 1.0_dp/(1.0_dp + i)
+  end function power_law
+
+  !> Solves that start below ten times the tolerance: one check each at the looser one; a solve that has nothing to do has
+  !> nothing to do there either.
+  subroutine test_warm_solves()
+    type(effort_t) :: effort
+
+    call add_solves(effort, 5, 10, warm)
+    call check_close(effort%looser(), 50.0_dp, rounding, "warm solves: looser")
+    call add_solves(effort, 5, 10, idle)
+    call check_close(effort%looser(), 50.0_dp, rounding, "idle solves: looser")
+    call check_equal(effort%solves, 10_i8, "warm and idle solves")
+  end subroutine test_warm_solves
+
+  pure real(dp) function warm(i)
+    integer, intent(in) :: i
+    warm = 5.0e-4_dp*10.0_dp**(-0.01_dp*i)
+  end function warm
+
+  pure real(dp) function idle(i)
+    integer, intent(in) :: i
+    idle = 1.0e-5_dp/(1.0_dp + i)
+  end function idle
+
+  !> One solve that stalls above the tolerance, one above ten times of it: what they would have taken is not known.
+  subroutine test_failed_solves()
+    type(effort_t) :: effort
+
+    call add_solves(effort, 4, 10, exponential)
+    call add_solves(effort, 1, 1000, stalls)
+    call check_close(effort%tighter(), unknown_effort, rounding, "one solve failed: tighter")
+    call check_close(effort%looser(), 1200.0_dp + 1000.0_dp, rounding, "one solve failed: looser")
+    call add_solves(effort, 1, 1000, stalls_early)
+    call check_close(effort%looser(), unknown_effort, rounding, "a solve that stalls early: looser")
+    call check_equal(effort%unreached(tenfold), 1_i8, "a solve that stalls early")
+  end subroutine test_failed_solves
+
+  pure real(dp) function stalls(i)
+    integer, intent(in) :: i
+    stalls = max(1.0_dp/(1.0_dp + i), 5.0e-4_dp)
+  end function stalls
+
+  pure real(dp) function stalls_early(i)
+    integer, intent(in) :: i
+    stalls_early = max(1.0_dp/(1.0_dp + i), 5.0e-3_dp)
+  end function stalls_early
+
+  !> Where all solves end at their first check nothing is seen of a decay; so it is without solves.
+  subroutine test_first_checks_only()
+    type(effort_t) :: effort
+
+    call check_close(effort%tighter(), unknown_effort, rounding, "no solves: tighter")
+    call add_solves(effort, 5, 1000, exponential)
+    call check_close(effort%tighter(), unknown_effort, rounding, "first checks only: tighter")
+    call check_close(effort%looser(), 5000.0_dp, rounding, "first checks only: looser")
+  end subroutine test_first_checks_only
+
+  !> A quarter of a second before the iterations of each solve, three quarters for them.
+  subroutine test_seconds()
+    type(effort_t) :: effort
+
+    call add_solves(effort, 2, 1, exponential)
+    call check_close(effort%seconds, 2.0_dp, rounding, "seconds")
+    call check_close(effort%seconds_of(600.0_dp), 0.5_dp + 1.5_dp*600.0_dp/800.0_dp, rounding, "seconds of fewer iterations")
+    call check_close(effort%seconds_of(unknown_effort), unknown_effort, rounding, "seconds of unknown iterations")
+  end subroutine test_seconds
+
+end program test_descent
