@@ -382,11 +382,12 @@ contains
     type(csv_writer_t) :: table
     integer :: k
 
-    call table%open(path, "variant,figure,value", error)
+    call table%open(path, "variant,figure,value,"//machine_columns, error)
     do k = 1, self%n
       call table%add(self%rows(k)%variant)
       call table%add(self%rows(k)%figure)
       call table%add(self%rows(k)%value)
+      call add_machine(table)
       call table%end_row(error)
     end do
     call table%close(error)

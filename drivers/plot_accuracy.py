@@ -29,8 +29,6 @@ def read(path):
             rows = list(csv.DictReader(file))
     except OSError as reason:
         sys.exit(f"plot_accuracy.py: {path}: {reason.strerror}; expected a table written by gravier_accuracy")
-    if not rows or "variant" not in rows[0]:
-        sys.exit(f"plot_accuracy.py: {path}: expected rows of a table written by gravier_accuracy")
     return rows
 
 
@@ -189,7 +187,7 @@ def print_tables(directory, rows):
         print_solve(variants)
         return
     print_runs(variants, rows)
-    summary = read(directory / "accuracy_summary.csv") if (directory / "accuracy_summary.csv").stat().st_size > 30 else []
+    summary = read(directory / "accuracy_summary.csv")
     figures = list(dict.fromkeys(row["figure"] for row in summary))
     if figures:
         found = {(row["variant"], row["figure"]): number(row["value"]) for row in summary}
@@ -226,6 +224,8 @@ def main():
     parser.add_argument("--markdown", action="store_true", help="print tables, draw nothing")
     options = parser.parse_args()
     rows = read(options.directory / "accuracy.csv")
+    if not rows or "variant" not in rows[0]:
+        sys.exit(f"plot_accuracy.py: {options.directory}/accuracy.csv: expected rows of a table written by gravier_accuracy")
     if options.markdown:
         print_tables(options.directory, rows)
     else:

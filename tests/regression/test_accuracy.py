@@ -125,6 +125,7 @@ class Columns(Studies):
         for row in rows:
             self.assertLessEqual(float(row["seconds_low"]), float(row["seconds"]))
             self.assertTrue(row["machine"] and row["compiler"] and row["version"] and row["flags"] and row["date"])
+        self.assertEqual({row["machine"] for row in summary}, {rows[0]["machine"]})
         found = {(row["variant"], row["figure"]): float(row["value"]) for row in summary}
         reached = next(int(row["iteration"]) for row in nlgs if float(row["error"]) <= 1e-3)
         self.assertEqual(found[("NLGS", "iterations_to_1e-3")], reached)
@@ -230,7 +231,8 @@ class BadInput(Studies):
                 ({**solve}, r": &variant \(number 1\) name is missing", ("&variant method = 'nlgs' /",)),
                 ({**solve}, ": &variant name = 'a': expected a name of its own", ("&variant name = 'a' /", "&variant name = 'a' /")),
                 ({**solve}, ": &variant sweeps = 2: expected once, but it is given twice", ("&variant name = 'a', sweeps = 1, sweeps = 2 /",)),
-                ({**solve}, ": unknown key 'directory' in &variant: expected a key of a case", ("&variant name = 'a', directory = 'b' /",)),
+                ({**solve}, ": unknown key 'directory' in &variant: expected a key of a case",
+                 ("&variant name = 'a', directory = 'b' /",)),
                 ({**solve}, ": 'a' of case.nml: &solver method = 'nlsg': expected 'nlgs'", ("&variant name = 'a', method = 'nlsg' /",)))):
             with self.subTest(message=message):
                 self.refused(f"study {number}", study, message, *others)
@@ -242,7 +244,8 @@ class BadInput(Studies):
         self.refused("two balls", {"kind": "run", "vary": "step", "values": "0.01", "reference": "exact"},
                      ": &study reference = 'exact': expected 'tight' or 'none'", case=BALL_CASE,
                      files={"ball.csv": BALL + "3,grain,1.0,0.21,0.01,,\n"})
-        self.refused("no steps", {"kind": "run", "vary": "tolerance", "values": "1e-2", "reference": "none"}, ": 'case' of case.nml: &time steps = 0: expected an integer >= 1",
+        self.refused("no steps", {"kind": "run", "vary": "tolerance", "values": "1e-2", "reference": "none"},
+                     ": 'case' of case.nml: &time steps = 0: expected an integer >= 1",
                      case=merged(COLUMN_CASE, {"time": {"steps": 0}}))
 
     def test_command_line(self):
@@ -267,7 +270,8 @@ class Shipped(RunTestCase):
 
     def test_cases_and_studies(self):
         """Every study is read, and refused for nothing but a packing that is not there or what is put in here."""
-        studies = [path for path in sorted(glob.glob(os.path.join(SOURCE, "data/studies/*.nml"))) if not path.endswith(("_case.nml", "_settle.nml"))]
+        studies = [path for path in sorted(glob.glob(os.path.join(SOURCE, "data/studies/*.nml")))
+                   if not path.endswith(("_case.nml", "_settle.nml"))]
         self.assertGreater(len(studies), 8)
         for path in studies:
             with open(path, encoding="utf-8") as file:
