@@ -20,6 +20,10 @@ METHODS = {
     "nscdd, 3 sweeps": {"solver": {"method": "nscdd", "sweeps": 3}, "decomposition": {"subdomains": 8, "partition": "metis"}},
     "nscdd_ep": {"solver": {"method": "nscdd_ep", "sweeps": 3}, "decomposition": {"subdomains": 4},
                  "enriched": {"direction": 1.0, "contacts": "active"}},
+    "schwarz": {"solver": {"method": "schwarz"}, "decomposition": {"subdomains": 8}},
+    "schwarz, 3 sweeps": {"solver": {"method": "schwarz", "sweeps": 3}, "decomposition": {"subdomains": 8, "partition": "metis"}},
+    "schwarz_ec": {"solver": {"method": "schwarz_ec", "sweeps": 3}, "decomposition": {"subdomains": 4},
+                   "enriched": {"direction": 1.0, "contacts": "active"}},
 }
 
 
@@ -82,7 +86,8 @@ class Momentum(RunTestCase):
             cases[f"disks {friction}, nlgs"] = merged(self.disks, NLGS, {"scene": {"friction": friction}})
         for friction in (0.0, 0.3, 0.5, 0.8, 1.2):
             cases[f"spheres {friction}, nlgs"] = merged(self.spheres, NLGS, {"scene": {"friction": friction}})
-        cases["spheres 0.3, nscdd"] = merged(self.spheres, METHODS["nscdd"])
+        for name in ("nscdd", "schwarz"):
+            cases[f"spheres 0.3, {name}"] = merged(self.spheres, METHODS[name])
         for title, (plain, momentum) in self.pairs(cases).items():
             for tolerance, most, taken in zip(TOLERANCES, plain, momentum):
                 if most is not None:
