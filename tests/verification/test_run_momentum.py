@@ -11,6 +11,7 @@ from gravier_runs import RunTestCase, differences, each, merged, run_case, settl
 TOLERANCES = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4]
 CHECK_EVERY = 5
 
+PLAIN = {"solver": {"acceleration": "none"}}
 MOMENTUM = {"solver": {"acceleration": "momentum"}}
 NLGS = {"solver": {"method": "nlgs"}}
 METHODS = {
@@ -66,7 +67,7 @@ class Momentum(RunTestCase):
         """{title: (iterations to each tolerance, plain and with momentum)}."""
         jobs = [(title, plain) for title in cases for plain in (True, False)]
         runs = dict(zip(jobs, each(lambda title, plain: run_case(
-            merged(cases[title], {} if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_")), timeout=300), jobs)))
+            merged(cases[title], PLAIN if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_")), timeout=300), jobs)))
         found = {}
         print()
         for title in cases:
