@@ -58,7 +58,7 @@ class Relaxation(RunTestCase):
             "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012,
                       "friction": 0.3},
             "time": {"step": 1e-3, "steps": 350},
-            "solver": {"tolerance": 1e-3, "max_iterations": 1000},
+            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
             "output": {"directory": ".", "every": 0, "final_bodies": True},
         }
         spheres = run_case(fall, directory=self.here("spheres"))
