@@ -10,6 +10,8 @@ module gravier_schwarz
   public :: schwarz_t, neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
     & extrapolate_loads
 
+  !> a change not measured yet; its multiple by growth_allowed is a number still [J]
+  real(dp), parameter :: unknown = 0.1_dp*huge(1.0_dp)
   !> growth of the alternating part of the changes that lowers the factor, and what is left of it then
   real(dp), parameter :: growth_allowed = 2.0_dp, factor_kept = 0.8_dp
 
@@ -34,7 +36,7 @@ module gravier_schwarz
     !> the automatic factor is not lowered beyond this
     real(dp) :: least = 1.0_dp
     !> |d|^2 of the last iteration, negative before the first, and lowest |d_k - d_k-1|^2 since the factor was lowered [J]
-    real(dp) :: last = -1.0_dp, lowest = huge(1.0_dp)
+    real(dp) :: last = -1.0_dp, lowest = unknown
   contains
     procedure :: adapt => relaxation_adapt
   end type relaxation_t
