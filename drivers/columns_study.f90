@@ -78,8 +78,9 @@ contains
 
     text = "&scene bodies = 'column', column_count = "//to_text(column%disks)//", radius = 1, mass = 1, gravity = 0, -1, 0 / "// &
       & "&time step = 1, steps = 1 / "// &
-      & "&solver method = '"//trim(method%name)//"', sweeps = "//to_text(sweeps)//", criterion = 'error', tolerance = "// &
-      & tolerance//", max_iterations = "//to_text(max_iterations)//", check_every = 1, warm_start = .false. / "// &
+      & "&solver method = '"//trim(method%name)//"', acceleration = 'none', sweeps = "//to_text(sweeps)// &
+      & ", criterion = 'error', tolerance = "//tolerance//", max_iterations = "//to_text(max_iterations)// &
+      & ", check_every = 1, warm_start = .false. / "// &
       & "&output trace = .true. / "
     if (method%name /= "nlgs") text = text//"&decomposition grid = 1, "//to_text(column%subdomains)//" / "
     if (method%direction /= "") text = text//"&enriched direction = "//trim(method%direction)//", direction_unit = 'absolute' / "

@@ -39,7 +39,7 @@ def compact(centres, radii, size, pressure, steps):
         run(scratch, {
             "scene": {"dimension": d, "gravity": [0.0] * d, "bodies": "file", "bodies_file": "loose.h5", "density": 2500.0},
             "time": {"step": 5.0e-4, "steps": steps},
-            "solver": {"tolerance": 1.0e-4, "max_iterations": 2000},
+            "solver": {"acceleration": "none", "tolerance": 1.0e-4, "max_iterations": 2000},
             "output": {"directory": ".", "every": 0, "final_bodies": True}}, planes)
         position = [state["boundaries/position"][:] for _, _, state in states(Path(scratch) / "results.h5")][-1]
         centres, _, _ = read_bodies(Path(scratch) / "final_bodies.h5")

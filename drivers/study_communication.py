@@ -33,6 +33,7 @@ CASE = """&scene
 /
 &solver
   method = 'nscdd'
+  acceleration = 'none'
   max_iterations = 1
 /
 &decomposition

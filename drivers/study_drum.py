@@ -32,7 +32,7 @@ def main():
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/drum.csv"), "density": 2500.0,
                   "friction": 0.5, "alert_distance": 1.5e-3},
         "time": {"step": 1.0e-3, "steps": 14000},
-        "solver": {"tolerance": 1.0e-3, "max_iterations": 1000},
+        "solver": {"acceleration": "none", "tolerance": 1.0e-3, "max_iterations": 1000},
         "output": {"directory": ".", "every": 20, "contacts": False}},
         [{"name": "drum", "shape": "circle", "radius": RADIUS, "rotation": RATE, "friction": 0.8}])
     rows, last = [], None

@@ -34,7 +34,7 @@ def main():
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": "../loose.h5", "density": DENSITY, "friction": FRICTION,
                   "alert_distance": 1.5e-3, "skin": 2.5e-3},
         "time": {"step": STEP, "steps": SETTLING + WARMING + SAMPLING},
-        "solver": {"tolerance": 1.0e-4, "max_iterations": 1000},
+        "solver": {"acceleration": "none", "tolerance": 1.0e-4, "max_iterations": 1000},
         "output": {"directory": ".", "every": 10}}, [
             {"name": "floor", "shape": "plane", "normal": [0.0, 1.0], "table": "../floor.csv"},
             {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},

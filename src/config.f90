@@ -264,7 +264,9 @@ contains
     integer :: i
 
     report%instance = 1
-    associate (scene => config%scene, parts => config%decomposition, sample => config%sample)
+    associate (scene => config%scene, parts => config%decomposition, sample => config%sample, solver => config%solver)
+      if (.not. is_given(report, "solver", "acceleration") .and. any(solver%method == ["nlgs ", "nscdd"])) &
+        solver%acceleration = "momentum"
       if (.not. is_given(report, "scene", "wall_friction")) scene%wall_friction = scene%friction
       if (.not. is_given(report, "scene", "wall_restitution")) scene%wall_restitution = scene%restitution
       call fill_third(scene%dimension, scene%lattice_count)

@@ -220,6 +220,7 @@ contains
     case ("warm_start"); slot%logical => config%solver%warm_start
     case ("on_failure"); slot%choice => config%solver%on_failure
     end select
+    if (name == "relaxation") slot%given => config%solver%relaxation_given
   end subroutine solver_slot
 
   subroutine decomposition_slot(config, name, slot)

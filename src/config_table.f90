@@ -232,9 +232,11 @@ module gravier_config_table
      key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
      key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
-           "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)"), &
+           "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)", &
+           note="found while iterating, from 1 down"), &
      key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
-           "`momentum`: iterations start from impulses extrapolated from the last two (`nlgs`, `nscdd`, `nscdd_ep` only)"), &
+           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then", &
+           note="`'momentum'` for `nlgs` and `nscdd`, else `'none'`"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &

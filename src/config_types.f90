@@ -80,6 +80,8 @@ module gravier_config_types
     integer :: max_iterations, sweeps, check_every
     !> in (0, 1]
     real(dp) :: relaxation
+    !> false: the factor is automatic
+    logical :: relaxation_given = .false.
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start

@@ -1,11 +1,11 @@
 !> The one place where a method is chosen.
 module gravier_scheme_choice
-  use gravier_config_types, only: config_t, enriched_config_t
+  use gravier_config_types, only: config_t, solver_config_t, enriched_config_t
   use gravier_scheme, only: scheme_t
   use gravier_nlgs, only: nlgs_t
   use gravier_nscdd, only: nscdd_t
   use gravier_nscdd_ep, only: nscdd_ep_t
-  use gravier_schwarz, only: schwarz_t
+  use gravier_schwarz, only: schwarz_t, relaxation_t
   use gravier_schwarz_ec, only: schwarz_ec_t
   use gravier_enriched_matrix, only: search_direction_t
   use gravier_interface_problem, only: interface_solver_t
@@ -28,11 +28,11 @@ contains
     select case (config%solver%method)
     case ("schwarz")
       allocate (schwarz)
-      schwarz%relaxation = config%solver%relaxation
+      schwarz%relaxation = relaxation_of(config%solver)
       call move_alloc(schwarz, scheme)
     case ("schwarz_ec")
       allocate (corrected)
-      corrected%relaxation = config%solver%relaxation
+      corrected%relaxation = relaxation_of(config%solver)
       corrected%matrix%direction = direction_of(config%enriched)
       call move_alloc(corrected, scheme)
     case ("nscdd")
@@ -48,6 +48,13 @@ contains
     scheme%sweeps = config%solver%sweeps
     scheme%momentum%on = config%solver%acceleration == "momentum"
   end subroutine choose_scheme
+
+  !> A given factor is fixed.
+  pure type(relaxation_t) function relaxation_of(solver) result(relaxation)
+    type(solver_config_t), intent(in) :: solver
+    relaxation%automatic = .not. solver%relaxation_given
+    if (solver%relaxation_given) relaxation%factor = solver%relaxation
+  end function relaxation_of
 
   pure type(search_direction_t) function direction_of(enriched) result(direction)
     type(enriched_config_t), intent(in) :: enriched

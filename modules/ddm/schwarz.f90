@@ -4,19 +4,45 @@ module gravier_schwarz
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
+  use gravier_scheme, only: scheme_t, momentum_t, start_sweeps, sweep_all, extrapolate
   implicit none
   private
-  public :: schwarz_t, neighbour_load_t, start_neighbour_loads, shared_reactions, take_neighbour_loads
+  public :: schwarz_t, neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
+    & extrapolate_loads
 
-  !> R^ddm on the shared bodies of one subdomain (nv, n_shared) [N s]
+  !> a change not measured yet; its multiple by growth_allowed is a number still [J]
+  real(dp), parameter :: unknown = 0.1_dp*huge(1.0_dp)
+  !> growth of the alternating part of the changes that lowers the factor, and what is left of it then
+  real(dp), parameter :: growth_allowed = 2.0_dp, factor_kept = 0.8_dp
+
+  !> Loads of the neighbours on the shared bodies of one subdomain, each (nv, n_shared) [N s, N m s].
   type :: neighbour_load_t
+    !> R^ddm
     real(dp), allocatable :: value(:, :)
+    !> what the last iteration asked it to change by
+    real(dp), allocatable :: change(:, :)
+    !> R^ddm of the iteration before; allocated with momentum
+    real(dp), allocatable :: previous(:, :)
   end type neighbour_load_t
 
+  !> The share of a change of R^ddm that is taken over: 1 in the paper, less where the method would diverge. It does so by
+  !> changes d_k that alternate from one iteration to the next, and grow: where |d_k - d_k-1|^2 is more than twice its lowest
+  !> value so far, and d_k no longer goes along with d_k-1, the automatic factor is lowered, see doc/theory.md section 9.
+  type :: relaxation_t
+    !> in (0, 1]
+    real(dp) :: factor = 1.0_dp
+    !> whether `adapt` may lower the factor; each solve starts at 1 then
+    logical :: automatic = .true.
+    !> the automatic factor is not lowered beyond this
+    real(dp) :: least = 1.0_dp
+    !> |d|^2 of the last iteration, negative before the first, and lowest |d_k - d_k-1|^2 since the factor was lowered [J]
+    real(dp) :: last = -1.0_dp, lowest = unknown
+  contains
+    procedure :: adapt => relaxation_adapt
+  end type relaxation_t
+
   type, extends(scheme_t) :: schwarz_t
-    !> share of a change of R^ddm that is taken over: 1 in the paper, less where the method would diverge
-    real(dp) :: relaxation = 1.0_dp
+    type(relaxation_t) :: relaxation
     type(neighbour_load_t), allocatable :: load(:)
   contains
     procedure :: start => schwarz_start
@@ -33,7 +59,7 @@ contains
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
     call start_sweeps(self, problem, shared_masses=.false.)
-    call start_neighbour_loads(problem, self%load)
+    call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
   end subroutine schwarz_start
 
   subroutine schwarz_iterate(self, problem, measure, jump, error)
@@ -46,6 +72,7 @@ contains
 
     jump = 0.0_dp
     if (allocated(error)) return
+    call extrapolate_loads(self%momentum, self%load)
     call sweep_all(self, problem)
     if (measure) jump = problem%jump()
     call start_timer(phase_exchange)
@@ -77,9 +104,13 @@ contains
   end subroutine shared_reactions
 
   !> Loads that agree with the impulses at the start of a solve, which `start_sweeps` has put into the velocities; none
-  !> on components that cannot move.
-  subroutine start_neighbour_loads(problem, load)
+  !> on components that cannot move. Collective.
+  subroutine start_neighbour_loads(problem, momentum, relaxation, load)
     type(contact_problem_t), intent(inout) :: problem
+    !> whether the loads are to be extrapolated
+    logical, intent(in) :: momentum
+    !> started anew where automatic
+    type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), allocatable, intent(out) :: load(:)
     integer :: s, k, d
 
@@ -97,35 +128,114 @@ contains
           if (.not. problem%sub(s)%moves(d, problem%shared%part(s)%body(k))) load(s)%value(d, k) = 0.0_dp
         end do
       end do
+      allocate (load(s)%change, mold=load(s)%value)
+      load(s)%change(:, :) = 0.0_dp
+      if (momentum) load(s)%previous = load(s)%value
     end do
+    if (relaxation%automatic) relaxation = relaxation_t(least=1.0_dp/largest_multiplicity(problem))
   end subroutine start_neighbour_loads
+
+  !> Subdomains that share the body which most share. Collective.
+  real(dp) function largest_multiplicity(problem) result(largest)
+    type(contact_problem_t), intent(in) :: problem
+    integer :: s, k
+
+    largest = 1.0_dp
+    do s = 1, size(problem%sub)
+      associate (part => problem%shared%part(s))
+        do k = 1, part%n_shared
+          largest = max(largest, real(part%multiplicity(k), dp))
+        end do
+      end associate
+    end do
+    largest = problem%comm%highest(largest)
+  end function largest_multiplicity
+
+  !> With momentum, bring the loads to those under the extrapolated impulses, as `begin_sweeps` does with the velocities.
+  subroutine extrapolate_loads(momentum, load)
+    type(momentum_t), intent(in) :: momentum
+    type(neighbour_load_t), intent(inout) :: load(:)
+    integer :: s
+
+    if (.not. momentum%on) return
+    do s = 1, size(load)
+      call extrapolate(momentum%beta, load(s)%value, load(s)%previous)
+    end do
+  end subroutine extrapolate_loads
 
   !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* /= E of B_E B_E*^T R_E*, and change the velocities by
   !> what the loads have changed. With under-relaxation, only a share of the change is taken over. Collective.
   subroutine take_neighbour_loads(problem, relaxation, load)
     type(contact_problem_t), intent(inout) :: problem
-    !> in (0, 1]
-    real(dp), intent(in) :: relaxation
+    type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), intent(inout) :: load(:)
-    real(dp) :: change(problem%kernels%nv)
+    real(dp) :: change(problem%kernels%nv), parts(2, size(load)), sums(2)
     integer :: s, k, b, nd, nw
 
     nd = problem%kernels%nd
     nw = problem%kernels%nw
     call problem%shared%pass()
+    parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), sub => problem%sub(s), old => load(s)%value)
+      associate (part => problem%shared%part(s), sub => problem%sub(s), load => load(s))
         do k = 1, part%n_shared
           b = part%body(k)
           change(:) = 0.0_dp
           call problem%shared%add_copies(s, k, change)
-          change(:) = relaxation*(change - old(:, k))
-          old(:, k) = old(:, k) + change
+          change(:) = change - load%value(:, k)
+          parts(1, s) = parts(1, s) + energy(sub%weight(:, b), change, change)
+          parts(2, s) = parts(2, s) + energy(sub%weight(:, b), change, load%change(:, k))
+          load%change(:, k) = change
+        end do
+      end associate
+    end do
+    if (relaxation%automatic) then
+      call problem%comm%sum_parts(parts, sums)
+      call relaxation%adapt(sums(1), sums(2))
+    end if
+    do s = 1, size(problem%sub)
+      associate (part => problem%shared%part(s), sub => problem%sub(s), load => load(s))
+        do k = 1, part%n_shared
+          b = part%body(k)
+          change(:) = relaxation%factor*load%change(:, k)
+          load%value(:, k) = load%value(:, k) + change
           sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1:nd, b)*change(1:nd)
           sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(nw, b)*change(nd + 1:)
         end do
       end associate
     end do
   end subroutine take_neighbour_loads
+
+  !> a M^-1 b of one body [J]
+  pure real(dp) function energy(weight, a, b)
+    !> (nw) [1/kg, 1/(kg m^2)]
+    real(dp), intent(in), contiguous :: weight(:)
+    !> (nv) [N s, N m s]
+    real(dp), intent(in), contiguous :: a(:), b(:)
+    integer :: d
+
+    energy = 0.0_dp
+    do d = 1, size(a)
+      energy = energy + weight(min(d, size(weight)))*a(d)*b(d)
+    end do
+  end function energy
+
+  !> Lower the automatic factor where the changes of the loads alternate and grow.
+  pure subroutine relaxation_adapt(self, change, product)
+    class(relaxation_t), intent(inout) :: self
+    !> |d_k|^2 and d_k . d_k-1 over all subdomains, 0 in the first iteration [J]
+    real(dp), intent(in) :: change, product
+    real(dp) :: alternating
+
+    if (self%last >= 0.0_dp) then
+      alternating = change + self%last - 2.0_dp*product
+      if (alternating > growth_allowed*self%lowest .and. 2.0_dp*product < self%last) then
+        self%factor = max(self%least, factor_kept*self%factor)
+        self%lowest = alternating
+      end if
+      self%lowest = min(self%lowest, alternating)
+    end if
+    self%last = change
+  end subroutine relaxation_adapt
 
 end module gravier_schwarz

@@ -6,15 +6,15 @@ module gravier_schwarz_ec
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t, work_t, start_sweeps
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
-  use gravier_schwarz, only: neighbour_load_t, start_neighbour_loads, shared_reactions, take_neighbour_loads
+  use gravier_schwarz, only: neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
+    & extrapolate_loads
   implicit none
   private
   public :: schwarz_ec_t
 
   type, extends(scheme_t) :: schwarz_ec_t
     type(enriched_matrix_t) :: matrix
-    !> see schwarz_t
-    real(dp) :: relaxation = 1.0_dp
+    type(relaxation_t) :: relaxation
     type(neighbour_load_t), allocatable :: load(:)
     logical, private :: prepared = .false.
   contains
@@ -34,7 +34,7 @@ contains
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
     call start_sweeps(self, problem, shared_masses=.false.)
-    call start_neighbour_loads(problem, self%load)
+    call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
     call self%matrix%start(problem, error)
     self%prepared = .false.
     call problem%comm%agree(error)
@@ -51,6 +51,7 @@ contains
 
     jump = 0.0_dp
     if (allocated(error)) return
+    call extrapolate_loads(self%momentum, self%load)
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
     if (self%matrix%direction%active_only .or. .not. self%prepared) then

@@ -7,7 +7,8 @@ module gravier_scheme
   use gravier_contact_problem, only: contact_problem_t
   implicit none
   private
-  public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, end_sweeps
+  public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
+    & end_sweeps, extrapolate
 
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
   real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)

@@ -15,8 +15,8 @@ DIVERGING = {
                                      "enriched": {"direction": 20.0, "interface": "cg"}, "decomposition": {"subdomains": 4}},
     "nscdd_ep, absolute": {"solver": {"method": "nscdd_ep"}, "enriched": {"direction": 1e8, "direction_unit": "absolute"},
                            "decomposition": {"subdomains": 4, "partition": "metis", "kind": "primal"}},
-    "schwarz": {"solver": {"method": "schwarz", "sweeps": 10}, "decomposition": {"subdomains": 16}},
-    "schwarz_ec": {"solver": {"method": "schwarz_ec", "sweeps": 50}, "decomposition": {"subdomains": 16},
+    "schwarz": {"solver": {"method": "schwarz", "sweeps": 10, "relaxation": 1.0}, "decomposition": {"subdomains": 16}},
+    "schwarz_ec": {"solver": {"method": "schwarz_ec", "sweeps": 50, "relaxation": 1.0}, "decomposition": {"subdomains": 16},
                    "enriched": {"direction": 1.0, "contacts": "active"}},
 }
 
@@ -130,7 +130,8 @@ class FailedSolves(RunTestCase):
 
     def test_oscillation_is_not_convergence(self):
         """Plain Schwarz with several sweeps oscillates on some partitions, neither growing nor settling."""
-        case = merged(self.case, {"solver": {"method": "schwarz", "sweeps": 3, "max_iterations": 1000, "on_failure": "discard"},
+        case = merged(self.case, {"solver": {"method": "schwarz", "sweeps": 3, "relaxation": 1.0, "max_iterations": 1000,
+                                             "on_failure": "discard"},
                                   "scene": {"friction": 0.1}, "decomposition": {"subdomains": 16, "kind": "primal"}})
         run = run_case(case, 2, self.here("oscillation"))
         self.assert_loud(run, "(NOT CONVERGED|DIVERGED)")

@@ -12,7 +12,7 @@ module free_plate
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_nlgs, only: nlgs_t
   use gravier_nscdd, only: nscdd_t
-  use gravier_schwarz, only: schwarz_t
+  use gravier_schwarz, only: schwarz_t, relaxation_t
   use gravier_schwarz_ec, only: schwarz_ec_t
   use gravier_nscdd_ep, only: nscdd_ep_t
   use gravier_interface_direct, only: interface_direct_t
@@ -203,8 +203,8 @@ contains
     call check_close(wanted(1, plate), 0.3_dp, 0.0_dp, name//"the plate keeps its speed along the axis it is driven on")
     call check(wanted(dimension, plate) < -0.1_dp, name//"the plate gives way along its free axis")
     ! 3 copies with the whole mass each: loads go a part of the way
-    schwarz%relaxation = 0.4_dp
-    schwarz_ec%relaxation = 0.4_dp
+    schwarz%relaxation = relaxation_t(0.4_dp, automatic=.false.)
+    schwarz_ec%relaxation = relaxation_t(0.4_dp, automatic=.false.)
     ! with friction, the iterates of NSCDD-EP settle only where l follows the active contacts
     direct%matrix%direction%active_only = .true.
     direct%matrix%direction%value = 30.0_dp

@@ -15,7 +15,7 @@ program test_nscdd
   use gravier_test_contact_columns, only: same_contacts
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
-  character(len=*), parameter :: newline = new_line("a"), keys = "&solver method = 'nscdd', sweeps = 2 /"
+  character(len=*), parameter :: newline = new_line("a"), keys = "&solver method = 'nscdd', acceleration = 'none', sweeps = 2 /"
   type(communicator_t), target :: comm, alone
   integer :: dimension, k
   real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]
@@ -360,7 +360,7 @@ contains
     real(dp), allocatable :: velocity(:, :), other(:, :)
 
     call make(comm, dimension, 9, 0.0_dp, keys, many)
-    call make(alone, dimension, 1, 0.0_dp, "&solver method = 'nlgs' /", one)
+    call make(alone, dimension, 1, 0.0_dp, "&solver acceleration = 'none' /", one)
     many%control%tolerance = 1.0e-9_dp
     one%control%tolerance = 1.0e-9_dp
     call solve_contacts(many%problem, many%scheme, many%control, report, error)

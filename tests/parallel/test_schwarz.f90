@@ -11,7 +11,7 @@ program test_schwarz
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_nlgs, only: nlgs_t
-  use gravier_schwarz, only: schwarz_t, neighbour_load_t
+  use gravier_schwarz, only: schwarz_t, neighbour_load_t, relaxation_t
   use gravier_schwarz_ec, only: schwarz_ec_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -182,7 +182,7 @@ contains
     logical :: right
 
     call make(comm, dimension, 9, friction, plain, sim)
-    schwarz%relaxation = 0.375_dp
+    schwarz%relaxation = relaxation_t(0.375_dp, automatic=.false.)
     call schwarz%start(sim%problem, error)
     allocate (expected(sim%problem%kernels%nv))
     do n = 1, 4

@@ -67,7 +67,7 @@ contains
     text = "&scene dimension = "//to_text(dimension)//", bodies = 'column', column_count = "//to_text(disks)// &
       & trim(merge(", gravity = 0, -1 /   ", ", gravity = 0, 0, -1 /", dimension == 2))//newline// &
       & "&time step = 1.0, steps = 1 /"//newline// &
-      & "&decomposition subdomains = "//to_text(subdomains)//" /"//newline//"&solver "//options//newline
+      & "&decomposition subdomains = "//to_text(subdomains)//" /"//newline//"&solver acceleration = 'none', "//options//newline
     call parse_config("column", text, config, error)
     if (.not. allocated(error)) call simulation%init(comm, config, error)
     if (.not. allocated(error)) call simulation%advance(figures, error)

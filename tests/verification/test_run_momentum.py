@@ -11,6 +11,7 @@ from gravier_runs import RunTestCase, differences, each, merged, run_case, settl
 TOLERANCES = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4]
 CHECK_EVERY = 5
 
+PLAIN = {"solver": {"acceleration": "none"}}
 MOMENTUM = {"solver": {"acceleration": "momentum"}}
 NLGS = {"solver": {"method": "nlgs"}}
 METHODS = {
@@ -20,6 +21,10 @@ METHODS = {
     "nscdd, 3 sweeps": {"solver": {"method": "nscdd", "sweeps": 3}, "decomposition": {"subdomains": 8, "partition": "metis"}},
     "nscdd_ep": {"solver": {"method": "nscdd_ep", "sweeps": 3}, "decomposition": {"subdomains": 4},
                  "enriched": {"direction": 1.0, "contacts": "active"}},
+    "schwarz": {"solver": {"method": "schwarz"}, "decomposition": {"subdomains": 8}},
+    "schwarz, 3 sweeps": {"solver": {"method": "schwarz", "sweeps": 3}, "decomposition": {"subdomains": 8, "partition": "metis"}},
+    "schwarz_ec": {"solver": {"method": "schwarz_ec", "sweeps": 3}, "decomposition": {"subdomains": 4},
+                   "enriched": {"direction": 1.0, "contacts": "active"}},
 }
 
 
@@ -50,7 +55,7 @@ class Momentum(RunTestCase):
             "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012,
                       "friction": 0.3},
             "time": {"step": 1e-3, "steps": 350},
-            "solver": {"tolerance": 1e-3, "max_iterations": 1000},
+            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
             "output": {"directory": ".", "every": 0, "final_bodies": True},
         }
         spheres = run_case(fall, directory=cls.scratch + "/spheres")
@@ -62,7 +67,7 @@ class Momentum(RunTestCase):
         """{title: (iterations to each tolerance, plain and with momentum)}."""
         jobs = [(title, plain) for title in cases for plain in (True, False)]
         runs = dict(zip(jobs, each(lambda title, plain: run_case(
-            merged(cases[title], {} if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_")), timeout=300), jobs)))
+            merged(cases[title], PLAIN if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_")), timeout=300), jobs)))
         found = {}
         print()
         for title in cases:
@@ -82,7 +87,8 @@ class Momentum(RunTestCase):
             cases[f"disks {friction}, nlgs"] = merged(self.disks, NLGS, {"scene": {"friction": friction}})
         for friction in (0.0, 0.3, 0.5, 0.8, 1.2):
             cases[f"spheres {friction}, nlgs"] = merged(self.spheres, NLGS, {"scene": {"friction": friction}})
-        cases["spheres 0.3, nscdd"] = merged(self.spheres, METHODS["nscdd"])
+        for name in ("nscdd", "schwarz"):
+            cases[f"spheres 0.3, {name}"] = merged(self.spheres, METHODS[name])
         for title, (plain, momentum) in self.pairs(cases).items():
             for tolerance, most, taken in zip(TOLERANCES, plain, momentum):
                 if most is not None:

@@ -1,0 +1,84 @@
+"""The under-relaxation that the Schwarz methods find by themselves: none where the paper's method converges, to the bit; and
+convergence where that diverges, on dense packings in many subdomains."""
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks
+
+# exit status of a solve that missed its tolerance
+MISSED = 3
+PAPER = {"solver": {"relaxation": 1.0}}
+METHODS = {
+    "schwarz": {"solver": {"method": "schwarz"}},
+    "schwarz, 10 sweeps": {"solver": {"method": "schwarz", "sweeps": 10}},
+    "schwarz_ec": {"solver": {"method": "schwarz_ec"}, "enriched": {"direction": 1.0}},
+}
+
+
+class Relaxation(RunTestCase):
+
+    def pairs(self, cases):
+        """{title: (run with the paper's factor 1, run with the automatic one)}."""
+        jobs = [(title, paper) for title in cases for paper in (True, False)]
+        runs = dict(zip(jobs, each(lambda title, paper: run_case(
+            merged(cases[title], PAPER if paper else {}), 1, self.here(f"{title}, {paper}".replace(" ", "_")), timeout=300), jobs)))
+        return {title: (runs[title, True], runs[title, False]) for title in cases}
+
+    def test_columns(self):
+        """A column in any number of subdomains: the same bits at each iteration."""
+        column = {
+            "scene": {"dimension": 2, "bodies": "column", "column_count": 40, "radius": 0.05},
+            "time": {"step": 1e-3, "steps": 1},
+            "solver": {"tolerance": 1e-6, "max_iterations": 20000, "check_every": 1},
+            "output": {"directory": "results", "trace": True},
+        }
+        cases = {f"{name} in {n}": merged(column, method, {"decomposition": {"subdomains": n}})
+                 for name, method in METHODS.items() for n in (2, 5)}
+        for title, (paper, automatic) in self.pairs(cases).items():
+            with self.subTest(title):
+                self.assert_status(paper, 0)
+                self.assert_status(automatic, 0)
+                self.assertGreater(len(paper.trace()["iteration"]), 20)
+                self.assertEqual(differences(paper.trace(), automatic.trace()), [])
+
+    def packed(self, dimension, packing, subdomains, *more):
+        return merged({
+            "scene": {"dimension": dimension, "bodies": "file", "bodies_file": packing, "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 1},
+            "solver": {"tolerance": 1e-4, "max_iterations": 3000, "check_every": 5},
+            "decomposition": {"subdomains": subdomains, "partition": "metis"},
+            "output": {"directory": "results", "trace": True},
+        }, *more)
+
+    def test_packings(self):
+        """Where a factor of 1 diverges, the automatic one meets the tolerance, and no slower than NSCDD to 1e-3."""
+        disks = settled_disks(self.scratch)
+        fall = {
+            "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012,
+                      "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 350},
+            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
+            "output": {"directory": ".", "every": 0, "final_bodies": True},
+        }
+        spheres = run_case(fall, directory=self.here("spheres"))
+        self.assert_status(spheres, 0)
+        packings = {"disks in 8, 10 sweeps": (2, disks, 8, {"solver": {"sweeps": 10}}),
+                    "spheres in 32": (3, spheres.path("final_bodies.h5"), 32)}
+        cases = {f"{name}, {method}": merged(METHODS[method], self.packed(*packing))
+                 for name, packing in packings.items() for method in ("schwarz", "schwarz_ec")}
+        del cases["spheres in 32, schwarz_ec"]
+        nscdd = {name: run_case(merged(self.packed(*packing), {"solver": {"method": "nscdd", "acceleration": "none"}}), 1,
+                                self.here(f"{name}, nscdd".replace(" ", "_"))) for name, packing in packings.items()}
+        for title, (paper, automatic) in self.pairs(cases).items():
+            with self.subTest(title):
+                self.assert_status(paper, MISSED)
+                self.assertIn("DIVERGED", paper.stdout)
+                self.assert_status(automatic, 0)
+                taken, others = (run.trace()["iteration"][np.argmax(run.trace()["residual"] <= 1e-3)]
+                                 for run in (automatic, nscdd[title.rpartition(", ")[0]]))
+                self.assertLessEqual(taken, others)
+
+
+if __name__ == "__main__":
+    unittest.main()
