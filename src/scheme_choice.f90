@@ -1,5 +1,6 @@
 !> The one place where a method is chosen.
 module gravier_scheme_choice
+  use gravier_kinds, only: dp
   use gravier_config_types, only: config_t, enriched_config_t
   use gravier_scheme, only: scheme_t
   use gravier_nlgs, only: nlgs_t
@@ -14,6 +15,9 @@ module gravier_scheme_choice
   implicit none
   private
   public :: choose_scheme
+
+  !> l that is chosen where none is given [1/W_aa]: of nscdd_ep and schwarz_ec on active contacts, and on all contacts
+  real(dp), parameter :: dual_direction = 100.0_dp, schwarz_direction = 1.0_dp, careful_direction = 0.3_dp
 
 contains
 
@@ -33,13 +37,13 @@ contains
     case ("schwarz_ec")
       allocate (corrected)
       corrected%relaxation = config%solver%relaxation
-      corrected%matrix%direction = direction_of(config%enriched)
+      corrected%matrix%direction = direction_of(config%enriched, schwarz_direction)
       call move_alloc(corrected, scheme)
     case ("nscdd")
       allocate (nscdd_t :: scheme)
     case ("nscdd_ep")
       allocate (dual)
-      dual%matrix%direction = direction_of(config%enriched)
+      dual%matrix%direction = direction_of(config%enriched, dual_direction)
       call choose_interface_solver(config%enriched, dual%interface_solver)
       call move_alloc(dual, scheme)
     case default
@@ -49,11 +53,20 @@ contains
     scheme%momentum%on = config%solver%acceleration == "momentum"
   end subroutine choose_scheme
 
-  pure type(search_direction_t) function direction_of(enriched) result(direction)
+  !> The search direction of &enriched, or one that serves on packings (doc/methods.md has the measurements).
+  pure type(search_direction_t) function direction_of(enriched, automatic_value) result(direction)
     type(enriched_config_t), intent(in) :: enriched
-    direction%value = enriched%direction
-    direction%relative = enriched%direction_unit == "relative"
+    !> l of the method on active contacts [1/W_aa]
+    real(dp), intent(in) :: automatic_value
+
     direction%active_only = enriched%contacts == "active"
+    direction%automatic = .not. enriched%direction_given
+    if (direction%automatic) then
+      direction%value = merge(automatic_value, careful_direction, direction%active_only)
+    else
+      direction%value = enriched%direction
+      direction%relative = enriched%direction_unit == "relative"
+    end if
   end function direction_of
 
   subroutine choose_interface_solver(enriched, solver)
