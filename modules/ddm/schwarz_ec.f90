@@ -57,7 +57,7 @@ contains
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
     call self%matrix%count_use(due)
-    if (due) then
+    if (due .or. self%matrix%direction%active_only) then
       call self%matrix%update(problem, changed, error)
       call problem%comm%agree(error)
       if (allocated(error)) return

@@ -58,6 +58,8 @@ module gravier_scheme
   type, abstract :: scheme_t
     !> whether growth is left to a safeguard of the method, which mends it
     logical :: guarded = .false.
+    !> what the log says of the search direction, empty without one
+    character(len=:), allocatable :: direction_text
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
     type(momentum_t) :: momentum
