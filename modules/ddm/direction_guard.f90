@@ -5,7 +5,7 @@
 !> Three windows in a row of which each exceeds the one before, the last by more than a factor 2 the one before the first, halve
 !> l: at most 20 iterations after the growth sets in, where it is that fast. Growth by orders of magnitude, as of an l far too large,
 !> does not wait for the end of a window. Changes that neither grow nor fall, of some percent of the impulses at each iteration,
-!> are those of a cycle, and halve l too.
+!> are those of a cycle, of an l far too large as well.
 module gravier_direction_guard
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -22,7 +22,7 @@ module gravier_direction_guard
   !> windows without one below `progress` times the lowest, and changes over impulses squared, that are a cycle
   integer, parameter :: idle_windows = 20
   real(dp), parameter :: progress = 0.8_dp, much = 1.0e-3_dp
-  !> factors of l for the two, and times that l is lowered before it is set to 0
+  !> factors of l for windows that grow, and for the other two; and times that l is lowered before it is set to 0
   real(dp), parameter :: less = 0.5_dp, far_less = 1.0_dp/16.0_dp
   integer, parameter :: most_lowerings = 12
   !> no window yet
@@ -128,9 +128,11 @@ contains
       guard%lowest = guard%now
       guard%idle = 0
     end if
-    if ((guard%grown >= growing_windows .and. guard%now/growth > guard%before) .or. &
-      & (guard%idle >= idle_windows .and. guard%now > window*much*impulses)) then
+    if (guard%grown >= growing_windows .and. guard%now/growth > guard%before) then
       call lower(guard, problem, less, lowered)
+      return
+    else if (guard%idle >= idle_windows .and. guard%now > window*much*impulses) then
+      call lower(guard, problem, far_less, lowered)
       return
     end if
     guard%last = guard%now
