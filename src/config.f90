@@ -275,6 +275,8 @@ contains
       if (grid_product(parts%grid) > 0 .and. .not. is_given(report, "decomposition", "subdomains")) &
         parts%subdomains = grid_product(parts%grid)
     end associate
+    if (config%solver%method == "nscdd_ep" .and. .not. (config%enriched%direction_given .or. &
+        is_given(report, "enriched", "contacts"))) config%enriched%contacts = "active"
     do i = 1, size(config%boundaries)
       report%instance = i
       call settle_boundary(config%scene, report, config%boundaries(i))

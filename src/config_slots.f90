@@ -251,6 +251,7 @@ contains
     case ("cg_tolerance"); slot%real => config%enriched%cg_tolerance
     case ("cg_max_iterations"); slot%integer => config%enriched%cg_max_iterations
     end select
+    if (name == "direction") slot%given => config%enriched%direction_given
   end subroutine enriched_slot
 
   subroutine output_slot(config, name, slot)

@@ -259,11 +259,14 @@ module gravier_config_table
            "what the last one reached; 0: never")]
 
   type(key_t), parameter :: enriched_keys(*) = &
-    [key_t("enriched", "direction", kind_real, "0.3", ">= 0", "search direction l", unit="1/W_aa or kg"), &
+    [key_t("enriched", "direction", kind_real, "0", ">= 0", &
+           "search direction l, which the safeguard lowers where the changes of the impulses grow", unit="1/W_aa or kg", &
+           note="automatic"), &
      key_t("enriched", "direction_unit", kind_choice, "'relative'", "relative absolute", &
            "l in units of 1/W_aa, the inverse of the local operator of each contact, or in kg"), &
      key_t("enriched", "contacts", kind_choice, "'all'", "all active", &
-           "contacts that take part: all, or those that carry an impulse"), &
+           "contacts that take part: all, as in the paper; those that carry an impulse, and `nscdd_ep` feeds their impulses back", &
+           note="`'all'`; `nscdd_ep` without `direction`: `'active'`"), &
      key_t("enriched", "interface", kind_choice, "'mumps'", "mumps cg", &
            "interface solve: direct, or conjugate gradient (`nscdd_ep` only)"), &
      key_t("enriched", "cg_tolerance", kind_real, "1e-12", "in (0, 1)", &

@@ -107,8 +107,9 @@ module gravier_config_types
 
   !> &enriched: the search direction of schwarz_ec and nscdd_ep.
   type :: enriched_config_t
-    !> times 1/W_aa of each contact, or kg, as direction_unit says
+    !> times 1/W_aa of each contact, or kg, as direction_unit says; the method's own choice where it is not given
     real(dp) :: direction
+    logical :: direction_given = .false.
     !> relative or absolute
     character(len=choice_length) :: direction_unit
     !> interface solve: mumps or cg (nscdd_ep only); contacts that take part: all or active

@@ -28,6 +28,8 @@ module gravier_run_log
     type(text_file_t) :: file
     !> kept until the file is open
     character(len=:), allocatable :: early
+    !> whether the safeguard of an enriched method has been mentioned
+    logical :: said_lowered = .false.
   contains
     procedure :: init => run_log_init
     procedure :: open => run_log_open
@@ -266,6 +268,11 @@ contains
       & "the old partition stays", error)
     if (figures%fast > 0 .and. simulation%fast == figures%fast) call self%line("warning     "//to_text(figures%fast)// &
       & " grains move by more than their radius in a step (said once; history.csv counts them)", error)
+    if (simulation%scheme%work%lowered > 0 .and. .not. self%said_lowered) then
+      self%said_lowered = .true.
+      call self%line("warning     changes grew or went round in circles under l: lowered "// &
+        & to_text(simulation%scheme%work%lowered)//" times (said once; the closing table counts)", error)
+    end if
     if (figures%solve%status /= solve_converged) call self%line("  *** "//failure_text(simulation, figures), error)
   end subroutine run_log_write_step
 
@@ -341,6 +348,8 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    if (simulation%scheme%direction_text /= "") call self%line("direction   "//simulation%scheme%direction_text//"; lowered "// &
+      & to_text(work%lowered)//" times", error)
     if (simulation%decomposition%n_subdomains > 1) then
       call simulation%scheme%measure_balance(self%comm, simulation%decomposition%n_subdomains, ranks, subdomains)
       call self%line("balance     "//balance_text(ranks, subdomains)//" of the mean since the last partition", error)

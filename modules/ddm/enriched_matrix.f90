@@ -12,12 +12,14 @@ module gravier_enriched_matrix
   use gravier_sparse_direct, only: sparse_factor_t
   implicit none
   private
-  public :: search_direction_t, enriched_matrix_t, enriched_part_t, sweep_all_recording
+  public :: search_direction_t, enriched_matrix_t, enriched_part_t, sweep_all_recording, drop_inactive
 
   !> The search direction r~ - r + l (v~ - v) = 0, l >= 0.
   type :: search_direction_t
     !> l, in units of 1/W_aa or in kg
     real(dp) :: value = 1.0_dp
+    !> chosen here, not by the input
+    logical :: automatic = .false.
     logical :: relative = .true.
     !> l on active contacts only: r_n > 0 for the normal part, |r_t| < mu r_n for the tangential one
     logical :: active_only = .false.
@@ -36,8 +38,14 @@ module gravier_enriched_matrix
 
   type :: enriched_matrix_t
     type(search_direction_t) :: direction
+    !> what the safeguard has left of l
+    real(dp) :: share = 1.0_dp
+    !> iterations since l was set
+    integer, private :: uses = 0
     type(enriched_part_t), allocatable :: part(:)
   contains
+    procedure :: set_share => enriched_matrix_set_share
+    procedure :: count_use => enriched_matrix_count_use
     procedure :: start => enriched_matrix_start
     procedure :: update => enriched_matrix_update
     procedure :: solve => enriched_matrix_solve
@@ -78,6 +86,25 @@ contains
     allocate (part%body_work(kernels%nv, sub%n_columns), source=0.0_dp)
   end subroutine make_room
 
+  !> Take another share of l, from the next `update` on, which is due at once.
+  pure subroutine enriched_matrix_set_share(self, share)
+    class(enriched_matrix_t), intent(inout) :: self
+    real(dp), intent(in) :: share
+    self%share = share
+    self%uses = 0
+  end subroutine enriched_matrix_set_share
+
+  !> Count an iteration, and say whether `update` is due in it: in the first one; with l on active contacts, which come and go, in
+  !> the 2nd, 4th, 8th ... too. Factors are worth hundreds of sweeps, and those of some iterations ago serve almost as well.
+  pure subroutine enriched_matrix_count_use(self, due)
+    class(enriched_matrix_t), intent(inout) :: self
+    logical, intent(out) :: due
+
+    self%uses = self%uses + 1
+    due = self%uses == 1
+    if (self%direction%active_only) due = iand(self%uses, self%uses - 1) == 0
+  end subroutine enriched_matrix_count_use
+
   !> Set l and factorise the matrices that it or the problem changed.
   subroutine enriched_matrix_update(self, problem, changed, error)
     class(enriched_matrix_t), intent(inout) :: self
@@ -95,7 +122,7 @@ contains
     do s = 1, size(self%part)
       associate (part => self%part(s), sub => problem%sub(s))
         if (sub%n_bodies == 0) cycle
-        call set_direction(self%direction, problem%kernels, sub, part%direction)
+        call set_direction(self%direction, self%share, problem%kernels, sub, part%direction)
         call assemble(problem%kernels, sub, part%direction, row, column, value)
         before = part%factor%factorisations
         call part%factor%factorise(sub%n_bodies*problem%kernels%nv, row, column, value, error)
@@ -106,8 +133,9 @@ contains
   end subroutine enriched_matrix_update
 
   !> l of every component of every contact, with W_aa of the undivided bodies.
-  pure subroutine set_direction(rule, kernels, sub, direction)
+  pure subroutine set_direction(rule, share, kernels, sub, direction)
     type(search_direction_t), intent(in) :: rule
+    real(dp), intent(in) :: share
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     !> (lanes, nc, blocks)
@@ -119,20 +147,34 @@ contains
     do c = 1, sub%n_contacts
       q = lane_of(c)
       g = block_of(c)
-      direction(q, :, g) = rule%value
+      direction(q, :, g) = share*rule%value
       if (rule%relative) then
         call sub%local_operator(c, sub%inverse_mass, w)
-        direction(q, 1, g) = rule%value/w(1)
-        direction(q, 2:, g) = rule%value/w(2)
-      end if
-      if (.not. rule%active_only) cycle
-      if (.not. sub%impulse(q, 1, g) > 0.0_dp) then
-        direction(q, :, g) = 0.0_dp
-      else if (kernels%nc > 1) then
-        if (norm2(sub%impulse(q, 2:, g)) >= sub%hot(q, kernels%nh, g)*sub%impulse(q, 1, g)) direction(q, 2:, g) = 0.0_dp
+        direction(q, 1, g) = share*rule%value/w(1)
+        direction(q, 2:, g) = share*rule%value/w(2)
       end if
     end do
+    if (rule%active_only) call drop_inactive(kernels, sub, direction)
   end subroutine set_direction
+
+  !> Put zeros where contacts are not active: everywhere on contacts without impulse, in the tangential part of those that slide.
+  pure subroutine drop_inactive(kernels, sub, field)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> (lanes, nc, blocks)
+    real(dp), intent(inout), contiguous :: field(:, :, :)
+    integer :: c, q, g
+
+    do c = 1, sub%n_contacts
+      q = lane_of(c)
+      g = block_of(c)
+      if (.not. sub%impulse(q, 1, g) > 0.0_dp) then
+        field(q, :, g) = 0.0_dp
+      else if (kernels%nc > 1) then
+        if (norm2(sub%impulse(q, 2:, g)) >= sub%hot(q, kernels%nh, g)*sub%impulse(q, 1, g)) field(q, 2:, g) = 0.0_dp
+      end if
+    end do
+  end subroutine drop_inactive
 
   !> Lower triangle of M + H l H^T with the masses in `weight`, as triplets; components that cannot move eliminated.
   subroutine assemble(kernels, sub, direction, row, column, value)
@@ -240,6 +282,7 @@ contains
     associate (part => self%part(s), sub => problem%sub(s))
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, part%contact_work)
       part%contact_work(:, :, :) = part%direction*(part%law_velocity - part%contact_work)
+      if (self%direction%active_only) call drop_inactive(problem%kernels, sub, part%contact_work)
       part%body_work(:, :) = 0.0_dp
       call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
       call self%solve(problem, s, part%body_work, error)

@@ -3,14 +3,19 @@
 !> The interface problem (28) is solved for the change of F. With M~_E V_E = R_E^d + H_E r_E - A_E^T F before the solve,
 !>   X_eta (F_new - F) = sum_E A_E [ V_E + M_eta,E^-1 H_E l_E (v_E - H_E^T V_E) ],
 !> which is (28) less X_eta F: the same solution, but rounding shrinks with the change, and F itself need not be kept.
+!>
+!> That is the paper's method, with l on all contacts. With l on active contacts, an iteration is one of NSCDD, and a correction of
+!> the impulses follows (gravier_impulse_feedback).
 module gravier_nscdd_ep
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_interface_solve, phase_factorise
+  use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve, phase_factorise
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: work_t
-  use gravier_nscdd, only: nscdd_t
+  use gravier_scheme, only: work_t, start_sweeps
+  use gravier_nscdd, only: nscdd_t, average_copies
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
+  use gravier_direction_guard, only: direction_guard_t
+  use gravier_impulse_feedback, only: impulse_feedback_t
   use gravier_interface_problem, only: interface_field_t, interface_solver_t, make_field, chain_differences
   implicit none
   private
@@ -22,6 +27,9 @@ module gravier_nscdd_ep
     class(interface_solver_t), allocatable :: interface_solver
     !> change of the multipliers, and the right-hand side of the interface problem
     type(interface_field_t), allocatable, private :: change(:), b(:)
+    !> l on active contacts: impulses are fed back
+    type(impulse_feedback_t), private :: feedback
+    type(direction_guard_t), private :: guard
     logical, private :: prepared = .false.
   contains
     procedure :: start => nscdd_ep_start
@@ -39,9 +47,13 @@ contains
 
     if (allocated(error)) return
     call self%nscdd_t%start(problem, error)
+    call self%matrix%set_share(1.0_dp)
+    self%guarded = is_enriched(self)
     if (.not. is_enriched(self)) return
     call make_field(problem, self%change)
     call make_field(problem, self%b)
+    if (self%matrix%direction%active_only) call self%feedback%start(problem)
+    call self%guard%start(problem)
     call self%matrix%start(problem, error)
     call problem%comm%agree(error)
     self%prepared = .false.
@@ -49,7 +61,7 @@ contains
 
   pure logical function is_enriched(self)
     class(nscdd_ep_t), intent(in) :: self
-    is_enriched = self%matrix%direction%value > 0.0_dp
+    is_enriched = self%matrix%direction%value*self%matrix%share > 0.0_dp
   end function is_enriched
 
   subroutine nscdd_ep_iterate(self, problem, measure, jump, error)
@@ -58,7 +70,7 @@ contains
     logical, intent(in) :: measure
     real(dp), intent(out) :: jump
     type(error_t), allocatable, intent(inout) :: error
-    integer :: s
+    logical :: lowered
 
     jump = 0.0_dp
     if (allocated(error)) return
@@ -68,34 +80,36 @@ contains
     end if
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
+    if (self%matrix%direction%active_only) then
+      call start_timer(phase_exchange)
+      call average_copies(problem)
+      call stop_timer(phase_exchange)
+    end if
     call prepare(self, problem, error)
     if (allocated(error)) return
     call start_timer(phase_interface_solve)
-    do s = 1, size(problem%sub)
-      call enriched_velocities(self, problem, s, error)
-      self%change(s)%upper(:, :) = 0.0_dp
-      self%change(s)%lower(:, :) = 0.0_dp
-    end do
-    call chain_differences(problem, self%matrix, self%b)
-    call problem%comm%agree(error)
+    call solve_interface(self, problem, error)
     if (allocated(error)) return
-    call self%interface_solver%solve(problem, self%matrix, self%b, self%change, error)
-    do s = 1, size(problem%sub)
-      call take_multipliers(self, problem, s)
-    end do
     call stop_timer(phase_interface_solve)
     self%work%interface_solves = self%work%interface_solves + 1
+    call self%guard%watch(problem, lowered)
+    if (.not. lowered) return
+    call start_sweeps(self, problem, shared_masses=.true.)
+    call self%matrix%set_share(self%guard%share)
+    self%guarded = is_enriched(self)
+    self%work%lowered = self%work%lowered + 1
+    self%prepared = .false.
   end subroutine nscdd_ep_iterate
 
-  !> Factorise what is not factorised yet: at the first iteration of a solve, and when the active contacts changed.
-  !> Collective.
+  !> Factorise what is due: at the first iteration of a solve or with a new l, and for active contacts now and then. Collective.
   subroutine prepare(self, problem, error)
     class(nscdd_ep_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     type(error_t), allocatable, intent(inout) :: error
-    logical :: changed
+    logical :: due, changed
 
-    if (self%prepared .and. .not. self%matrix%direction%active_only) return
+    call self%matrix%count_use(due)
+    if (.not. due) return
     call self%matrix%update(problem, changed, error)
     call problem%comm%agree(error)
     if (allocated(error)) return
@@ -105,6 +119,38 @@ contains
     call stop_timer(phase_factorise)
     self%prepared = .true.
   end subroutine prepare
+
+  !> Solve the interface problem and take over what it gives: multipliers, or impulses. Collective; an error is the same on all
+  !> ranks.
+  subroutine solve_interface(self, problem, error)
+    class(nscdd_ep_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      if (self%matrix%direction%active_only) then
+        call self%matrix%enrich(problem, s, error)
+        call self%feedback%keep_lead(s, self%matrix)
+      else
+        call enriched_velocities(self, problem, s, error)
+      end if
+      self%change(s)%upper(:, :) = 0.0_dp
+      self%change(s)%lower(:, :) = 0.0_dp
+    end do
+    call chain_differences(problem, self%matrix, self%b)
+    call problem%comm%agree(error)
+    if (allocated(error)) return
+    call self%interface_solver%solve(problem, self%matrix, self%b, self%change, error)
+    if (allocated(error)) return
+    if (self%matrix%direction%active_only) then
+      call self%feedback%take(problem, self%matrix, self%change, error)
+    else
+      do s = 1, size(problem%sub)
+        call take_multipliers(self, problem, s)
+      end do
+    end if
+  end subroutine solve_interface
 
   !> V_E + M_eta,E^-1 H_E l_E (v_E - H_E^T V_E), into body_work.
   subroutine enriched_velocities(self, problem, s, error)

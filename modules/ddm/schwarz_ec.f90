@@ -5,6 +5,7 @@ module gravier_schwarz_ec
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t, work_t, start_sweeps
+  use gravier_direction_guard, only: direction_guard_t
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
   use gravier_schwarz, only: neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
     & extrapolate_loads
@@ -16,7 +17,7 @@ module gravier_schwarz_ec
     type(enriched_matrix_t) :: matrix
     type(relaxation_t) :: relaxation
     type(neighbour_load_t), allocatable :: load(:)
-    logical, private :: prepared = .false.
+    type(direction_guard_t), private :: guard
   contains
     procedure :: start => schwarz_ec_start
     procedure :: iterate => schwarz_ec_iterate
@@ -35,8 +36,10 @@ contains
     self%work%solves = self%work%solves + 1
     call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
+    call self%matrix%set_share(1.0_dp)
+    self%guarded = is_enriched(self)
+    call self%guard%start(problem)
     call self%matrix%start(problem, error)
-    self%prepared = .false.
     call problem%comm%agree(error)
   end subroutine schwarz_ec_start
 
@@ -46,7 +49,7 @@ contains
     logical, intent(in) :: measure
     real(dp), intent(out) :: jump
     type(error_t), allocatable, intent(inout) :: error
-    logical :: changed
+    logical :: due, changed, lowered
     integer :: s
 
     jump = 0.0_dp
@@ -54,12 +57,12 @@ contains
     call extrapolate_loads(self%momentum, self%load)
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
-    if (self%matrix%direction%active_only .or. .not. self%prepared) then
+    call self%matrix%count_use(due)
+    if (due .or. self%matrix%direction%active_only) then
       call self%matrix%update(problem, changed, error)
       call problem%comm%agree(error)
       if (allocated(error)) return
     end if
-    self%prepared = .true.
     call start_timer(phase_interface_solve)
     do s = 1, size(problem%sub)
       call enriched_reactions(self, problem, s, error)
@@ -71,7 +74,20 @@ contains
     call take_neighbour_loads(problem, self%relaxation, self%load)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
+    if (.not. is_enriched(self)) return
+    call self%guard%watch(problem, lowered)
+    if (.not. lowered) return
+    call start_sweeps(self, problem, shared_masses=.false.)
+    call start_neighbour_loads(problem, self%load)
+    call self%matrix%set_share(self%guard%share)
+    self%guarded = is_enriched(self)
+    self%work%lowered = self%work%lowered + 1
   end subroutine schwarz_ec_iterate
+
+  pure logical function is_enriched(self)
+    class(schwarz_ec_t), intent(in) :: self
+    is_enriched = self%matrix%direction%value*self%matrix%share > 0.0_dp
+  end function is_enriched
 
   !> R~_E = (I + L_E M_E^-1)^-1 ( R_E - L_E M_E^-1 (R_E^d + R_E^ddm) + H_E l_E v_E ) with L_E = H_E l_E H_E^T, on the shared
   !> bodies, into body_work. With I + L M^-1 = (M + L) M^-1 and M V_E = R_E^d + R_E^ddm + R_E this is

@@ -27,6 +27,8 @@ module gravier_scheme
     integer(i8) :: sweeps = 0, relaxations = 0
     integer(i8) :: interface_solves = 0, interface_iterations = 0
     integer(i8) :: analyses = 0, factorisations = 0
+    !> times that the safeguard of an enriched method has lowered its search direction
+    integer(i8) :: lowered = 0
   end type work_t
 
   !> What extrapolation keeps of the last iteration, for one subdomain.
@@ -55,6 +57,10 @@ module gravier_scheme
   end type momentum_t
 
   type, abstract :: scheme_t
+    !> whether growth is left to a safeguard of the method, which mends it
+    logical :: guarded = .false.
+    !> what the log says of the search direction, empty without one
+    character(len=:), allocatable :: direction_text
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
     type(momentum_t) :: momentum

@@ -160,7 +160,7 @@ contains
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
       if (report%figure <= control%tolerance) then
         report%status = solve_converged
-      else if (defect > growth_limit*reference) then
+      else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted

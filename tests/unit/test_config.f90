@@ -270,7 +270,7 @@ contains
     call check_equal(config%decomposition%subdomains, 1, "default subdomains")
     call check_equal(config%decomposition%repartition_every, 0, "default repartition_every")
     call check_close(config%decomposition%repartition_imbalance, 0.0_dp, 0.0_dp, "default repartition_imbalance")
-    call check_close(config%enriched%direction, 0.3_dp, 1.0e-15_dp, "default direction")
+    call check(.not. config%enriched%direction_given, "default direction is automatic")
     call check_equal(config%enriched%direction_unit, "relative", "default direction_unit")
     call check_equal(config%enriched%contacts, "all", "default contacts of enriched")
     call check_equal(config%enriched%interface, "mumps", "default interface")

@@ -1,0 +1,202 @@
+#!/usr/bin/env python3
+"""The four decomposition methods side by side: iterations and seconds of one step of settled packings, and on columns.
+
+    python3 drivers/study_methods.py [--out DIR] [--quick] [--redraw]
+
+Packings of disks and spheres settle in a box; then each method solves one step of them from zero impulses: NSCDD, NSCDD-EP,
+Schwarz and Schwarz-EC, with 1 to 64 subdomains, 1 to 50 sweeps an iteration, friction 0 and 0.3, search directions from 0 to
+1e12, plain and with momentum. Columns of 4 disks a subdomain show what a growing number of subdomains costs. Writes
+methods.csv, methods_columns.csv and methods.svg into DIR; --redraw draws from the CSV files that are there. --quick takes the
+small packings only.
+"""
+
+import argparse
+import csv
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+from study_support import plt, read_history, run, write_csv
+
+#: name: dimension, grains along each axis, steps of settling
+PACKINGS = {"disks 1e3": (2, [32, 31], 500), "disks 1e4": (2, [100, 100], 900), "spheres 1e3": (3, [10, 10, 10], 450),
+            "spheres 1e4": (3, [21, 21, 23], 600)}
+SMALL = ("disks 1e3", "spheres 1e3")
+TOLERANCES = (1e-2, 1e-3, 1e-4)
+PHASES = {"seconds in sweeps": "sweeps", "in interface": "interface solve", "in factors": "factorisation"}
+COLUMNS = ["packing", "friction", "method", "direction", "contacts", "momentum", "subdomains", "sweeps"]
+COLOURS = {"nscdd": "#0072b2", "nscdd_ep": "#d55e00", "schwarz": "#009e73", "schwarz_ec": "#cc79a7"}
+
+
+def settle(directory, packing):
+    """The bodies file of a packing, made once."""
+    dimension, count, steps = PACKINGS[packing]
+    place = directory / packing.replace(" ", "_")
+    if not (place / "final_bodies.h5").exists():
+        run(place, {"scene": {"dimension": dimension, "bodies": "lattice", "lattice_count": count, "radius_min": 0.008,
+                              "radius_max": 0.012, "friction": 0.3},
+                    "time": {"step": 1e-3, "steps": steps},
+                    "solver": {"tolerance": 1e-3, "max_iterations": 300, "acceleration": "momentum"},
+                    "output": {"directory": ".", "every": 0, "contacts": False, "final_bodies": True}})
+    return place / "final_bodies.h5"
+
+
+def phase_seconds(log):
+    """{phase: mean seconds} of the closing table."""
+    found = {}
+    for key, name in PHASES.items():
+        match = re.search(rf"^{name} +([0-9.]+)", log, re.MULTILINE)
+        found[key] = float(match.group(1)) if match else 0.0
+    return found
+
+
+def solve(directory, bodies, case, iterations):
+    """One step: iterations to each tolerance, '' where not in `iterations` iterations, and seconds by phase."""
+    groups = {
+        "scene": {"dimension": PACKINGS[case["packing"]][0], "bodies": "file", "bodies_file": str(bodies.resolve()),
+                  "friction": case["friction"]},
+        "time": {"step": 1e-3, "steps": 1},
+        "solver": {"method": case["method"], "sweeps": case["sweeps"], "tolerance": TOLERANCES[-1], "check_every": 1,
+                   "max_iterations": iterations, "acceleration": "momentum" if case["momentum"] else "none",
+                   "warm_start": False},
+        "decomposition": {"subdomains": case["subdomains"], "partition": "metis" if case["subdomains"] > 1 else "grid"},
+        "output": {"directory": "results", "every": 0, "contacts": False, "trace": True},
+    }
+    if case["method"].startswith("schwarz"):
+        groups["solver"]["relaxation"] = 0.7
+    if case["direction"] != "" and case["direction"] != "automatic":
+        groups["enriched"] = {"direction": float(case["direction"]), "contacts": case["contacts"]}
+    name = " ".join(str(case[key]) for key in COLUMNS).replace(" ", "_")
+    place = directory / "runs" / name
+    run(place, groups)
+    with open(place / "results" / "trace.csv", encoding="ascii") as file:
+        trace = [(int(row["iteration"]), float(row["residual"])) for row in csv.DictReader(file)]
+    row = dict(case)
+    for tolerance in TOLERANCES:
+        row[f"to {tolerance:g}"] = next((k for k, residual in trace if residual <= tolerance), "")
+    log = (place / "results" / "run.log").read_text()
+    row.update(phase_seconds(log))
+    row["done"], row["residual"] = trace[-1]
+    lowered = re.search(r"lowered (\d+) times$", log, re.MULTILINE)
+    row["lowered"] = int(lowered.group(1)) if lowered else 0
+    return row
+
+
+def cases(quick):
+    """(case, iterations allowed) of the study."""
+    def case(packing, friction, method, direction="", contacts="", momentum=False, subdomains=8, sweeps=1):
+        return dict(zip(COLUMNS, (packing, friction, method, direction, contacts, momentum, subdomains, sweeps)))
+
+    def methods(packing, friction, allowed, **more):
+        for momentum in (False, True):
+            yield case(packing, friction, "nscdd", momentum=momentum, **more), allowed
+            yield case(packing, friction, "nscdd_ep", "automatic", "active", momentum=momentum, **more), allowed
+
+    small = 500 if quick else 2000
+    for packing in SMALL:
+        for friction in (0.3, 0.0):
+            for sweeps in (1, 3, 10, 50):
+                yield from methods(packing, friction, small if sweeps < 10 else small // 2, sweeps=sweeps)
+            for sweeps in (1, 10):
+                yield case(packing, friction, "schwarz", sweeps=sweeps), small // 2
+                yield case(packing, friction, "schwarz_ec", "3", "all", sweeps=sweeps), small // 2
+        for subdomains in (1, 2, 4, 16, 32, 64):
+            yield from methods(packing, 0.3, small, subdomains=subdomains, sweeps=3)
+        for direction in ("1", "10", "1000", "1e12"):
+            for momentum in (False, True):
+                yield case(packing, 0.3, "nscdd_ep", direction, "active", momentum, sweeps=3), small // 2
+        for direction in ("1", "3", "100", "1e12"):
+            yield case(packing, 0.3, "nscdd_ep", direction, "all", sweeps=3), small // 2
+    if quick:
+        return
+    for packing in PACKINGS:
+        if packing not in SMALL:
+            yield from methods(packing, 0.3, 150, subdomains=32, sweeps=3)
+
+
+def column(directory, subdomains, method, groups, sweeps):
+    """Iterations on a column of 4 disks a subdomain, until the error on the impulses is below 1e-6."""
+    place = directory / "columns" / f"{method}_{subdomains}_{sweeps}_{len(groups)}"
+    run(place, {"scene": {"bodies": "column", "column_count": 4 * subdomains, "gravity": [0.0, -1.0, 0.0]},
+                "time": {"step": 1.0, "steps": 1},
+                "solver": {"method": method, "sweeps": sweeps, "criterion": "error", "tolerance": 1e-6, "check_every": 1,
+                           "max_iterations": 2000},
+                "decomposition": {"subdomains": subdomains}, **groups,
+                "output": {"directory": "results", "every": 0}})
+    history = read_history(place / "results")
+    return int(history["iterations"][0]) if history["converged"][0] else ""
+
+
+def study_columns(directory, quick):
+    given = {"enriched": {"direction": 1e4, "direction_unit": "absolute"}}
+    kinds = {"NSCDD": ("nscdd", {}), "NSCDD-EP, l = 1e4, all": ("nscdd_ep", given), "NSCDD-EP, automatic": ("nscdd_ep", {}),
+             "Schwarz": ("schwarz", {}), "Schwarz-EC, l = 1e4": ("schwarz_ec", given)}
+    rows = []
+    for sweeps in (1, 10):
+        for name, (method, groups) in kinds.items():
+            for subdomains in (2, 4, 8, 16) if quick else (2, 4, 8, 16, 32, 64):
+                rows.append({"method": name, "sweeps": sweeps, "subdomains": subdomains,
+                             "iterations": column(directory, subdomains, method,
+                                                  groups, sweeps)})
+    return rows
+
+
+def read_rows(path):
+    with open(path, encoding="ascii") as file:
+        return list(csv.DictReader(file))
+
+
+def draw(rows, columns, path):
+    """Iterations to 1e-3 against sweeps and against subdomains, and on columns."""
+    figure, axes = plt.subplots(1, 3, figsize=(13, 4))
+    labels = {"nscdd": "NSCDD", "nscdd_ep": "NSCDD-EP"}
+    for axis, along, fixed in ((axes[0], "sweeps", ("subdomains", "8")), (axes[1], "subdomains", ("sweeps", "3"))):
+        for method in ("nscdd", "nscdd_ep"):
+            for momentum in ("False", "True"):
+                points = sorted((int(row[along]), int(row["to 0.001"])) for row in rows
+                                if row["packing"] == "disks 1e3" and row["friction"] == "0.3" and row["method"] == method and
+                                row["momentum"] == momentum and row["direction"] in ("", "automatic") and
+                                row[fixed[0]] == fixed[1] and row["to 0.001"] != "")
+                if points:
+                    axis.loglog(*np.array(points).T, "o-" if momentum == "False" else "s--", color=COLOURS[method],
+                                label=labels[method] + (", momentum" if momentum == "True" else ""))
+        axis.set_xlabel({"sweeps": "sweeps an iteration", "subdomains": "subdomains"}[along])
+        axis.set_ylabel("iterations to a residual of 1e-3")
+        axis.legend(frameon=False, fontsize=8)
+    axes[0].set_title("1000 disks, friction 0.3, 8 subdomains", fontsize=9)
+    axes[1].set_title("1000 disks, friction 0.3, 3 sweeps", fontsize=9)
+    for name in dict.fromkeys(row["method"] for row in columns):
+        points = [(int(row["subdomains"]), int(row["iterations"])) for row in columns
+                  if row["method"] == name and row["sweeps"] == "10" and row["iterations"] != ""]
+        if points:
+            axes[2].loglog(*np.array(points).T, "o-", label=name)
+    axes[2].set_xlabel("subdomains of 4 disks")
+    axes[2].set_ylabel("iterations to an error of 1e-6")
+    axes[2].set_title("columns, 10 sweeps", fontsize=9)
+    axes[2].legend(frameon=False, fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", default="methods", help="directory of the results")
+    parser.add_argument("--quick", action="store_true", help="small packings and few iterations")
+    parser.add_argument("--redraw", action="store_true", help="draw from the CSV files")
+    options = parser.parse_args()
+    directory = Path(options.out)
+    os.makedirs(directory, exist_ok=True)
+    if not options.redraw:
+        columns = study_columns(directory, options.quick)
+        write_csv(directory / "methods_columns.csv", {key: [row[key] for row in columns] for key in columns[0]})
+        rows = []
+        for case, iterations in cases(options.quick):
+            rows.append(solve(directory, settle(directory, case["packing"]), case, iterations))
+            # after every case: a study that is stopped has what it has done
+            write_csv(directory / "methods.csv", {key: [row[key] for row in rows] for key in rows[0]})
+    draw(read_rows(directory / "methods.csv"), read_rows(directory / "methods_columns.csv"), directory / "methods.svg")
+
+
+if __name__ == "__main__":
+    main()
