@@ -224,7 +224,7 @@ module gravier_config_table
            "weight of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
 
   type(key_t), parameter :: solver_keys(*) = &
-    [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep", &
+    [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton", &
            "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP"), &
      key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
            "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &

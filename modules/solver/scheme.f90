@@ -57,6 +57,8 @@ module gravier_scheme
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
     type(momentum_t) :: momentum
+    !> the next iteration costs much more than a check: check after it
+    logical :: check_next = .false.
     !> spent in sweeps of each subdomain of this rank since `forget_times` [s]
     real(dp), allocatable :: seconds(:)
     type(work_t) :: work

@@ -86,7 +86,7 @@ contains
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
       if (measure .and. .not. (control%trace .or. present(exact))) measure = is_worth_a_check()
-      measure = measure .or. report%iterations == control%max_iterations
+      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) call check(done)
