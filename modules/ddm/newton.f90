@@ -11,7 +11,7 @@ module gravier_newton
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: work_t, start_sweeps
+  use gravier_scheme, only: work_t
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
   use gravier_enriched_matrix, only: enriched_matrix_t
@@ -21,21 +21,24 @@ module gravier_newton
   private
   public :: newton_t
 
-  !> sweeps' iterations of the first turn
-  integer, parameter :: first_sweeps = 100
+  !> iterations of a window of sweeps in the first turn; what is left of the least change of the last window where sweeps do well
+  integer, parameter :: first_window = 100
+  real(dp), parameter :: little_gain = 0.5_dp
   !> Newton's steps without progress that end the first turn; times which a residual must fall to be progress
-  integer, parameter :: first_patience = 30
+  integer, parameter :: first_patience = 12
   real(dp), parameter :: progress_made = 0.5_dp
-  !> doublings of both from turn to turn
+  !> doublings of window and patience from turn to turn
   integer, parameter :: most_doublings = 8
   !> alpha at the start of a turn and its bounds
-  real(dp), parameter :: alpha_start = 1.0e-3_dp, alpha_least = 1.0e-10_dp, alpha_most = 10.0_dp
+  real(dp), parameter :: alpha_start = 1.0e-2_dp, alpha_least = 1.0e-10_dp, alpha_most = 10.0_dp
   !> what it is multiplied with after a proximal point found in very few steps, in few, in many, not found
-  real(dp), parameter :: drop = 0.1_dp, fall = 0.7_dp, climb = 1.5_dp, rise = 3.0_dp
+  real(dp), parameter :: drop = 0.1_dp, fall = 0.3_dp, climb = 1.5_dp, rise = 10.0_dp
   !> steps to a proximal point that are very few, few, not many, and the most
   integer, parameter :: very_few_steps = 2, few_steps = 6, some_steps = 12, most_inner_steps = 25
-  !> what is left of |F| where a proximal point counts as found
-  real(dp), parameter :: found_point = 0.05_dp
+  !> what is left of |F| where a proximal point counts as found; what may be left of its lowest value after so many steps
+  !> more, or it counts as not found
+  real(dp), parameter :: found_point = 0.05_dp, some_gain = 0.7_dp
+  integer, parameter :: stall = 4
   !> the line search compares with the greatest of so many last values, and halves the step so often at most
   integer, parameter :: memory = 5, most_halvings = 8
   real(dp), parameter :: sufficient = 1.0e-4_dp
@@ -45,6 +48,8 @@ module gravier_newton
     type(proximal_law_t) :: law
     !> Newton's iterate, its step, the best impulses so far (lanes, nc, blocks) [N s]; velocities of the contacts [m/s]
     real(dp), allocatable :: r(:, :, :), step(:, :, :), best(:, :, :), v(:, :, :)
+    !> where the sweeps were left: impulses, velocities of the bodies (nv, n_columns)
+    real(dp), allocatable :: swept(:, :, :), swept_velocity(:, :)
   end type newton_part_t
 
   type, extends(nscdd_t) :: newton_t
@@ -55,14 +60,21 @@ module gravier_newton
     logical, private :: sweeping = .true.
     !> turns of sweeps and Newton's steps; iterations of this part of a turn; steps of this proximal point
     integer, private :: turn = 0, taken = 0, inner = 0
+    !> lowest |r - y|^2 of this window of sweeps and of the last [N^2 s^2]
+    real(dp), private :: lowest = 0.0_dp, last_lowest = 0.0_dp
     real(dp), private :: alpha = alpha_start
+    !> that for which a proximal point was not found last, 0 for none
+    real(dp), private :: refused = 0.0_dp
     !> |F| at the iterate and at the last points of the inner loop, and where it counts as solved [N s]
     real(dp), private :: size_of_f = 0.0_dp, past(memory) = 0.0_dp, goal = 0.0_dp
+    !> lowest |F| after each step of the inner loop [N s]
+    real(dp), private :: reached(0:most_inner_steps) = 0.0_dp
     !> residuals: of the best impulses, of the last centre, of the last progress
     real(dp), private :: least = 0.0_dp, before = 0.0_dp, mark = 0.0_dp
   contains
     procedure :: start => newton_start
     procedure :: iterate => newton_iterate
+    procedure :: conclude => newton_conclude
     procedure :: free => newton_free
     procedure :: work_done => newton_work_done
   end type newton_t
@@ -89,24 +101,27 @@ contains
       associate (part => self%part(s), impulse => problem%sub(s)%impulse)
         call part%law%init(problem%kernels, problem%sub(s))
         part%best = impulse
-        allocate (part%r, part%step, part%v, mold=impulse)
+        allocate (part%r, part%step, part%v, part%swept, mold=impulse)
+        allocate (part%swept_velocity, mold=problem%sub(s)%velocity)
         part%step(:, :, :) = 0.0_dp
         part%v(:, :, :) = 0.0_dp
       end associate
     end do
     self%turn = 0
     self%least = huge(1.0_dp)
-    call begin_turn(self)
+    call begin_sweeps(self)
   end subroutine newton_start
 
   !> Sweeps come next.
-  subroutine begin_turn(self)
+  subroutine begin_sweeps(self)
     class(newton_t), intent(inout) :: self
 
     self%sweeping = .true.
     self%check_next = .false.
     self%taken = 0
-  end subroutine begin_turn
+    self%lowest = huge(1.0_dp)
+    self%last_lowest = huge(1.0_dp)
+  end subroutine begin_sweeps
 
   subroutine newton_iterate(self, problem, measure, jump, error)
     class(newton_t), intent(inout) :: self
@@ -114,19 +129,34 @@ contains
     logical, intent(in) :: measure
     real(dp), intent(out) :: jump
     type(error_t), allocatable, intent(inout) :: error
+    logical :: stagnant
 
     jump = 0.0_dp
     if (allocated(error)) return
     if (self%sweeping) then
       call self%nscdd_t%iterate(problem, measure, jump, error)
-      self%taken = self%taken + 1
-      if (self%taken == first_sweeps*2**min(self%turn, most_doublings)) call begin_steps(self, problem)
+      call close_window(self, stagnant)
+      if (stagnant) call begin_steps(self, problem)
     else
       call make_step(self, problem, measure, jump)
     end if
   end subroutine newton_iterate
 
-  !> Newton's steps come next, from the best impulses so far. Collective.
+  !> Whether windows of sweeps have come to bring little.
+  subroutine close_window(self, stagnant)
+    class(newton_t), intent(inout) :: self
+    logical, intent(out) :: stagnant
+
+    stagnant = .false.
+    self%taken = self%taken + 1
+    self%lowest = min(self%lowest, self%momentum%change)
+    if (mod(self%taken, first_window*2**min(self%turn, most_doublings)) /= 0) return
+    stagnant = self%lowest > little_gain**2*self%last_lowest
+    self%last_lowest = self%lowest
+    self%lowest = huge(1.0_dp)
+  end subroutine close_window
+
+  !> Newton's steps come next, from where the sweeps have come to. Collective.
   subroutine begin_steps(self, problem)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -137,17 +167,20 @@ contains
     self%check_next = .true.
     self%taken = 0
     self%alpha = alpha_start
+    self%refused = 0.0_dp
     call keep_best(self, problem, residual)
     do s = 1, size(self%part)
-      self%part(s)%r(:, :, :) = self%part(s)%best
+      associate (part => self%part(s), sub => problem%sub(s))
+        part%r(:, :, :) = sub%impulse
+        part%swept(:, :, :) = sub%impulse
+        part%swept_velocity(:, :) = sub%velocity
+      end associate
     end do
-    self%mark = self%least
-    self%before = self%least
+    self%mark = residual
+    self%before = residual
     call begin_point(self)
     call restart_point(self, problem)
-    do s = 1, size(self%part)
-      problem%sub(s)%impulse(:, :, :) = self%part(s)%best
-    end do
+    call take_best(self, problem)
   end subroutine begin_steps
 
   !> The next proximal point is one around the iterate.
@@ -174,6 +207,7 @@ contains
     self%inner = 0
     self%past(:) = 0.0_dp
     self%goal = found_point*self%size_of_f
+    self%reached(0) = self%size_of_f
   end subroutine restart_point
 
   !> |F| at the impulses of the problem. Collective.
@@ -202,7 +236,6 @@ contains
     real(dp), intent(inout) :: jump
     type(error_t), allocatable :: singular
     real(dp) :: residual
-    integer :: s
 
     self%past(1 + mod(self%inner, memory)) = self%size_of_f
     call find_step(self, problem, singular)
@@ -210,21 +243,39 @@ contains
     self%taken = self%taken + 1
     self%work%iterations = self%work%iterations + 1
     self%work%interface_solves = self%work%interface_solves + 1
-    if (allocated(singular)) then
-      self%inner = most_inner_steps
-    else if (measure) then
-      jump = problem%jump()
-    end if
+    if (measure .and. .not. allocated(singular)) jump = problem%jump()
     call start_timer(phase_check)
     if (.not. allocated(singular)) call search_line(self, problem)
     call keep_best(self, problem, residual)
-    if (self%size_of_f <= self%goal .or. self%inner >= most_inner_steps) call end_point(self, problem, residual)
-    do s = 1, size(self%part)
-      problem%sub(s)%impulse(:, :, :) = self%part(s)%best
-    end do
-    if (self%sweeping) call start_sweeps(self, problem, shared_masses=.true.)
+    self%reached(self%inner) = min(self%reached(self%inner - 1), self%size_of_f)
+    if (allocated(singular) .or. self%size_of_f <= self%goal .or. is_stuck(self)) call end_point(self, problem, residual)
+    if (self%sweeping) then
+      call take_swept(self, problem)
+    else
+      call take_best(self, problem)
+    end if
     call stop_timer(phase_check)
   end subroutine make_step
+
+  !> Sweeps go on from where they were left, as if nothing had been between.
+  subroutine take_swept(self, problem)
+    class(newton_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    do s = 1, size(self%part)
+      problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
+      problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
+    end do
+  end subroutine take_swept
+
+  !> Whether the proximal point is not in reach.
+  pure logical function is_stuck(self)
+    class(newton_t), intent(in) :: self
+
+    is_stuck = self%inner == most_inner_steps
+    if (self%inner > stall) is_stuck = is_stuck .or. self%reached(self%inner) > some_gain*self%reached(self%inner - stall)
+  end function is_stuck
 
   !> The step of the impulses, into `step`, with the velocities that it gives the copies. Collective.
   subroutine find_step(self, problem, singular)
@@ -312,7 +363,8 @@ contains
       integer :: i
 
       do i = 1, size(self%part)
-        problem%sub(i)%impulse(:, :, :) = self%part(i)%r + part_of_step*self%part(i)%step
+        problem%sub(i)%impulse(:, :, :) = self%part(i)%r
+        if (part_of_step > 0.0_dp) problem%sub(i)%impulse(:, :, :) = self%part(i)%r + part_of_step*self%part(i)%step
       end do
       call evaluate(self, problem, self%size_of_f)
     end subroutine go
@@ -336,6 +388,17 @@ contains
     end do
   end subroutine keep_best
 
+  !> The impulses of the problem are the best so far.
+  subroutine take_best(self, problem)
+    class(newton_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    do s = 1, size(self%part)
+      problem%sub(s)%impulse(:, :, :) = self%part(s)%best
+    end do
+  end subroutine take_best
+
   !> The iterate becomes the next centre if it is worth it, alpha goes with the steps taken; where all that has brought no
   !> progress, sweeps come next. Collective.
   subroutine end_point(self, problem, residual)
@@ -346,27 +409,39 @@ contains
     logical :: found
 
     found = self%size_of_f <= self%goal
+    if (found .and. self%alpha <= self%refused) self%refused = 0.0_dp
     if (.not. found) then
+      self%refused = self%alpha
       self%alpha = min(self%alpha*rise, alpha_most)
-    else if (self%inner <= very_few_steps) then
+    else if (self%inner <= very_few_steps .and. self%alpha*drop > self%refused) then
       self%alpha = max(self%alpha*drop, alpha_least)
     else if (self%inner <= few_steps) then
       self%alpha = max(self%alpha*fall, alpha_least)
     else if (self%inner > some_steps) then
       self%alpha = min(self%alpha*climb, alpha_most)
     end if
-    if (self%least <= progress_made*self%mark) then
-      self%mark = self%least
+    if (residual <= progress_made*self%mark) then
+      self%mark = residual
       self%taken = 0
     else if (self%taken >= first_patience*2**min(self%turn, most_doublings)) then
       self%turn = self%turn + 1
-      call begin_turn(self)
+      call begin_sweeps(self)
       return
     end if
     if (found .or. residual < self%before) call begin_point(self)
     self%before = residual
     call restart_point(self, problem)
   end subroutine end_point
+
+  !> The end of a solve without success. Collective.
+  subroutine newton_conclude(self, problem)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: ignored
+
+    call keep_best(self, problem, ignored)
+    call take_best(self, problem)
+  end subroutine newton_conclude
 
   subroutine newton_free(self)
     class(newton_t), intent(inout) :: self

@@ -65,6 +65,7 @@ module gravier_scheme
   contains
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
+    procedure :: conclude => scheme_conclude
     procedure :: free => scheme_free
     procedure :: work_done => scheme_work_done
     procedure :: measure_balance => scheme_measure_balance
@@ -95,6 +96,16 @@ module gravier_scheme
   end interface
 
 contains
+
+  !> The end of a solve without success: what is left are the impulses of the last iteration; methods that keep better ones
+  !> override it. Collective.
+  subroutine scheme_conclude(self, problem)
+    class(scheme_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+
+    self%check_next = .false.
+    call problem%evaluate()
+  end subroutine scheme_conclude
 
   !> Give back what the method holds; methods that hold something override it.
   subroutine scheme_free(self)

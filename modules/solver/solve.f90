@@ -70,7 +70,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> criterion 'error'
     class(exact_solution_t), intent(in), optional :: exact
-    real(dp) :: reference, progress, ratio
+    real(dp) :: reference, progress, ratio, ignored
     integer :: skips
     logical :: measure, done
 
@@ -91,6 +91,10 @@ contains
       if (allocated(error)) return
       if (measure) call check(done)
     end do
+    if (report%status == solve_exhausted) then
+      call scheme%conclude(problem)
+      call problem%residual(report%residual, ignored)
+    end if
 
   contains
 
