@@ -25,19 +25,19 @@ module gravier_newton
   integer, parameter :: first_window = 100
   real(dp), parameter :: little_gain = 0.5_dp
   !> Newton's steps without progress that end the first turn; times which a residual must fall to be progress
-  integer, parameter :: first_patience = 12
-  real(dp), parameter :: progress_made = 0.5_dp
+  integer, parameter :: first_patience = 100
+  real(dp), parameter :: progress_made = 0.8_dp
   !> doublings of window and patience from turn to turn
   integer, parameter :: most_doublings = 8
   !> alpha at the start of a turn and its bounds
   real(dp), parameter :: alpha_start = 1.0e-2_dp, alpha_least = 1.0e-10_dp, alpha_most = 10.0_dp
   !> what it is multiplied with after a proximal point found in very few steps, in few, in many, not found
-  real(dp), parameter :: drop = 0.1_dp, fall = 0.3_dp, climb = 1.5_dp, rise = 10.0_dp
+  real(dp), parameter :: drop = 0.1_dp, fall = 0.5_dp, climb = 1.5_dp, rise = 5.0_dp
   !> steps to a proximal point that are very few, few, not many, and the most
   integer, parameter :: very_few_steps = 2, few_steps = 6, some_steps = 12, most_inner_steps = 25
   !> what is left of |F| where a proximal point counts as found; what may be left of its lowest value after so many steps
   !> more, or it counts as not found
-  real(dp), parameter :: found_point = 0.05_dp, some_gain = 0.7_dp
+  real(dp), parameter :: found_point = 0.1_dp, some_gain = 0.7_dp
   integer, parameter :: stall = 4
   !> the line search compares with the greatest of so many last values, and halves the step so often at most
   integer, parameter :: memory = 5, most_halvings = 8

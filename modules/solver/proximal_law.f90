@@ -2,10 +2,11 @@
 !>
 !> With the projection P of Alart and Curnier (P_n = max(x_n, 0), P_t = x_t cut to the disc of radius mu P_n), s the diagonal of
 !> the undivided local operator, v~ the velocity with its shift and r_k the centre of a proximal point,
-!>   F(r, v) = r - P(x),   x = r - v~/s - alpha (r - r_k):
+!>   F(r, v) = r - P(x),   x = r - (v~ + alpha s (r - r_k))/(b s):
 !> F = 0 says that r and v~ + alpha s (r - r_k) satisfy Signorini's condition and Coulomb's law, and for r = r_k that r and v~ do.
-!> Linearised, dr = c - L dv with
-!>   L = (1 - (1 - alpha) D)^-1 D/s,   c = -(1 - (1 - alpha) D)^-1 F,   D = dP/dx.
+!> b = 1 gives the function of gravier_alart_curnier, b = alpha the augmented Lagrangian, in which x is a function of v alone; between
+!> them, with b = sqrt(alpha), points are found in the fewest steps (doc/newton.md). Linearised, dr = c - L dv with
+!>   L = (1 - (1 - a) D)^-1 D/(b s),   c = -(1 - (1 - a) D)^-1 F,   D = dP/dx,   a = alpha/b.
 module gravier_proximal_law
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
@@ -66,19 +67,21 @@ contains
     real(dp), intent(in) :: alpha
     !> |F|^2 [N^2 s^2]
     real(dp), intent(out) :: square
-    real(dp) :: x(3), mu, length, bound
+    real(dp) :: x(3), mu, length, bound, a, b
     integer :: c, q, g, nc
 
     nc = kernels%nc
+    b = sqrt(alpha)
+    a = alpha/b
     square = 0.0_dp
     mu = 0.0_dp
     do c = 1, sub%n_contacts
       q = lane_of(c)
       g = block_of(c)
       if (nc > 1) mu = sub%hot(q, kernels%nh, g)
-      x(1:nc) = (1.0_dp - alpha)*sub%impulse(q, :, g) + alpha*self%centre(q, :, g)
-      x(1) = x(1) - self%softness(1, c)*(v(q, 1, g) + sub%hot(q, kernels%nd + 1, g))
-      x(2:nc) = x(2:nc) - self%softness(2, c)*v(q, 2:, g)
+      x(1:nc) = (1.0_dp - a)*sub%impulse(q, :, g) + a*self%centre(q, :, g)
+      x(1) = x(1) - self%softness(1, c)/b*(v(q, 1, g) + sub%hot(q, kernels%nd + 1, g))
+      x(2:nc) = x(2:nc) - self%softness(2, c)/b*v(q, 2:, g)
       if (x(1) <= 0.0_dp) then
         self%state(c) = is_open
         x(1:nc) = 0.0_dp
@@ -108,37 +111,40 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     real(dp), intent(in) :: alpha
-    real(dp) :: e(2), f(3), mu, across
+    real(dp) :: e(2), f(3), mu, across, a, b, soft(2)
     integer :: c, q, g, k, l, nc
 
     nc = kernels%nc
+    b = sqrt(alpha)
+    a = alpha/b
     do c = 1, sub%n_contacts
       q = lane_of(c)
       g = block_of(c)
       f(1:nc) = self%f(q, :, g)
+      soft(:) = self%softness(:, c)/b
       self%slope(:, :, c) = 0.0_dp
       select case (self%state(c))
       case (is_open)
         self%offset(q, :, g) = -f(1:nc)
       case (sticks)
-        self%offset(q, :, g) = -f(1:nc)/alpha
-        self%slope(1, 1, c) = self%softness(1, c)/alpha
+        self%offset(q, :, g) = -f(1:nc)/a
+        self%slope(1, 1, c) = soft(1)/a
         do k = 2, nc
-          self%slope(k, k, c) = self%softness(2, c)/alpha
+          self%slope(k, k, c) = soft(2)/a
         end do
       case (slides)
-        ! across the sliding, D keeps a part and the inverse is 1/(1 - (1 - alpha) kept); along it D keeps nothing
+        ! across the sliding, D keeps a part and the inverse is 1/(1 - (1 - a) kept); along it D keeps nothing
         mu = sub%hot(q, kernels%nh, g)
         e(:) = self%along(:, c)
-        across = 1.0_dp/((1.0_dp - self%kept(c)) + alpha*self%kept(c))
-        self%offset(q, 1, g) = -f(1)/alpha
-        self%slope(1, 1, c) = self%softness(1, c)/alpha
+        across = 1.0_dp/((1.0_dp - self%kept(c)) + a*self%kept(c))
+        self%offset(q, 1, g) = -f(1)/a
+        self%slope(1, 1, c) = soft(1)/a
         do k = 2, nc
           self%offset(q, k, g) = -across*(f(k) - e(k - 1)*dot_product(e(1:nc - 1), f(2:nc))) &
-            & - e(k - 1)*(dot_product(e(1:nc - 1), f(2:nc)) + (1.0_dp - alpha)*mu*f(1)/alpha)
-          self%slope(k, 1, c) = mu*e(k - 1)*self%softness(1, c)/alpha
+            & - e(k - 1)*(dot_product(e(1:nc - 1), f(2:nc)) + (1.0_dp - a)*mu*f(1)/a)
+          self%slope(k, 1, c) = mu*e(k - 1)*soft(1)/a
           do l = 2, nc
-            self%slope(k, l, c) = self%kept(c)*across*self%softness(2, c)*(merge(1.0_dp, 0.0_dp, k == l) - e(k - 1)*e(l - 1))
+            self%slope(k, l, c) = self%kept(c)*across*soft(2)*(merge(1.0_dp, 0.0_dp, k == l) - e(k - 1)*e(l - 1))
           end do
         end do
       end select
