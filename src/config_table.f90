@@ -225,7 +225,8 @@ module gravier_config_table
 
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton", &
-           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP"), &
+           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP; sweeps of NSCDD with momentum "// &
+           "and, where they stagnate, a proximal Newton method"), &
      key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
            "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
      key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &
@@ -234,7 +235,8 @@ module gravier_config_table
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
            "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)"), &
      key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
-           "`momentum`: iterations start from impulses extrapolated from the last two (`nlgs`, `nscdd`, `nscdd_ep` only)"), &
+           "`momentum`: iterations start from impulses extrapolated from the last two (`nlgs`, `nscdd`, `nscdd_ep` only; "// &
+           "the sweeps of `newton` always do)"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
