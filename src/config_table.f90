@@ -225,8 +225,8 @@ module gravier_config_table
 
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton", &
-           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP; sweeps of NSCDD with momentum "// &
-           "and, where they stagnate, a proximal Newton method"), &
+           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP; "// &
+           "sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method"), &
      key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
            "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
      key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &

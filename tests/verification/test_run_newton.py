@@ -53,15 +53,15 @@ class Newton(RunTestCase):
         self.assertGreater(sweeps.trace()["residual"][-1], 1e3 * TIGHT)
 
     def test_column_against_exact_impulses(self):
-        case = merged(self.disks, {"scene": {"bodies": "column", "bodies_file": None, "column_count": 600, "radius": 0.05,
+        case = merged(self.disks, {"scene": {"bodies": "column", "bodies_file": None, "column_count": 300, "radius": 0.05,
                                              "friction": 0.0},
-                                   "solver": {"criterion": "error"}})
+                                   "solver": {"criterion": "error", "tolerance": 1e-7}})
         for subdomains in (1, 5):
             run = run_case(merged(case, {"decomposition": {"subdomains": subdomains}}), directory=self.here(f"column{subdomains}"))
             self.assert_status(run, 0)
             self.assertNotIn(" 0 factorisations", run.stdout)
-            # impulses are exact, so all velocities vanish on the scale of those that gravity gives in a step
-            self.assertLess(np.abs(self.velocities(run)).max(), 1e-6 * 9.81 * 1e-3)
+            # a grain moves by what the impulses lack, at most a few times 1e-7 of 300 weights
+            self.assertLess(np.abs(self.velocities(run)).max(), 1e-4 * 9.81 * 1e-3)
 
     def test_same_bits_on_any_number_of_ranks(self):
         case = merged(self.disks, {"decomposition": {"subdomains": 4, "partition": "metis"},
