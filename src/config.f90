@@ -264,9 +264,7 @@ contains
     integer :: i
 
     report%instance = 1
-    associate (scene => config%scene, parts => config%decomposition, sample => config%sample, solver => config%solver)
-      if (.not. is_given(report, "solver", "acceleration") .and. any(solver%method == ["nlgs ", "nscdd"])) &
-        solver%acceleration = "momentum"
+    associate (scene => config%scene, parts => config%decomposition, sample => config%sample)
       if (.not. is_given(report, "scene", "wall_friction")) scene%wall_friction = scene%friction
       if (.not. is_given(report, "scene", "wall_restitution")) scene%wall_restitution = scene%restitution
       call fill_third(scene%dimension, scene%lattice_count)
@@ -277,6 +275,8 @@ contains
     end associate
     if (config%solver%method == "nscdd_ep" .and. .not. (config%enriched%direction_given .or. &
         is_given(report, "enriched", "contacts"))) config%enriched%contacts = "active"
+    if (.not. is_given(report, "solver", "acceleration") .and. (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
+        (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active"))) config%solver%acceleration = "momentum"
     do i = 1, size(config%boundaries)
       report%instance = i
       call settle_boundary(config%scene, report, config%boundaries(i))

@@ -224,8 +224,9 @@ module gravier_config_table
            "weight of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
 
   type(key_t), parameter :: solver_keys(*) = &
-    [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep", &
-           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP"), &
+    [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton", &
+           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP; "// &
+           "sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method"), &
      key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
            "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
      key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &
@@ -235,8 +236,9 @@ module gravier_config_table
            "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)", &
            note="found while iterating, from 1 down"), &
      key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
-           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then", &
-           note="`'momentum'` for `nlgs` and `nscdd`, else `'none'`"), &
+           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. The sweeps "// &
+           "of `newton` always do", &
+           note="`'momentum'` for `nlgs`, `nscdd` and, on active contacts, `nscdd_ep`; else `'none'`"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &

@@ -72,7 +72,7 @@ module gravier_config_types
 
   !> &solver: the method of every step and when it stops.
   type :: solver_config_t
-    !> nlgs, schwarz, schwarz_ec, nscdd or nscdd_ep
+    !> nlgs, schwarz, schwarz_ec, nscdd, nscdd_ep or newton
     character(len=choice_length) :: method
     !> residual or error
     character(len=choice_length) :: criterion

@@ -7,6 +7,7 @@ module gravier_scheme_choice
   use gravier_nlgs, only: nlgs_t
   use gravier_nscdd, only: nscdd_t
   use gravier_nscdd_ep, only: nscdd_ep_t
+  use gravier_newton, only: newton_t
   use gravier_schwarz, only: schwarz_t, relaxation_t
   use gravier_schwarz_ec, only: schwarz_ec_t
   use gravier_enriched_matrix, only: search_direction_t
@@ -47,6 +48,8 @@ contains
       dual%matrix%direction = direction_of(config%enriched, active_direction, careful_direction)
       call choose_interface_solver(config%enriched, dual%interface_solver)
       call move_alloc(dual, scheme)
+    case ("newton")
+      allocate (newton_t :: scheme)
     case default
       allocate (nlgs_t :: scheme)
     end select
@@ -58,7 +61,7 @@ contains
       scheme%direction_text = direction_text(scheme%matrix%direction)
     end select
     scheme%sweeps = config%solver%sweeps
-    scheme%momentum%on = config%solver%acceleration == "momentum"
+    scheme%momentum%on = config%solver%acceleration == "momentum" .or. config%solver%method == "newton"
   end subroutine choose_scheme
 
   !> A given factor is fixed.

@@ -42,12 +42,15 @@ module gravier_enriched_matrix
     real(dp) :: share = 1.0_dp
     !> iterations since l was set
     integer, private :: uses = 0
+    !> l has blocks that are not symmetric: set before `start`, factorised by `factorise_blocks`
+    logical :: general = .false.
     type(enriched_part_t), allocatable :: part(:)
   contains
     procedure :: set_share => enriched_matrix_set_share
     procedure :: count_use => enriched_matrix_count_use
     procedure :: start => enriched_matrix_start
     procedure :: update => enriched_matrix_update
+    procedure :: factorise_blocks => enriched_matrix_factorise_blocks
     procedure :: solve => enriched_matrix_solve
     procedure :: enrich => enriched_matrix_enrich
     procedure :: counts => enriched_matrix_counts
@@ -68,7 +71,7 @@ contains
     end if
     if (.not. allocated(self%part)) allocate (self%part(size(problem%sub)))
     do s = 1, size(self%part)
-      if (.not. self%part(s)%factor%is_alive()) call self%part(s)%factor%init_local(error)
+      if (.not. self%part(s)%factor%is_alive()) call self%part(s)%factor%init_local(error, general=self%general)
       call make_room(self%part(s), problem%kernels, problem%sub(s))
     end do
   end subroutine enriched_matrix_start
@@ -113,7 +116,7 @@ contains
     logical, intent(out) :: changed
     type(error_t), allocatable, intent(inout) :: error
     integer, allocatable :: row(:), column(:)
-    real(dp), allocatable :: value(:)
+    real(dp), allocatable :: value(:), block(:, :, :)
     integer(i8) :: before
     integer :: s
 
@@ -123,7 +126,8 @@ contains
       associate (part => self%part(s), sub => problem%sub(s))
         if (sub%n_bodies == 0) cycle
         call set_direction(self%direction, self%share, problem%kernels, sub, part%direction)
-        call assemble(problem%kernels, sub, part%direction, row, column, value)
+        call make_diagonal_blocks(part%direction, sub%n_contacts, block)
+        call assemble(problem%kernels, sub, block, .false., row, column, value)
         before = part%factor%factorisations
         call part%factor%factorise(sub%n_bodies*problem%kernels%nv, row, column, value, error)
         changed = changed .or. part%factor%factorisations > before
@@ -176,15 +180,50 @@ contains
     end do
   end subroutine drop_inactive
 
-  !> Lower triangle of M + H l H^T with the masses in `weight`, as triplets; components that cannot move eliminated.
-  subroutine assemble(kernels, sub, direction, row, column, value)
+  !> Factorise M + H l H^T of subdomain `s` with any blocks l.
+  subroutine enriched_matrix_factorise_blocks(self, problem, s, block, error)
+    class(enriched_matrix_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (nc, nc, contacts) [kg]
+    real(dp), intent(in), contiguous :: block(:, :, :)
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: row(:), column(:)
+    real(dp), allocatable :: value(:)
+
+    if (problem%sub(s)%n_bodies == 0) return
+    call assemble(problem%kernels, problem%sub(s), block, self%general, row, column, value)
+    call self%part(s)%factor%factorise(problem%sub(s)%n_bodies*problem%kernels%nv, row, column, value, error)
+  end subroutine enriched_matrix_factorise_blocks
+
+  !> The blocks (nc, nc, contacts) of an l without coupling.
+  pure subroutine make_diagonal_blocks(direction, n_contacts, block)
+    !> (lanes, nc, blocks)
+    real(dp), intent(in), contiguous :: direction(:, :, :)
+    integer, intent(in) :: n_contacts
+    real(dp), allocatable, intent(out) :: block(:, :, :)
+    integer :: c, k
+
+    allocate (block(size(direction, 2), size(direction, 2), n_contacts), source=0.0_dp)
+    do c = 1, n_contacts
+      do k = 1, size(direction, 2)
+        block(k, k, c) = direction(lane_of(c), k, block_of(c))
+      end do
+    end do
+  end subroutine make_diagonal_blocks
+
+  !> M + H l H^T with the masses in `weight`, as triplets, of a symmetric matrix the lower triangle; components that cannot
+  !> move eliminated.
+  subroutine assemble(kernels, sub, block, general, row, column, value)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
-    real(dp), intent(in), contiguous :: direction(:, :, :)
+    !> l (nc, nc, contacts) [kg]
+    real(dp), intent(in), contiguous :: block(:, :, :)
+    logical, intent(in) :: general
     integer, allocatable, intent(out) :: row(:), column(:)
     real(dp), allocatable, intent(out) :: value(:)
     real(dp) :: jacobian(kernels%nc, kernels%nv, 2)
-    integer :: b, c, d, n, nv, side, on_wall
+    integer :: b, c, d, n, nv, side, on_wall, of_pair
 
     nv = kernels%nv
     ! on what moves as prescribed: the antagonist, or a candidate glued to it
@@ -192,7 +231,8 @@ contains
     do c = 1, sub%n_contacts
       if (any(sub%pair(:, c) > sub%n_bodies)) on_wall = on_wall + 1
     end do
-    n = sub%n_bodies*nv + on_wall*(nv*(nv + 1))/2 + (sub%n_contacts - on_wall)*(nv*(nv + 1) + nv*nv)
+    of_pair = merge(2*nv*nv, nv*(nv + 1), general)
+    n = sub%n_bodies*nv + on_wall*(of_pair/2) + (sub%n_contacts - on_wall)*(of_pair + merge(2, 1, general)*nv*nv)
     allocate (row(n), column(n), value(n))
     n = 0
     do b = 1, sub%n_bodies
@@ -210,26 +250,25 @@ contains
         if (sub%pair(side, c) <= sub%n_bodies) call add_block(sub%pair(side, c), sub%pair(side, c), side, side)
       end do
       if (any(sub%pair(:, c) > sub%n_bodies)) cycle
-      if (sub%pair(1, c) > sub%pair(2, c)) then
-        call add_block(sub%pair(1, c), sub%pair(2, c), 1, 2)
-      else
-        call add_block(sub%pair(2, c), sub%pair(1, c), 2, 1)
-      end if
+      if (sub%pair(1, c) > sub%pair(2, c) .or. general) call add_block(sub%pair(1, c), sub%pair(2, c), 1, 2)
+      if (sub%pair(1, c) < sub%pair(2, c) .or. general) call add_block(sub%pair(2, c), sub%pair(1, c), 2, 1)
     end do
 
   contains
 
-    !> J_a^T l J_b at bodies (i, j), i >= j; of a diagonal block only the lower triangle.
+    !> J_a^T l J_b at bodies (i, j); of a symmetric matrix i >= j, and of a diagonal block the lower triangle.
     subroutine add_block(i, j, a, b)
       integer, intent(in) :: i, j, a, b
-      integer :: p, q
-      real(dp) :: x
+      integer :: p, q, k
+      real(dp) :: x, row_of(kernels%nc)
 
       do p = 1, nv
-        do q = 1, merge(p, nv, i == j)
+        do k = 1, kernels%nc
+          row_of(k) = sum(jacobian(:, p, a)*block(:, k, c))
+        end do
+        do q = 1, merge(p, nv, i == j .and. .not. general)
           x = 0.0_dp
-          if (sub%moves(p, i) .and. sub%moves(q, j)) &
-            & x = sum(jacobian(:, p, a)*direction(lane_of(c), :, block_of(c))*jacobian(:, q, b))
+          if (sub%moves(p, i) .and. sub%moves(q, j)) x = sum(row_of*jacobian(:, q, b))
           call add((i - 1)*nv + p, (j - 1)*nv + q, x)
         end do
       end do

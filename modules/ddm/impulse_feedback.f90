@@ -90,7 +90,7 @@ contains
     if (allocated(error)) return
     call problem%shared%pass()
     do s = 1, size(problem%sub)
-      call problem%shared%sum_copies(s, problem%sub(s)%reaction)
+      call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
       call velocity_change(problem%kernels, problem%sub(s), self%part(s)%lead)
       associate (part => self%part(s), sub => problem%sub(s), work => matrix%part(s)%contact_work)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)

@@ -58,7 +58,7 @@ contains
     real(dp), allocatable :: value(:)
     integer :: s
 
-    if (.not. self%factor%is_alive()) call self%factor%init_distributed(problem%comm, error)
+    if (.not. self%factor%is_alive()) call self%factor%init_distributed(problem%comm, error, general=matrix%general)
     call number_unknowns(self, problem, error)
     if (self%n == 0 .or. allocated(error)) return
     do s = 1, size(self%blocks)
@@ -66,7 +66,7 @@ contains
     end do
     call problem%comm%agree(error)
     if (allocated(error)) return
-    call assemble(self%blocks, problem%kernels%nv, row, column, value)
+    call assemble(self%blocks, problem%kernels%nv, matrix%general, row, column, value)
     call self%factor%factorise(self%n, row, column, value, error)
     call problem%comm%agree(error)
   end subroutine interface_direct_prepare
@@ -161,10 +161,11 @@ contains
     end do
   end subroutine find_compliance
 
-  !> Lower triangle of the blocks A_E M_eta,E^-1 A_E^T of this rank, as triplets.
-  subroutine assemble(blocks, nv, row, column, value)
+  !> The blocks A_E M_eta,E^-1 A_E^T of this rank, as triplets; of symmetric ones the lower triangle.
+  subroutine assemble(blocks, nv, general, row, column, value)
     type(block_t), intent(in) :: blocks(:)
     integer, intent(in) :: nv
+    logical, intent(in) :: general
     integer, allocatable, intent(out) :: row(:), column(:)
     real(dp), allocatable, intent(out) :: value(:)
     integer :: s, round, n
@@ -202,7 +203,7 @@ contains
       if (first_row == 0 .or. first_column == 0) return
       do q = 0, nv - 1
         do p = 0, nv - 1
-          if (first_row + p < first_column + q) cycle
+          if (first_row + p < first_column + q .and. .not. general) cycle
           n = n + 1
           if (round == 1) cycle
           row(n) = first_row + p

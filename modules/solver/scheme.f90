@@ -64,12 +64,17 @@ module gravier_scheme
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
     type(momentum_t) :: momentum
+    !> the next iteration costs much more than a check: check after it
+    logical :: check_next = .false.
+    !> the method keeps the best impulses of a solve: `conclude` takes them
+    logical :: keeps_best = .false.
     !> spent in sweeps of each subdomain of this rank since `forget_times` [s]
     real(dp), allocatable :: seconds(:)
     type(work_t) :: work
   contains
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
+    procedure :: conclude => scheme_conclude
     procedure :: free => scheme_free
     procedure :: work_done => scheme_work_done
     procedure :: measure_balance => scheme_measure_balance
@@ -101,6 +106,16 @@ module gravier_scheme
   end interface
 
 contains
+
+  !> The end of a solve without success, with v_global evaluated: what is left are the impulses of the last iteration; methods
+  !> that keep better ones override it. Collective.
+  subroutine scheme_conclude(self, problem)
+    class(scheme_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+
+    self%check_next = .false.
+    call problem%evaluate()
+  end subroutine scheme_conclude
 
   !> Give back what the method holds; methods that hold something override it.
   subroutine scheme_free(self)

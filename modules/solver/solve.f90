@@ -79,7 +79,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> criterion 'error'
     class(exact_solution_t), intent(in), optional :: exact
-    real(dp) :: reference, progress, ratio, began, checking
+    real(dp) :: reference, progress, ratio, began, checking, ignored
     integer :: skips
     logical :: measure, done
 
@@ -100,11 +100,15 @@ contains
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
       if (measure .and. .not. (control%trace .or. present(exact))) measure = is_worth_a_check()
-      measure = measure .or. report%iterations == control%max_iterations
+      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) call check(done)
     end do
+    if (report%status == solve_exhausted .and. scheme%keeps_best) then
+      call scheme%conclude(problem)
+      call problem%residual(report%residual, ignored)
+    end if
     report%seconds = clock() - began
 
   contains

@@ -1,5 +1,4 @@
-!> Sparse direct solution of linear systems, symmetric positive definite or, on one rank, general: the only module that
-!> knows MUMPS.
+!> Sparse direct solution of linear systems, symmetric positive definite or general: the only module that knows MUMPS.
 module gravier_sparse_direct
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
@@ -65,16 +64,19 @@ contains
   end subroutine sparse_factor_init_local
 
   !> A matrix whose entries and rows are spread over the ranks. Collective.
-  subroutine sparse_factor_init_distributed(self, comm, error)
+  subroutine sparse_factor_init_distributed(self, comm, error, general)
     class(sparse_factor_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
     type(error_t), allocatable, intent(inout) :: error
+    !> as for a local matrix
+    logical, intent(in), optional :: general
 
     call self%free()
     allocate (self%id)
     self%comm => comm
     self%id%comm = comm%mpi%mpi_val
     self%id%sym = 1
+    if (present(general)) self%id%sym = merge(0, 1, general)
     call start(self, error)
   end subroutine sparse_factor_init_distributed
 

@@ -180,7 +180,7 @@ FILES = [
     key("output", "directory", "''", "not empty"),
     # the choice
     key("scene", "bodies", "'cubes'", "'column', 'lattice', 'file' or 'sample'"),
-    key("solver", "method", "'jacobi'", "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd' or 'nscdd_ep'"),
+    key("solver", "method", "'jacobi'", "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd', 'nscdd_ep' or 'newton'"),
     key("solver", "criterion", "'energy'", "'residual' or 'error'"),
     key("solver", "on_failure", "'panic'", "'continue', 'stop' or 'discard'"),
     key("decomposition", "partition", "'scotch'", "'grid' or 'metis'"),

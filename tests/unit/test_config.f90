@@ -348,7 +348,7 @@ contains
 
   !> Every word of every choice, and any case.
   subroutine test_words_of_choices()
-    call accept_words("solver", "method", "nlgs schwarz schwarz_ec nscdd nscdd_ep")
+    call accept_words("solver", "method", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton")
     call accept_words("solver", "criterion", "residual error")
     call accept_words("solver", "on_failure", "continue stop discard")
     call accept_words("decomposition", "partition", "grid metis")
@@ -381,7 +381,7 @@ contains
     character(len=:), allocatable :: text
     select case (group // " " // key)
     case ("solver method")
-      text = "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd' or 'nscdd_ep'"
+      text = "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd', 'nscdd_ep' or 'newton'"
     case ("solver criterion")
       text = "'residual' or 'error'"
     case ("solver on_failure")

@@ -1,0 +1,464 @@
+!> Proximal Newton method on the velocities, for tolerances that sweeps do not reach.
+!>
+!> Outer loop: proximal points, as in gravier_contact_newton; its fixed points are the solutions with Coulomb's exact law, for
+!> every weight alpha. Inner loop: semismooth Newton steps on gravier_proximal_law. The impulses of a step, dr = c - L H^T dV, are
+!> eliminated contact by contact; with M V = R^d + H r at every point there remains (M + H L H^T) dV = H c, in subdomains
+!>   X_L F = sum_E A_E M_L,E^-1 H_E c_E,   dV_E = M_L,E^-1 (H_E c_E - A_E^T F),   M_L,E = M~_E + H_E L_E H_E^T,
+!> the interface problem of NSCDD-EP with blocks L for l. Newton's method converges near a solution: sweeps with momentum come
+!> first, and again where it makes no progress.
+module gravier_newton
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: work_t
+  use gravier_nscdd, only: nscdd_t
+  use gravier_proximal_law, only: proximal_law_t
+  use gravier_enriched_matrix, only: enriched_matrix_t
+  use gravier_interface_problem, only: interface_field_t, make_field, chain_differences, load_transpose
+  use gravier_interface_direct, only: interface_direct_t
+  implicit none
+  private
+  public :: newton_t
+
+  !> iterations of a window of sweeps in the first turn; what is left of the least change of the last window where sweeps do well
+  integer, parameter :: first_window = 100
+  real(dp), parameter :: little_gain = 0.5_dp
+  !> Newton's steps without progress that end the first turn; times which a residual must fall to be progress
+  integer, parameter :: first_patience = 100
+  real(dp), parameter :: progress_made = 0.8_dp
+  !> doublings of window and patience from turn to turn
+  integer, parameter :: most_doublings = 8
+  !> alpha at the start of a turn and its bounds
+  real(dp), parameter :: alpha_start = 1.0e-2_dp, alpha_least = 1.0e-10_dp, alpha_most = 10.0_dp
+  !> what it is multiplied with after a proximal point found in very few steps, in few, in many, not found
+  real(dp), parameter :: drop = 0.1_dp, fall = 0.5_dp, climb = 1.5_dp, rise = 5.0_dp
+  !> steps to a proximal point that are very few, few, not many, and the most
+  integer, parameter :: very_few_steps = 2, few_steps = 6, some_steps = 12, most_inner_steps = 25
+  !> what is left of |F| where a proximal point counts as found; what may be left of its lowest value after so many steps
+  !> more, or it counts as not found
+  real(dp), parameter :: found_point = 0.1_dp, some_gain = 0.7_dp
+  integer, parameter :: stall = 4
+  !> the line search compares with the greatest of so many last values, and halves the step so often at most
+  integer, parameter :: memory = 5, most_halvings = 8
+  real(dp), parameter :: sufficient = 1.0e-4_dp
+
+  !> Of one subdomain.
+  type :: newton_part_t
+    type(proximal_law_t) :: law
+    !> Newton's iterate, its step, the best impulses so far (lanes, nc, blocks) [N s]; velocities of the contacts [m/s]
+    real(dp), allocatable :: r(:, :, :), step(:, :, :), best(:, :, :), v(:, :, :)
+    !> where the sweeps were left: impulses, velocities of the bodies (nv, n_columns)
+    real(dp), allocatable :: swept(:, :, :), swept_velocity(:, :)
+  end type newton_part_t
+
+  type, extends(nscdd_t) :: newton_t
+    type(enriched_matrix_t) :: matrix
+    type(interface_direct_t) :: interface_solver
+    type(newton_part_t), allocatable, private :: part(:)
+    type(interface_field_t), allocatable, private :: b(:), f(:)
+    logical, private :: sweeping = .true.
+    !> turns of sweeps and Newton's steps; iterations of this part of a turn; steps of this proximal point
+    integer, private :: turn = 0, taken = 0, inner = 0
+    !> lowest |r - y|^2 of this window of sweeps and of the last [N^2 s^2]
+    real(dp), private :: lowest = 0.0_dp, last_lowest = 0.0_dp
+    real(dp), private :: alpha = alpha_start
+    !> that for which a proximal point was not found last, 0 for none
+    real(dp), private :: refused = 0.0_dp
+    !> |F| at the iterate and at the last points of the inner loop, and where it counts as solved [N s]
+    real(dp), private :: size_of_f = 0.0_dp, past(memory) = 0.0_dp, goal = 0.0_dp
+    !> lowest |F| after each step of the inner loop [N s]
+    real(dp), private :: reached(0:most_inner_steps) = 0.0_dp
+    !> residuals: of the best impulses, of the last centre, of the last progress
+    real(dp), private :: least = 0.0_dp, before = 0.0_dp, mark = 0.0_dp
+  contains
+    procedure :: start => newton_start
+    procedure :: iterate => newton_iterate
+    procedure :: conclude => newton_conclude
+    procedure :: free => newton_free
+    procedure :: work_done => newton_work_done
+  end type newton_t
+
+contains
+
+  subroutine newton_start(self, problem, error)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    if (allocated(error)) return
+    call self%nscdd_t%start(problem, error)
+    self%matrix%general = .true.
+    call self%matrix%start(problem, error)
+    call problem%comm%agree(error)
+    if (allocated(error)) return
+    call make_field(problem, self%b)
+    call make_field(problem, self%f)
+    if (allocated(self%part)) deallocate (self%part)
+    allocate (self%part(size(problem%sub)))
+    do s = 1, size(self%part)
+      associate (part => self%part(s), impulse => problem%sub(s)%impulse)
+        call part%law%init(problem%kernels, problem%sub(s))
+        part%best = impulse
+        allocate (part%r, part%step, part%v, part%swept, mold=impulse)
+        allocate (part%swept_velocity, mold=problem%sub(s)%velocity)
+        part%step(:, :, :) = 0.0_dp
+        part%v(:, :, :) = 0.0_dp
+      end associate
+    end do
+    self%turn = 0
+    self%least = huge(1.0_dp)
+    call begin_sweeps(self)
+  end subroutine newton_start
+
+  !> Sweeps come next.
+  subroutine begin_sweeps(self)
+    class(newton_t), intent(inout) :: self
+
+    self%sweeping = .true.
+    self%check_next = .false.
+    self%keeps_best = .true.
+    self%taken = 0
+    self%lowest = huge(1.0_dp)
+    self%last_lowest = huge(1.0_dp)
+  end subroutine begin_sweeps
+
+  subroutine newton_iterate(self, problem, measure, jump, error)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(in) :: measure
+    real(dp), intent(out) :: jump
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: stagnant
+
+    jump = 0.0_dp
+    if (allocated(error)) return
+    if (self%sweeping) then
+      call self%nscdd_t%iterate(problem, measure, jump, error)
+      call close_window(self, stagnant)
+      if (stagnant) call begin_steps(self, problem)
+    else
+      call make_step(self, problem, measure, jump)
+    end if
+  end subroutine newton_iterate
+
+  !> Whether windows of sweeps have come to bring little.
+  subroutine close_window(self, stagnant)
+    class(newton_t), intent(inout) :: self
+    logical, intent(out) :: stagnant
+
+    stagnant = .false.
+    self%taken = self%taken + 1
+    self%lowest = min(self%lowest, self%momentum%change)
+    if (mod(self%taken, first_window*2**min(self%turn, most_doublings)) /= 0) return
+    stagnant = self%lowest > little_gain**2*self%last_lowest
+    self%last_lowest = self%lowest
+    self%lowest = huge(1.0_dp)
+  end subroutine close_window
+
+  !> Newton's steps come next, from where the sweeps have come to. Collective.
+  subroutine begin_steps(self, problem)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: residual
+    integer :: s
+
+    self%sweeping = .false.
+    self%check_next = .true.
+    self%taken = 0
+    self%alpha = alpha_start
+    self%refused = 0.0_dp
+    call keep_best(self, problem, residual)
+    do s = 1, size(self%part)
+      associate (part => self%part(s), sub => problem%sub(s))
+        part%r(:, :, :) = sub%impulse
+        part%swept(:, :, :) = sub%impulse
+        part%swept_velocity(:, :) = sub%velocity
+      end associate
+    end do
+    self%mark = residual
+    self%before = residual
+    call begin_point(self)
+    call restart_point(self, problem)
+    call take_best(self, problem)
+  end subroutine begin_steps
+
+  !> The next proximal point is one around the iterate.
+  subroutine begin_point(self)
+    class(newton_t), intent(inout) :: self
+    integer :: s
+
+    do s = 1, size(self%part)
+      self%part(s)%law%centre(:, :, :) = self%part(s)%r
+    end do
+  end subroutine begin_point
+
+  !> Newton's method for the proximal point starts from its centre. Collective.
+  subroutine restart_point(self, problem)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    do s = 1, size(self%part)
+      self%part(s)%r(:, :, :) = self%part(s)%law%centre
+      problem%sub(s)%impulse(:, :, :) = self%part(s)%r
+    end do
+    call evaluate(self, problem, self%size_of_f)
+    self%inner = 0
+    self%past(:) = 0.0_dp
+    self%goal = found_point*self%size_of_f
+    self%reached(0) = self%size_of_f
+  end subroutine restart_point
+
+  !> |F| at the impulses of the problem. Collective.
+  subroutine evaluate(self, problem, size_of_f)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp), intent(out) :: size_of_f
+    real(dp) :: squares(size(problem%sub))
+    integer :: s
+
+    call problem%evaluate()
+    do s = 1, size(problem%sub)
+      associate (part => self%part(s), sub => problem%sub(s))
+        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, part%v)
+        call part%law%evaluate(problem%kernels, sub, part%v, self%alpha, squares(s))
+      end associate
+    end do
+    size_of_f = sqrt(problem%comm%sum_real(squares))
+  end subroutine evaluate
+
+  !> One step of Newton's method, and what follows from it. The impulses left in the problem are the best so far. Collective.
+  subroutine make_step(self, problem, measure, jump)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(in) :: measure
+    real(dp), intent(inout) :: jump
+    type(error_t), allocatable :: singular
+    real(dp) :: residual
+
+    self%past(1 + mod(self%inner, memory)) = self%size_of_f
+    call find_step(self, problem, singular)
+    self%inner = self%inner + 1
+    self%taken = self%taken + 1
+    self%work%iterations = self%work%iterations + 1
+    self%work%interface_solves = self%work%interface_solves + 1
+    if (measure .and. .not. allocated(singular)) jump = problem%jump()
+    call start_timer(phase_check)
+    if (.not. allocated(singular)) call search_line(self, problem)
+    call keep_best(self, problem, residual)
+    self%reached(self%inner) = min(self%reached(self%inner - 1), self%size_of_f)
+    if (allocated(singular) .or. self%size_of_f <= self%goal .or. is_stuck(self)) call end_point(self, problem, residual)
+    if (self%sweeping) then
+      call take_swept(self, problem)
+    else
+      call take_best(self, problem)
+    end if
+    call stop_timer(phase_check)
+  end subroutine make_step
+
+  !> Sweeps go on from where they were left, as if nothing had been between.
+  subroutine take_swept(self, problem)
+    class(newton_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    do s = 1, size(self%part)
+      problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
+      problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
+    end do
+  end subroutine take_swept
+
+  !> Whether the proximal point is not in reach.
+  pure logical function is_stuck(self)
+    class(newton_t), intent(in) :: self
+
+    is_stuck = self%inner == most_inner_steps
+    if (self%inner > stall) is_stuck = is_stuck .or. self%reached(self%inner) > some_gain*self%reached(self%inner - stall)
+  end function is_stuck
+
+  !> The step of the impulses, into `step`, with the velocities that it gives the copies. Collective.
+  subroutine find_step(self, problem, singular)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    !> allocated, on all ranks, where a matrix was
+    type(error_t), allocatable, intent(inout) :: singular
+    integer :: s
+
+    call start_timer(phase_factorise)
+    do s = 1, size(problem%sub)
+      call self%part(s)%law%linearise(problem%kernels, problem%sub(s), self%alpha)
+      call self%matrix%factorise_blocks(problem, s, self%part(s)%law%slope, singular)
+    end do
+    call problem%comm%agree(singular)
+    if (.not. allocated(singular)) call self%interface_solver%prepare(problem, self%matrix, singular)
+    call stop_timer(phase_factorise)
+    if (allocated(singular)) return
+    call start_timer(phase_interface_solve)
+    if (problem%n_subdomains > 1) call find_multipliers(self, problem, singular)
+    do s = 1, size(problem%sub)
+      call load_transpose(problem, s, self%f(s), self%matrix)
+      associate (part => self%part(s), sub => problem%sub(s), work => self%matrix%part(s)%body_work)
+        work(:, :) = -work
+        call problem%kernels%add_reaction(sub%pair, sub%hot, part%law%offset, work)
+        call self%matrix%solve(problem, s, work, singular)
+        call problem%kernels%contact_velocity(sub%pair, sub%hot, work, part%v)
+        call part%law%find_step(part%v, part%step)
+        sub%velocity(:, :) = sub%v_global + work
+      end associate
+    end do
+    call problem%comm%agree(singular)
+    call stop_timer(phase_interface_solve)
+  end subroutine find_step
+
+  !> Multipliers that keep the copies of bodies together, into `f`. Collective.
+  subroutine find_multipliers(self, problem, error)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), work => self%matrix%part(s)%body_work)
+        work(:, :) = 0.0_dp
+        call problem%kernels%add_reaction(sub%pair, sub%hot, self%part(s)%law%offset, work)
+        call self%matrix%solve(problem, s, work, error)
+      end associate
+    end do
+    call chain_differences(problem, self%matrix, self%b)
+    call problem%comm%agree(error)
+    if (allocated(error)) return
+    call self%interface_solver%solve(problem, self%matrix, self%b, self%f, error)
+  end subroutine find_multipliers
+
+  !> Go along the step: all of it, or half and so on until F falls below a reference, or to where it was least. Collective.
+  subroutine search_line(self, problem)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: length, best_length, least, reference
+    integer :: k, s
+
+    reference = maxval(self%past)
+    length = 1.0_dp
+    best_length = 0.0_dp
+    least = huge(least)
+    do k = 1, most_halvings
+      call go(length)
+      if (self%size_of_f < least) then
+        least = self%size_of_f
+        best_length = length
+      end if
+      if (self%size_of_f <= (1.0_dp - sufficient*length)*reference) exit
+      length = 0.5_dp*length
+    end do
+    if (k > most_halvings) call go(best_length)
+    do s = 1, size(self%part)
+      self%part(s)%r(:, :, :) = problem%sub(s)%impulse
+    end do
+
+  contains
+
+    subroutine go(part_of_step)
+      real(dp), intent(in) :: part_of_step
+      integer :: i
+
+      do i = 1, size(self%part)
+        problem%sub(i)%impulse(:, :, :) = self%part(i)%r
+        if (part_of_step > 0.0_dp) problem%sub(i)%impulse(:, :, :) = self%part(i)%r + part_of_step*self%part(i)%step
+      end do
+      call evaluate(self, problem, self%size_of_f)
+    end subroutine go
+
+  end subroutine search_line
+
+  !> Keep the impulses of the problem if they are the best so far. Collective.
+  subroutine keep_best(self, problem, residual)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    !> of these impulses
+    real(dp), intent(out) :: residual
+    real(dp) :: ignored
+    integer :: s
+
+    call problem%evaluate()
+    call problem%residual(residual, ignored)
+    if (.not. residual < self%least) return
+    self%least = residual
+    do s = 1, size(self%part)
+      self%part(s)%best(:, :, :) = problem%sub(s)%impulse
+    end do
+  end subroutine keep_best
+
+  !> The impulses of the problem are the best so far.
+  subroutine take_best(self, problem)
+    class(newton_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    do s = 1, size(self%part)
+      problem%sub(s)%impulse(:, :, :) = self%part(s)%best
+    end do
+  end subroutine take_best
+
+  !> The iterate becomes the next centre if it is worth it, alpha goes with the steps taken; where all that has brought no
+  !> progress, sweeps come next. Collective.
+  subroutine end_point(self, problem, residual)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    !> of the iterate
+    real(dp), intent(in) :: residual
+    logical :: found
+
+    found = self%size_of_f <= self%goal
+    if (found .and. self%alpha <= self%refused) self%refused = 0.0_dp
+    if (.not. found) then
+      self%refused = self%alpha
+      self%alpha = min(self%alpha*rise, alpha_most)
+    else if (self%inner <= very_few_steps .and. self%alpha*drop > self%refused) then
+      self%alpha = max(self%alpha*drop, alpha_least)
+    else if (self%inner <= few_steps) then
+      self%alpha = max(self%alpha*fall, alpha_least)
+    else if (self%inner > some_steps) then
+      self%alpha = min(self%alpha*climb, alpha_most)
+    end if
+    if (residual <= progress_made*self%mark) then
+      self%mark = residual
+      self%taken = 0
+    else if (self%taken >= first_patience*2**min(self%turn, most_doublings)) then
+      self%turn = self%turn + 1
+      call begin_sweeps(self)
+      return
+    end if
+    if (found .or. residual < self%before) call begin_point(self)
+    self%before = residual
+    call restart_point(self, problem)
+  end subroutine end_point
+
+  !> The end of a solve without success. Collective.
+  subroutine newton_conclude(self, problem)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: ignored
+
+    call keep_best(self, problem, ignored)
+    call take_best(self, problem)
+    call problem%evaluate()
+  end subroutine newton_conclude
+
+  subroutine newton_free(self)
+    class(newton_t), intent(inout) :: self
+    call self%matrix%free()
+    call self%interface_solver%free()
+    if (allocated(self%part)) deallocate (self%part)
+    self%work = work_t()
+  end subroutine newton_free
+
+  type(work_t) function newton_work_done(self) result(work)
+    class(newton_t), intent(in) :: self
+    work = self%work
+    call self%matrix%counts(work%analyses, work%factorisations)
+    work%interface_iterations = self%interface_solver%iterations
+  end function newton_work_done
+
+end module gravier_newton

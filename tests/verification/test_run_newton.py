@@ -1,0 +1,96 @@
+"""Newton's method: tolerances that sweeps do not reach, the velocities that sweeps approach, the same bits on any number of ranks, a
+lattice with far more contacts than freedoms, and an honest end where it does not get there."""
+import csv
+import math
+import unittest
+
+import h5py
+import numpy as np
+
+from gravier_runs import RunTestCase, merged, run_case, settled_disks, write
+
+TIGHT = 1e-10
+
+
+def lattice_csv(columns, rows, radius):
+    """Equal disks in a hexagonal packing, pressed into each other by 1e-6 of their radius so that all neighbours touch."""
+    near = 2 * radius * (1 - 1e-6)
+    lines = ["id,radius,mass,x,y,vx,vy,omega"]
+    for row in range(rows):
+        for column in range(columns - row % 2):
+            x = radius + near * (column + 0.5 * (row % 2))
+            y = radius + near * row * math.sqrt(3) / 2
+            lines.append(f"{len(lines)},{radius!r},1.0,{x!r},{y!r},0,0,0")
+    return "\n".join(lines) + "\n"
+
+
+class Newton(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.disks = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": settled_disks(cls.scratch), "friction": 0.3},
+            "time": {"step": 1e-3, "steps": 1},
+            "solver": {"method": "newton", "tolerance": TIGHT, "max_iterations": 4000},
+            "output": {"directory": "results", "trace": True},
+        }
+
+    @staticmethod
+    def velocities(run):
+        with h5py.File(run.path("results", "results.h5")) as file:
+            return file["steps/1/bodies/velocity"][:]
+
+    def test_tolerance_that_sweeps_do_not_reach(self):
+        newton = run_case(self.disks, directory=self.here("newton"))
+        self.assert_status(newton, 0)
+        residual = newton.trace()["residual"]
+        self.assertLessEqual(residual[-1], TIGHT)
+        sweeps = run_case(merged(self.disks, {"solver": {"method": "nlgs", "acceleration": "momentum"}}),
+                          directory=self.here("sweeps"))
+        self.assert_status(sweeps, 3)
+        # sweeps stagnate near 7e-7, in as many iterations
+        self.assertGreater(sweeps.trace()["residual"][-1], 1e3 * TIGHT)
+
+    def test_column_against_exact_impulses(self):
+        case = merged(self.disks, {"scene": {"bodies": "column", "bodies_file": None, "column_count": 300, "radius": 0.05,
+                                             "friction": 0.0},
+                                   "solver": {"criterion": "error", "tolerance": 1e-7}})
+        for subdomains in (1, 5):
+            run = run_case(merged(case, {"decomposition": {"subdomains": subdomains}}), directory=self.here(f"column{subdomains}"))
+            self.assert_status(run, 0)
+            self.assertNotIn(" 0 factorisations", run.stdout)
+            # a grain moves by what the impulses lack, at most a few times 1e-7 of 300 weights
+            self.assertLess(np.abs(self.velocities(run)).max(), 1e-4 * 9.81 * 1e-3)
+
+    def test_same_bits_on_any_number_of_ranks(self):
+        case = merged(self.disks, {"decomposition": {"subdomains": 4, "partition": "metis"},
+                                   "solver": {"max_iterations": 312}})
+        runs = [run_case(case, ranks=ranks, directory=self.here(f"ranks{ranks}")) for ranks in (1, 2, 4)]
+        first = runs[0].trace()
+        self.assertGreater(len(first["residual"]), 30)
+        for run in runs[1:]:
+            for name in ("iteration", "residual", "jump"):
+                np.testing.assert_array_equal(run.trace()[name], first[name])
+
+    def test_lattice(self):
+        # 3 contacts a disk and 6 impulses against 3 freedoms
+        write(self.here("lattice.csv"), lattice_csv(20, 20, 0.01))
+        case = merged(self.disks, {"scene": {"bodies_file": self.here("lattice.csv"), "friction": 0.5}})
+        for subdomains in (1, 4):
+            run = run_case(merged(case, {"decomposition": {"subdomains": subdomains}}), directory=self.here(f"lattice{subdomains}"))
+            self.assert_status(run, 0)
+            self.assertLessEqual(run.trace()["residual"][-1], TIGHT)
+
+    def test_honest_end(self):
+        run = run_case(merged(self.disks, {"solver": {"max_iterations": 320}}), directory=self.here("short"))
+        self.assert_status(run, 3)
+        self.assertIn("did NOT reach the tolerance", run.stdout)
+        # what is left are the best impulses of all
+        with open(run.path("results", "history.csv"), encoding="utf-8") as file:
+            row = list(csv.DictReader(file))[-1]
+        self.assertLessEqual(float(row["residual"]), min(run.trace()["residual"]))
+
+
+if __name__ == "__main__":
+    unittest.main()
