@@ -78,7 +78,7 @@ contains
     call self%guard%watch(problem, lowered)
     if (.not. lowered) return
     call start_sweeps(self, problem, shared_masses=.false.)
-    call start_neighbour_loads(problem, self%load)
+    call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
     call self%matrix%set_share(self%guard%share)
     self%guarded = is_enriched(self)
     self%work%lowered = self%work%lowered + 1
