@@ -270,8 +270,9 @@ contains
       if (grid_product(parts%grid) > 0 .and. .not. is_given(report, "decomposition", "subdomains")) &
         parts%subdomains = grid_product(parts%grid)
     end associate
-    if (config%solver%method == "nscdd_ep" .and. .not. (config%enriched%direction_given .or. &
-        is_given(report, "enriched", "contacts"))) config%enriched%contacts = "active"
+    if (config%solver%method == "nscdd_ep" .and. .not. config%enriched%direction_given) then
+      if (.not. is_given(report, "enriched", "contacts")) config%enriched%contacts = "active"
+    end if
     do i = 1, size(config%boundaries)
       report%instance = i
       call settle_boundary(config%scene, report, config%boundaries(i))
