@@ -273,8 +273,9 @@ contains
       if (grid_product(parts%grid) > 0 .and. .not. is_given(report, "decomposition", "subdomains")) &
         parts%subdomains = grid_product(parts%grid)
     end associate
-    if (config%solver%method == "nscdd_ep" .and. .not. (config%enriched%direction_given .or. &
-        is_given(report, "enriched", "contacts"))) config%enriched%contacts = "active"
+    if (config%solver%method == "nscdd_ep" .and. .not. config%enriched%direction_given) then
+      if (.not. is_given(report, "enriched", "contacts")) config%enriched%contacts = "active"
+    end if
     if (.not. is_given(report, "solver", "acceleration") .and. (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
         (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active"))) config%solver%acceleration = "momentum"
     do i = 1, size(config%boundaries)

@@ -1,5 +1,5 @@
-!> NSCDD-EP: l = 0, the enriched interface condition after each iteration, impulses fed back, fixed points, both interface solvers, work, any
-!> number of ranks.
+!> NSCDD-EP: l = 0, the enriched interface condition after each iteration, impulses fed back, fixed points, both interface solvers,
+!> work, any number of ranks.
 program test_nscdd_ep
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
