@@ -266,6 +266,7 @@ contains
     case ("trace"); slot%logical => config%output%trace
     case ("final_bodies"); slot%logical => config%output%final_bodies
     case ("checkpoint_every"); slot%integer => config%output%checkpoint_every
+    case ("fclib_step"); slot%integer => config%output%fclib_step
     case ("checkpoint_seconds"); slot%real => config%output%checkpoint_seconds
     case ("walltime"); slot%real => config%output%walltime
     case ("energy"); slot%logical => config%output%energy

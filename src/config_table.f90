@@ -284,6 +284,8 @@ module gravier_config_table
      key_t("output", "final_bodies", kind_logical, ".false.", "", &
            "write `final_bodies.h5`, a bodies file from which another scene starts"), &
      key_t("output", "checkpoint_every", kind_integer, "0", ">= 0", "steps between two checkpoints; 0: never"), &
+     key_t("output", "fclib_step", kind_integer, "0", ">= 0", &
+           "step whose contact problem is written to `step_N.hdf5` in the format of FCLIB; 0: none"), &
      key_t("output", "checkpoint_seconds", kind_real, "0.0", ">= 0", "wall time between two checkpoints; 0: never", unit="s"), &
      key_t("output", "walltime", kind_real, "0.0", ">= 0", &
            "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s"), &

@@ -126,6 +126,8 @@ module gravier_config_types
     logical :: contacts, trace, final_bodies
     !> steps; 0 never
     integer :: checkpoint_every
+    !> step whose problem is written as a file of FCLIB; 0 none
+    integer :: fclib_step
     !> s of wall time; 0 never
     real(dp) :: checkpoint_seconds
     !> s: the run writes a checkpoint and stops before it has run so long; 0: no limit

@@ -207,6 +207,8 @@ contains
       if (allocated(error)) exit
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
+      if (simulation%step == simulation%config%output%fclib_step .and. figures%solve%status /= solve_diverged .and. &
+        & simulation%step > 0) call output%write_problem(simulation, error)
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call write_step(simulation, figures, MPI_Wtime() - step_start, output, error)
       call simulation%comm%agree(error)

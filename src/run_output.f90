@@ -2,6 +2,7 @@
 module gravier_run_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_boundary, only: shape_plane, shape_name
@@ -14,6 +15,7 @@ module gravier_run_output
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
+  use gravier_problem_dump, only: write_problem
   use gravier_checkpoint, only: save_checkpoint, checkpoint_name
   implicit none
   private
@@ -31,6 +33,7 @@ module gravier_run_output
     procedure :: write_row => run_output_write_row
     procedure :: write_state => run_output_write_state
     procedure :: write_checkpoint => run_output_write_checkpoint
+    procedure :: write_problem => run_output_write_problem
     procedure :: finish => run_output_finish
   end type run_output_t
 
@@ -313,6 +316,17 @@ contains
       end associate
     end do
   end subroutine collect_contacts
+
+  !> Write the problem of the last step as step_N.hdf5. Collective.
+  subroutine run_output_write_problem(self, simulation, error)
+    class(run_output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    call start_timer(phase_output)
+    call write_problem(simulation, self%directory//"step_"//to_text(simulation%step)//".hdf5", error)
+    call stop_timer(phase_output)
+  end subroutine run_output_write_problem
 
   !> Write checkpoint.h5. What the tables and the results hold by then is on the disk before it. Collective.
   subroutine run_output_write_checkpoint(self, simulation, error)

@@ -1,5 +1,5 @@
 !> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + q read and
-!> written, global ones (M, H and G) read. What is wrong with a file ends in status_input and one line that names the dataset.
+!> written, global ones (M, H and G) read, those without G written. What is wrong with a file ends in status_input and one line that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
@@ -10,7 +10,7 @@ module gravier_fclib_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: fclib_local_t, fclib_global_t, read_fclib, write_fclib_local
+  public :: fclib_local_t, fclib_global_t, fclib_rows_t, read_fclib, write_fclib_local, write_fclib_global
 
   !> v = W r + q, of each contact (n, t) or (n, t, s).
   type :: fclib_local_t
@@ -34,6 +34,18 @@ module gravier_fclib_file
     !> (n), (p), (dimension*contacts), (contacts)
     real(dp), allocatable :: f(:), b(:), w(:), mu(:)
   end type fclib_global_t
+
+  !> What one rank holds of a global problem without G: a block of the unknowns and a block of the contacts, those of rank 0 first.
+  type :: fclib_rows_t
+    integer :: dimension = 0
+    !> the diagonal matrix M, f and the velocities of the solution (unknowns of this rank)
+    real(dp), allocatable :: mass(:), f(:), v(:)
+    !> entries of each column of H (dimension*contacts of this rank), their rows from 1 on, their values
+    integer(i8), allocatable :: entries(:), row(:)
+    real(dp), allocatable :: h(:)
+    !> (contacts); the rest (dimension*contacts): w, impulses of the solution and H^T v + w
+    real(dp), allocatable :: mu(:), w(:), r(:), u(:)
+  end type fclib_rows_t
 
   !> An open file and where it is, for messages.
   type :: source_t
@@ -382,5 +394,81 @@ contains
     end subroutine write_columns
 
   end subroutine write_fclib_local
+
+  !> Write a global problem, M by compressed rows and H by compressed columns, with its solution. Collective; errors are the same
+  !> on all ranks.
+  subroutine write_fclib_global(comm, path, rows, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(fclib_rows_t), intent(in) :: rows
+    type(error_t), allocatable, intent(inout) :: error
+    type(h5_file_t) :: file
+    integer(i8) :: n, columns, entries, before
+    integer(i8), allocatable :: one(:), place(:)
+    integer :: k
+
+    if (allocated(error)) return
+    n = comm%total(size(rows%mass, kind=i8))
+    before = comm%offset(size(rows%mass, kind=i8))
+    columns = comm%total(size(rows%w, kind=i8))
+    entries = comm%total(size(rows%h, kind=i8))
+    allocate (one(size(rows%mass)), source=1_i8)
+    allocate (place(size(rows%mass)))
+    do k = 1, size(place)
+      place(k) = before + k
+    end do
+    call file%create(comm, path, error)
+    call file%reserve(48_i8*(n + columns) + 16_i8*entries + 65536_i8, error)
+    call write_integer("/fclib_global/spacedim", int(rows%dimension, i8))
+    call write_matrix("/fclib_global/M", by_rows, n, one, place, rows%mass)
+    call write_matrix("/fclib_global/H", by_columns, columns, rows%entries, rows%row, rows%h)
+    call file%write_rows("/fclib_global/vectors/f", rows%f, error)
+    call file%write_rows("/fclib_global/vectors/w", rows%w, error)
+    call file%write_rows("/fclib_global/vectors/mu", rows%mu, error)
+    call file%write_rows("/fclib_global/solution/v", rows%v, error)
+    call file%write_rows("/fclib_global/solution/r", rows%r, error)
+    call file%write_rows("/fclib_global/solution/u", rows%u, error)
+    call file%close(error)
+
+  contains
+
+    !> One number, by rank 0.
+    subroutine write_integer(dataset, value)
+      character(len=*), intent(in) :: dataset
+      integer(i8), intent(in) :: value
+      integer(i8) :: values(1)
+
+      values(1) = value
+      call file%write_rows(dataset, values(1:merge(1, 0, comm%rank == 0)), error)
+    end subroutine write_integer
+
+    !> A matrix of n rows, compressed by lines (rows or columns).
+    subroutine write_matrix(group, kind, n_columns, length, places, values)
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: kind
+      integer(i8), intent(in) :: n_columns
+      !> entries of each line of this rank; their places in the lines, from 1 on
+      integer(i8), intent(in), contiguous :: length(:), places(:)
+      real(dp), intent(in), contiguous :: values(:)
+      integer(i8), allocatable :: start(:)
+      integer :: i
+
+      allocate (start(size(length) + 1))
+      start(1) = comm%offset(size(values, kind=i8))
+      do i = 1, size(length)
+        start(i + 1) = start(i) + length(i)
+      end do
+      call write_integer(group//"/m", n)
+      call write_integer(group//"/n", n_columns)
+      call write_integer(group//"/nzmax", comm%total(size(values, kind=i8)))
+      call write_integer(group//"/nz", int(kind, i8))
+      ! the last rank writes the end of the last line
+      call file%write_rows(group//"/p", start(1:size(length) + merge(1, 0, comm%rank == comm%size - 1)), error)
+      start = places - 1
+      call file%write_rows(group//"/i", start, error)
+      call file%write_rows(group//"/x", values, error)
+    end subroutine write_matrix
+
+  end subroutine write_fclib_global
 
 end module gravier_fclib_file
