@@ -236,9 +236,9 @@ module gravier_config_table
            "share of a change of the neighbours' impulses that is taken over (`schwarz` and `schwarz_ec` only)", &
            note="found while iterating, from 1 down"), &
      key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
-           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. The sweeps "// &
-           "of `newton` always do", &
-           note="`'momentum'` for `nlgs`, `nscdd` and, on active contacts, `nscdd_ep`; else `'none'`"), &
+           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. Default of "// &
+           "`nlgs`, `nscdd` and, on active contacts, `nscdd_ep`", &
+           note="by the method"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
