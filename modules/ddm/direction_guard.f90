@@ -4,8 +4,8 @@
 !> Watched is the change |r - y|^2 of the first sweep of each iteration, over all subdomains, summed over windows of iterations.
 !> Three windows in a row of which each exceeds the one before, the last by more than a factor 2 the one before the first, halve
 !> l: at most 20 iterations after the growth sets in, where it is that fast. Growth by orders of magnitude, as of an l far too
-!> large, does not wait for the end of a window. Changes that neither grow nor fall, of some percent of the impulses at each iteration,
-!> are those of a cycle, of an l far too large as well.
+!> large, does not wait for the end of a window. Changes that neither grow nor fall, of some percent of the impulses at each
+!> iteration, are those of a cycle, of an l far too large as well.
 module gravier_direction_guard
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp

@@ -112,8 +112,9 @@ class Enriched(RunTestCase):
         """The same bits on 1, 2 and 4 ranks, with the safeguard at work too."""
         jobs = {"automatic": merged(self.disks, ep()), "momentum": merged(self.disks, ep(), MOMENTUM),
                 "spheres": merged(self.spheres, ep(), MOMENTUM), "cg": merged(self.disks, ep(interface="cg")),
-                "guarded": merged(self.disks, ep(100.0, "all"), {"solver": {"max_iterations": 100}}),
+                "guarded": merged(self.disks, ep(100.0, "all")),
                 "schwarz_ec": merged(self.disks, ep(), {"solver": {"method": "schwarz_ec", "relaxation": 0.7}})}
+        jobs = {title: merged(case, {"solver": {"max_iterations": 24}}) for title, case in jobs.items()}
         one = self.play(jobs)
         self.assertGreater(self.lowered(one["guarded"]), 0)
         for ranks in (2, 4):
