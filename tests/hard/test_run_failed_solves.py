@@ -113,7 +113,8 @@ class FailedSolves(RunTestCase):
 
     def test_giving_up_and_converging(self):
         """Some steps give up, others do not: history tells which, and the exit status is 3."""
-        case = merged(self.case, {"solver": {"method": "nlgs", "tolerance": 1e-3, "max_iterations": 60, "warm_start": True},
+        case = merged(self.case, {"solver": {"method": "nlgs", "acceleration": "none", "tolerance": 1e-3, "max_iterations": 60,
+                                             "warm_start": True},
                                   "time": {"steps": 12}, "output": {"every": 0}})
         run = run_case(case, 1, self.here("some"))
         self.assert_loud(run, "NOT CONVERGED")

@@ -10,7 +10,7 @@ METHODS = {
     "schwarz, momentum": {"solver": {"method": "schwarz", "acceleration": "momentum", "tolerance": 1e-5}},
     # a direction of 1 on all contacts does not converge on every packing (user guide, choosing a method)
     "schwarz_ec": merged(FEW, {"solver": {"method": "schwarz_ec"}, "enriched": {"direction": 0.3}}),
-    "nscdd": {"solver": {"method": "nscdd", "sweeps": 2}},
+    "nscdd": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "none"}},
     # a tolerance at which it steers for many iterations
     "nscdd, momentum": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "momentum", "tolerance": 1e-5}},
     # a direction on active contacts only: the matrices change from one iteration to the next
