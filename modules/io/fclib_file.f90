@@ -1,5 +1,6 @@
 !> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + q read and
-!> written, global ones (M, H and G) read, those without G written. What is wrong with a file ends in status_input and one line that names the dataset.
+!> written, global ones (M, H and G) read, those without G written. What is wrong with a file ends in status_input and one line
+!> that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input

@@ -4,8 +4,8 @@
 !> the undivided local operator, v~ the velocity with its shift and r_k the centre of a proximal point,
 !>   F(r, v) = r - P(x),   x = r - (v~ + alpha s (r - r_k))/(b s):
 !> F = 0 says that r and v~ + alpha s (r - r_k) satisfy Signorini's condition and Coulomb's law, and for r = r_k that r and v~ do.
-!> b = 1 gives the function of gravier_alart_curnier, b = alpha the augmented Lagrangian, in which x is a function of v alone; between
-!> them, with b = sqrt(alpha), points are found in the fewest steps (doc/newton.md). Linearised, dr = c - L dv with
+!> b = 1 gives the function of gravier_alart_curnier, b = alpha the augmented Lagrangian, in which x is a function of v alone;
+!> between them, with b = sqrt(alpha), points are found in the fewest steps (doc/newton.md). Linearised, dr = c - L dv with
 !>   L = (1 - (1 - a) D)^-1 D/(b s),   c = -(1 - (1 - a) D)^-1 F,   D = dP/dx,   a = alpha/b.
 module gravier_proximal_law
   use gravier_kinds, only: dp

@@ -18,8 +18,8 @@ program test_nscdd_ep
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
-  character(len=*), parameter :: plain = "&solver method = 'nscdd', sweeps = 2 /"
-  character(len=*), parameter :: enriched = "&solver method = 'nscdd_ep', sweeps = 2 / &enriched direction = "
+  character(len=*), parameter :: plain = "&solver method = 'nscdd', sweeps = 2, acceleration = 'none' /"
+  character(len=*), parameter :: enriched = "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched direction = "
   type(communicator_t), target :: comm, alone
   integer :: dimension, k
   real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]
@@ -287,7 +287,7 @@ contains
     integer :: n, s
 
     call make(comm, dimension, 9, friction, plain, nscdd)
-    call make(comm, dimension, 9, friction, "&solver method = 'nscdd_ep', sweeps = 2 / &enriched "//keys, ep)
+    call make(comm, dimension, 9, friction, "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched "//keys, ep)
     call ep%scheme%start(ep%problem, error)
     gained = 0.0_dp
     do n = 1, 6

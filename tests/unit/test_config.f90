@@ -168,7 +168,8 @@ contains
       // "&enriched direction = 2.5, direction_unit = 'absolute', contacts = 'active', interface = 'cg'" // newline &
       // "  cg_tolerance = 0.0625, cg_max_iterations = 77 /" // newline &
       // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
-      // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, energy = .true., stress = .true." // newline &
+      // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, fclib_step = 3, stress = .true." // newline &
+      // "  energy = .true." // newline &
       // "  structure = .true., boundary_forces = .true. /" // newline
   end function whole_file
 
@@ -201,6 +202,7 @@ contains
     call check(config%output%trace, "trace")
     call check(config%output%final_bodies, "final_bodies")
     call check_equal(config%output%checkpoint_every, 6, "checkpoint_every")
+    call check_equal(config%output%fclib_step, 3, "fclib_step")
     call check_close(config%output%checkpoint_seconds, 60.0_dp, 0.0_dp, "checkpoint_seconds")
     call check_close(config%output%walltime, 3600.0_dp, 0.0_dp, "walltime")
     call check(config%output%energy, "energy")
@@ -282,6 +284,7 @@ contains
     call check(.not. config%output%trace, "default trace")
     call check(.not. config%output%final_bodies, "default final_bodies")
     call check_equal(config%output%checkpoint_every, 0, "default checkpoint_every")
+    call check_equal(config%output%fclib_step, 0, "default fclib_step")
     call check_close(config%output%checkpoint_seconds, 0.0_dp, 0.0_dp, "default checkpoint_seconds")
     call check_close(config%output%walltime, 0.0_dp, 0.0_dp, "default walltime")
     call check(.not. config%output%energy, "default energy")
@@ -772,6 +775,7 @@ contains
     call refuse(column // "&output directory = '' /", &
       "&output directory = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(column // "&output every = -1 /", "&output every = -1: expected an integer >= 0")
+    call refuse(column // "&output fclib_step = -1 /", "&output fclib_step = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_every = -1 /", "&output checkpoint_every = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_seconds = -1 /", &
       "&output checkpoint_seconds = -1: expected a finite real number >= 0 (s)")
