@@ -195,6 +195,7 @@ contains
       call simulation%advance(figures, error)
       if (allocated(error)) exit
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
+      if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call write_step(simulation, figures, MPI_Wtime() - step_start, output, error)
