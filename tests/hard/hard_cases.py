@@ -15,7 +15,8 @@ from scene_laws import Figures, Scene, check_numbers, check_states
 from small_scenes import G, Grain, Record, bodies_csv, plane
 
 STEP = 1.0 / 512
-#: of a solve; a fifth of it, and 100 steps at most, for the enriched methods, whose iterations cost a hundred times as much here
+#: of a solve; a tenth of it, and 100 steps at most, for the enriched methods, whose iterations cost a hundred times as much here.
+#: That is not enough everywhere: they may always end with exit status 3
 ITERATIONS = 1000
 TOLERANCE = 1e-8
 
@@ -30,6 +31,11 @@ METHODS = {
     "schwarz": {"solver": {"method": "schwarz"}},
     "schwarz_ec": {"solver": {"method": "schwarz_ec", "relaxation": 0.7}},
 }
+
+
+def is_enriched(method):
+    """Whether a method, by its word or its title, is one of the enriched ones."""
+    return method.startswith(("nscdd_ep", "schwarz_ec"))
 
 
 @dataclasses.dataclass
@@ -54,6 +60,8 @@ class Case:
     steps: int = 20
     #: the same in a study, where that is longer
     long: int = 0
+    #: states are written at half of the steps and at the end, not in each step
+    halves: bool = False
     subdomains: int = 4
     dimension: int = 2
     #: what must hold of a run that ended with 0 or 3
@@ -69,25 +77,28 @@ class Case:
     #: methods other than those of METHODS
     methods: dict = dataclasses.field(default_factory=dict)
     files: dict = dataclasses.field(default_factory=dict)
+    #: words of a complaint that a run may lead to: a limit that the page states
+    known: str = ""
     #: from BASE to this scene
     change: Change | None = None
 
     def input_groups(self, method, long=False):
         several = method["solver"]["method"] != "nlgs"
-        enriched = method["solver"]["method"] in ("nscdd_ep", "schwarz_ec")
+        enriched = is_enriched(method["solver"]["method"])
         steps = self.long if long and self.long else self.steps
+        steps = min(steps, 100) if enriched else steps
         return merged({
             "scene": {"dimension": self.dimension, "bodies": "file", "bodies_file": "bodies.csv",
                       "gravity": [0.0, -G, 0.0] if self.dimension == 2 else [0.0, 0.0, -G]},
             "boundary": [dict(keys) for keys in self.boundaries],
-            "time": {"step": STEP, "steps": min(steps, 100) if enriched else steps},
-            "solver": {"tolerance": TOLERANCE, "max_iterations": ITERATIONS // 5 if enriched else ITERATIONS},
+            "time": {"step": STEP, "steps": steps},
+            "solver": {"tolerance": TOLERANCE, "max_iterations": ITERATIONS // 10 if enriched else ITERATIONS},
             "decomposition": {"subdomains": self.subdomains if several else 1},
-            "output": {"directory": "results", "energy": True},
+            "output": {"directory": "results", "energy": True, "every": steps // 2 if self.halves else 1},
         }, method, self.groups, {} if several else {"decomposition": {"subdomains": 1, "grid": None}})
 
     def may_miss(self, method):
-        return "all" in self.may_fail or method in self.may_fail
+        return "all" in self.may_fail or method in self.may_fail or is_enriched(method)
 
 
 class Played:
@@ -103,8 +114,12 @@ class Played:
     def record(self):
         return Record(self.run, self.case.grains, self.case.dimension)
 
+    def failures(self):
+        """What is wrong with the run and not known to be; empty if nothing is."""
+        return [words for words in self.complaints() if not self.case.known or self.case.known not in words]
+
     def complaints(self):
-        """What is wrong with the run; empty if nothing is."""
+        """All that is wrong with the run; empty if nothing is."""
         case, run = self.case, self.run
         said = run.stdout + run.stderr
         if case.ends:
@@ -284,11 +299,13 @@ def overlaps_below(part, late=0.0):
     return holds
 
 
-def stays_within(part):
-    """No grain moves from its place by more than `part` of its radius."""
+def creeps_below(part):
+    """In the second half of a run of 1000 steps and more no grain moves by more than `part` of its radius."""
     def holds(played):
         record = played.record
-        moved = np.abs(record.position[-1] - record.position[0]).max() / min(grain.radius for grain in played.case.grains)
+        if record.step[-1] < 1000:
+            return []
+        moved = np.abs(record.position[-1] - record.position[1]).max() / min(grain.radius for grain in played.case.grains)
         return [] if moved <= part else [f"a grain crept by {moved:.1e} radii, allowed are {part:.1e}"]
     return holds
 
@@ -321,7 +338,10 @@ def turns_up(played):
 
 
 ALL = ("all",)
-BASE = Case("heap", "twelve disks are thrown into a box without friction", heap(), heap_box(), {"solver": {"tolerance": 1e-11}}, agree=1e-6)
+#: radii that a grain at rest may move by in 5 10^4 steps
+CREEP = 1e-4
+BASE = Case("heap", "twelve disks are thrown into a box without friction", heap(), heap_box(),
+            {"solver": {"tolerance": 1e-11}}, agree=1e-6)
 
 
 def own(title, groups, method="nscdd_ep"):
@@ -336,6 +356,9 @@ def towers():
              tower(np.logspace(0, 6, 10)), [floor()], {"scene": {"friction": 0.3}}, steps=10, may_fail=ALL, holds=at_rest(1e-4)),
         Case("heavy on one light disk", "a body bears 10^6 times its own weight",
              tower([1.0, 1e6]), [floor()], steps=10, subdomains=2, may_fail=ALL, holds=at_rest(1e-4)),
+        Case("heavy on one light disk, tolerance 1e-4", "the residual compares what a local solve changes, which the light disk keeps "
+             "small, with the momentum of the heavy one: it meets the tolerance while that falls", tower([1.0, 1e6]), [floor()],
+             {"solver": {"tolerance": 1e-4}}, steps=10, subdomains=2, holds=at_rest(1e-2), known="not at rest"),
         Case("column of 1000", "impulses travel from end to end, one contact a sweep",
              tower([1.0] * 1000, 0.01), [floor()], {"solver": {"max_iterations": 100}}, steps=2, subdomains=8, may_fail=ALL,
              holds=at_rest(1e-4)),
@@ -347,16 +370,18 @@ def packings():
     wide = 10 * radius
     wedge = [plane([0.0, 0.0], [np.cos(0.25), np.sin(0.25)]), plane([0.0, 0.0], [-np.cos(0.25), np.sin(0.25)])]
     still = together(at_rest(1e-5), overlaps_below(1e-6))
-    rest = {"solver": {"tolerance": 1e-4, "max_iterations": 500}, "output": {"every": 0}}
+    rest = {"solver": {"tolerance": 1e-4, "max_iterations": 500}}
     return [
         Case("10^5 steps at rest", "15 disks in a box, tolerance 1e-4: errors of each step add up",
              heap(count=15), heap_box(), merged(rest, {"scene": {"friction": 0.3}}), steps=1000, long=100000,
-             holds=together(overlaps_below(0.02, 0.2), bounded_energy(12.0), calms_down), may_fail=ALL),
+             halves=True, may_fail=ALL,
+             holds=together(overlaps_below(0.02, 0.2), bounded_energy(12.0), calms_down, creeps_below(CREEP))),
         Case("square lattice", "more contacts than it takes: impulses are not unique", square(5), box(wide),
              {"scene": {"friction": 0.3}}, holds=still, agree=1e-5),
         Case("hexagonal lattice", "the same, six neighbours each", hexagons(5), box(wide), {"scene": {"friction": 0.5}},
              holds=still, agree=1e-5),
-        Case("square lattice, no friction", "a column of it stands on nothing but its foot", square(5), box(wide), holds=still, agree=1e-5),
+        Case("square lattice, no friction", "a column of it stands on nothing but its foot", square(5), box(wide), holds=still,
+             agree=1e-5),
         Case("jammed wedge", "a heavy disk between two planes that lean towards each other; friction bears it with no unique force",
              [Grain([0.0, radius / np.sin(0.25)], radius=radius, mass=100.0)], wedge,
              {"scene": {"friction": 1.0}}, subdomains=1, holds=still),
@@ -403,7 +428,7 @@ def places():
     return [
         Case("overlaps of a fifth, weightless", "twelve disks overlap by a fifth of their radius: they are moved apart, not thrown",
              overlapping, [], still, holds=together(bounded_energy(0.0), overlaps_below(0.02, 0.5))),
-        Case("overlaps of a fifth, in a box", "the same under gravity, between walls: energy of the heights that they are lifted by",
+        Case("overlaps of a fifth, in a box", "the same under gravity, between walls: they gain what lifts them",
              overlapping, box(0.45), {}, steps=100, holds=bounded_energy(12 * 0.7 * G * 0.3)),
         Case("coincident centres", "no direction from one to the other", [Grain([0.0, 0.3]), Grain([0.0, 0.3]), Grain([0.2, 0.1])],
              [floor()], {"scene": {"friction": 0.3}}, steps=40, subdomains=2,
@@ -451,7 +476,8 @@ def next_to_nothing():
              merged(free, {"decomposition": {"grid": [8, 1], "subdomains": 8}}), steps=40, subdomains=8),
         # subdomains are no more than the cells of a diameter in the box of the grains: far ones make it large enough
         Case("large disk in many subdomains", "a body that 8 subdomains and more share", flower(16) + [Grain([0.0, 16.0])], [],
-             merged(free, {"decomposition": {"grid": [30, 1], "subdomains": 30}, "solver": {"max_iterations": 3000}}), subdomains=30, holds=shared_by(8), agree=1e-4),
+             merged(free, {"decomposition": {"grid": [30, 1], "subdomains": 30}, "solver": {"max_iterations": 3000}}), subdomains=30,
+             holds=shared_by(8), agree=1e-4),
         Case("large sphere in many subdomains", "the same in space",
              [Grain([0.0] * 3, radius=0.3, mass=10.0), Grain([0.0, 0.0, 30.0])] + [
                  Grain(np.array(n) * 0.35 / np.linalg.norm(n), -0.3 * np.array(n), radius=0.05) for n in around], [],
@@ -469,12 +495,12 @@ def extremes():
     spin = [Grain([0.0, 0.0, 0.05], spin=[0.0, 0.0, 30.0]), Grain([1.0, 0.0, 2.0], spin=[3.0, 20.0, -5.0])]
     return [
         Case("spinning spheres", "one on the ground, one in flight: no step may change their spin", spin, [floor(3)],
-             {"scene": {"gravity": [0.0, 0.0, 0.0], "friction": 0.5}, "output": {"every": 0, "energy": False}},
+             {"scene": {"gravity": [0.0, 0.0, 0.0], "friction": 0.5}, "output": {"energy": False}}, halves=True,
              dimension=3, steps=5000, long=1000000,
              subdomains=1, holds=keeps_energy(1e-12)),
         Case("denormal impulses", "momenta of 10^-309 kg m/s",
-             [Grain([0.1 * k, 0.0], [1e-280 * (1 - k), 0.0], mass=1e-29) for k in range(3)], [], merged(free, {"time": {"step": 1e-5}}),
-             subdomains=2),
+             [Grain([0.1 * k, 0.0], [1e-280 * (1 - k), 0.0], mass=1e-29) for k in range(3)], [],
+             merged(free, {"time": {"step": 1e-5}}), subdomains=2),
         Case("tiny impulses", "momenta of 10^-125 kg m/s",
              [Grain([0.1 * k, 0.0], [1e-100 * (1 - k), 0.0], mass=1e-25) for k in range(3)], [], free, subdomains=2,
              may_fail=ALL),
@@ -524,7 +550,7 @@ def calms_down(played):
     """At the end: no energy to speak of."""
     figures = played.figures
     kinetic = played.figures.history["kinetic_energy"]
-    if played.run.status == 3 or kinetic[len(kinetic) // 2:].max() <= 1e-4 * figures.most_kinetic:
+    if played.run.status == 3 or len(kinetic) < 1000 or kinetic[len(kinetic) // 2:].max() <= 1e-4 * figures.most_kinetic:
         return []
     return [f"kinetic energy of {kinetic[len(kinetic) // 2:].max():.1e} J in the second half"]
 

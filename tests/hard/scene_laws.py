@@ -29,8 +29,8 @@ class Scene:
         self.step = groups["time"]["step"]
         self.tolerance = groups["solver"]["tolerance"]
         self.turns = self.with_friction(boundaries) and scene.get("rotation", True)
-        self.still = all(not np.any(b.get("velocity", 0.0)) and not np.any(b.get("rotation", 0.0)) and not np.any(b.get("free", False))
-                         for b in boundaries)
+        #: no boundary does work
+        self.still = not any(np.any(b.get(key, False)) for b in boundaries for key in ("velocity", "rotation", "free"))
 
     def with_friction(self, boundaries):
         return max([self.friction, self.wall_friction] + [b.get("friction", 0.0) for b in boundaries]) > 0.0
@@ -173,7 +173,8 @@ def check_states(run, scene, history):
             wrong.append(f"step {step}: an impulse is outside Coulomb's cone")
         if step != last + 1 or not np.array_equal(contacts.identifiers, results[f"/steps/{last}/bodies/id"]):
             continue
-        wrong += [f"step {step}: {words}" for words in check_step(contacts, scene, results, (last, step), history["residual"][rows[step]])]
+        found = check_step(contacts, scene, results, (last, step), history["residual"][rows[step]])
+        wrong += [f"step {step}: {words}" for words in found]
     return wrong
 
 
@@ -236,7 +237,8 @@ def work_of(contacts, relative):
 
 def read_history(run):
     """The columns of history.csv that are looked at, zero where they were not asked for; of millions of rows too."""
-    names = ["step", "iterations", "residual", "max_overlap", "kinetic_energy", "converged", "contacts", "potential_energy", "load_work"]
+    names = ["step", "iterations", "residual", "max_overlap", "kinetic_energy", "converged", "contacts", "potential_energy",
+             "load_work"]
     values = {name: array.array("d") for name in names}
     with open(run.path("results", "history.csv"), encoding="ascii") as file:
         header = file.readline().strip().split(",")

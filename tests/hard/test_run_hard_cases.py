@@ -23,7 +23,7 @@ class HardCases(RunTestCase):
 
     def play(self, number, case):
         runs = [play(case, title, groups, ranks, self.here(f"{number} {title}")) for title, groups, ranks in selection(number, case)]
-        wrong = [f"{run.method}: {words}" for run in runs for words in run.complaints()]
+        wrong = [f"{run.method}: {words}" for run in runs for words in run.failures()]
         return wrong + [words for run in runs[1:] for words in disagreement(runs[0], run)]
 
     def test_cases(self):
