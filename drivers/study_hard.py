@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The hard cases of tests/hard by every method, on 1 and 2 ranks: what converges, in how many iterations, and what does not.
 
-    python3 drivers/study_hard.py --out DIR [--cases REGEX] [--ranks 1 2] [--short]     30 minutes on two cores
+    python3 drivers/study_hard.py --out DIR [--cases REGEX] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
 
 leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page of the table. --short leaves out the long runs."""
 import argparse
@@ -18,7 +18,7 @@ from hard_cases import cases, disagreement, methods_of, play  # noqa: E402
 
 COLUMNS = ["case", "method", "ranks", "subdomains", "steps", "iterations", "residual", "energy_change", "overlap", "status", "wrong"]
 #: methods that run the long cases at full length: minutes each
-LONG = ("nlgs", "nscdd")
+LONG = ("nlgs",)
 
 
 def row(case, title, groups, ranks, played, wrong):
@@ -36,7 +36,7 @@ def study(options, case):
     """Rows of a case."""
     reference, rows = None, []
     for title, groups in methods_of(case).items():
-        several = groups["solver"]["method"] != "nlgs"
+        several = groups["solver"]["method"] != "nlgs" and title.startswith(tuple(options.several))
         for ranks in options.ranks if several else options.ranks[:1]:
             directory = options.out / "runs" / re.sub(r"\W+", "_", f"{case.name} {title} {ranks}")
             shutil.rmtree(directory, ignore_errors=True)
@@ -85,6 +85,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--cases", default="", help="names of cases that match")
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--several", nargs="+", default=[""], help="beginnings of the methods that run on more than the first of the ranks")
     parser.add_argument("--short", action="store_true", help="no long runs")
     parser.add_argument("--workers", type=int, default=2, help="cases side by side")
     options = parser.parse_args()

@@ -40,7 +40,8 @@ class HardCases(RunTestCase):
             self.assertEqual([name for name in differences(first, other) if not name.startswith("/run")], [])
 
     def test_units(self):
-        """Units that are powers of two change no digit; a mirrored or turned scene has the same velocities."""
+        """Units that are powers of two change no digit (large lengths do, since the norm2 of gfortran rounds otherwise above 1);
+        a mirrored or turned scene has the same velocities."""
         for title in ("nlgs", "nscdd, momentum"):
             base = play(BASE, title, METHODS[title], 1, self.here(f"base {title}")).record
             for case in units():
@@ -49,7 +50,7 @@ class HardCases(RunTestCase):
                     scale = case.change
                     wanted = base.velocity @ scale.turn.T * (scale.length / scale.time)
                     spin = base.spin * np.linalg.det(scale.turn) / scale.time
-                    if np.array_equal(scale.turn, np.eye(2)):
+                    if np.array_equal(scale.turn, np.eye(2)) and scale.length <= 1.0:
                         self.assertTrue(np.array_equal(record.velocity, wanted) and np.array_equal(record.spin, spin))
                     else:
                         self.assertLess(np.abs(record.velocity - wanted).max(), case.agree * np.abs(wanted).max())
