@@ -36,7 +36,7 @@ def study(options, case):
     """Rows of a case."""
     reference, rows = None, []
     for title, groups in methods_of(case).items():
-        several = groups["solver"]["method"] != "nlgs" and title.startswith(tuple(options.several))
+        several = groups["solver"]["method"] != "nlgs" and (not options.several or title in options.several)
         for ranks in options.ranks if several else options.ranks[:1]:
             directory = options.out / "runs" / re.sub(r"\W+", "_", f"{case.name} {title} {ranks}")
             shutil.rmtree(directory, ignore_errors=True)
@@ -85,7 +85,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--cases", default="", help="names of cases that match")
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--several", nargs="+", default=[""], help="beginnings of the methods that run on more than the first of the ranks")
+    parser.add_argument("--several", nargs="+", help="titles of the methods that run on more than the first of the ranks; all")
     parser.add_argument("--short", action="store_true", help="no long runs")
     parser.add_argument("--workers", type=int, default=2, help="cases side by side")
     options = parser.parse_args()
