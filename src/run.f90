@@ -206,6 +206,7 @@ contains
       call simulation%advance(figures, error)
       if (allocated(error)) exit
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
+      if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
       if (simulation%step == simulation%config%output%fclib_step .and. figures%solve%status /= solve_diverged .and. &
         & simulation%step > 0) call output%write_problem(simulation, error)

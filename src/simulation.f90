@@ -2,9 +2,9 @@
 module gravier_simulation
   use gravier_kinds, only: dp, i8
   use gravier_heap, only: keep_heap
-  use gravier_errors, only: error_t, raise, status_input, status_failure
+  use gravier_errors, only: error_t, raise, status_input, status_unconverged, status_failure
   use gravier_text, only: to_text
-  use gravier_finite, only: is_finite
+  use gravier_finite, only: is_finite, has_finite_square
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
@@ -12,6 +12,7 @@ module gravier_simulation
   use gravier_boundary, only: shape_outlet
   use gravier_facing_planes, only: find_facing_planes
   use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: effort_t
@@ -53,6 +54,8 @@ module gravier_simulation
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
+    !> after a solve that diverged to NaN or infinity: a contact where it did
+    character(len=:), allocatable :: cause
   end type step_figures_t
 
   type :: simulation_t
@@ -603,7 +606,10 @@ contains
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
     if (allocated(error)) return
-    if (figures%solve%status == solve_diverged) return
+    if (figures%solve%status == solve_diverged) then
+      call find_cause(self, figures)
+      return
+    end if
     associate (solve => figures%solve)
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
@@ -629,6 +635,29 @@ contains
       & self%n_grains - self%n_glued)
     call check_numbers(self, figures, error)
   end subroutine simulation_advance
+
+  !> After a solve that diverged: the first contact, in the order of the subdomains, whose impulse or velocities are not finite or
+  !> have squares that are not. Collective.
+  subroutine find_cause(self, figures)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(inout) :: figures
+    type(error_t), allocatable :: found
+    integer :: s, c
+
+    do s = 1, size(self%problem%sub)
+      associate (sub => self%problem%sub(s))
+        do c = 1, sub%n_contacts
+          associate (pair => sub%pair(:, c), impulse => sub%impulse(lane_of(c), :, block_of(c)))
+            if (all(has_finite_square(impulse)) .and. all(has_finite_square(sub%velocity(:, pair)))) cycle
+            call raise(found, status_unconverged, "contact of bodies "//to_text(sub%id(pair(1)))//" and "// &
+              & to_text(sub%id(pair(2)))//": an impulse or a velocity whose square is not a finite number")
+          end associate
+        end do
+      end associate
+    end do
+    call self%comm%agree(found)
+    if (allocated(found)) figures%cause = found%message
+  end subroutine find_cause
 
   !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
   subroutine check_numbers(self, figures, error)

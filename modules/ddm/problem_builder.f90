@@ -375,7 +375,7 @@ contains
       sub%hot(q, 1:nd, g) = found%normal(:, f)
       e = restitution_of(view, boundaries, physics, p)
       if (e > 0.0_dp) then
-        sub%hot(q, nd + 1, g) = e*min(approach(), 0.0_dp)
+        sub%hot(q, nd + 1, g) = e*returned()
       else
         sub%hot(q, nd + 1, g) = max(found%gap(f), 0.0_dp)/physics%h
       end if
@@ -434,6 +434,15 @@ contains
       real(dp), intent(out) :: point(nd)
       point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(f))*found%normal(:, f)
     end subroutine find_surface_point
+
+    !> Normal velocity at the start of the step as far as the contact sends it back. It counts where the contact opens, too: what
+    !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
+    !> the contact comes to rest.
+    real(dp) function returned()
+      returned = approach()
+      if (returned <= 0.0_dp) return
+      if (sum((sub%v_free(1:nd, sub%pair(1, c)) - sub%v_free(1:nd, sub%pair(2, c)))*found%normal(:, f)) < 0.0_dp) returned = 0.0_dp
+    end function returned
 
     !> Normal velocity at the start of the step.
     real(dp) function approach()

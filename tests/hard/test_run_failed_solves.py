@@ -138,7 +138,10 @@ class FailedSolves(RunTestCase):
         or for a light grain in its kinetic energy, first. The run ends with an error or a divergence, and no result is other
         than a number."""
         bodies = "id,x,y,radius,mass\n1,1,1,1,{0}\n2,30,1,1,{0}\n"
-        for mass, status, words in (("1", 3, "DIVERGED"), ("1e-30", 4, "kinetic energy of body 1: not a finite number")):
+        # the plane has the identifier that follows on those of the bodies
+        for mass, status, words in (
+                ("1", 3, r"DIVERGED: step \d+ (.|\n)*contact of bodies 1 and 3: an impulse or a velocity whose square is not a finite"),
+                ("1e-30", 4, r"step \d+: kinetic energy of body 1: not a finite number")):
             for ranks in (1, 2):
                 with self.subTest(mass, ranks=ranks):
                     directory = self.here(f"overflow {mass} {ranks}")
@@ -151,7 +154,7 @@ class FailedSolves(RunTestCase):
                         "output": {"directory": "results", "every": 0, "energy": True},
                     }, ranks, directory)
                     self.assert_status(run, status)
-                    self.assertIn(words, run.stdout + run.stderr)
+                    self.assertRegex(run.stdout + run.stderr, words)
                     self.assert_finite(run.results())
                     self.assert_finite(run.history())
 

@@ -19,7 +19,8 @@ program test_nscdd_ep
   implicit none
   character(len=*), parameter :: newline = new_line("a")
   character(len=*), parameter :: plain = "&solver method = 'nscdd', sweeps = 2, acceleration = 'none' /"
-  character(len=*), parameter :: enriched = "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched direction = "
+  character(len=*), parameter :: enriched = &
+    & "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched direction = "
   type(communicator_t), target :: comm, alone
   integer :: dimension, k
   real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]

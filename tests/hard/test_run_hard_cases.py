@@ -1,0 +1,69 @@
+"""All hard cases by a selection of methods: NLGS on one rank, NSCDD on two, and one of the other methods in turn. The table of all
+methods is drivers/study_hard.py."""
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, each
+from hard_cases import BASE, METHODS, cases, disagreement, methods_of, play, units
+
+CASES = cases()
+OTHERS = [title for title in METHODS if title not in ("nlgs", "nscdd")]
+
+
+def selection(number, case):
+    """(title, groups, ranks) of the runs of a case."""
+    if case.methods:
+        return [(title, groups, 1 + k % 2) for k, (title, groups) in enumerate(case.methods.items())]
+    chosen = ["nlgs", "nscdd", OTHERS[number % len(OTHERS)]]
+    return [(title, METHODS[title], ranks) for title, ranks in zip(chosen, (1, 2, 1))]
+
+
+class HardCases(RunTestCase):
+
+    def play(self, number, case):
+        runs = [play(case, title, groups, ranks, self.here(f"{number} {title}")) for title, groups, ranks in selection(number, case)]
+        wrong = [f"{run.method}: {words}" for run in runs for words in run.failures()]
+        return wrong + [words for run in runs[1:] for words in disagreement(runs[0], run)]
+
+    def test_cases(self):
+        for case, wrong in zip(CASES.values(), each(self.play, list(enumerate(CASES.values())))):
+            with self.subTest(case.name):
+                self.assertEqual(wrong, [])
+
+    def test_no_direction_is_nscdd(self):
+        """l = 0 is NSCDD, bit for bit."""
+        case = CASES["no direction"]
+        first, *others = [play(case, title, groups, 1, self.here(f"zero {title}")).run.results()
+                          for title, groups in case.methods.items()]
+        for other in others:
+            self.assertEqual([name for name in differences(first, other) if not name.startswith("/run")], [])
+
+    def test_units(self):
+        """Units that are powers of two change no digit (large lengths do, since the norm2 of gfortran rounds otherwise above 1);
+        a mirrored or turned scene has the same velocities."""
+        for title in ("nlgs", "nscdd, momentum"):
+            base = play(BASE, title, METHODS[title], 1, self.here(f"base {title}")).record
+            for case in units():
+                with self.subTest(case.name, method=title):
+                    record = play(case, title, METHODS[title], 1, self.here(f"{case.name} {title}")).record
+                    scale = case.change
+                    wanted = base.velocity @ scale.turn.T * (scale.length / scale.time)
+                    spin = base.spin * np.linalg.det(scale.turn) / scale.time
+                    if np.array_equal(scale.turn, np.eye(2)) and scale.length <= 1.0:
+                        self.assertTrue(np.array_equal(record.velocity, wanted) and np.array_equal(record.spin, spin))
+                    else:
+                        self.assertLess(np.abs(record.velocity - wanted).max(), case.agree * np.abs(wanted).max())
+
+
+class Suite(unittest.TestCase):
+
+    def test_every_method_is_in_turn(self):
+        """Each method is run by some case."""
+        run = {title for number, case in enumerate(CASES.values()) for title, _, _ in selection(number, case)}
+        self.assertLessEqual(set(METHODS), run)
+        self.assertTrue(all(set(methods_of(case)) for case in CASES.values()))
+
+
+if __name__ == "__main__":
+    unittest.main()
