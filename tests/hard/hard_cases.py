@@ -391,12 +391,14 @@ def laws():
                    agree=1e-4 if mu == 0.0 else 0.0) for mu in (0.0, 10.0, 1e6)]
     return found + [
         Case("cradle", "a row that touches, e = 1: nothing may be lost", row, [], merged(free, {"scene": {"restitution": 1.0}}),
-             holds=keeps_energy(1e-7), agree=1e-6),
+             # a gap that rounding opens or closes decides what follows
+             holds=keeps_energy(1e-7), agree=1e-6, agree_until=1),
         Case("cradle in a box", "e = 1, walls too, shocks for 0.4 s", row, [plane([-0.06, 0.0], [1.0, 0.0]),
              plane([0.58, 0.0], [-1.0, 0.0])], merged(free, {"scene": {"restitution": 1.0}}), steps=200, holds=keeps_energy(1e-6)),
         Case("struck from behind", "e = 1: a shock loads a pair that opens; held instead of sent back, it would gain 6 % of energy",
              [Grain([x, 0.0], [v, 0.0]) for x, v in ((0.0, 1.0), (0.1, 0.0), (0.199, 0.1))], [],
-             merged(free, {"scene": {"restitution": 1.0}}), steps=5, subdomains=2, holds=keeps_energy(1e-7), agree=1e-6),
+             merged(free, {"scene": {"restitution": 1.0}}), steps=5, subdomains=2, holds=keeps_energy(1e-7), agree=1e-6,
+             agree_until=1),
         Case("inelastic collapse", "ever more and ever smaller shocks in finite time, e = 0.3", cluster, [floor()],
              {"scene": {"restitution": 0.3}, "time": {"step": 1.0 / 128}}, steps=150, holds=comes_to_rest),
         Case("bouncing heap", "e = 1 without friction: shocks of many contacts at once", heap(), heap_box(),
