@@ -10,7 +10,8 @@ module gravier_newton
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: work_t
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
@@ -372,7 +373,8 @@ contains
 
   end subroutine search_line
 
-  !> Keep the impulses of the problem if they are the best so far. Collective.
+  !> Project the impulses of the problem on Coulomb's cones, outside of which iterates may lie, and keep them if they are the
+  !> best so far. Collective.
   subroutine keep_best(self, problem, residual)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -381,6 +383,9 @@ contains
     real(dp) :: ignored
     integer :: s
 
+    do s = 1, size(problem%sub)
+      call project(problem%kernels, problem%sub(s))
+    end do
     call problem%evaluate()
     call problem%residual(residual, ignored)
     if (.not. residual < self%least) return
@@ -389,6 +394,24 @@ contains
       self%part(s)%best(:, :, :) = problem%sub(s)%impulse
     end do
   end subroutine keep_best
+
+  !> Project the impulses of a subdomain on Coulomb's cones.
+  pure subroutine project(kernels, sub)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: length, bound
+    integer :: c, q, g
+
+    do c = 1, sub%n_contacts
+      q = lane_of(c)
+      g = block_of(c)
+      sub%impulse(q, 1, g) = max(sub%impulse(q, 1, g), 0.0_dp)
+      if (kernels%nc == 1) cycle
+      bound = sub%hot(q, kernels%nh, g)*sub%impulse(q, 1, g)
+      length = norm2(sub%impulse(q, 2:, g))
+      if (length > bound) sub%impulse(q, 2:, g) = sub%impulse(q, 2:, g)*(bound/length)
+    end do
+  end subroutine project
 
   !> The impulses of the problem are the best so far.
   subroutine take_best(self, problem)
