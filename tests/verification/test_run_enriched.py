@@ -25,15 +25,16 @@ class Enriched(RunTestCase):
         cls.disks = merged({
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": settled_disks(cls.scratch, count=(16, 16)), "friction": 0.3},
             "time": {"step": 1e-3, "steps": 1},
-            "solver": {"method": "nscdd", "sweeps": 3, "tolerance": 1e-3, "max_iterations": 2000, "check_every": 1,
-                       "warm_start": False},
+            "solver": {"method": "nscdd", "acceleration": "none", "sweeps": 3, "tolerance": 1e-3, "max_iterations": 2000,
+                       "check_every": 1, "warm_start": False},
             "output": {"directory": "results", "trace": True},
         }, PARTS)
         spheres = run_case({
             "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [5, 5, 5], "radius_min": 0.008, "radius_max": 0.012,
                       "friction": 0.3},
             "time": {"step": 1e-3, "steps": 350},
-            "solver": {"tolerance": 1e-3, "max_iterations": 1000},
+            # settled by plain iterations: with momentum 0.6 of NSCDD's are left here at a friction of 0.3, not half (doc/methods.md)
+            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
             "output": {"directory": ".", "every": 0, "final_bodies": True},
         }, directory=cls.scratch + "/spheres")
         if spheres.status != 0:
