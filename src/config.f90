@@ -276,8 +276,10 @@ contains
     if (config%solver%method == "nscdd_ep" .and. .not. config%enriched%direction_given) then
       if (.not. is_given(report, "enriched", "contacts")) config%enriched%contacts = "active"
     end if
-    if (.not. is_given(report, "solver", "acceleration") .and. (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
-        (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active"))) config%solver%acceleration = "momentum"
+    if (.not. is_given(report, "solver", "acceleration")) then
+      if (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
+          (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
+    end if
     do i = 1, size(config%boundaries)
       report%instance = i
       call settle_boundary(config%scene, report, config%boundaries(i))
