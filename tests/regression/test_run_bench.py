@@ -16,7 +16,8 @@ KERNELS = ["2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
 SHAPES = {"2d_frictionless": (4, 1, 2, 2), "2d_friction": (8, 2, 3, 3),
           "3d_frictionless": (5, 1, 3, 3), "3d_friction": (9, 3, 6, 4)}
 SCENE = ["list_build", "contacts", "iterations", "step", "solve", "solve_per_contact_iteration", "list_build_over_step"]
-SHARES = ["share_" + name for name in ("sweeps", "exchange", "checks", "detection", "lists_and_ghosts", "setup", "bodies", "rest")]
+SHARES = ["share_" + name for name in ("sweeps", "exchange", "checks", "reductions", "detection", "lists_and_ghosts", "setup", "bodies",
+                                       "rest")]
 DETECTION = ["list_check_and_ghosts", "contact_search", "contact_packing", "interface_search"]
 
 
