@@ -149,7 +149,7 @@ contains
       & "&solver method = '"//trim(packing%method)//"', acceleration = 'none', tolerance = 1e-30, max_iterations = "// &
       & to_text(packing%iterations)//" / "
     if (packing%method /= "nlgs") text = text//"&decomposition subdomains = "//to_text(packing%subdomains)//" / "
-    if (packing%method == "nscdd_ep") text = text//"&enriched interface = '"//trim(packing%interface)//"' / "
+    if (packing%method == "nscdd_ep") text = text//"&enriched direction = 0.3, interface = '"//trim(packing%interface)//"' / "
   end function case_text
 
   !> Bring the upper planes of the lattice's box to the packing.
