@@ -95,7 +95,7 @@ contains
     real(dp) :: sums(2)
 
     lowered = .false.
-    call problem%comm%sum_parts(problem%progress, sums)
+    call problem%sum_progress(sums)
     if (.not. ieee_is_finite(sums(1))) then
       call lower(self, problem, far_less, lowered)
     else if (self%reference > 0.0_dp .and. sums(1) > explosion*self%reference) then

@@ -9,7 +9,7 @@
 module gravier_impulse_feedback
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, project_on_cones
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_enriched_matrix, only: enriched_matrix_t, drop_inactive
   use gravier_interface_problem, only: interface_field_t, load_transpose
@@ -79,7 +79,7 @@ contains
         work(:, :, :) = matrix%part(s)%direction*(matrix%part(s)%law_velocity - work)
         call drop_inactive(problem%kernels, sub, work)
         part%step(:, :, :) = sub%impulse + work
-        call project(problem%kernels, sub, part%step)
+        call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, part%step)
         part%step(:, :, :) = part%step - sub%impulse
         sub%reaction(:, :) = 0.0_dp
         call problem%kernels%add_reaction(sub%pair, sub%hot, part%step, sub%reaction)
@@ -126,25 +126,5 @@ contains
       change(nd + 1:, b) = sub%inverse_mass(nw, b)*sub%reaction(nd + 1:, b)
     end do
   end subroutine velocity_change
-
-  !> Bring impulses into the cones: r_n >= 0, |r_t| <= mu r_n.
-  pure subroutine project(kernels, sub, impulse)
-    type(kernels_t), intent(in) :: kernels
-    type(subproblem_t), intent(in) :: sub
-    !> (lanes, nc, blocks)
-    real(dp), intent(inout), contiguous :: impulse(:, :, :)
-    real(dp) :: bound, tangential
-    integer :: c, q, g
-
-    impulse(:, 1, :) = max(0.0_dp, impulse(:, 1, :))
-    if (kernels%nc == 1) return
-    do c = 1, sub%n_contacts
-      q = lane_of(c)
-      g = block_of(c)
-      bound = sub%hot(q, kernels%nh, g)*impulse(q, 1, g)
-      tangential = norm2(impulse(q, 2:, g))
-      if (tangential > bound) impulse(q, 2:, g) = impulse(q, 2:, g)*(bound/tangential)
-    end do
-  end subroutine project
 
 end module gravier_impulse_feedback

@@ -10,8 +10,8 @@ module gravier_newton
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
-  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_kernels, only: project_on_cones
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: work_t
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
@@ -384,7 +384,9 @@ contains
     integer :: s
 
     do s = 1, size(problem%sub)
-      call project(problem%kernels, problem%sub(s))
+      associate (sub => problem%sub(s))
+        call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
+      end associate
     end do
     call problem%evaluate()
     call problem%residual(residual, ignored)
@@ -394,24 +396,6 @@ contains
       self%part(s)%best(:, :, :) = problem%sub(s)%impulse
     end do
   end subroutine keep_best
-
-  !> Project the impulses of a subdomain on Coulomb's cones.
-  pure subroutine project(kernels, sub)
-    type(kernels_t), intent(in) :: kernels
-    type(subproblem_t), intent(inout) :: sub
-    real(dp) :: length, bound
-    integer :: c, q, g
-
-    do c = 1, sub%n_contacts
-      q = lane_of(c)
-      g = block_of(c)
-      sub%impulse(q, 1, g) = max(sub%impulse(q, 1, g), 0.0_dp)
-      if (kernels%nc == 1) cycle
-      bound = sub%hot(q, kernels%nh, g)*sub%impulse(q, 1, g)
-      length = norm2(sub%impulse(q, 2:, g))
-      if (length > bound) sub%impulse(q, 2:, g) = sub%impulse(q, 2:, g)*(bound/length)
-    end do
-  end subroutine project
 
   !> The impulses of the problem are the best so far.
   subroutine take_best(self, problem)

@@ -38,7 +38,7 @@ contains
     call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
     call self%matrix%set_share(1.0_dp)
     self%guarded = is_enriched(self)
-    call self%guard%start(problem)
+    if (self%guarded) call self%guard%start(problem)
     call self%matrix%start(problem, error)
     call problem%comm%agree(error)
   end subroutine schwarz_ec_start

@@ -22,10 +22,14 @@ module gravier_contact_kernels
   implicit none
   private
   public :: kernels_t, contact_jacobian, global_impulse, tangents, local_operator
-  public :: lanes, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors
+  public :: lanes, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors, project_on_cones
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
+
+  ! rows of `hot` that hold 1/W_nn and 1/W_tt
+  integer, parameter :: operators_2d_frictionless(1) = [4], operators_3d_frictionless(1) = [5]
+  integer, parameter :: operators_2d_friction(2) = [4, 5], operators_3d_friction(2) = [5, 6]
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
@@ -398,6 +402,26 @@ contains
     end do
   end subroutine tangential_vectors
 
+  !> Bring impulses into Coulomb's cones: r_n >= 0, |r_t| <= mu r_n.
+  pure subroutine project_on_cones(kernels, n_contacts, hot, impulse)
+    type(kernels_t), intent(in) :: kernels
+    integer, intent(in) :: n_contacts
+    real(dp), intent(in), contiguous :: hot(:, :, :)
+    real(dp), intent(inout), contiguous :: impulse(:, :, :)
+    real(dp) :: bound, tangential
+    integer :: c, q, g
+
+    impulse(:, 1, :) = max(0.0_dp, impulse(:, 1, :))
+    if (kernels%nc == 1) return
+    do c = 1, n_contacts
+      q = lane_of(c)
+      g = block_of(c)
+      bound = hot(q, kernels%nh, g)*impulse(q, 1, g)
+      tangential = norm2(impulse(q, 2:, g))
+      if (tangential > bound) impulse(q, 2:, g) = impulse(q, 2:, g)*(bound/tangential)
+    end do
+  end subroutine project_on_cones
+
   !> Rows of H^T of contact `c`: v = candidate . V_i + antagonist . V_j.
   pure subroutine contact_jacobian(kernels, hot, c, candidate, antagonist)
     type(kernels_t), intent(in) :: kernels
@@ -621,108 +645,66 @@ contains
   ! W_nn and W_tt of a block [1/kg], at least the least positive number: contacts of no effect between bodies that cannot move
   ! have W = 0.
 
-  pure subroutine weigh_2d_frictionless(pair, hot, weight, wn)
+  pure subroutine weigh_2d_frictionless(pair, hot, weight, w)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 4), weight(2, *)
-    real(dp), intent(out) :: wn(lanes)
+    real(dp), intent(out) :: w(lanes, 1)
     integer :: q
 
     do q = 1, lanes
-      wn(q) = max(normal_2d(hot(q, 2), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
+      w(q, 1) = max(normal_2d(hot(q, 2), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
     end do
   end subroutine weigh_2d_frictionless
 
-  pure subroutine weigh_3d_frictionless(pair, hot, weight, wn)
+  pure subroutine weigh_3d_frictionless(pair, hot, weight, w)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 5), weight(3, *)
-    real(dp), intent(out) :: wn(lanes)
+    real(dp), intent(out) :: w(lanes, 1)
     integer :: q
 
     do q = 1, lanes
-      wn(q) = max(normal_3d(hot(q, 2), hot(q, 3), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
+      w(q, 1) = max(normal_3d(hot(q, 2), hot(q, 3), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
     end do
   end subroutine weigh_3d_frictionless
 
-  pure subroutine weigh_2d_friction(pair, hot, weight, wn, wt)
+  pure subroutine weigh_2d_friction(pair, hot, weight, w)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 8), weight(3, *)
-    real(dp), intent(out) :: wn(lanes), wt(lanes)
+    real(dp), intent(out) :: w(lanes, 2)
     integer :: q, i, j
 
     do q = 1, lanes
       i = pair(1, q)
       j = pair(2, q)
-      wn(q) = max(normal_2d(hot(q, 2), weight(1:2, i), weight(1:2, j)), tiny(1.0_dp))
-      wt(q) = max(tangential_2d(hot(q, 1), weight(1:2, i), weight(1:2, j)) + weight(3, i)*hot(q, 6)**2 &
+      w(q, 1) = max(normal_2d(hot(q, 2), weight(1:2, i), weight(1:2, j)), tiny(1.0_dp))
+      w(q, 2) = max(tangential_2d(hot(q, 1), weight(1:2, i), weight(1:2, j)) + weight(3, i)*hot(q, 6)**2 &
         & + weight(3, j)*hot(q, 7)**2, tiny(1.0_dp))
     end do
   end subroutine weigh_2d_friction
 
-  pure subroutine weigh_3d_friction(pair, hot, weight, wn, wt)
+  pure subroutine weigh_3d_friction(pair, hot, weight, w)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 9), weight(4, *)
-    real(dp), intent(out) :: wn(lanes), wt(lanes)
+    real(dp), intent(out) :: w(lanes, 2)
     integer :: q, i, j
-    real(dp) :: tx, ty, tz, sx, sy, sz, w, y, z, tt, ss, ts
+    real(dp) :: tx, ty, tz, sx, sy, sz, sum_w, y, z, tt, ss, ts
 
     do q = 1, lanes
       i = pair(1, q)
       j = pair(2, q)
       call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
       ! as normal_3d and tangential_3d, written out: arrays of three would keep the lanes from becoming vectors
-      w = weight(1, i) + weight(1, j)
+      sum_w = weight(1, i) + weight(1, j)
       y = (weight(2, i) - weight(1, i)) + (weight(2, j) - weight(1, j))
       z = (weight(3, i) - weight(1, i)) + (weight(3, j) - weight(1, j))
       tt = ty**2*y + tz**2*z
       ss = sy**2*y + sz**2*z
       ts = ty*sy*y + tz*sz*z
-      wn(q) = max(w + (hot(q, 2)**2*y + hot(q, 3)**2*z), tiny(1.0_dp))
-      wt(q) = max(w + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2)) + weight(4, i)*hot(q, 7)**2 &
+      w(q, 1) = max(sum_w + (hot(q, 2)**2*y + hot(q, 3)**2*z), tiny(1.0_dp))
+      w(q, 2) = max(sum_w + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2)) + weight(4, i)*hot(q, 7)**2 &
         & + weight(4, j)*hot(q, 8)**2, tiny(1.0_dp))
     end do
   end subroutine weigh_3d_friction
-
-  pure subroutine invert_2d_frictionless(pair, hot, weight)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(inout) :: hot(lanes, 4)
-    real(dp), intent(in) :: weight(2, *)
-    real(dp) :: wn(lanes)
-
-    call weigh_2d_frictionless(pair, hot, weight, wn)
-    hot(:, 4) = 1.0_dp/wn
-  end subroutine invert_2d_frictionless
-
-  pure subroutine invert_3d_frictionless(pair, hot, weight)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(inout) :: hot(lanes, 5)
-    real(dp), intent(in) :: weight(3, *)
-    real(dp) :: wn(lanes)
-
-    call weigh_3d_frictionless(pair, hot, weight, wn)
-    hot(:, 5) = 1.0_dp/wn
-  end subroutine invert_3d_frictionless
-
-  pure subroutine invert_2d_friction(pair, hot, weight)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(inout) :: hot(lanes, 8)
-    real(dp), intent(in) :: weight(3, *)
-    real(dp) :: wn(lanes), wt(lanes)
-
-    call weigh_2d_friction(pair, hot, weight, wn, wt)
-    hot(:, 4) = 1.0_dp/wn
-    hot(:, 5) = 1.0_dp/wt
-  end subroutine invert_2d_friction
-
-  pure subroutine invert_3d_friction(pair, hot, weight)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(inout) :: hot(lanes, 9)
-    real(dp), intent(in) :: weight(4, *)
-    real(dp) :: wn(lanes), wt(lanes)
-
-    call weigh_3d_friction(pair, hot, weight, wn, wt)
-    hot(:, 5) = 1.0_dp/wn
-    hot(:, 6) = 1.0_dp/wt
-  end subroutine invert_3d_friction
 
   ! |r - P|^2 and |r|^2 added lane by lane.
 
@@ -731,12 +713,12 @@ contains
     real(dp), intent(in) :: hot(lanes, 4), weight(2, *), velocity(2, *), impulse(lanes, 1)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q
-    real(dp) :: v(lanes, 1), wn(lanes), rn
+    real(dp) :: v(lanes, 1), w(lanes, 1), rn
 
     call velocity_2d_frictionless(pair, hot, velocity, v)
-    call weigh_2d_frictionless(pair, hot, weight, wn)
+    call weigh_2d_frictionless(pair, hot, weight, w)
     do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/wn(q))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/w(q, 1))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2
     end do
@@ -747,12 +729,12 @@ contains
     real(dp), intent(in) :: hot(lanes, 5), weight(3, *), velocity(3, *), impulse(lanes, 1)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q
-    real(dp) :: v(lanes, 1), wn(lanes), rn
+    real(dp) :: v(lanes, 1), w(lanes, 1), rn
 
     call velocity_3d_frictionless(pair, hot, velocity, v)
-    call weigh_3d_frictionless(pair, hot, weight, wn)
+    call weigh_3d_frictionless(pair, hot, weight, w)
     do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/wn(q))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/w(q, 1))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2
     end do
@@ -763,13 +745,13 @@ contains
     real(dp), intent(in) :: hot(lanes, 8), weight(3, *), velocity(3, *), impulse(lanes, 2)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q
-    real(dp) :: v(lanes, 2), wn(lanes), wt(lanes), rn, rt
+    real(dp) :: v(lanes, 2), w(lanes, 2), rn, rt
 
     call velocity_2d_friction(pair, hot, velocity, v)
-    call weigh_2d_friction(pair, hot, weight, wn, wt)
+    call weigh_2d_friction(pair, hot, weight, w)
     do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/wn(q))
-      rt = max(-hot(q, 8)*rn, min(hot(q, 8)*rn, impulse(q, 2) - v(q, 2)/wt(q)))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/w(q, 1))
+      rt = max(-hot(q, 8)*rn, min(hot(q, 8)*rn, impulse(q, 2) - v(q, 2)/w(q, 2)))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2 + (rt - impulse(q, 2))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2 + impulse(q, 2)**2
     end do
@@ -780,15 +762,15 @@ contains
     real(dp), intent(in) :: hot(lanes, 9), weight(4, *), velocity(6, *), impulse(lanes, 3)
     real(dp), intent(inout) :: parts(lanes, 2)
     integer :: q
-    real(dp) :: v(lanes, 3), wn(lanes), wt(lanes), rn, rt, rs, bound, reduction
+    real(dp) :: v(lanes, 3), w(lanes, 2), rn, rt, rs, bound, reduction
 
     call velocity_3d_friction(pair, hot, velocity, v)
-    call weigh_3d_friction(pair, hot, weight, wn, wt)
+    call weigh_3d_friction(pair, hot, weight, w)
     do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/wn(q))
+      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/w(q, 1))
       bound = hot(q, 9)*rn
-      rt = impulse(q, 2) - v(q, 2)/wt(q)
-      rs = impulse(q, 3) - v(q, 3)/wt(q)
+      rt = impulse(q, 2) - v(q, 2)/w(q, 2)
+      rs = impulse(q, 3) - v(q, 3)/w(q, 2)
       reduction = bound/max(sqrt(rt*rt + rs*rs), bound, tiny(1.0_dp))
       parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2 + (rt*reduction - impulse(q, 2))**2 + (rs*reduction - impulse(q, 3))**2
       parts(q, 2) = parts(q, 2) + impulse(q, 1)**2 + impulse(q, 2)**2 + impulse(q, 3)**2

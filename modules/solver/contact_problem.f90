@@ -72,6 +72,9 @@ module gravier_contact_problem
     !> of each subdomain, (sum of |r - y|^2, sum of |r|^2) of the first sweep of the last iteration, which started from y
     !> (2, subdomains) [N^2 s^2]
     real(dp), allocatable :: progress(:, :)
+    !> their sums over all subdomains, once `sum_progress` was called; whoever changes `progress` clears the mark
+    real(dp) :: progress_sums(2) = 0.0_dp
+    logical :: progress_is_summed = .false.
     !> contacts of the scene
     integer(i8) :: n_contacts = 0
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
@@ -79,6 +82,7 @@ module gravier_contact_problem
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
+    procedure :: sum_progress => contact_problem_sum_progress
     procedure :: jump => contact_problem_jump
     procedure :: received_jump => contact_problem_received_jump
     procedure :: own_reactions => contact_problem_own_reactions
@@ -247,6 +251,21 @@ contains
       residual = 0.0_dp
     end if
   end subroutine contact_problem_residual
+
+  !> Sums of `progress` over all subdomains of the scene, for momentum, checks and safeguards: one reduction an iteration at
+  !> most. Collective.
+  subroutine contact_problem_sum_progress(self, sums)
+    class(contact_problem_t), intent(inout) :: self
+    real(dp), intent(out) :: sums(2)
+
+    if (.not. self%progress_is_summed) then
+      call start_timer(phase_reduction)
+      call self%comm%sum_parts(self%progress, self%progress_sums)
+      call stop_timer(phase_reduction)
+      self%progress_is_summed = .true.
+    end if
+    sums(:) = self%progress_sums
+  end subroutine contact_problem_sum_progress
 
   !> Largest difference of translation velocity between two copies of a body under the present loads of the
   !> subdomains, relative to velocity_scale. Collective.

@@ -2,7 +2,7 @@
 module gravier_scheme
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, phase_reduction, clock
+  use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
   use gravier_communicator, only: communicator_t
   use gravier_contact_problem, only: contact_problem_t
   implicit none
@@ -184,6 +184,7 @@ contains
     end do
     if (allocated(problem%progress)) deallocate (problem%progress)
     allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)
+    problem%progress_is_summed = .false.
     if (.not. allocated(scheme%seconds)) allocate (scheme%seconds(size(problem%sub)), source=0.0_dp)
     if (scheme%momentum%on) call start_momentum(scheme%momentum, problem)
   end subroutine start_sweeps
@@ -254,6 +255,7 @@ contains
     integer :: s
 
     call start_timer(phase_sweep)
+    problem%progress_is_summed = .false.
     if (.not. scheme%momentum%on) return
     do s = 1, size(problem%sub)
       call extrapolate(scheme%momentum%beta, problem%sub(s)%velocity, scheme%momentum%part(s)%velocity)
@@ -312,16 +314,14 @@ contains
   !> Count the sweeps, and choose the extrapolation of the next iteration. Collective with momentum.
   subroutine end_sweeps(scheme, problem)
     class(scheme_t), intent(inout) :: scheme
-    type(contact_problem_t), intent(in) :: problem
+    type(contact_problem_t), intent(inout) :: problem
     real(dp) :: sums(2)
 
     scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
     scheme%work%iterations = scheme%work%iterations + 1
     call stop_timer(phase_sweep)
     if (.not. scheme%momentum%on) return
-    call start_timer(phase_reduction)
-    call problem%comm%sum_parts(problem%progress, sums)
-    call stop_timer(phase_reduction)
+    call problem%sum_progress(sums)
     call scheme%momentum%steer(sums(1))
   end subroutine end_sweeps
 

@@ -3,7 +3,7 @@ module gravier_solve
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_timers, only: start_timer, stop_timer, phase_setup, phase_check, phase_reduction, clock
+  use gravier_timers, only: start_timer, stop_timer, phase_setup, phase_check, clock
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: descent_t
@@ -117,9 +117,7 @@ contains
     logical function is_worth_a_check() result(is_worth)
       real(dp) :: sums(2)
 
-      call start_timer(phase_reduction)
-      call problem%comm%sum_parts(problem%progress, sums)
-      call stop_timer(phase_reduction)
+      call problem%sum_progress(sums)
       progress = 0.0_dp
       is_worth = .true.
       if (all(ieee_is_finite(sums))) then

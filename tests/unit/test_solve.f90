@@ -43,6 +43,7 @@ contains
     ! it has no sweeps that tell how far they went: no check is left out
     if (allocated(problem%progress)) deallocate (problem%progress)
     allocate (problem%progress(2, 1), source=0.0_dp)
+    problem%progress_is_summed = .false.
     do c = 1, problem%sub(1)%n_contacts
       problem%sub(1)%impulse(lane_of(c), 1, block_of(c)) = 1.0_dp
     end do
