@@ -200,8 +200,9 @@ class Words(unittest.TestCase):
 
     def test_options_of_the_programs_exist(self):
         count = 0
-        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_fclib", "gravier_sample"):
-            usage = run([str(PROGRAMS / program), "--help"], ".")[1]
+        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_fclib", "gravier_import", "gravier_sample"):
+            interpreter = [sys.executable] if program == "gravier_import" else []
+            usage = run([*interpreter, str(PROGRAMS / program), "--help"], ".")[1]
             for page in PAGES:
                 for option in re.findall(rf"(?<!/)\b{program} [^`\n]*?(--[a-z]+)", page.read_text(encoding="utf-8")):
                     count += 1
@@ -218,9 +219,11 @@ class Blocks(unittest.TestCase):
         self.work.mkdir()
         self.bin.mkdir()
         (self.work / "data").symlink_to(SOURCE / "data")
-        launcher = self.bin / "mpirun"
-        launcher.write_text(f'#!/bin/sh\nexec "{MPIEXEC}" "$@"\n', encoding="utf-8")
-        launcher.chmod(0o755)
+        # `python3` is the one that has h5py
+        for name, program in (("mpirun", MPIEXEC), ("python3", sys.executable)):
+            launcher = self.bin / name
+            launcher.write_text(f'#!/bin/sh\nexec "{program}" "$@"\n', encoding="utf-8")
+            launcher.chmod(0o755)
 
     def run_page(self, page):
         """Run the blocks of a page; how many."""
