@@ -89,7 +89,8 @@ def anchors(page):
 
 def run(command, directory, path=None):
     """Status and output of a command; a command that is not over in time is ended, with all that it started."""
-    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8"}
+    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8",
+                   "PYTHONPATH": f"{SOURCE / 'drivers/python'}:{os.environ.get('PYTHONPATH', '')}"}
     if path:
         environment["PATH"] = f"{path}:{environment['PATH']}"
     process = subprocess.Popen(command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -221,6 +222,10 @@ class Blocks(unittest.TestCase):
         launcher = self.bin / "mpirun"
         launcher.write_text(f'#!/bin/sh\nexec "{MPIEXEC}" "$@"\n', encoding="utf-8")
         launcher.chmod(0o755)
+        # the first python3 in PATH need not be the one with the packages
+        python = self.bin / "python3"
+        python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n', encoding="utf-8")
+        python.chmod(0o755)
 
     def run_page(self, page):
         """Run the blocks of a page; how many."""
