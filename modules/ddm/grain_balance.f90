@@ -177,11 +177,9 @@ contains
           twice = twice - sub%reaction(d, b)*(physics%h*physics%body_force(d)*volume*sub%inverse_mass(d, b))
         end do
       end if
-      if (physics%rotation) then
-        do d = nd + 1, nv
-          twice = twice + sub%reaction(d, b)*(sub%v_free(d, b) + sub%v_global(d, b))
-        end do
-      end if
+      do d = nd + 1, nv
+        twice = twice + sub%reaction(d, b)*(sub%v_free(d, b) + sub%v_global(d, b))
+      end do
       work = work + 0.5_dp*twice/sub%multiplicity(b)
     end do
   end subroutine add_contact_work
