@@ -267,6 +267,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     associate (enriched => config%enriched)
+      call expect(report, enriched%interface == "mumps" .or. config%solver%method /= "newton", "enriched", "interface", error, &
+                  "'mumps' where &solver method = 'newton': its interface problem is not symmetric")
       call expect(report, enriched%direction >= 0.0_dp, "enriched", "direction", error)
       call expect(report, enriched%cg_tolerance > 0.0_dp .and. enriched%cg_tolerance < 1.0_dp, "enriched", "cg_tolerance", &
                   error)

@@ -270,7 +270,7 @@ module gravier_config_table
            "contacts that take part: all, as in the paper; those that carry an impulse, and `nscdd_ep` feeds their impulses back", &
            note="`'all'`; `nscdd_ep` without `direction`: `'active'`"), &
      key_t("enriched", "interface", kind_choice, "'mumps'", "mumps cg", &
-           "interface solve: direct, or conjugate gradient (`nscdd_ep` only)"), &
+           "interface solve: direct, or conjugate gradient (`nscdd_ep` only; `newton` takes no other than `mumps`)"), &
      key_t("enriched", "cg_tolerance", kind_real, "1e-12", "in (0, 1)", &
            "relative residual at which the conjugate gradient stops (`nscdd_ep` with `interface = 'cg'` only)"), &
      key_t("enriched", "cg_max_iterations", kind_integer, "10000", ">= 1", &

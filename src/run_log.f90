@@ -391,18 +391,19 @@ contains
     end associate
   end subroutine write_accuracy
 
-  !> How far energies balance, where they are measured.
+  !> How far energies balance: of the whole scene where its terms are measured, else of the grains.
   function energy_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    real(dp) :: off, turnover
 
-    if (.not. allocated(simulation%diagnostics%energy)) then
-      text = "energy balance not measured; &output energy = .true. does"
-      return
+    off = simulation%balance%error()
+    turnover = simulation%balance%turnover()
+    if (allocated(simulation%diagnostics%energy)) then
+      off = simulation%diagnostics%energy%error()
+      turnover = simulation%diagnostics%energy%turnover()
     end if
-    associate (energy => simulation%diagnostics%energy)
-      text = "energy balance off by "//to_text(abs(energy%error()), 2)//" J, of "//to_text(energy%turnover(), 3)//" J turned over"
-    end associate
+    text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
   end function energy_text
 
   !> What so many iterations would have taken. Collective.

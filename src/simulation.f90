@@ -25,6 +25,7 @@ module gravier_simulation
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
   use gravier_overlap_projection, only: project_overlaps
   use gravier_diagnostics, only: diagnostics_t
+  use gravier_grain_balance, only: grain_balance_t
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -71,6 +72,8 @@ module gravier_simulation
     type(column_solution_t) :: column
     !> figures that the user asked for
     type(diagnostics_t) :: diagnostics
+    !> energies of the grains since this run began or went on from a checkpoint
+    type(grain_balance_t) :: balance
     !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
     real(dp), allocatable :: boundary_impulses(:, :)
     !> grains of the scene now, and those of them that are glued to boundaries
@@ -109,7 +112,6 @@ module gravier_simulation
     procedure :: make_subdomains => simulation_make_subdomains
     procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
-    procedure :: kinetic_energy => simulation_kinetic_energy
     procedure :: facing_area => simulation_facing_area
     procedure :: free => simulation_free
   end type simulation_t
@@ -188,10 +190,11 @@ contains
     call self%start_diagnostics()
   end subroutine simulation_start
 
-  !> Prepare the diagnostics that &output asks for, of the scene as it is. Collective.
+  !> Prepare the balance of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
   subroutine simulation_start_diagnostics(self)
     class(simulation_t), intent(inout) :: self
 
+    call self%balance%begin(self%decomposition, self%physics)
     associate (output => self%config%output)
       call self%diagnostics%init(self%decomposition, output%energy, output%stress, output%structure, output%boundary_forces)
     end associate
@@ -619,6 +622,7 @@ contains
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
     call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
       & self%time, figures%left > 0)
+    call self%balance%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, figures%left > 0)
     call move_to_end(self)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
@@ -628,7 +632,7 @@ contains
     call stop_timer(phase_bodies)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
-    figures%kinetic_energy = self%kinetic_energy()
+    figures%kinetic_energy = self%balance%kinetic
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
@@ -722,26 +726,6 @@ contains
     end do
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
   end subroutine move_to_end
-
-  !> Kinetic energy of all grains [J]. Collective.
-  real(dp) function simulation_kinetic_energy(self) result(energy)
-    class(simulation_t), intent(in) :: self
-    real(dp), allocatable :: part(:)
-    integer :: s, k, nd
-
-    nd = self%decomposition%nd
-    allocate (part(size(self%decomposition%home)), source=0.0_dp)
-    do s = 1, size(part)
-      associate (home => self%decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) > 0) cycle
-          part(s) = part(s) + 0.5_dp*home%mass(k)*sum(home%velocity(1:nd, k)**2) + &
-            & 0.5_dp*home%inertia(k)*sum(home%velocity(nd + 1:, k)**2)
-        end do
-      end associate
-    end do
-    energy = self%comm%sum_real(part)
-  end function simulation_kinetic_energy
 
   !> Give back what the method holds.
   subroutine simulation_free(self)

@@ -163,7 +163,8 @@ contains
     if (allocated(self%seconds)) deallocate (self%seconds)
   end subroutine scheme_forget_times
 
-  !> Masses as the method wants them, and velocities that agree with the impulses in all copies, v_global too. Collective.
+  !> Masses as the method wants them, and reactions and velocities that agree with the impulses in all copies, v_global too.
+  !> Collective.
   subroutine start_sweeps(scheme, problem, shared_masses)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
@@ -175,6 +176,7 @@ contains
       call problem%evaluate()
     else
       do s = 1, size(problem%sub)
+        problem%sub(s)%reaction(:, :) = 0.0_dp
         problem%sub(s)%v_global(:, :) = problem%sub(s)%v_free
       end do
     end if
