@@ -30,7 +30,7 @@ module gravier_config_table
   !> A key of a group.
   type :: key_t
     character(len=16) :: group
-    character(len=24) :: name
+    character(len=28) :: name
     !> one of the kind_ constants
     integer :: kind
     !> the default, as it would be typed after the equal sign
@@ -109,6 +109,19 @@ module gravier_config_table
      key_t("scene", "restitution", kind_real, "0.0", "in [0, 1]", "normal restitution coefficient between bodies"), &
      key_t("scene", "wall_restitution", kind_real, "-1", "in [0, 1]", &
            "normal restitution coefficient between bodies and boundaries", note="the value of `restitution`"), &
+     key_t("scene", "tangential_restitution", kind_real, "0.0", "in [0, 1]", &
+           "tangential restitution coefficient between bodies, where there is friction"), &
+     key_t("scene", "wall_tangential_restitution", kind_real, "-1", "in [0, 1]", &
+           "tangential restitution coefficient between bodies and boundaries", note="the value of `tangential_restitution`"), &
+     key_t("scene", "rolling_friction", kind_real, "0.0", ">= 0", &
+           "rolling friction coefficient between bodies: the largest moment over `R* r_n`, `R* = R_i R_j/(R_i + R_j)`"), &
+     key_t("scene", "wall_rolling_friction", kind_real, "-1", ">= 0", &
+           "rolling friction coefficient between bodies and boundaries, where `R* = R_i`", &
+           note="the value of `rolling_friction`"), &
+     key_t("scene", "pivoting_friction", kind_real, "0.0", ">= 0", &
+           "pivoting friction coefficient between bodies: the same for the moment about the normal; 0 in 2D"), &
+     key_t("scene", "wall_pivoting_friction", kind_real, "-1", ">= 0", &
+           "pivoting friction coefficient between bodies and boundaries; 0 in 2D", note="the value of `pivoting_friction`"), &
      key_t("scene", "rotation", kind_logical, ".true.", "", "grains turn where friction asks; `.false.`: they never turn"), &
      key_t("scene", "period", kind_real, "3*0", ">= 0", &
            "length after which the scene repeats itself along each axis, 0: it does not; the third is 0 in 2D", &
@@ -175,6 +188,15 @@ module gravier_config_table
      key_t("boundary", "restitution", kind_real, "-1", "in [0, 1]", &
            "normal restitution coefficient between grains and this boundary", &
            note="the value of `wall_restitution` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "tangential_restitution", kind_real, "-1", "in [0, 1]", &
+           "tangential restitution coefficient between grains and this boundary", &
+           note="the value of `wall_tangential_restitution` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "rolling_friction", kind_real, "-1", ">= 0", &
+           "rolling friction coefficient between grains and this boundary", &
+           note="the value of `wall_rolling_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "pivoting_friction", kind_real, "-1", ">= 0", &
+           "pivoting friction coefficient between grains and this boundary; 0 in 2D", &
+           note="the value of `wall_pivoting_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is taken away", &
            unit="s", note="never")]
 

@@ -37,6 +37,9 @@ module gravier_config_types
     real(dp) :: friction, wall_friction
     !> in [0, 1]
     real(dp) :: restitution, wall_restitution
+    real(dp) :: tangential_restitution, wall_tangential_restitution
+    !> >= 0, times R*: the lever of the largest moment; 0 in 2D: pivoting
+    real(dp) :: rolling_friction, wall_rolling_friction, pivoting_friction, wall_pivoting_friction
     !> false: no grain turns; true: grains turn where friction asks
     logical :: rotation
     !> m; 0 along an axis that is not periodic; the third is 0 in 2D
@@ -179,6 +182,9 @@ module gravier_config_types
     !> wall_restitution of &scene when not given
     real(dp) :: restitution
     logical :: restitution_given = .false.
+    !> the value for walls of &scene when not given
+    real(dp) :: tangential_restitution, rolling_friction, pivoting_friction
+    logical :: tangential_restitution_given = .false., rolling_given = .false., pivoting_given = .false.
     !> s; the largest real number when not given
     real(dp) :: remove_at
     logical :: remove_given = .false.

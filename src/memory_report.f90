@@ -8,7 +8,7 @@ module gravier_memory_report
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: memory_report_t, report_memory, peak_memory
+  public :: memory_report_t, report_memory, item_bytes, peak_memory
 
   !> A kind of item, the bytes of one, array by array, and how many all ranks keep.
   type :: item_t
@@ -47,6 +47,18 @@ contains
     end do
   end subroutine report_memory
 
+  !> Bytes of a contact, of a body in contact, and of what an exchange sends of a copy of a shared body.
+  subroutine item_bytes(simulation, contact, body, copy)
+    type(simulation_t), intent(in) :: simulation
+    integer(i8), intent(out) :: contact, body, copy
+    type(item_t) :: items(5)
+
+    call describe(simulation, items)
+    contact = items(1)%bytes
+    body = items(3)%bytes
+    copy = simulation%problem%kernels%nv*storage_size(0.0_dp)/8
+  end subroutine item_bytes
+
   subroutine describe(simulation, items)
     type(simulation_t), intent(in) :: simulation
     type(item_t), intent(inout) :: items(5)
@@ -65,7 +77,7 @@ contains
       call items(1)%add("source", 4, 1)
       ! a projection of places borrows these
       if (simulation%overlap_allowed < huge(1.0_dp)) then
-        call items(1)%add("law of projections", 8, merge(2, 1, kernels%nc > 1))
+        call items(1)%add("law of projections", 8, merge(2, 1, kernels%nf > 1))
         call items(1)%add("impulse of projections", 8, kernels%nc)
         call items(1)%add("velocity of projections", 8, kernels%nc)
       end if

@@ -8,13 +8,14 @@ module gravier_run_log
   use gravier_timers, only: gather_timers, phase_names, n_phases
   use gravier_file_system, only: text_file_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
+  use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
   use gravier_descent, only: effort_t, tenfold
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_problem_builder, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_memory_report, only: memory_report_t, report_memory, peak_memory
+  use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
   implicit none
   private
   public :: run_log_t, banner_text
@@ -118,7 +119,7 @@ contains
     character(len=:), allocatable :: options
 
     call write_lines(self, banner_text(), "", error)
-    associate (config => simulation%config, kernels => simulation%problem%kernels)
+    associate (config => simulation%config)
       call self%line("case        "//config%file//"  "//trim(config%scene%title), error)
       call self%line("ranks       "//to_text(self%comm%size)//", subdomains "//to_text(simulation%decomposition%n_subdomains)// &
         & " ("//boxes_text(simulation)//", "//trim(config%decomposition%kind)//" rule)", error)
@@ -126,8 +127,9 @@ contains
         & to_text(self%comm%size - simulation%decomposition%n_subdomains)//" ranks own no subdomain and stay idle", error)
       call self%line("bodies      "//to_text(simulation%n_grains)//" grains, "// &
         & to_text(size(simulation%decomposition%boundaries))//" boundaries", error)
-      call self%line("effects     "//effects_text(simulation)//": "//to_text(kernels%nv)//" degrees of freedom a grain, "// &
-        & to_text(kernels%nc)//" unknowns a contact", error)
+      call self%line("effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.), error)
+      call self%line("off         "//effects_text(simulation%effects, .false.), error)
+      call self%line("unknowns    "//cost_text(simulation), error)
       call self%line("options in force", error)
       call write_active(options, config)
       call write_lines(self, options, "  ", error)
@@ -170,17 +172,37 @@ contains
     end do
   end function boxes_text
 
-  !> The effects that the scene has, and those that it could have and does not pay for.
-  function effects_text(simulation) result(text)
+  !> Names of the effects that the scene has, or of those that it could have and does not pay for.
+  function effects_text(effects, wanted) result(text)
+    type(effects_t), intent(in) :: effects
+    logical, intent(in) :: wanted
+    character(len=:), allocatable :: text
+    character(len=effect_name_length) :: names(n_effects)
+    logical :: on(n_effects)
+    integer :: k
+
+    call effects%list(names, on)
+    text = ""
+    do k = 1, n_effects
+      if (on(k) .eqv. wanted) text = text//", "//trim(names(k))
+    end do
+    if (text == "") text = ", nothing"
+    text = text(3:)
+  end function effects_text
+
+  !> What the effects cost.
+  function cost_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    integer(i8) :: contact, body, copy
 
+    call item_bytes(simulation, contact, body, copy)
     associate (kernels => simulation%problem%kernels)
-      text = to_text(kernels%nd)//"D, friction "//trim(merge("on ", "off", kernels%nc > 1))//", rotation "// &
-        & trim(merge("on ", "off", kernels%nv > kernels%nd))//", gravity "// &
-        & trim(merge("on ", "off", any(abs(simulation%physics%gravity(1:kernels%nd)) > 0.0_dp)))
+      text = to_text(kernels%nv)//" degrees of freedom a grain, "//to_text(kernels%nc)//" unknowns a contact, "// &
+        & to_text(contact)//" bytes a contact, "//to_text(body)//" a body in contact, "//to_text(copy)// &
+        & " an exchange and copy of a shared body"
     end associate
-  end function effects_text
+  end function cost_text
 
   !> Contacts and interface as the partition makes them now.
   subroutine run_log_write_interface(self, figures, subdomains, error)

@@ -283,20 +283,22 @@ contains
     end do
   end subroutine collect_bodies
 
-  !> Contacts of this rank; without friction the tangential impulses are written as zeros.
+  !> Contacts of this rank; without friction the tangential impulses are written as zeros. Moments where the kernels have some.
   subroutine collect_contacts(simulation, rows)
     type(simulation_t), intent(in) :: simulation
     type(contact_rows_t), intent(out) :: rows
-    integer :: s, c, p, n, nd, nc
+    real(dp) :: radius
+    integer :: s, c, p, n, nd, nf
 
     nd = simulation%problem%kernels%nd
-    nc = simulation%problem%kernels%nc
+    nf = simulation%problem%kernels%nf
     n = 0
     do s = 1, size(simulation%problem%sub)
       n = n + simulation%problem%sub(s)%n_contacts
     end do
     allocate (rows%candidate(n), rows%antagonist(n), rows%normal(nd, n), rows%gap(n))
     allocate (rows%impulse(nd, n), source=0.0_dp)
+    if (simulation%problem%kernels%rolling_row > 0) allocate (rows%moment(2*nd - 3, n))
     n = 0
     do s = 1, size(simulation%problem%sub)
       associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
@@ -311,7 +313,12 @@ contains
           end if
           rows%normal(:, n) = sub%hot(lane_of(c), 1:nd, block_of(c))
           rows%gap(n) = sub%gap(c)
-          rows%impulse(1:nc, n) = sub%impulse(lane_of(c), :, block_of(c))
+          rows%impulse(1:nf, n) = sub%impulse(lane_of(c), 1:nf, block_of(c))
+          if (.not. allocated(rows%moment)) cycle
+          radius = sub%hot(lane_of(c), simulation%problem%kernels%rolling_row + 1, block_of(c))
+          ! that about the normal comes last in a sweep
+          rows%moment(1, n) = radius*sub%impulse(lane_of(c), simulation%problem%kernels%nc, block_of(c))
+          if (nd == 3) rows%moment(2:3, n) = radius*sub%impulse(lane_of(c), 4:5, block_of(c))
         end do
       end associate
     end do

@@ -12,6 +12,7 @@ module gravier_simulation
   use gravier_boundary, only: shape_outlet
   use gravier_facing_planes, only: find_facing_planes
   use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_effects, only: effects_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
@@ -65,6 +66,8 @@ module gravier_simulation
     type(decomposition_t) :: decomposition
     type(neighbourhoods_t) :: neighbourhoods
     type(physics_t) :: physics
+    !> what the scene has
+    type(effects_t) :: effects
     type(time_table_t) :: gravity_table
     type(contact_problem_t) :: problem
     class(scheme_t), allocatable :: scheme
@@ -221,7 +224,11 @@ contains
       self%physics%restitution = config%restitution
       self%physics%rotation = config%rotation
       self%physics%h = self%config%time%step
-      call self%problem%kernels%choose(config%dimension, scene%friction)
+      self%physics%tangential_restitution = config%tangential_restitution
+      self%physics%rolling_friction = config%rolling_friction
+      self%physics%pivoting_friction = config%pivoting_friction
+      self%effects = scene%effects
+      call self%problem%kernels%choose(config%dimension, scene%effects)
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)

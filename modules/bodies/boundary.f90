@@ -51,6 +51,7 @@ module gravier_boundary
     real(dp) :: mass = 0.0_dp
     type(time_table_t) :: table
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+    real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
     !> [s]
     real(dp) :: remove_at = huge(1.0_dp)
     !> false once removed

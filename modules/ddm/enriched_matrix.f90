@@ -179,7 +179,7 @@ contains
       if (.not. sub%impulse(q, 1, g) > 0.0_dp) then
         field(q, :, g) = 0.0_dp
       else if (kernels%nc > 1) then
-        if (norm2(sub%impulse(q, 2:, g)) >= sub%hot(q, kernels%nh, g)*sub%impulse(q, 1, g)) field(q, 2:, g) = 0.0_dp
+        if (norm2(sub%impulse(q, 2:, g)) >= sub%hot(q, kernels%friction_row, g)*sub%impulse(q, 1, g)) field(q, 2:, g) = 0.0_dp
       end if
     end do
   end subroutine drop_inactive

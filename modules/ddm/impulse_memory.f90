@@ -4,7 +4,8 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: shift_of_code
-  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
+    & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
@@ -15,10 +16,12 @@ module gravier_impulse_memory
 
 contains
 
-  !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector.
+  !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
+  !> over R*, or its vector.
   pure integer function impulse_entries(kernels) result(n)
     type(kernels_t), intent(in) :: kernels
-    n = merge(4, kernels%nc, kernels%nc == 3)
+    n = kernels%nc
+    if (kernels%nf == 3) n = merge(7, 4, kernels%rolling_row > 0)
   end function impulse_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists.
@@ -26,23 +29,27 @@ contains
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
     integer :: s, c, q, g
-    real(dp) :: vector(lanes, 3)
+    real(dp) :: vector(lanes, 3), moment(lanes, 3)
+    logical :: rolls
 
+    rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
         list%impulse(:, :) = 0.0_dp
         do g = 1, n_blocks(sub%n_contacts)
-          if (problem%kernels%nc == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
           do q = 1, lanes
             ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart; contacts of
             ! no effect have none
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
-            if (problem%kernels%nc < 3) then
+            if (problem%kernels%nf < 3) then
               list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
               list%impulse(2:4, sub%source(c)) = vector(q, :)
+              if (rolls) list%impulse(5:7, sub%source(c)) = moment(q, :)
             end if
           end do
         end do
@@ -50,28 +57,34 @@ contains
     end do
   end subroutine keep_impulses
 
-  !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now.
+  !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now; a
+  !> moment keeps its vector.
   subroutine recall_impulses(neighbourhoods, problem)
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, c, q, g
-    real(dp) :: vector(lanes, 3)
+    real(dp) :: vector(lanes, 3), moment(lanes, 3)
+    logical :: rolls
 
+    rolls = problem%kernels%rolling_row > 0
     vector(:, :) = 0.0_dp
+    moment(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
         do g = 1, n_blocks(sub%n_contacts)
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
-            if (problem%kernels%nc < 3) then
+            if (problem%kernels%nf < 3) then
               sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
             else
               sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
               vector(q, :) = list%impulse(2:4, sub%source(c))
+              if (rolls) moment(q, :) = list%impulse(5:7, sub%source(c))
             end if
           end do
           ! contacts of no effect have no normal, and no frame
-          if (problem%kernels%nc == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          if (problem%kernels%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          if (problem%kernels%nf == 3 .and. rolls) call project_moments(sub%hot(:, :, g), moment, sub%impulse(:, :, g))
           sub%impulse(q:, :, g) = 0.0_dp
         end do
       end associate

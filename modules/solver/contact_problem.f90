@@ -111,13 +111,11 @@ contains
   pure subroutine subproblem_update_local_operator(self, kernels)
     class(subproblem_t), intent(inout) :: self
     type(kernels_t), intent(in) :: kernels
-    integer :: nd
 
     if (self%n_contacts == 0) return
     call kernels%set_operators(self%pair, self%hot, self%weight)
     ! contacts of no effect are all zero
-    nd = kernels%nd
-    self%hot(lane_of(self%n_contacts) + 1:, nd + 2:nd + min(kernels%nc, 2) + 1, block_of(self%n_contacts)) = 0.0_dp
+    self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
   end subroutine subproblem_update_local_operator
 
   !> W_nn and W_tt of contact `c` [1/kg], see gravier_contact_kernels; W_tt = W_nn without friction.
