@@ -243,7 +243,7 @@ module gravier_config_table
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "sleeping", kind_logical, ".false.", "", &
            "contacts of bodies at rest leave the sweeps until these are disturbed (`nlgs`, `nscdd` and `schwarz` only)"), &
-     key_t("solver", "sleep_after", kind_integer, "10", ">= 1", "steps at rest after which a contact sleeps"), &
+     key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
      key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
            "momentum of a body at rest, at most, over the root mean square of the impulses; and over a tenth of those on it", &
            note="100 times `tolerance`"), &

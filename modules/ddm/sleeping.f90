@@ -8,7 +8,7 @@
 !> half of `after` stands still: what the impulses of solves do not balance would else add up, step by step, and sweeps now find
 !> impulses that hold a grain without motion. A contact that has counted them all sleeps: no sweep takes it, its impulse stays,
 !> and its reaction is part of the velocities from the start of a solve. A solve that misses its tolerance for contacts that
-!> sleep wakes them.
+!> sleep wakes them; what moves then moves by the laws of all contacts, and nothing is stopped.
 module gravier_sleeping
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lane_of, block_of
@@ -32,11 +32,12 @@ module gravier_sleeping
 
 contains
 
-  !> Count the steps at rest of the contacts of a solved problem, before its impulses are kept, and stop the grains at rest: their
-  !> v_global is zero. Collective.
-  subroutine count_rest(rule, boundaries, neighbourhoods, problem)
+  !> Count the steps at rest of the contacts of a solved problem, before its impulses are kept. Collective.
+  subroutine count_rest(rule, boundaries, stop_grains, neighbourhoods, problem)
     type(sleeping_rule_t), intent(in) :: rule
     type(boundary_t), intent(in) :: boundaries(:)
+    !> let the grains at rest stand still: their v_global becomes zero
+    logical, intent(in) :: stop_grains
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
     !> v_global is evaluated
     type(contact_problem_t), intent(inout) :: problem
@@ -49,6 +50,7 @@ contains
     do s = 1, size(problem%sub)
       call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s))
     end do
+    if (.not. stop_grains) return
     call sum_over_copies(problem)
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_grains
