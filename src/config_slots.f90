@@ -230,9 +230,13 @@ contains
     case ("acceleration"); slot%choice => config%solver%acceleration
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
+    case ("sleeping"); slot%logical => config%solver%sleeping
+    case ("sleep_after"); slot%integer => config%solver%sleep_after
+    case ("sleep_speed"); slot%real => config%solver%sleep_speed
     case ("on_failure"); slot%choice => config%solver%on_failure
     end select
     if (name == "relaxation") slot%given => config%solver%relaxation_given
+    if (name == "sleep_speed") slot%given => config%solver%sleep_given
   end subroutine solver_slot
 
   subroutine decomposition_slot(config, name, slot)

@@ -263,6 +263,12 @@ module gravier_config_table
            note="by the method"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
+     key_t("solver", "sleeping", kind_logical, ".false.", "", &
+           "contacts of bodies at rest leave the sweeps until these are disturbed (`nlgs`, `nscdd` and `schwarz` only)"), &
+     key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
+     key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
+           "momentum of a body at rest, at most, over the root mean square of the impulses; and over a tenth of those on it", &
+           note="100 times `tolerance`"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
            "after a solve that gave up: go on; write the step and stop; stop without it. "// &
            "One that diverged always stops without it")]

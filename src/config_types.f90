@@ -88,6 +88,11 @@ module gravier_config_types
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start
+    logical :: sleeping
+    !> steps; momentum of a body at rest over the root mean square of the impulses
+    integer :: sleep_after
+    real(dp) :: sleep_speed
+    logical :: sleep_given = .false.
     !> continue, stop or discard
     character(len=choice_length) :: on_failure
   end type solver_config_t

@@ -93,7 +93,7 @@ contains
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
       call items(2)%add("shift", 4, merge(1, 0, ni > 0))
-      call items(2)%add("impulse", 8, impulse_entries(kernels))
+      call items(2)%add("impulse", 8, impulse_entries(kernels, simulation%sleeping%after > 0))
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
       call items(3)%add("home", 4, 1)

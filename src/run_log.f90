@@ -130,6 +130,8 @@ contains
       call self%line("effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.), error)
       call self%line("off         "//effects_text(simulation%effects, .false.), error)
       call self%line("unknowns    "//cost_text(simulation), error)
+      if (config%solver%sleeping) call self%line("sleeping    contacts of bodies at rest for "// &
+        & to_text(config%solver%sleep_after)//" steps leave the sweeps; the residual is that of all contacts", error)
       call self%line("options in force", error)
       call write_active(options, config)
       call write_lines(self, options, "  ", error)
@@ -370,6 +372,8 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    if (simulation%config%solver%sleeping) call self%line("sleeping    "//to_text(simulation%slept)// &
+      & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance", error)
     if (simulation%scheme%direction_text /= "") call self%line("direction   "//simulation%scheme%direction_text//"; lowered "// &
       & to_text(work%lowered)//" times", error)
     if (simulation%decomposition%n_subdomains > 1) then

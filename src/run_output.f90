@@ -61,7 +61,7 @@ contains
       call write_boundaries(self, simulation, error)
     end if
     if (self%comm%rank == 0) then
-      call open_table(self%history, self%directory//"history.csv", history_header(simulation%diagnostics), simulation, error)
+      call open_table(self%history, self%directory//"history.csv", history_header(simulation), simulation, error)
       if (simulation%config%output%trace) call open_table(self%trace, self%directory//"trace.csv", trace_header(simulation), &
         & simulation, error)
     end if
@@ -82,16 +82,17 @@ contains
   end subroutine open_table
 
   !> The columns, those of the diagnostics last.
-  pure function history_header(diagnostics) result(header)
-    type(diagnostics_t), intent(in) :: diagnostics
+  pure function history_header(simulation) result(header)
+    type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: header
     integer :: k
 
     header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
       & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,most_messages,most_values,"// &
       & "ghosts,solve_seconds"
-    do k = 1, diagnostics%n_columns
-      header = header//","//trim(diagnostics%name(k))
+    if (simulation%config%solver%sleeping) header = header//",sleeping,woken"
+    do k = 1, simulation%diagnostics%n_columns
+      header = header//","//trim(simulation%diagnostics%name(k))
     end do
   end function history_header
 
@@ -162,6 +163,10 @@ contains
       call self%history%add(figures%sharing%most_values)
       call self%history%add(figures%sharing%ghosts)
       call self%history%add(figures%solve%seconds)
+      if (simulation%config%solver%sleeping) then
+        call self%history%add(figures%asleep)
+        call self%history%add(merge(1, 0, figures%solve%woken))
+      end if
       do k = 1, simulation%diagnostics%n_columns
         call self%history%add(simulation%diagnostics%value(k))
       end do

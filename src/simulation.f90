@@ -27,6 +27,7 @@ module gravier_simulation
   use gravier_overlap_projection, only: project_overlaps
   use gravier_diagnostics, only: diagnostics_t
   use gravier_grain_balance, only: grain_balance_t
+  use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -52,6 +53,8 @@ module gravier_simulation
     !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
     !> space was divided anew
     real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
+    !> contacts that slept at the start of the solve; where they can
+    integer(i8) :: asleep = 0
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
@@ -103,6 +106,9 @@ module gravier_simulation
     type(effort_t) :: effort
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
+    type(sleeping_rule_t) :: sleeping
+    !> over all steps of this run: contacts that slept at the start of a solve, and solves that woke them
+    integer(i8) :: slept = 0, woken = 0
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
     !> the same just after space was last divided in a step; 0 before
@@ -227,6 +233,10 @@ contains
       self%physics%tangential_restitution = config%tangential_restitution
       self%physics%rolling_friction = config%rolling_friction
       self%physics%pivoting_friction = config%pivoting_friction
+      associate (solver => self%config%solver)
+        self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
+      end associate
+      self%physics%sleep_after = self%sleeping%after
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)
       rule%largest_radius = scene%largest_radius
@@ -386,6 +396,7 @@ contains
     if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
     figures%contacts = self%problem%n_contacts
+    figures%asleep = self%problem%n_asleep
     do s = 1, size(self%problem%sub)
       if (self%problem%sub(s)%n_contacts > 0) figures%max_overlap = max(figures%max_overlap, -minval(self%problem%sub(s)%gap))
     end do
@@ -425,6 +436,7 @@ contains
         if (.not. boundary%present .or. self%time < boundary%remove_at) cycle
         boundary%present = .false.
         listed = .true.
+        if (self%sleeping%after > 0) call wake_all(self%neighbourhoods)
       end associate
     end do
   end subroutine move_to_middle
@@ -506,7 +518,10 @@ contains
     end_time = self%time + self%physics%h
     if (allocated(self%gravity_table%has)) then
       do d = 1, nd
-        if (self%gravity_table%has(d)) self%physics%gravity(d) = self%gravity_table%at(d, end_time)
+        if (.not. self%gravity_table%has(d)) cycle
+        self%physics%gravity(d) = self%gravity_table%at(d, end_time)
+        if (self%sleeping%after > 0 .and. abs(self%physics%gravity(d) - self%gravity_table%at(d, self%time)) > 0.0_dp) &
+          & call wake_all(self%neighbourhoods)
       end do
     end if
     do b = 1, size(self%decomposition%boundaries)
@@ -594,7 +609,7 @@ contains
     call let_grains_out(self, figures)
     if (figures%divided) call divide_again(self, figures%refused)
     call self%decomposition%settle()
-    call self%neighbourhoods%build(self%decomposition, impulse_entries(self%problem%kernels))
+    call self%neighbourhoods%build(self%decomposition, impulse_entries(self%problem%kernels, self%sleeping%after > 0))
     if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)
   end subroutine list_neighbours
 
@@ -624,6 +639,8 @@ contains
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
     call start_timer(phase_bodies)
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, .not. figures%solve%woken, &
+      & self%neighbourhoods, self%problem)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
@@ -642,6 +659,8 @@ contains
     figures%kinetic_energy = self%balance%kinetic
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
+    self%slept = self%slept + figures%asleep
+    if (figures%solve%woken) self%woken = self%woken + 1
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
       & self%n_grains - self%n_glued)
     call check_numbers(self, figures, error)
@@ -750,6 +769,8 @@ contains
     self%failed = 0
     self%left = 0
     self%fast = 0
+    self%slept = 0
+    self%woken = 0
     self%last_written = -1
     self%restarted = .false.
     self%worst_overlap = 0.0_dp

@@ -18,24 +18,29 @@ contains
 
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
   !> over R*, or its vector.
-  pure integer function impulse_entries(kernels) result(n)
+  pure integer function impulse_entries(kernels, counts_rest) result(n)
     type(kernels_t), intent(in) :: kernels
+    !> one more entry for the steps at rest
+    logical, intent(in), optional :: counts_rest
+
     n = kernels%nc
     if (kernels%nf == 3) n = merge(7, 4, kernels%rolling_row > 0)
+    if (present(counts_rest)) n = n + merge(1, 0, counts_rest)
   end function impulse_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists.
   subroutine keep_impulses(problem, neighbourhoods)
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
-    integer :: s, c, q, g
+    integer :: s, c, q, g, n
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
+    n = impulse_entries(problem%kernels)
     rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
-        list%impulse(:, :) = 0.0_dp
+        list%impulse(1:n, :) = 0.0_dp
         do g = 1, n_blocks(sub%n_contacts)
           if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
           if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
@@ -45,7 +50,7 @@ contains
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
             if (problem%kernels%nf < 3) then
-              list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
+              list%impulse(1:n, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
               list%impulse(2:4, sub%source(c)) = vector(q, :)
@@ -62,10 +67,11 @@ contains
   subroutine recall_impulses(neighbourhoods, problem)
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, c, q, g
+    integer :: s, c, q, g, n
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
+    n = impulse_entries(problem%kernels)
     rolls = problem%kernels%rolling_row > 0
     vector(:, :) = 0.0_dp
     moment(:, :) = 0.0_dp
@@ -75,7 +81,7 @@ contains
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
             if (problem%kernels%nf < 3) then
-              sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
+              sub%impulse(q, :, g) = list%impulse(1:n, sub%source(c))
             else
               sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
               vector(q, :) = list%impulse(2:4, sub%source(c))
@@ -91,7 +97,7 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist and the impulse, for the pairs of a list that carry one; the antagonist of a
+  !> Identifiers of candidate and antagonist and the impulse, for the pairs of a list that keep something; the antagonist of a
   !> boundary is minus its number.
   subroutine list_impulses(view, lead, records)
     type(neighbourhood_t), intent(in) :: view
@@ -102,14 +108,10 @@ contains
     integer :: p, e, n
 
     associate (list => view%list)
+      allocate (records(lead + 2 + size(list%impulse, 1), list%n_remembered()), source=0_i8)
       n = 0
       do p = 1, list%n
-        if (list%impulse(1, p) > 0.0_dp) n = n + 1
-      end do
-      allocate (records(lead + 2 + size(list%impulse, 1), n), source=0_i8)
-      n = 0
-      do p = 1, list%n
-        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        if (.not. list%remembers(p)) cycle
         n = n + 1
         records(lead + 1, n) = view%bodies%id(list%candidate(p))
         records(lead + 2, n) = antagonist_id(view, p)
@@ -141,9 +143,7 @@ contains
     words = 3 + decomposition%nd + neighbourhoods%n_impulse
     n = 0
     do s = 1, size(neighbourhoods%view)
-      associate (list => neighbourhoods%view(s)%list)
-        n = n + count(list%impulse(1, :) > 0.0_dp)
-      end associate
+      n = n + neighbourhoods%view(s)%list%n_remembered()
     end do
     allocate (records(words, n))
     n = 0
@@ -166,7 +166,7 @@ contains
     n = 0
     associate (list => view%list, position => view%bodies%position)
       do p = 1, list%n
-        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        if (.not. list%remembers(p)) cycle
         n = n + 1
         point(:) = position(:, list%candidate(p))
         if (list%antagonist(p) > 0) then
@@ -216,7 +216,7 @@ contains
     end do
   end subroutine spread_impulses
 
-  !> Give impulses to the pairs of a list that have the same bodies.
+  !> Give impulses to the pairs of a list that have the same bodies; of a checkpoint without steps at rest, these are none.
   subroutine match_impulses(records, view)
     !> (2 + entries of an impulse, n): candidate, antagonist, impulse
     integer(i8), intent(in), contiguous :: records(:, :)
@@ -232,7 +232,7 @@ contains
       do p = 1, list%n
         k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p))
         if (k == 0) cycle
-        do e = 1, size(list%impulse, 1)
+        do e = 1, min(size(list%impulse, 1), size(records, 1) - 2)
           list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
         end do
       end do

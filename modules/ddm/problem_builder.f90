@@ -33,6 +33,8 @@ module gravier_problem_builder
     logical :: rotation = .true.
     !> step [s]
     real(dp) :: h = 1.0_dp
+    !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
+    integer :: sleep_after = 0
   contains
     procedure :: accelerate => physics_accelerate
   end type physics_t
@@ -60,6 +62,8 @@ module gravier_problem_builder
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: found_t
     integer :: n = 0
+    !> those that sweeps take: the first ones, in whole blocks where others follow
+    integer :: n_swept = 0
     !> place in the list (n)
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
@@ -120,6 +124,8 @@ contains
       associate (view => neighbourhoods%view(s))
         call start_timer(phase_detection)
         call find_contacts(view, decomposition, physics, found)
+        found%n_swept = found%n
+        if (physics%sleep_after > 0) call put_sleepers_last(view, decomposition%boundaries, physics%sleep_after, found)
         call stop_timer(phase_detection)
         call start_timer(phase_setup)
         problem%sub(s)%subdomain = decomposition%subdomain_of(s)
@@ -181,6 +187,45 @@ contains
       found%normal(:, found%n) = normal
     end do
   end subroutine find_contacts
+
+  !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
+  !> whole blocks. A contact with a boundary that moves as prescribed does not sleep.
+  subroutine put_sleepers_last(view, boundaries, after, found)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: after
+    type(found_t), intent(inout) :: found
+    type(found_t) :: old
+    logical, allocatable :: asleep(:)
+    integer :: c, b, n, round
+
+    allocate (asleep(found%n))
+    do c = 1, found%n
+      asleep(c) = view%list%impulse(size(view%list%impulse, 1), found%source(c)) >= after
+      b = boundary_of(view, found%source(c))
+      if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
+    end do
+    found%n_swept = min(found%n, lanes*n_blocks(count(.not. asleep)))
+    n = found%n_swept - count(.not. asleep)
+    do c = 1, found%n
+      if (n == 0) exit
+      if (.not. asleep(c)) cycle
+      asleep(c) = .false.
+      n = n - 1
+    end do
+    if (found%n_swept == found%n) return
+    old = found
+    n = 0
+    do round = 1, 2
+      do c = 1, found%n
+        if (asleep(c) .neqv. round == 2) cycle
+        n = n + 1
+        found%source(n) = old%source(c)
+        found%gap(n) = old%gap(c)
+        found%normal(:, n) = old%normal(:, c)
+      end do
+    end do
+  end subroutine put_sleepers_last
 
   !> Take the shift of the antagonist into account in the way from it to the candidate.
   pure subroutine shift_back(period, code, branch)
@@ -368,7 +413,11 @@ contains
     nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
     call find_pairs()
-    call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
+    sub%n_swept = found%n_swept
+    call group_contacts(pair(:, 1:sub%n_swept), sub%n_bodies, order(1:sub%n_swept), sub%n_grouped)
+    do c = sub%n_swept + 1, found%n
+      order(c) = c
+    end do
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
@@ -822,7 +871,7 @@ contains
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
     type(interface_figures_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 5)
+    integer(i8) :: counts(n_multiplicities + 6)
     real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
     integer :: s, b, c, k, m
@@ -853,6 +902,7 @@ contains
         counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(neighbourhoods%view(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
+        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_swept
         deallocate (counted_elsewhere)
       end associate
     end do
@@ -869,6 +919,7 @@ contains
     figures%most_neighbours = nint(extremes(3), i8)
     figures%most_values = nint(extremes(4), i8)
     problem%n_contacts = counts(n_multiplicities + 2)
+    problem%n_asleep = counts(n_multiplicities + 6)
   end subroutine count_figures
 
   !> Scales of the residual and of the jump: largest |R^d|, over the components that can move, and largest free speed of a
