@@ -19,10 +19,13 @@ module gravier_neighbour_list
     integer, allocatable :: shift(:)
     !> (entries of an impulse, n) [N s]
     real(dp), allocatable :: impulse(:, :)
+    !> what pairs remember under laws with a memory, 0 at first; without such laws of no size (n or 0)
+    integer, allocatable :: state(:)
   contains
     procedure :: init => neighbour_list_init
     procedure :: add => neighbour_list_add
     procedure :: finish => neighbour_list_finish
+    procedure :: keeps => neighbour_list_keeps
   end type neighbour_list_t
 
 contains
@@ -35,7 +38,7 @@ contains
 
     self%n = 0
     if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
-    if (allocated(self%impulse)) deallocate (self%impulse)
+    if (allocated(self%impulse)) deallocate (self%impulse, self%state)
     allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
   end subroutine neighbour_list_init
 
@@ -65,19 +68,31 @@ contains
     call move_alloc(longer, list)
   end subroutine lengthen
 
-  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses to zero.
-  subroutine neighbour_list_finish(self, order, n_impulse)
+  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses and states to zero.
+  subroutine neighbour_list_finish(self, order, n_impulse, remembers)
     class(neighbour_list_t), intent(inout) :: self
     !> (n) a permutation
     integer, intent(in), contiguous :: order(:)
     !> entries of an impulse
     integer, intent(in) :: n_impulse
+    !> pairs have states
+    logical, intent(in) :: remembers
 
     call permute(self%candidate, order)
     call permute(self%antagonist, order)
     if (size(self%shift) > 0) call permute(self%shift, order)
     allocate (self%impulse(n_impulse, self%n), source=0.0_dp)
+    allocate (self%state(merge(self%n, 0, remembers)), source=0)
   end subroutine neighbour_list_finish
+
+  !> Whether pair `p` has something to keep: an impulse or a state.
+  pure logical function neighbour_list_keeps(self, p) result(keeps)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p
+
+    keeps = self%impulse(1, p) > 0.0_dp
+    if (size(self%state) > 0) keeps = keeps .or. self%state(p) /= 0
+  end function neighbour_list_keeps
 
   subroutine permute(list, order)
     integer, allocatable, intent(inout) :: list(:)

@@ -10,11 +10,14 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_contact_law, only: contact_pair_t, contact_terms_t
+  use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
   implicit none
   private
   public :: physics_t, interface_figures_t, build_problem, take_velocities, take_displacements, n_multiplicities
@@ -27,6 +30,10 @@ module gravier_problem_builder
     real(dp) :: body_force(3) = 0.0_dp
     !> friction and normal restitution between grains; boundaries have their own
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+    !> laws of pairs of materials, which take their place
+    type(law_set_t) :: laws
+    !> the step is the first of the run
+    logical :: first = .false.
     !> grains turn
     logical :: rotation = .true.
     !> step [s]
@@ -62,6 +69,8 @@ module gravier_problem_builder
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
     real(dp), allocatable :: gap(:), normal(:, :)
+    !> where a law is given (n)
+    type(contact_terms_t), allocatable :: terms(:)
   end type found_t
 
   !> Columns of a subproblem by what else is known of a body.
@@ -101,7 +110,8 @@ contains
   !> them. Collective.
   subroutine build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    !> states of pairs are those of the step afterwards
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(inout) :: problem
@@ -128,6 +138,7 @@ contains
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
     call count_figures(decomposition, neighbourhoods, problem, figures)
+    if (physics%laws%attracts) call problem%load_attraction()
     call find_scales(problem)
     call stop_timer(phase_interface)
   end subroutine build_problem
@@ -135,16 +146,18 @@ contains
   !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
   !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
   subroutine find_contacts(view, decomposition, physics, found)
-    type(neighbourhood_t), intent(in) :: view
+    type(neighbourhood_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(found_t), intent(inout) :: found
     integer :: p, i, j, nd
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
+    type(contact_terms_t) :: terms
 
     nd = decomposition%nd
-    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal)
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms)
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
+    allocate (found%terms(merge(view%list%n, 0, physics%laws%n > 0)))
     found%n = 0
     alert = decomposition%rule%alert_distance
     do p = 1, view%list%n
@@ -155,7 +168,7 @@ contains
         if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
-        if (gap > alert) cycle
+        if (is_far()) cycle
         if (distance > 0.0_dp) then
           normal(:) = branch/distance
         else
@@ -167,16 +180,42 @@ contains
         if (.not. decomposition%boundaries(-j)%present) cycle
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
         gap = distance - view%bodies%radius(i)
-        if (gap > alert) cycle
+        if (is_far()) cycle
       end if
-      if (gap > 0.0_dp) then
-        if (restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
-      end if
+      call find_terms()
+      if (is_far() .or. (gap > 0.0_dp .and. terms%restitution > 0.0_dp)) cycle
       found%n = found%n + 1
       found%source(found%n) = p
       found%gap(found%n) = gap
       found%normal(:, found%n) = normal
+      if (size(found%terms) > 0) found%terms(found%n) = terms
     end do
+
+  contains
+
+    !> Whether the pair is no contact: beyond the alert distance, and with nothing to remember.
+    logical function is_far()
+      is_far = gap > alert
+      if (is_far .and. size(view%list%state) > 0) is_far = view%list%state(p) == 0
+    end function is_far
+
+    subroutine find_terms()
+      type(contact_pair_t) :: pair
+      integer :: l
+
+      l = law_of(view, decomposition%boundaries, physics%laws, p)
+      if (l == 0) then
+        terms = scene_terms(view, decomposition%boundaries, physics, p, gap)
+        return
+      end if
+      pair%first = physics%first
+      pair%gap = gap
+      if (size(view%list%state) > 0) pair%state = view%list%state(p)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, normal, pair)
+      if (size(view%list%state) > 0) view%list%state(p) = pair%state
+      terms = pair%terms
+    end subroutine find_terms
+
   end subroutine find_contacts
 
   !> Take the shift of the antagonist into account in the way from it to the candidate.
@@ -193,29 +232,24 @@ contains
     end do
   end subroutine shift_back
 
-  !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
-  pure integer function boundary_of(view, p) result(b)
-    type(neighbourhood_t), intent(in) :: view
-    integer, intent(in) :: p
-
-    if (view%list%antagonist(p) < 0) then
-      b = -view%list%antagonist(p)
-    else
-      b = max(view%bodies%glued(view%list%candidate(p)), view%bodies%glued(view%list%antagonist(p)))
-    end if
-  end function boundary_of
-
-  pure real(dp) function restitution_of(view, boundaries, physics, p) result(e)
+  !> The terms of pair `p` where no law is given: the scene's values, or those of the boundary that takes part.
+  pure type(contact_terms_t) function scene_terms(view, boundaries, physics, p, gap) result(terms)
     type(neighbourhood_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap
     integer :: b
 
     b = boundary_of(view, p)
-    e = physics%restitution
-    if (b > 0) e = boundaries(b)%restitution
-  end function restitution_of
+    terms%play = max(gap, 0.0_dp)
+    terms%friction = physics%friction
+    terms%restitution = physics%restitution
+    if (b == 0) return
+    terms%friction = boundaries(b)%friction
+    terms%restitution = boundaries(b)%restitution
+  end function scene_terms
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
   !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
@@ -347,7 +381,7 @@ contains
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: pair(:, :), order(:)
     integer :: c, f, p, b, i, j, q, g, nd
-    real(dp) :: e
+    type(contact_terms_t) :: terms
 
     nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
@@ -358,6 +392,7 @@ contains
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
     allocate (sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
+    if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
     do c = 1, found%n
       f = order(c)
       q = lane_of(c)
@@ -373,18 +408,22 @@ contains
         if (boundaries(b)%turns()) call add_column()
       end if
       sub%hot(q, 1:nd, g) = found%normal(:, f)
-      e = restitution_of(view, boundaries, physics, p)
-      if (e > 0.0_dp) then
-        sub%hot(q, nd + 1, g) = e*returned()
+      if (size(found%terms) > 0) then
+        terms = found%terms(f)
       else
-        sub%hot(q, nd + 1, g) = max(found%gap(f), 0.0_dp)/physics%h
+        terms = scene_terms(view, boundaries, physics, p, found%gap(f))
       end if
+      if (terms%restitution > 0.0_dp) then
+        sub%hot(q, nd + 1, g) = terms%restitution*returned()
+      else
+        sub%hot(q, nd + 1, g) = terms%play/physics%h
+      end if
+      if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) cycle
       sub%hot(q, nd + 4, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
       sub%hot(q, nd + 5, g) = 0.0_dp
       if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
-      sub%hot(q, nd + 6, g) = physics%friction
-      if (b > 0) sub%hot(q, nd + 6, g) = boundaries(b)%friction
+      sub%hot(q, nd + 6, g) = terms%friction
     end do
 
   contains

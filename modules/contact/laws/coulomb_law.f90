@@ -1,0 +1,51 @@
+!> Coulomb friction with Newton restitution (Moreau 1988).
+module gravier_coulomb_law
+  use gravier_kinds, only: dp
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t
+  implicit none
+  private
+  public :: coulomb_law_t
+
+  type, extends(contact_law_t) :: coulomb_law_t
+    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+  contains
+    procedure, nopass :: kind => coulomb_kind
+    procedure, nopass :: keys => coulomb_keys
+    procedure :: set => coulomb_set
+    procedure :: evaluate => coulomb_evaluate
+  end type coulomb_law_t
+
+  type(law_key_t), parameter :: law_keys(*) = &
+    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  law_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient")]
+
+contains
+
+  pure function coulomb_kind() result(kind)
+    character(len=16) :: kind
+    kind = "coulomb"
+  end function coulomb_kind
+
+  pure subroutine coulomb_keys(keys)
+    type(law_key_t), allocatable, intent(out) :: keys(:)
+    allocate (keys, source=law_keys)
+  end subroutine coulomb_keys
+
+  pure subroutine coulomb_set(self, values)
+    class(coulomb_law_t), intent(inout) :: self
+    real(dp), intent(in) :: values(:)
+
+    self%friction = values(1)
+    self%restitution = values(2)
+    self%largest_friction = self%friction
+  end subroutine coulomb_set
+
+  pure subroutine coulomb_evaluate(self, pair)
+    class(coulomb_law_t), intent(in) :: self
+    type(contact_pair_t), intent(inout) :: pair
+
+    pair%terms%friction = self%friction
+    pair%terms%restitution = self%restitution
+  end subroutine coulomb_evaluate
+
+end module gravier_coulomb_law
