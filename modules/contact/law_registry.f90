@@ -30,6 +30,9 @@ contains
     block; use gravier_coulomb_law, only: coulomb_law_t; call add(coulomb_law_t()); end block
     block; use gravier_frictionless_law, only: frictionless_law_t; call add(frictionless_law_t()); end block
     block; use gravier_velocity_law, only: velocity_law_t; call add(velocity_law_t()); end block
+    block; use gravier_adhesive_law, only: adhesive_law_t; call add(adhesive_law_t()); end block
+    block; use gravier_capillary_law, only: capillary_law_t; call add(capillary_law_t()); end block
+    block; use gravier_bonded_law, only: bonded_law_t; call add(bonded_law_t()); end block
     !&>
 
   contains
