@@ -10,6 +10,7 @@ module gravier_config_check
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
   use gravier_config_check_boundary, only: check_boundaries, is_pivoting, pivoting_text
+  use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
   implicit none
   private
@@ -38,7 +39,9 @@ contains
     call check_scene(report, config, error)
     if (config%scene%bodies == "column") call check_column(report, config, error)
     if (config%scene%bodies == "lattice") call check_lattice(report, config, error)
+    call check_materials(report, config, error)
     call check_boundaries(report, config, error)
+    call check_laws(report, config, error)
     if (config%scene%bodies == "sample") call check_sample(report, config, error)
     call check_time(report, config, error)
     call check_solver(report, config, error)

@@ -73,6 +73,7 @@ contains
       call items(1)%add("pair", 4, 2)
       call items(1)%add("hot", 8, kernels%nh)
       call items(1)%add("impulse", 8, kernels%nc)
+      if (simulation%physics%laws%attracts) call items(1)%add("attraction", 8, 1)
       call items(1)%add("gap", 8, 1)
       call items(1)%add("source", 4, 1)
       ! a projection of places borrows these
@@ -94,6 +95,7 @@ contains
       call items(2)%add("antagonist", 4, 1)
       call items(2)%add("shift", 4, merge(1, 0, ni > 0))
       call items(2)%add("impulse", 8, impulse_entries(kernels, simulation%sleeping%after > 0))
+      if (simulation%decomposition%rule%remembers) call items(2)%add("state", 4, 1)
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
       call items(3)%add("home", 4, 1)
@@ -133,6 +135,7 @@ contains
       call item%add("mass", 8, 1)
       call item%add("inertia", 8, 1)
       call item%add("glued", 4, 1)
+      call item%add("material", 4, 1)
       call item%add("image", 4, ni)
     end subroutine add_grain
 

@@ -28,6 +28,7 @@ module gravier_simulation
   use gravier_diagnostics, only: diagnostics_t
   use gravier_grain_balance, only: grain_balance_t
   use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
+  use gravier_pair_laws, only: conclude_pairs
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -229,6 +230,7 @@ contains
       self%physics%friction = config%friction
       self%physics%restitution = config%restitution
       self%physics%rotation = config%rotation
+      self%physics%laws = scene%laws
       self%physics%h = self%config%time%step
       self%physics%tangential_restitution = config%tangential_restitution
       self%physics%rolling_friction = config%rolling_friction
@@ -242,6 +244,8 @@ contains
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
+      rule%alert_distance = max(rule%alert_distance, scene%laws%range)
+      rule%remembers = scene%laws%remembers
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
@@ -380,6 +384,7 @@ contains
 
     call start_timer(phase_bodies)
     listed = .false.
+    self%physics%first = self%step == 0
     call move_to_middle(self, listed)
     call drive(self)
     call count_fast(self, figures)
@@ -604,7 +609,7 @@ contains
 
     if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
     if (.not. figures%listed) return
-    remembered = self%config%solver%warm_start .and. self%neighbourhoods%builds > 0
+    remembered = (self%config%solver%warm_start .or. self%physics%laws%remembers) .and. self%neighbourhoods%builds > 0
     if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
     call let_grains_out(self, figures)
     if (figures%divided) call divide_again(self, figures%refused)
@@ -641,6 +646,10 @@ contains
     call start_timer(phase_bodies)
     if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, .not. figures%solve%woken, &
       & self%neighbourhoods, self%problem)
+    if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
+    if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
+      & self%neighbourhoods)
+    call self%problem%shift_impulses(-1)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
@@ -651,9 +660,6 @@ contains
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
-    call start_timer(phase_bodies)
-    if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
-    call stop_timer(phase_bodies)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic

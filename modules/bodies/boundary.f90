@@ -52,6 +52,8 @@ module gravier_boundary
     type(time_table_t) :: table
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
     real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
+    !> number of its material, 0 for none
+    integer :: material = 0
     !> [s]
     real(dp) :: remove_at = huge(1.0_dp)
     !> false once removed

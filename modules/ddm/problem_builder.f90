@@ -10,11 +10,14 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_contact_law, only: contact_pair_t, contact_terms_t
+  use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
   implicit none
   private
   public :: physics_t, interface_figures_t, build_problem, take_velocities, take_displacements, n_multiplicities
@@ -29,6 +32,10 @@ module gravier_problem_builder
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
     !> tangential restitution, rolling and pivoting friction, likewise
     real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
+    !> laws of pairs of materials, which take their place
+    type(law_set_t) :: laws
+    !> the step is the first of the run
+    logical :: first = .false.
     !> grains turn
     logical :: rotation = .true.
     !> step [s]
@@ -68,6 +75,8 @@ module gravier_problem_builder
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
     real(dp), allocatable :: gap(:), normal(:, :)
+    !> where a law is given (n)
+    type(contact_terms_t), allocatable :: terms(:)
   end type found_t
 
   !> Columns of a subproblem by what else is known of a body.
@@ -107,7 +116,8 @@ contains
   !> them. Collective.
   subroutine build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    !> states of pairs are those of the step afterwards
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(inout) :: problem
@@ -136,6 +146,7 @@ contains
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
     call count_figures(decomposition, neighbourhoods, problem, figures)
+    if (physics%laws%attracts) call problem%load_attraction()
     call find_scales(problem)
     call stop_timer(phase_interface)
   end subroutine build_problem
@@ -143,16 +154,18 @@ contains
   !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
   !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
   subroutine find_contacts(view, decomposition, physics, found)
-    type(neighbourhood_t), intent(in) :: view
+    type(neighbourhood_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(found_t), intent(inout) :: found
     integer :: p, i, j, nd
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
+    type(contact_terms_t) :: terms
 
     nd = decomposition%nd
-    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal)
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms)
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
+    allocate (found%terms(merge(view%list%n, 0, physics%laws%n > 0)))
     found%n = 0
     alert = decomposition%rule%alert_distance
     do p = 1, view%list%n
@@ -163,7 +176,7 @@ contains
         if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
-        if (gap > alert) cycle
+        if (is_far()) cycle
         if (distance > 0.0_dp) then
           normal(:) = branch/distance
         else
@@ -175,17 +188,43 @@ contains
         if (.not. decomposition%boundaries(-j)%present) cycle
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
         gap = distance - view%bodies%radius(i)
-        if (gap > alert) cycle
+        if (is_far()) cycle
       end if
-      if (gap > 0.0_dp) then
-        if (restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
-        if (tangential_restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
-      end if
+      call find_terms()
+      if (is_far()) cycle
+      if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) cycle
       found%n = found%n + 1
       found%source(found%n) = p
       found%gap(found%n) = gap
       found%normal(:, found%n) = normal
+      if (size(found%terms) > 0) found%terms(found%n) = terms
     end do
+
+  contains
+
+    !> Whether the pair is no contact: beyond the alert distance, and with nothing to remember.
+    logical function is_far()
+      is_far = gap > alert
+      if (is_far .and. size(view%list%state) > 0) is_far = view%list%state(p) == 0
+    end function is_far
+
+    subroutine find_terms()
+      type(contact_pair_t) :: pair
+      integer :: l
+
+      l = law_of(view, decomposition%boundaries, physics%laws, p)
+      if (l == 0) then
+        terms = scene_terms(view, decomposition%boundaries, physics, p, gap)
+        return
+      end if
+      pair%first = physics%first
+      pair%gap = gap
+      if (size(view%list%state) > 0) pair%state = view%list%state(p)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, normal, pair)
+      if (size(view%list%state) > 0) view%list%state(p) = pair%state
+      terms = pair%terms
+    end subroutine find_terms
+
   end subroutine find_contacts
 
   !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
@@ -223,6 +262,7 @@ contains
         found%source(n) = old%source(c)
         found%gap(n) = old%gap(c)
         found%normal(:, n) = old%normal(:, c)
+        if (size(old%terms) > 0) found%terms(n) = old%terms(c)
       end do
     end do
   end subroutine put_sleepers_last
@@ -241,42 +281,33 @@ contains
     end do
   end subroutine shift_back
 
-  !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
-  pure integer function boundary_of(view, p) result(b)
+  !> The terms of pair `p` where no law is given: the scene's values, or those of the boundary that takes part.
+  pure type(contact_terms_t) function scene_terms(view, boundaries, physics, p, gap) result(terms)
     type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap
+    integer :: b
 
-    if (view%list%antagonist(p) < 0) then
-      b = -view%list%antagonist(p)
-    else
-      b = max(view%bodies%glued(view%list%candidate(p)), view%bodies%glued(view%list%antagonist(p)))
+    b = boundary_of(view, p)
+    terms%play = max(gap, 0.0_dp)
+    terms%friction = physics%friction
+    terms%restitution = physics%restitution
+    terms%tangential_restitution = physics%tangential_restitution
+    terms%rolling = physics%rolling_friction
+    terms%pivoting = physics%pivoting_friction
+    if (b > 0) then
+      terms%friction = boundaries(b)%friction
+      terms%restitution = boundaries(b)%restitution
+      terms%tangential_restitution = boundaries(b)%tangential_restitution
+      terms%rolling = boundaries(b)%rolling_friction
+      terms%pivoting = boundaries(b)%pivoting_friction
     end if
-  end function boundary_of
-
-  pure real(dp) function restitution_of(view, boundaries, physics, p) result(e)
-    type(neighbourhood_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    integer :: b
-
-    b = boundary_of(view, p)
-    e = physics%restitution
-    if (b > 0) e = boundaries(b)%restitution
-  end function restitution_of
-
-  !> Tangential restitution of pair `p`; 0 without friction, which alone can send anything back.
-  pure real(dp) function tangential_restitution_of(view, boundaries, physics, p) result(e)
-    type(neighbourhood_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    integer :: b
-
-    b = boundary_of(view, p)
-    e = merge(physics%tangential_restitution, 0.0_dp, physics%friction > 0.0_dp)
-    if (b > 0) e = merge(boundaries(b)%tangential_restitution, 0.0_dp, boundaries(b)%friction > 0.0_dp)
-  end function tangential_restitution_of
+    ! friction alone can send a tangential velocity back
+    if (.not. terms%friction > 0.0_dp) terms%tangential_restitution = 0.0_dp
+  end function scene_terms
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
   !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
@@ -408,7 +439,7 @@ contains
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: pair(:, :), order(:)
     integer :: c, f, p, b, i, j, q, g, nd
-    real(dp) :: e
+    type(contact_terms_t) :: terms
 
     nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
@@ -423,6 +454,7 @@ contains
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
     allocate (sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
+    if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
     do c = 1, found%n
       f = order(c)
       q = lane_of(c)
@@ -438,18 +470,22 @@ contains
         if (boundaries(b)%turns()) call add_column()
       end if
       sub%hot(q, 1:nd, g) = found%normal(:, f)
-      e = restitution_of(view, boundaries, physics, p)
-      if (e > 0.0_dp) then
-        sub%hot(q, nd + 1, g) = e*returned()
+      if (size(found%terms) > 0) then
+        terms = found%terms(f)
       else
-        sub%hot(q, nd + 1, g) = max(found%gap(f), 0.0_dp)/physics%h
+        terms = scene_terms(view, boundaries, physics, p, found%gap(f))
       end if
+      if (terms%restitution > 0.0_dp) then
+        sub%hot(q, nd + 1, g) = terms%restitution*returned()
+      else
+        sub%hot(q, nd + 1, g) = terms%play/physics%h
+      end if
+      if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) cycle
       sub%hot(q, nd + 4, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
       sub%hot(q, nd + 5, g) = 0.0_dp
       if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
-      sub%hot(q, nd + 6, g) = physics%friction
-      if (b > 0) sub%hot(q, nd + 6, g) = boundaries(b)%friction
+      sub%hot(q, nd + 6, g) = terms%friction
       if (kernels%shift_row > 0) call pack_tangential_shift()
       if (kernels%rolling_row > 0) call pack_rolling()
     end do
@@ -500,15 +536,14 @@ contains
 
     !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
     subroutine pack_tangential_shift()
-      real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), returned
+      real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
       integer :: d
 
       call contact_jacobian(kernels, sub%hot, c, rows(:, :, 1), rows(:, :, 2))
       call find_start_velocity(i, vi)
       call find_start_velocity(j, vj)
-      returned = tangential_restitution_of(view, boundaries, physics, p)
       do d = 2, nd
-        sub%hot(q, kernels%shift_row + d - 1, g) = returned*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
+        sub%hot(q, kernels%shift_row + d - 1, g) = terms%tangential_restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
       end do
     end subroutine pack_tangential_shift
 
@@ -536,11 +571,8 @@ contains
     subroutine pack_rolling()
       associate (row => kernels%rolling_row)
         sub%hot(q, row + 1, g) = rolling_radius(sub%hot(q, nd + 4, g), sub%hot(q, nd + 5, g))
-        sub%hot(q, row + 3, g) = physics%rolling_friction
-        if (b > 0) sub%hot(q, row + 3, g) = boundaries(b)%rolling_friction
-        if (nd == 2) return
-        sub%hot(q, row + 4, g) = physics%pivoting_friction
-        if (b > 0) sub%hot(q, row + 4, g) = boundaries(b)%pivoting_friction
+        sub%hot(q, row + 3, g) = terms%rolling
+        if (nd == 3) sub%hot(q, row + 4, g) = terms%pivoting
       end associate
     end subroutine pack_rolling
 

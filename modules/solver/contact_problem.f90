@@ -51,6 +51,9 @@ module gravier_contact_problem
     integer, allocatable :: pair(:, :)
     real(dp), allocatable :: hot(:, :, :)
     real(dp), allocatable :: impulse(:, :, :)
+    !> h F of the attraction F of each contact, where some law of the scene attracts (lanes, blocks) [N s]: impulses of a solve are
+    !> r + h F n, and -h F n is in v_free
+    real(dp), allocatable :: attraction(:, :)
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
@@ -61,6 +64,7 @@ module gravier_contact_problem
     procedure :: local_operator => subproblem_local_operator
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
+    procedure :: held_impulse => subproblem_held_impulse
   end type subproblem_t
 
   type :: contact_problem_t
@@ -94,6 +98,8 @@ module gravier_contact_problem
     procedure :: received_jump => contact_problem_received_jump
     procedure :: own_reactions => contact_problem_own_reactions
     procedure :: any_impulse => contact_problem_any_impulse
+    procedure :: load_attraction => contact_problem_load_attraction
+    procedure :: shift_impulses => contact_problem_shift_impulses
   end type contact_problem_t
 
 contains
@@ -172,6 +178,41 @@ contains
       end if
     end do
   end subroutine subproblem_multiply_mass
+
+  !> Normal impulse of contact `c` of a step that is over as the solve had it, r_n + h F [N s]: it is not 0 where the bodies touch.
+  pure real(dp) function subproblem_held_impulse(self, c) result(impulse)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: c
+
+    impulse = self%impulse(lane_of(c), 1, block_of(c))
+    if (allocated(self%attraction)) impulse = impulse + self%attraction(lane_of(c), block_of(c))
+  end function subproblem_held_impulse
+
+  !> Add the attractions to the loads, v_free := v_free + M^-1 H (-h F n). Impulses are zero before and after. Collective.
+  subroutine contact_problem_load_attraction(self)
+    class(contact_problem_t), intent(inout) :: self
+    integer :: s
+
+    call self%shift_impulses(-1)
+    call self%evaluate()
+    do s = 1, size(self%sub)
+      self%sub(s)%v_free(:, :) = self%sub(s)%v_global
+      self%sub(s)%impulse(:, :, :) = 0.0_dp
+    end do
+  end subroutine contact_problem_load_attraction
+
+  !> Turn the impulses of a solve into those on the bodies, r_n = r~_n - h F, where there are attractions, or back.
+  subroutine contact_problem_shift_impulses(self, sign)
+    class(contact_problem_t), intent(inout) :: self
+    !> -1 or 1, back
+    integer, intent(in) :: sign
+    integer :: s
+
+    do s = 1, size(self%sub)
+      if (.not. allocated(self%sub(s)%attraction)) cycle
+      self%sub(s)%impulse(:, 1, :) = self%sub(s)%impulse(:, 1, :) + sign*self%sub(s)%attraction
+    end do
+  end subroutine contact_problem_shift_impulses
 
   !> R_E = H_E r_E of subdomain `s` of this rank, into `reaction`.
   subroutine contact_problem_own_reactions(self, s)
