@@ -295,9 +295,9 @@ contains
       call pack_grains(simulation, records, counts)
       call file%write_table("grains", n_subdomains, records, counts, error)
       if (simulation%neighbourhoods%builds > 0) then
-        n_words = 2 + impulse_entries(simulation%problem%kernels)
+        n_words = 2 + impulse_entries(simulation%problem%kernels, simulation%sleeping%after > 0)
         do s = 1, size(home)
-          counts(s) = count(simulation%neighbourhoods%view(s)%list%impulse(1, :) > 0.0_dp)
+          counts(s) = simulation%neighbourhoods%view(s)%list%n_remembered()
         end do
         deallocate (records)
         allocate (records(n_words, sum(counts)))
@@ -400,7 +400,8 @@ contains
       if (builds > 0) then
         call unpack_boundaries(words, decomposition%boundaries, simulation%config%file, error)
         if (allocated(error)) return
-        call simulation%neighbourhoods%build(decomposition, impulse_entries(simulation%problem%kernels))
+        call simulation%neighbourhoods%build(decomposition, impulse_entries(simulation%problem%kernels, &
+          & simulation%sleeping%after > 0))
         simulation%neighbourhoods%builds = builds
         call load_impulses(simulation, file, error)
       end if

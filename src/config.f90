@@ -267,6 +267,10 @@ contains
     associate (scene => config%scene, parts => config%decomposition, sample => config%sample)
       if (.not. is_given(report, "scene", "wall_friction")) scene%wall_friction = scene%friction
       if (.not. is_given(report, "scene", "wall_restitution")) scene%wall_restitution = scene%restitution
+      if (.not. is_given(report, "scene", "wall_tangential_restitution")) &
+        scene%wall_tangential_restitution = scene%tangential_restitution
+      if (.not. is_given(report, "scene", "wall_rolling_friction")) scene%wall_rolling_friction = scene%rolling_friction
+      if (.not. is_given(report, "scene", "wall_pivoting_friction")) scene%wall_pivoting_friction = scene%pivoting_friction
       call fill_third(scene%dimension, scene%lattice_count)
       call fill_third(scene%dimension, parts%grid)
       where (.not. abs(sample%box) > 0.0_dp) sample%box = scene%period
@@ -280,6 +284,7 @@ contains
       if (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
           (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
     end if
+    if (.not. config%solver%sleep_given) config%solver%sleep_speed = 100.0_dp*config%solver%tolerance
     do i = 1, size(config%boundaries)
       report%instance = i
       call settle_boundary(config%scene, report, config%boundaries(i))
@@ -297,6 +302,9 @@ contains
     where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = boundary%point
     if (.not. boundary%friction_given) boundary%friction = scene%wall_friction
     if (.not. boundary%restitution_given) boundary%restitution = scene%wall_restitution
+    if (.not. boundary%tangential_restitution_given) boundary%tangential_restitution = scene%wall_tangential_restitution
+    if (.not. boundary%rolling_given) boundary%rolling_friction = scene%wall_rolling_friction
+    if (.not. boundary%pivoting_given) boundary%pivoting_friction = scene%wall_pivoting_friction
     if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)
   end subroutine settle_boundary
 

@@ -9,7 +9,7 @@ module gravier_config_check
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
-  use gravier_config_check_boundary, only: check_boundaries
+  use gravier_config_check_boundary, only: check_boundaries, is_pivoting, pivoting_text
   use gravier_config_check_sample, only: check_sample
   implicit none
   private
@@ -160,6 +160,16 @@ contains
       call expect(report, scene%restitution >= 0.0_dp .and. scene%restitution <= 1.0_dp, "scene", "restitution", error)
       call expect(report, scene%wall_restitution >= 0.0_dp .and. scene%wall_restitution <= 1.0_dp, &
                   "scene", "wall_restitution", error)
+      call expect(report, scene%tangential_restitution >= 0.0_dp .and. scene%tangential_restitution <= 1.0_dp, &
+                  "scene", "tangential_restitution", error)
+      call expect(report, scene%wall_tangential_restitution >= 0.0_dp .and. scene%wall_tangential_restitution <= 1.0_dp, &
+                  "scene", "wall_tangential_restitution", error)
+      call expect(report, scene%rolling_friction >= 0.0_dp, "scene", "rolling_friction", error)
+      call expect(report, scene%wall_rolling_friction >= 0.0_dp, "scene", "wall_rolling_friction", error)
+      call expect(report, is_pivoting(scene%dimension, scene%pivoting_friction), "scene", "pivoting_friction", error, &
+                  pivoting_text)
+      call expect(report, is_pivoting(scene%dimension, scene%wall_pivoting_friction), "scene", "wall_pivoting_friction", error, &
+                  pivoting_text)
       call expect(report, all(scene%period >= 0.0_dp), "scene", "period", error)
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
@@ -222,6 +232,12 @@ contains
                   .not. solver%relaxation_given, "solver", "acceleration", error, &
                   "'none' where relaxation is given: momentum needs a factor that adapts itself")
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
+      call expect(report, .not. solver%sleeping .or. any(solver%method == ["nlgs   ", "nscdd  ", "schwarz"]), "solver", &
+                  "sleeping", error, ".false. with this method: sleeping serves 'nlgs', 'nscdd' and 'schwarz'")
+      call expect(report, .not. solver%sleeping .or. solver%warm_start, "solver", "sleeping", error, &
+                  ".false. where warm_start = .false.: contacts that sleep keep their impulses from step to step")
+      call expect(report, solver%sleep_after >= 1, "solver", "sleep_after", error)
+      call expect(report, solver%sleep_speed > 0.0_dp .or. .not. solver%sleep_given, "solver", "sleep_speed", error)
     end associate
   end subroutine check_solver
 
@@ -247,13 +263,18 @@ contains
     end associate
   end subroutine check_decomposition
 
-  !> One domain for nlgs.
+  !> One domain for nlgs; no moments in what is written for two or three components a contact.
   subroutine check_method(report, config, error)
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: key
 
+    call expect(report, .not. (rolls(config) .and. any(config%solver%method == [character(len=10) :: "nscdd_ep", &
+                "schwarz_ec", "newton"])), "solver", "method", error, &
+                "'nlgs', 'nscdd' or 'schwarz' with rolling or pivoting friction")
+    call expect(report, .not. (rolls(config) .and. config%output%fclib_step > 0), "output", "fclib_step", error, &
+                "0 with rolling or pivoting friction, which a file of FCLIB cannot say")
     if (config%solver%method /= "nlgs") return
     key = "subdomains"
     if (.not. is_given(report, "decomposition", key)) key = "grid"
@@ -261,12 +282,25 @@ contains
                 "one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'")
   end subroutine check_method
 
+  !> Whether some contact may resist rolling or pivoting.
+  pure logical function rolls(config)
+    type(config_t), intent(in) :: config
+
+    associate (scene => config%scene)
+      rolls = scene%rotation .and. (max(scene%rolling_friction, scene%wall_rolling_friction, scene%pivoting_friction, &
+        scene%wall_pivoting_friction) > 0.0_dp .or. any(config%boundaries%rolling_friction > 0.0_dp) .or. &
+        any(config%boundaries%pivoting_friction > 0.0_dp))
+    end associate
+  end function rolls
+
   subroutine check_enriched(report, config, error)
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
 
     associate (enriched => config%enriched)
+      call expect(report, enriched%interface == "mumps" .or. config%solver%method /= "newton", "enriched", "interface", error, &
+                  "'mumps' where &solver method = 'newton': its interface problem is not symmetric")
       call expect(report, enriched%direction >= 0.0_dp, "enriched", "direction", error)
       call expect(report, enriched%cg_tolerance > 0.0_dp .and. enriched%cg_tolerance < 1.0_dp, "enriched", "cg_tolerance", &
                   error)

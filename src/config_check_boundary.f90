@@ -8,11 +8,13 @@ module gravier_config_check_boundary
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, ordinal
   implicit none
   private
-  public :: check_boundaries
+  public :: check_boundaries, is_pivoting, pivoting_text
 
   !> shapes of each dimension
   character(len=*), parameter :: shapes_of(2:3) = ["plane segment circle grains outlet     ", &
                                                    "plane rectangle cylinder grains outlet "]
+  !> what `is_pivoting` wants
+  character(len=*), parameter :: pivoting_text = "a finite real number >= 0; 0 where dimension = 2"
   !> shortest edge
   character(len=*), parameter :: shortest = "1e-30 m"
   !> largest cosine of the angle between the edges of a rectangle
@@ -36,7 +38,7 @@ contains
       call check_size(report, config%boundaries(i), error)
       call check_free(report, config%boundaries(i), error)
       call check_loads(report, config%boundaries(i), error)
-      call check_contact(report, config%boundaries(i), error)
+      call check_contact(report, config%scene%dimension, config%boundaries(i), error)
       if (allocated(error)) return
     end do
     report%instance = 1
@@ -150,13 +152,25 @@ contains
                 "boundary", "pressure", error, "0 where no component along normal is free")
   end subroutine check_loads
 
-  subroutine check_contact(report, boundary, error)
+  !> Whether a coefficient of pivoting friction makes sense: disks do not pivot.
+  pure logical function is_pivoting(dimension, coefficient)
+    integer, intent(in) :: dimension
+    real(dp), intent(in) :: coefficient
+    is_pivoting = coefficient >= 0.0_dp .and. (dimension == 3 .or. coefficient <= 0.0_dp)
+  end function is_pivoting
+
+  subroutine check_contact(report, dimension, boundary, error)
     type(report_t), intent(in) :: report
+    integer, intent(in) :: dimension
     type(boundary_config_t), intent(in) :: boundary
     type(error_t), allocatable, intent(inout) :: error
 
     call expect(report, boundary%friction >= 0.0_dp, "boundary", "friction", error)
     call expect(report, boundary%restitution >= 0.0_dp .and. boundary%restitution <= 1.0_dp, "boundary", "restitution", error)
+    call expect(report, boundary%tangential_restitution >= 0.0_dp .and. boundary%tangential_restitution <= 1.0_dp, "boundary", &
+                "tangential_restitution", error)
+    call expect(report, boundary%rolling_friction >= 0.0_dp, "boundary", "rolling_friction", error)
+    call expect(report, is_pivoting(dimension, boundary%pivoting_friction), "boundary", "pivoting_friction", error, pivoting_text)
     call expect(report, boundary%remove_at >= 0.0_dp, "boundary", "remove_at", error)
   end subroutine check_contact
 

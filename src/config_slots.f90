@@ -112,6 +112,12 @@ contains
     case ("wall_friction"); slot%real => config%scene%wall_friction
     case ("restitution"); slot%real => config%scene%restitution
     case ("wall_restitution"); slot%real => config%scene%wall_restitution
+    case ("tangential_restitution"); slot%real => config%scene%tangential_restitution
+    case ("wall_tangential_restitution"); slot%real => config%scene%wall_tangential_restitution
+    case ("rolling_friction"); slot%real => config%scene%rolling_friction
+    case ("wall_rolling_friction"); slot%real => config%scene%wall_rolling_friction
+    case ("pivoting_friction"); slot%real => config%scene%pivoting_friction
+    case ("wall_pivoting_friction"); slot%real => config%scene%wall_pivoting_friction
     case ("rotation"); slot%logical => config%scene%rotation
     case ("period"); slot%reals => config%scene%period
     case ("period_origin"); slot%reals => config%scene%period_origin
@@ -155,12 +161,18 @@ contains
     case ("table"); slot%text => config%boundaries(instance)%table
     case ("friction"); slot%real => config%boundaries(instance)%friction
     case ("restitution"); slot%real => config%boundaries(instance)%restitution
+    case ("tangential_restitution"); slot%real => config%boundaries(instance)%tangential_restitution
+    case ("rolling_friction"); slot%real => config%boundaries(instance)%rolling_friction
+    case ("pivoting_friction"); slot%real => config%boundaries(instance)%pivoting_friction
     case ("remove_at"); slot%real => config%boundaries(instance)%remove_at
     end select
     select case (name)
     case ("pivot"); slot%given => config%boundaries(instance)%pivot_given
     case ("friction"); slot%given => config%boundaries(instance)%friction_given
     case ("restitution"); slot%given => config%boundaries(instance)%restitution_given
+    case ("tangential_restitution"); slot%given => config%boundaries(instance)%tangential_restitution_given
+    case ("rolling_friction"); slot%given => config%boundaries(instance)%rolling_given
+    case ("pivoting_friction"); slot%given => config%boundaries(instance)%pivoting_given
     case ("remove_at"); slot%given => config%boundaries(instance)%remove_given
     end select
   end subroutine boundary_slot
@@ -218,9 +230,13 @@ contains
     case ("acceleration"); slot%choice => config%solver%acceleration
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
+    case ("sleeping"); slot%logical => config%solver%sleeping
+    case ("sleep_after"); slot%integer => config%solver%sleep_after
+    case ("sleep_speed"); slot%real => config%solver%sleep_speed
     case ("on_failure"); slot%choice => config%solver%on_failure
     end select
     if (name == "relaxation") slot%given => config%solver%relaxation_given
+    if (name == "sleep_speed") slot%given => config%solver%sleep_given
   end subroutine solver_slot
 
   subroutine decomposition_slot(config, name, slot)

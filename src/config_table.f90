@@ -30,7 +30,7 @@ module gravier_config_table
   !> A key of a group.
   type :: key_t
     character(len=16) :: group
-    character(len=24) :: name
+    character(len=28) :: name
     !> one of the kind_ constants
     integer :: kind
     !> the default, as it would be typed after the equal sign
@@ -109,6 +109,19 @@ module gravier_config_table
      key_t("scene", "restitution", kind_real, "0.0", "in [0, 1]", "normal restitution coefficient between bodies"), &
      key_t("scene", "wall_restitution", kind_real, "-1", "in [0, 1]", &
            "normal restitution coefficient between bodies and boundaries", note="the value of `restitution`"), &
+     key_t("scene", "tangential_restitution", kind_real, "0.0", "in [0, 1]", &
+           "tangential restitution coefficient between bodies, where there is friction"), &
+     key_t("scene", "wall_tangential_restitution", kind_real, "-1", "in [0, 1]", &
+           "tangential restitution coefficient between bodies and boundaries", note="the value of `tangential_restitution`"), &
+     key_t("scene", "rolling_friction", kind_real, "0.0", ">= 0", &
+           "rolling friction coefficient between bodies: the largest moment over `R* r_n`, `R* = R_i R_j/(R_i + R_j)`"), &
+     key_t("scene", "wall_rolling_friction", kind_real, "-1", ">= 0", &
+           "rolling friction coefficient between bodies and boundaries, where `R* = R_i`", &
+           note="the value of `rolling_friction`"), &
+     key_t("scene", "pivoting_friction", kind_real, "0.0", ">= 0", &
+           "pivoting friction coefficient between bodies: the same for the moment about the normal; 0 in 2D"), &
+     key_t("scene", "wall_pivoting_friction", kind_real, "-1", ">= 0", &
+           "pivoting friction coefficient between bodies and boundaries; 0 in 2D", note="the value of `pivoting_friction`"), &
      key_t("scene", "rotation", kind_logical, ".true.", "", "grains turn where friction asks; `.false.`: they never turn"), &
      key_t("scene", "period", kind_real, "3*0", ">= 0", &
            "length after which the scene repeats itself along each axis, 0: it does not; the third is 0 in 2D", &
@@ -175,6 +188,15 @@ module gravier_config_table
      key_t("boundary", "restitution", kind_real, "-1", "in [0, 1]", &
            "normal restitution coefficient between grains and this boundary", &
            note="the value of `wall_restitution` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "tangential_restitution", kind_real, "-1", "in [0, 1]", &
+           "tangential restitution coefficient between grains and this boundary", &
+           note="the value of `wall_tangential_restitution` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "rolling_friction", kind_real, "-1", ">= 0", &
+           "rolling friction coefficient between grains and this boundary", &
+           note="the value of `wall_rolling_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "pivoting_friction", kind_real, "-1", ">= 0", &
+           "pivoting friction coefficient between grains and this boundary; 0 in 2D", &
+           note="the value of `wall_pivoting_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is taken away", &
            unit="s", note="never")]
 
@@ -241,6 +263,12 @@ module gravier_config_table
            note="by the method"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
+     key_t("solver", "sleeping", kind_logical, ".false.", "", &
+           "contacts of bodies at rest leave the sweeps until these are disturbed (`nlgs`, `nscdd` and `schwarz` only)"), &
+     key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
+     key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
+           "momentum of a body at rest, at most, over the root mean square of the impulses; and over a tenth of those on it", &
+           note="100 times `tolerance`"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
            "after a solve that gave up: go on; write the step and stop; stop without it. "// &
            "One that diverged always stops without it")]
@@ -270,7 +298,7 @@ module gravier_config_table
            "contacts that take part: all, as in the paper; those that carry an impulse, and `nscdd_ep` feeds their impulses back", &
            note="`'all'`; `nscdd_ep` without `direction`: `'active'`"), &
      key_t("enriched", "interface", kind_choice, "'mumps'", "mumps cg", &
-           "interface solve: direct, or conjugate gradient (`nscdd_ep` only)"), &
+           "interface solve: direct, or conjugate gradient (`nscdd_ep` only; `newton` takes no other than `mumps`)"), &
      key_t("enriched", "cg_tolerance", kind_real, "1e-12", "in (0, 1)", &
            "relative residual at which the conjugate gradient stops (`nscdd_ep` with `interface = 'cg'` only)"), &
      key_t("enriched", "cg_max_iterations", kind_integer, "10000", ">= 1", &

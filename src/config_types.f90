@@ -37,6 +37,9 @@ module gravier_config_types
     real(dp) :: friction, wall_friction
     !> in [0, 1]
     real(dp) :: restitution, wall_restitution
+    real(dp) :: tangential_restitution, wall_tangential_restitution
+    !> >= 0, times R*: the lever of the largest moment; 0 in 2D: pivoting
+    real(dp) :: rolling_friction, wall_rolling_friction, pivoting_friction, wall_pivoting_friction
     !> false: no grain turns; true: grains turn where friction asks
     logical :: rotation
     !> m; 0 along an axis that is not periodic; the third is 0 in 2D
@@ -85,6 +88,11 @@ module gravier_config_types
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start
+    logical :: sleeping
+    !> steps; momentum of a body at rest over the root mean square of the impulses
+    integer :: sleep_after
+    real(dp) :: sleep_speed
+    logical :: sleep_given = .false.
     !> continue, stop or discard
     character(len=choice_length) :: on_failure
   end type solver_config_t
@@ -179,6 +187,9 @@ module gravier_config_types
     !> wall_restitution of &scene when not given
     real(dp) :: restitution
     logical :: restitution_given = .false.
+    !> the value for walls of &scene when not given
+    real(dp) :: tangential_restitution, rolling_friction, pivoting_friction
+    logical :: tangential_restitution_given = .false., rolling_given = .false., pivoting_given = .false.
     !> s; the largest real number when not given
     real(dp) :: remove_at
     logical :: remove_given = .false.

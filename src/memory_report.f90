@@ -4,10 +4,11 @@ module gravier_memory_report
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_impulse_memory, only: impulse_entries
+  use gravier_newton, only: newton_t
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: memory_report_t, report_memory, peak_memory
+  public :: memory_report_t, report_memory, item_bytes, peak_memory
 
   !> A kind of item, the bytes of one, array by array, and how many all ranks keep.
   type :: item_t
@@ -46,6 +47,18 @@ contains
     end do
   end subroutine report_memory
 
+  !> Bytes of a contact, of a body in contact, and of what an exchange sends of a copy of a shared body.
+  subroutine item_bytes(simulation, contact, body, copy)
+    type(simulation_t), intent(in) :: simulation
+    integer(i8), intent(out) :: contact, body, copy
+    type(item_t) :: items(5)
+
+    call describe(simulation, items)
+    contact = items(1)%bytes
+    body = items(3)%bytes
+    copy = simulation%problem%kernels%nv*storage_size(0.0_dp)/8
+  end subroutine item_bytes
+
   subroutine describe(simulation, items)
     type(simulation_t), intent(in) :: simulation
     type(item_t), intent(inout) :: items(5)
@@ -64,16 +77,23 @@ contains
       call items(1)%add("source", 4, 1)
       ! a projection of places borrows these
       if (simulation%overlap_allowed < huge(1.0_dp)) then
-        call items(1)%add("law of projections", 8, merge(2, 1, kernels%nc > 1))
+        call items(1)%add("law of projections", 8, merge(2, 1, kernels%nf > 1))
         call items(1)%add("impulse of projections", 8, kernels%nc)
         call items(1)%add("velocity of projections", 8, kernels%nc)
       end if
       if (simulation%scheme%momentum%on) call items(1)%add("impulse of momentum", 8, kernels%nc)
+      select type (scheme => simulation%scheme)
+      class is (newton_t)
+        call items(1)%add("impulses of Newton's method", 8, 4*kernels%nc)
+        call items(1)%add("velocity of Newton's method", 8, kernels%nc)
+        call items(1)%add("law of Newton's method", 8, 3*kernels%nc + kernels%nc**2 + 5)
+        call items(1)%add("state of Newton's method", 4, 1)
+      end select
       items(2)%name = "near pair"
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
       call items(2)%add("shift", 4, merge(1, 0, ni > 0))
-      call items(2)%add("impulse", 8, impulse_entries(kernels))
+      call items(2)%add("impulse", 8, impulse_entries(kernels, simulation%sleeping%after > 0))
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
       call items(3)%add("home", 4, 1)
@@ -86,6 +106,11 @@ contains
       call items(3)%add("v_global", 8, nv)
       call items(3)%add("reaction", 8, nv)
       if (simulation%scheme%momentum%on) call items(3)%add("velocity of momentum", 8, nv)
+      select type (scheme => simulation%scheme)
+      class is (newton_t)
+        call items(3)%add("velocity of the sweeps of Newton's method", 8, nv)
+        call items(3)%add("velocity of Newton's steps", 8, nv)
+      end select
       call items(3)%add("inverse_mass", 8, nw)
       call items(3)%add("weight", 8, nw)
       items(4)%name = "grain seen, ghosts included"

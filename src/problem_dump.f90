@@ -149,6 +149,9 @@ contains
     call full_jacobian(problem, sub, c, jacobian)
     w(:) = 0.0_dp
     w(1) = sub%hot(lane_of(c), nd + 1, block_of(c))
+    associate (row => problem%kernels%shift_row)
+      if (row > 0) w(2:) = sub%hot(lane_of(c), row + 1:row + nd - 1, block_of(c))
+    end associate
     u(:) = w
     do side = 1, 2
       body = sub%pair(side, c)
@@ -160,7 +163,7 @@ contains
         jacobian(:, d, side) = 0.0_dp
       end do
     end do
-    if (nc > 1) record(5) = transfer(sub%hot(lane_of(c), problem%kernels%nh, block_of(c)), 0_i8)
+    if (nc > 1) record(5) = transfer(sub%hot(lane_of(c), problem%kernels%friction_row, block_of(c)), 0_i8)
     at = 5
     do k = 1, nd
       r = 0.0_dp

@@ -8,13 +8,14 @@ module gravier_run_log
   use gravier_timers, only: gather_timers, phase_names, n_phases
   use gravier_file_system, only: text_file_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
+  use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
   use gravier_descent, only: effort_t, tenfold
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_problem_builder, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_memory_report, only: memory_report_t, report_memory, peak_memory
+  use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
   implicit none
   private
   public :: run_log_t, banner_text
@@ -118,7 +119,7 @@ contains
     character(len=:), allocatable :: options
 
     call write_lines(self, banner_text(), "", error)
-    associate (config => simulation%config, kernels => simulation%problem%kernels)
+    associate (config => simulation%config)
       call self%line("case        "//config%file//"  "//trim(config%scene%title), error)
       call self%line("ranks       "//to_text(self%comm%size)//", subdomains "//to_text(simulation%decomposition%n_subdomains)// &
         & " ("//boxes_text(simulation)//", "//trim(config%decomposition%kind)//" rule)", error)
@@ -126,8 +127,11 @@ contains
         & to_text(self%comm%size - simulation%decomposition%n_subdomains)//" ranks own no subdomain and stay idle", error)
       call self%line("bodies      "//to_text(simulation%n_grains)//" grains, "// &
         & to_text(size(simulation%decomposition%boundaries))//" boundaries", error)
-      call self%line("effects     "//effects_text(simulation)//": "//to_text(kernels%nv)//" degrees of freedom a grain, "// &
-        & to_text(kernels%nc)//" unknowns a contact", error)
+      call self%line("effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.), error)
+      call self%line("off         "//effects_text(simulation%effects, .false.), error)
+      call self%line("unknowns    "//cost_text(simulation), error)
+      if (config%solver%sleeping) call self%line("sleeping    contacts of bodies at rest for "// &
+        & to_text(config%solver%sleep_after)//" steps leave the sweeps; the residual is that of all contacts", error)
       call self%line("options in force", error)
       call write_active(options, config)
       call write_lines(self, options, "  ", error)
@@ -170,17 +174,37 @@ contains
     end do
   end function boxes_text
 
-  !> The effects that the scene has, and those that it could have and does not pay for.
-  function effects_text(simulation) result(text)
+  !> Names of the effects that the scene has, or of those that it could have and does not pay for.
+  function effects_text(effects, wanted) result(text)
+    type(effects_t), intent(in) :: effects
+    logical, intent(in) :: wanted
+    character(len=:), allocatable :: text
+    character(len=effect_name_length) :: names(n_effects)
+    logical :: on(n_effects)
+    integer :: k
+
+    call effects%list(names, on)
+    text = ""
+    do k = 1, n_effects
+      if (on(k) .eqv. wanted) text = text//", "//trim(names(k))
+    end do
+    if (text == "") text = ", nothing"
+    text = text(3:)
+  end function effects_text
+
+  !> What the effects cost.
+  function cost_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    integer(i8) :: contact, body, copy
 
+    call item_bytes(simulation, contact, body, copy)
     associate (kernels => simulation%problem%kernels)
-      text = to_text(kernels%nd)//"D, friction "//trim(merge("on ", "off", kernels%nc > 1))//", rotation "// &
-        & trim(merge("on ", "off", kernels%nv > kernels%nd))//", gravity "// &
-        & trim(merge("on ", "off", any(abs(simulation%physics%gravity(1:kernels%nd)) > 0.0_dp)))
+      text = to_text(kernels%nv)//" degrees of freedom a grain, "//to_text(kernels%nc)//" unknowns a contact, "// &
+        & to_text(contact)//" bytes a contact, "//to_text(body)//" a body in contact, "//to_text(copy)// &
+        & " an exchange and copy of a shared body"
     end associate
-  end function effects_text
+  end function cost_text
 
   !> Contacts and interface as the partition makes them now.
   subroutine run_log_write_interface(self, figures, subdomains, error)
@@ -348,6 +372,8 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    if (simulation%config%solver%sleeping) call self%line("sleeping    "//to_text(simulation%slept)// &
+      & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance", error)
     if (simulation%scheme%direction_text /= "") call self%line("direction   "//simulation%scheme%direction_text//"; lowered "// &
       & to_text(work%lowered)//" times", error)
     if (simulation%decomposition%n_subdomains > 1) then
@@ -391,18 +417,19 @@ contains
     end associate
   end subroutine write_accuracy
 
-  !> How far energies balance, where they are measured.
+  !> How far energies balance: of the whole scene where its terms are measured, else of the grains.
   function energy_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    real(dp) :: off, turnover
 
-    if (.not. allocated(simulation%diagnostics%energy)) then
-      text = "energy balance not measured; &output energy = .true. does"
-      return
+    off = simulation%balance%error()
+    turnover = simulation%balance%turnover()
+    if (allocated(simulation%diagnostics%energy)) then
+      off = simulation%diagnostics%energy%error()
+      turnover = simulation%diagnostics%energy%turnover()
     end if
-    associate (energy => simulation%diagnostics%energy)
-      text = "energy balance off by "//to_text(abs(energy%error()), 2)//" J, of "//to_text(energy%turnover(), 3)//" J turned over"
-    end associate
+    text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
   end function energy_text
 
   !> What so many iterations would have taken. Collective.

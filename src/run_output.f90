@@ -61,7 +61,7 @@ contains
       call write_boundaries(self, simulation, error)
     end if
     if (self%comm%rank == 0) then
-      call open_table(self%history, self%directory//"history.csv", history_header(simulation%diagnostics), simulation, error)
+      call open_table(self%history, self%directory//"history.csv", history_header(simulation), simulation, error)
       if (simulation%config%output%trace) call open_table(self%trace, self%directory//"trace.csv", trace_header(simulation), &
         & simulation, error)
     end if
@@ -82,16 +82,17 @@ contains
   end subroutine open_table
 
   !> The columns, those of the diagnostics last.
-  pure function history_header(diagnostics) result(header)
-    type(diagnostics_t), intent(in) :: diagnostics
+  pure function history_header(simulation) result(header)
+    type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: header
     integer :: k
 
     header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
       & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,most_messages,most_values,"// &
       & "ghosts,solve_seconds"
-    do k = 1, diagnostics%n_columns
-      header = header//","//trim(diagnostics%name(k))
+    if (simulation%config%solver%sleeping) header = header//",sleeping,woken"
+    do k = 1, simulation%diagnostics%n_columns
+      header = header//","//trim(simulation%diagnostics%name(k))
     end do
   end function history_header
 
@@ -162,6 +163,10 @@ contains
       call self%history%add(figures%sharing%most_values)
       call self%history%add(figures%sharing%ghosts)
       call self%history%add(figures%solve%seconds)
+      if (simulation%config%solver%sleeping) then
+        call self%history%add(figures%asleep)
+        call self%history%add(merge(1, 0, figures%solve%woken))
+      end if
       do k = 1, simulation%diagnostics%n_columns
         call self%history%add(simulation%diagnostics%value(k))
       end do
@@ -283,20 +288,22 @@ contains
     end do
   end subroutine collect_bodies
 
-  !> Contacts of this rank; without friction the tangential impulses are written as zeros.
+  !> Contacts of this rank; without friction the tangential impulses are written as zeros. Moments where the kernels have some.
   subroutine collect_contacts(simulation, rows)
     type(simulation_t), intent(in) :: simulation
     type(contact_rows_t), intent(out) :: rows
-    integer :: s, c, p, n, nd, nc
+    real(dp) :: radius
+    integer :: s, c, p, n, nd, nf
 
     nd = simulation%problem%kernels%nd
-    nc = simulation%problem%kernels%nc
+    nf = simulation%problem%kernels%nf
     n = 0
     do s = 1, size(simulation%problem%sub)
       n = n + simulation%problem%sub(s)%n_contacts
     end do
     allocate (rows%candidate(n), rows%antagonist(n), rows%normal(nd, n), rows%gap(n))
     allocate (rows%impulse(nd, n), source=0.0_dp)
+    if (simulation%problem%kernels%rolling_row > 0) allocate (rows%moment(2*nd - 3, n))
     n = 0
     do s = 1, size(simulation%problem%sub)
       associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
@@ -311,7 +318,12 @@ contains
           end if
           rows%normal(:, n) = sub%hot(lane_of(c), 1:nd, block_of(c))
           rows%gap(n) = sub%gap(c)
-          rows%impulse(1:nc, n) = sub%impulse(lane_of(c), :, block_of(c))
+          rows%impulse(1:nf, n) = sub%impulse(lane_of(c), 1:nf, block_of(c))
+          if (.not. allocated(rows%moment)) cycle
+          radius = sub%hot(lane_of(c), simulation%problem%kernels%rolling_row + 1, block_of(c))
+          ! that about the normal comes last in a sweep
+          rows%moment(1, n) = radius*sub%impulse(lane_of(c), simulation%problem%kernels%nc, block_of(c))
+          if (nd == 3) rows%moment(2:3, n) = radius*sub%impulse(lane_of(c), 4:5, block_of(c))
         end do
       end associate
     end do

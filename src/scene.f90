@@ -9,7 +9,8 @@ module gravier_scene
   use gravier_bodies_file, only: read_bodies
   use gravier_periodic, only: period_t
   use gravier_body_store, only: body_set_t
-  use gravier_boundary, only: boundary_t
+  use gravier_boundary, only: boundary_t, shape_outlet
+  use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
@@ -29,8 +30,7 @@ module gravier_scene
     integer(i8) :: n_grains = 0, n_glued = 0
     !> of all ranks [m]; 0 without grains
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
-    !> some contact has friction; some grain turns
-    logical :: friction = .false., rotation = .false.
+    type(effects_t) :: effects
   end type scene_t
 
 contains
@@ -182,23 +182,75 @@ contains
     data%wall_normal(scene%dimension, 1) = 1.0_dp
   end subroutine make_column
 
-  !> Turn the rows of a file, or made rows, into bodies; find out what the scene has. Collective.
+  !> Find out what the scene has, from its laws, bodies, boundaries and loads. What no pair can feel is off: a law between grains
+  !> where there are no two, one of an outlet, rolling friction where nothing turns. Collective.
+  subroutine deduce_effects(comm, config, data, scene)
+    type(communicator_t), intent(in) :: comm
+    type(scene_config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(scene_t), intent(inout) :: scene
+    logical :: turning
+    integer :: k, nd
+
+    nd = config%dimension
+    associate (effects => scene%effects)
+      if (data%total > 1) call add_law(config%friction, config%restitution, config%tangential_restitution, &
+        & config%rolling_friction, config%pivoting_friction)
+      do k = 1, size(scene%boundaries)
+        associate (boundary => scene%boundaries(k))
+          effects%drives = effects%drives .or. moves(boundary)
+          effects%forces = effects%forces .or. boundary%is_driven()
+          effects%removal = effects%removal .or. boundary%shape == shape_outlet
+          if (boundary%shape /= shape_outlet) call add_law(boundary%friction, boundary%restitution, &
+            & boundary%tangential_restitution, boundary%rolling_friction, boundary%pivoting_friction)
+        end associate
+      end do
+      ! moments are in the kernels of friction
+      effects%friction = effects%friction .or. effects%rolling
+      turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. config%rotation
+      effects%rotation = effects%friction .or. turning
+      effects%periodic = scene%period%on()
+      effects%glued = comm%any_true(any(data%group > 0))
+      effects%gravity = any(abs(config%gravity) > 0.0_dp) .or. config%gravity_table /= ""
+      effects%body_force = any(abs(config%body_force) > 0.0_dp)
+    end associate
+
+  contains
+
+    subroutine add_law(friction, restitution, tangential, rolling, pivoting)
+      real(dp), intent(in) :: friction, restitution, tangential, rolling, pivoting
+
+      associate (effects => scene%effects)
+        effects%friction = effects%friction .or. friction > 0.0_dp
+        effects%restitution = effects%restitution .or. restitution > 0.0_dp
+        effects%tangential_restitution = effects%tangential_restitution .or. (friction > 0.0_dp .and. tangential > 0.0_dp)
+        if (.not. config%rotation) return
+        effects%rolling = effects%rolling .or. rolling > 0.0_dp .or. pivoting > 0.0_dp
+        effects%pivoting = effects%pivoting .or. pivoting > 0.0_dp
+      end associate
+    end subroutine add_law
+
+    !> Whether a boundary moves as prescribed.
+    pure logical function moves(boundary)
+      type(boundary_t), intent(in) :: boundary
+
+      moves = any(abs(boundary%given_velocity) > 0.0_dp) .or. boundary%turns()
+      if (allocated(boundary%table%has)) moves = .true.
+    end function moves
+
+  end subroutine deduce_effects
+
+  !> Turn the rows of a file, or made rows, into bodies. Collective.
   subroutine take_data(comm, scene_config, data, scene)
     type(communicator_t), intent(in) :: comm
     type(scene_config_t), intent(in) :: scene_config
     type(bodies_data_t), intent(in) :: data
     type(scene_t), intent(inout) :: scene
-    logical :: turning
     integer :: k, nd, nv
 
     nd = scene_config%dimension
-    scene%friction = scene_config%friction > 0.0_dp
-    do k = 1, size(scene%boundaries)
-      scene%friction = scene%friction .or. scene%boundaries(k)%friction > 0.0_dp
-    end do
-    turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. scene_config%rotation
-    scene%rotation = scene%friction .or. turning
-    nv = merge(3*nd - 3, nd, scene%rotation)
+    call deduce_effects(comm, scene_config, data, scene)
+    nv = merge(3*nd - 3, nd, scene%effects%rotation)
     call scene%grains%init(nd, nv, merge(nd, 0, scene%period%on()), data%n)
     scene%grains%glued(:) = 0
     scene%grains%image(:, :) = 0

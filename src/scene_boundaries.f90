@@ -36,6 +36,9 @@ contains
         wall%axis(1:nd) = data%wall_normal(:, w)
         wall%friction = config%scene%wall_friction
         wall%restitution = config%scene%wall_restitution
+        wall%tangential_restitution = config%scene%wall_tangential_restitution
+        wall%rolling_friction = config%scene%wall_rolling_friction
+        wall%pivoting_friction = config%scene%wall_pivoting_friction
       end associate
     end do
     last_id = 0
@@ -144,6 +147,9 @@ contains
     boundary%mass = config%mass
     boundary%friction = config%friction
     boundary%restitution = config%restitution
+    boundary%tangential_restitution = config%tangential_restitution
+    boundary%rolling_friction = config%rolling_friction
+    boundary%pivoting_friction = config%pivoting_friction
     boundary%remove_at = config%remove_at
   end subroutine set_boundary
 

@@ -17,15 +17,35 @@ module gravier_neighbour_list
     !> periods by which the antagonist's place is shifted to meet the candidate, see shift_code; without periods of no
     !> size (n or 0)
     integer, allocatable :: shift(:)
-    !> (entries of an impulse, n) [N s]
+    !> (entries of an impulse, n) [N s]; the last entry is the number of steps at rest where contacts may sleep
     real(dp), allocatable :: impulse(:, :)
   contains
     procedure :: init => neighbour_list_init
     procedure :: add => neighbour_list_add
     procedure :: finish => neighbour_list_finish
+    procedure :: remembers => neighbour_list_remembers
+    procedure :: n_remembered => neighbour_list_n_remembered
   end type neighbour_list_t
 
 contains
+
+  !> Whether pair `p` keeps something from the last step.
+  pure logical function neighbour_list_remembers(self, p) result(remembers)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p
+    remembers = any(abs(self%impulse(:, p)) > 0.0_dp)
+  end function neighbour_list_remembers
+
+  !> Pairs that keep something from the last step.
+  pure integer function neighbour_list_n_remembered(self) result(n)
+    class(neighbour_list_t), intent(in) :: self
+    integer :: p
+
+    n = 0
+    do p = 1, self%n
+      if (self%remembers(p)) n = n + 1
+    end do
+  end function neighbour_list_n_remembered
 
   !> An empty list with room for `room` pairs.
   subroutine neighbour_list_init(self, periodic, room)

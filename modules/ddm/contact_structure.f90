@@ -56,7 +56,7 @@ contains
     counts(:) = 0
     largest = 0.0_dp
     do s = 1, size(problem%sub)
-      call count_contacts(problem%sub(s), nd, problem%kernels%nc, counts, parts(:, s))
+      call count_contacts(problem%sub(s), nd, problem%kernels%nf, counts, parts(:, s))
       if (problem%sub(s)%n_contacts > 0) largest = max(largest, maxval(problem%sub(s)%impulse(:, 1, :)))
     end do
     call count_ends(problem, counts)
@@ -87,9 +87,10 @@ contains
   end function ratio
 
   !> Counts and sums (fabric, normal impulse, overlap) over the contacts of a subdomain.
-  pure subroutine count_contacts(sub, nd, nc, counts, part)
+  pure subroutine count_contacts(sub, nd, nf, counts, part)
     type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: nd, nc
+    !> space dimension, components of a force
+    integer, intent(in) :: nd, nf
     integer(i8), intent(inout) :: counts(n_counts)
     !> (nd**2 + 2)
     real(dp), intent(inout) :: part(:)
@@ -106,11 +107,11 @@ contains
       if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
       counts(carrying) = counts(carrying) + 1
       part(nd**2 + 1) = part(nd**2 + 1) + sub%impulse(q, 1, g)
-      if (nc > 1) then
+      if (nf > 1) then
         bound = sub%hot(q, nd + 6, g)*sub%impulse(q, 1, g)
         if (bound > 0.0_dp) then
           counts(with_friction) = counts(with_friction) + 1
-          if (norm2(sub%impulse(q, 2:, g)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
+          if (norm2(sub%impulse(q, 2:nf, g)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
         end if
       end if
       if (any(sub%pair(:, c) > sub%n_grains)) cycle

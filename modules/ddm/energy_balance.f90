@@ -5,7 +5,7 @@ module gravier_energy_balance
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_contact_kernels, only: global_impulse, lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: global_impulse, global_moment, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
@@ -190,7 +190,7 @@ contains
 
     subroutine add_boundary_work(c)
       integer, intent(in) :: c
-      real(dp) :: p(problem%kernels%nd)
+      real(dp) :: p(problem%kernels%nd), m(problem%kernels%nv - problem%kernels%nd)
       integer :: column, d
 
       associate (sub => problem%sub(s))
@@ -203,6 +203,10 @@ contains
         do d = 1, size(p)
           if (.not. earlier(sub%boundary(column))%free(d)) part(in_boundary) = part(in_boundary) + p(d)*mean(d, column)
         end do
+        if (problem%kernels%rolling_row == 0) return
+        call global_moment(problem%kernels, sub%hot, sub%impulse, c, m)
+        if (sub%pair(1, c) > sub%n_grains) m(:) = -m
+        part(in_boundary) = part(in_boundary) + sum(m*mean(problem%kernels%nd + 1:, column))
       end associate
     end subroutine add_boundary_work
 
@@ -247,6 +251,7 @@ contains
         point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*normal
       end if
       call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
+      start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
     end subroutine fill
 
   end subroutine find_start

@@ -95,6 +95,9 @@ contains
       associate (part => self%part(s), sub => problem%sub(s), work => matrix%part(s)%contact_work)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
         work(:, 1, :) = work(:, 1, :) + sub%hot(:, problem%kernels%nd + 1, :)
+        associate (row => problem%kernels%shift_row, nf => problem%kernels%nf)
+          if (row > 0) work(:, 2:nf, :) = work(:, 2:nf, :) + sub%hot(:, row + 1:row + nf - 1, :)
+        end associate
         parts(1, s) = sum(part%step*work)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, part%lead, work)
         parts(2, s) = sum(part%step*work)

@@ -4,7 +4,8 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: shift_of_code
-  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
+    & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
@@ -15,34 +16,45 @@ module gravier_impulse_memory
 
 contains
 
-  !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector.
-  pure integer function impulse_entries(kernels) result(n)
+  !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
+  !> over R*, or its vector.
+  pure integer function impulse_entries(kernels, counts_rest) result(n)
     type(kernels_t), intent(in) :: kernels
-    n = merge(4, kernels%nc, kernels%nc == 3)
+    !> one more entry for the steps at rest
+    logical, intent(in), optional :: counts_rest
+
+    n = kernels%nc
+    if (kernels%nf == 3) n = merge(7, 4, kernels%rolling_row > 0)
+    if (present(counts_rest)) n = n + merge(1, 0, counts_rest)
   end function impulse_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists.
   subroutine keep_impulses(problem, neighbourhoods)
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
-    integer :: s, c, q, g
-    real(dp) :: vector(lanes, 3)
+    integer :: s, c, q, g, n
+    real(dp) :: vector(lanes, 3), moment(lanes, 3)
+    logical :: rolls
 
+    n = impulse_entries(problem%kernels)
+    rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
-        list%impulse(:, :) = 0.0_dp
+        list%impulse(1:n, :) = 0.0_dp
         do g = 1, n_blocks(sub%n_contacts)
-          if (problem%kernels%nc == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
           do q = 1, lanes
             ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart; contacts of
             ! no effect have none
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
-            if (problem%kernels%nc < 3) then
-              list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
+            if (problem%kernels%nf < 3) then
+              list%impulse(1:n, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
               list%impulse(2:4, sub%source(c)) = vector(q, :)
+              if (rolls) list%impulse(5:7, sub%source(c)) = moment(q, :)
             end if
           end do
         end do
@@ -50,35 +62,42 @@ contains
     end do
   end subroutine keep_impulses
 
-  !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now.
+  !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now; a
+  !> moment keeps its vector.
   subroutine recall_impulses(neighbourhoods, problem)
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, c, q, g
-    real(dp) :: vector(lanes, 3)
+    integer :: s, c, q, g, n
+    real(dp) :: vector(lanes, 3), moment(lanes, 3)
+    logical :: rolls
 
+    n = impulse_entries(problem%kernels)
+    rolls = problem%kernels%rolling_row > 0
     vector(:, :) = 0.0_dp
+    moment(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
         do g = 1, n_blocks(sub%n_contacts)
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
-            if (problem%kernels%nc < 3) then
-              sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
+            if (problem%kernels%nf < 3) then
+              sub%impulse(q, :, g) = list%impulse(1:n, sub%source(c))
             else
               sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
               vector(q, :) = list%impulse(2:4, sub%source(c))
+              if (rolls) moment(q, :) = list%impulse(5:7, sub%source(c))
             end if
           end do
           ! contacts of no effect have no normal, and no frame
-          if (problem%kernels%nc == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          if (problem%kernels%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          if (problem%kernels%nf == 3 .and. rolls) call project_moments(sub%hot(:, :, g), moment, sub%impulse(:, :, g))
           sub%impulse(q:, :, g) = 0.0_dp
         end do
       end associate
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist and the impulse, for the pairs of a list that carry one; the antagonist of a
+  !> Identifiers of candidate and antagonist and the impulse, for the pairs of a list that keep something; the antagonist of a
   !> boundary is minus its number.
   subroutine list_impulses(view, lead, records)
     type(neighbourhood_t), intent(in) :: view
@@ -89,14 +108,10 @@ contains
     integer :: p, e, n
 
     associate (list => view%list)
+      allocate (records(lead + 2 + size(list%impulse, 1), list%n_remembered()), source=0_i8)
       n = 0
       do p = 1, list%n
-        if (list%impulse(1, p) > 0.0_dp) n = n + 1
-      end do
-      allocate (records(lead + 2 + size(list%impulse, 1), n), source=0_i8)
-      n = 0
-      do p = 1, list%n
-        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        if (.not. list%remembers(p)) cycle
         n = n + 1
         records(lead + 1, n) = view%bodies%id(list%candidate(p))
         records(lead + 2, n) = antagonist_id(view, p)
@@ -128,9 +143,7 @@ contains
     words = 3 + decomposition%nd + neighbourhoods%n_impulse
     n = 0
     do s = 1, size(neighbourhoods%view)
-      associate (list => neighbourhoods%view(s)%list)
-        n = n + count(list%impulse(1, :) > 0.0_dp)
-      end associate
+      n = n + neighbourhoods%view(s)%list%n_remembered()
     end do
     allocate (records(words, n))
     n = 0
@@ -153,7 +166,7 @@ contains
     n = 0
     associate (list => view%list, position => view%bodies%position)
       do p = 1, list%n
-        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        if (.not. list%remembers(p)) cycle
         n = n + 1
         point(:) = position(:, list%candidate(p))
         if (list%antagonist(p) > 0) then
@@ -203,7 +216,7 @@ contains
     end do
   end subroutine spread_impulses
 
-  !> Give impulses to the pairs of a list that have the same bodies.
+  !> Give impulses to the pairs of a list that have the same bodies; of a checkpoint without steps at rest, these are none.
   subroutine match_impulses(records, view)
     !> (2 + entries of an impulse, n): candidate, antagonist, impulse
     integer(i8), intent(in), contiguous :: records(:, :)
@@ -219,7 +232,7 @@ contains
       do p = 1, list%n
         k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p))
         if (k == 0) cycle
-        do e = 1, size(list%impulse, 1)
+        do e = 1, min(size(list%impulse, 1), size(records, 1) - 2)
           list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
         end do
       end do

@@ -123,14 +123,15 @@ contains
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
       borrowed%impulse = sub%impulse
-      allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nc > 1), size(sub%hot, 3)))
+      allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nf > 1), size(sub%hot, 3)))
       allocate (borrowed%work, mold=sub%impulse)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
       borrowed%law(:, 1, :) = sub%hot(:, nd + 1, :)
       do c = 1, sub%n_contacts
         sub%hot(lane_of(c), nd + 1, block_of(c)) = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
       end do
-      if (problem%kernels%nc > 1) then
+      if (problem%kernels%nf > 1) then
+        ! nothing turns then, and no moment is needed
         borrowed%law(:, 2, :) = sub%hot(:, nd + 6, :)
         sub%hot(:, nd + 6, :) = 0.0_dp
       end if
@@ -150,7 +151,7 @@ contains
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
       sub%hot(:, nd + 1, :) = borrowed%law(:, 1, :)
-      if (problem%kernels%nc > 1) sub%hot(:, nd + 6, :) = borrowed%law(:, 2, :)
+      if (problem%kernels%nf > 1) sub%hot(:, nd + 6, :) = borrowed%law(:, 2, :)
       call move_alloc(borrowed%impulse, sub%impulse)
     end associate
   end subroutine give_back

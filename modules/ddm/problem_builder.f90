@@ -10,7 +10,7 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_neighbour_list, only: neighbour_list_t
-  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
@@ -27,10 +27,14 @@ module gravier_problem_builder
     real(dp) :: body_force(3) = 0.0_dp
     !> friction and normal restitution between grains; boundaries have their own
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+    !> tangential restitution, rolling and pivoting friction, likewise
+    real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
     !> grains turn
     logical :: rotation = .true.
     !> step [s]
     real(dp) :: h = 1.0_dp
+    !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
+    integer :: sleep_after = 0
   contains
     procedure :: accelerate => physics_accelerate
   end type physics_t
@@ -58,6 +62,8 @@ module gravier_problem_builder
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: found_t
     integer :: n = 0
+    !> those that sweeps take: the first ones, in whole blocks where others follow
+    integer :: n_swept = 0
     !> place in the list (n)
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
@@ -118,6 +124,8 @@ contains
       associate (view => neighbourhoods%view(s))
         call start_timer(phase_detection)
         call find_contacts(view, decomposition, physics, found)
+        found%n_swept = found%n
+        if (physics%sleep_after > 0) call put_sleepers_last(view, decomposition%boundaries, physics%sleep_after, found)
         call stop_timer(phase_detection)
         call start_timer(phase_setup)
         problem%sub(s)%subdomain = decomposition%subdomain_of(s)
@@ -171,6 +179,7 @@ contains
       end if
       if (gap > 0.0_dp) then
         if (restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
+        if (tangential_restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
       end if
       found%n = found%n + 1
       found%source(found%n) = p
@@ -178,6 +187,45 @@ contains
       found%normal(:, found%n) = normal
     end do
   end subroutine find_contacts
+
+  !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
+  !> whole blocks. A contact with a boundary that moves as prescribed does not sleep.
+  subroutine put_sleepers_last(view, boundaries, after, found)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: after
+    type(found_t), intent(inout) :: found
+    type(found_t) :: old
+    logical, allocatable :: asleep(:)
+    integer :: c, b, n, round
+
+    allocate (asleep(found%n))
+    do c = 1, found%n
+      asleep(c) = view%list%impulse(size(view%list%impulse, 1), found%source(c)) >= after
+      b = boundary_of(view, found%source(c))
+      if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
+    end do
+    found%n_swept = min(found%n, lanes*n_blocks(count(.not. asleep)))
+    n = found%n_swept - count(.not. asleep)
+    do c = 1, found%n
+      if (n == 0) exit
+      if (.not. asleep(c)) cycle
+      asleep(c) = .false.
+      n = n - 1
+    end do
+    if (found%n_swept == found%n) return
+    old = found
+    n = 0
+    do round = 1, 2
+      do c = 1, found%n
+        if (asleep(c) .neqv. round == 2) cycle
+        n = n + 1
+        found%source(n) = old%source(c)
+        found%gap(n) = old%gap(c)
+        found%normal(:, n) = old%normal(:, c)
+      end do
+    end do
+  end subroutine put_sleepers_last
 
   !> Take the shift of the antagonist into account in the way from it to the candidate.
   pure subroutine shift_back(period, code, branch)
@@ -216,6 +264,19 @@ contains
     e = physics%restitution
     if (b > 0) e = boundaries(b)%restitution
   end function restitution_of
+
+  !> Tangential restitution of pair `p`; 0 without friction, which alone can send anything back.
+  pure real(dp) function tangential_restitution_of(view, boundaries, physics, p) result(e)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    integer :: b
+
+    b = boundary_of(view, p)
+    e = merge(physics%tangential_restitution, 0.0_dp, physics%friction > 0.0_dp)
+    if (b > 0) e = merge(boundaries(b)%tangential_restitution, 0.0_dp, boundaries(b)%friction > 0.0_dp)
+  end function tangential_restitution_of
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
   !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
@@ -352,7 +413,11 @@ contains
     nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
     call find_pairs()
-    call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
+    sub%n_swept = found%n_swept
+    call group_contacts(pair(:, 1:sub%n_swept), sub%n_bodies, order(1:sub%n_swept), sub%n_grouped)
+    do c = sub%n_swept + 1, found%n
+      order(c) = c
+    end do
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
@@ -385,6 +450,8 @@ contains
       if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
       sub%hot(q, nd + 6, g) = physics%friction
       if (b > 0) sub%hot(q, nd + 6, g) = boundaries(b)%friction
+      if (kernels%shift_row > 0) call pack_tangential_shift()
+      if (kernels%rolling_row > 0) call pack_rolling()
     end do
 
   contains
@@ -426,8 +493,56 @@ contains
         point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*found%normal(:, f)
       end if
       call boundaries(b)%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
+      ! levers of boundaries are 0: rolling alone sees the spin
+      sub%v_free(nd + 1:, sub%n_columns) = boundaries(b)%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
       sub%pair(merge(1, 2, view%bodies%glued(i) > 0), c) = sub%n_columns
     end subroutine add_column
+
+    !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
+    subroutine pack_tangential_shift()
+      real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), returned
+      integer :: d
+
+      call contact_jacobian(kernels, sub%hot, c, rows(:, :, 1), rows(:, :, 2))
+      call find_start_velocity(i, vi)
+      call find_start_velocity(j, vj)
+      returned = tangential_restitution_of(view, boundaries, physics, p)
+      do d = 2, nd
+        sub%hot(q, kernels%shift_row + d - 1, g) = returned*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
+      end do
+    end subroutine pack_tangential_shift
+
+    !> Velocity at the start of the step of grain `k` of the view or, with its spin left out, of the boundary that the grain or the
+    !> negative number stands for, where the free grain touches it.
+    subroutine find_start_velocity(k, v)
+      integer, intent(in) :: k
+      !> (nv)
+      real(dp), intent(out) :: v(:)
+      real(dp) :: point(nd)
+
+      v(:) = 0.0_dp
+      if (k < 0) then
+        call find_surface_point(point)
+      else if (view%bodies%glued(k) == 0) then
+        v(:) = view%bodies%velocity(1:kernels%nv, k)
+        return
+      else
+        point(:) = view%bodies%position(:, k) + merge(-1, 1, k == i)*view%bodies%radius(k)*found%normal(:, f)
+      end if
+      call boundaries(b)%last_velocity_at(point, v(1:nd))
+    end subroutine find_start_velocity
+
+    !> R* and the coefficients of rolling and, of spheres, pivoting.
+    subroutine pack_rolling()
+      associate (row => kernels%rolling_row)
+        sub%hot(q, row + 1, g) = rolling_radius(sub%hot(q, nd + 4, g), sub%hot(q, nd + 5, g))
+        sub%hot(q, row + 3, g) = physics%rolling_friction
+        if (b > 0) sub%hot(q, row + 3, g) = boundaries(b)%rolling_friction
+        if (nd == 2) return
+        sub%hot(q, row + 4, g) = physics%pivoting_friction
+        if (b > 0) sub%hot(q, row + 4, g) = boundaries(b)%pivoting_friction
+      end associate
+    end subroutine pack_rolling
 
     !> Point of the surface of a boundary that the candidate is nearest to.
     pure subroutine find_surface_point(point)
@@ -756,7 +871,7 @@ contains
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
     type(interface_figures_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 5)
+    integer(i8) :: counts(n_multiplicities + 6)
     real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
     integer :: s, b, c, k, m
@@ -787,6 +902,7 @@ contains
         counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(neighbourhoods%view(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
+        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_swept
         deallocate (counted_elsewhere)
       end associate
     end do
@@ -803,6 +919,7 @@ contains
     figures%most_neighbours = nint(extremes(3), i8)
     figures%most_values = nint(extremes(4), i8)
     problem%n_contacts = counts(n_multiplicities + 2)
+    problem%n_asleep = counts(n_multiplicities + 6)
   end subroutine count_figures
 
   !> Scales of the residual and of the jump: largest |R^d|, over the components that can move, and largest free speed of a

@@ -122,6 +122,7 @@ contains
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
+      call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
       do k = 1, problem%shared%part(s)%n_shared
         call problem%shared%add_copies(s, k, load(s)%value(:, k))
         do d = 1, problem%kernels%nv

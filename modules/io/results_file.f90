@@ -50,6 +50,8 @@ module gravier_results_file
     real(dp), allocatable :: gap(:)
     !> (dimension, n): n, t[, s]
     real(dp), allocatable :: impulse(:, :)
+    !> moments on the candidate [N m s]: 2D (1, n), 3D (3, n): about n, t, s; allocated on all ranks or on none
+    real(dp), allocatable :: moment(:, :)
   end type contact_rows_t
 
   !> Figures of a step, the same on all ranks.
@@ -251,7 +253,7 @@ contains
     if (present(contacts)) then
       call sort_contacts(self, contacts, sorted_contacts)
       call check_contacts(self, group//"/contacts", sorted_contacts, error)
-      words = words + self%comm%total(size(contacts%gap, kind=i8))*(3 + 2*self%dimension)
+      words = words + self%comm%total(size(contacts%gap, kind=i8))*(3 + 2*self%dimension + moment_entries(contacts))
     end if
     if (present(boundaries)) then
       call check_boundaries(self, group//"/boundaries", boundaries, error)
@@ -345,6 +347,9 @@ contains
     call file%write_attribute(group//"/gap", "unit", "m", error)
     call file%write_rows(group//"/impulse", contacts%impulse, error)
     call file%write_attribute(group//"/impulse", "unit", "N s", error)
+    if (.not. allocated(contacts%moment)) return
+    call file%write_rows(group//"/moment", contacts%moment, error)
+    call file%write_attribute(group//"/moment", "unit", "N m s", error)
   end subroutine write_contacts
 
   !> Figures as attributes of a group, and the histogram.
@@ -393,6 +398,14 @@ contains
     if (ni > 0) sorted%image = int(ordered(3 + nd + nv:, :))
   end subroutine sort_bodies
 
+  !> Components of a moment, 0 where there are none.
+  pure integer function moment_entries(contacts) result(n)
+    type(contact_rows_t), intent(in) :: contacts
+
+    n = 0
+    if (allocated(contacts%moment)) n = size(contacts%moment, 1)
+  end function moment_entries
+
   !> The contacts of all ranks in the order of candidate, then antagonist, cut into nearly equal blocks.
   subroutine sort_contacts(self, contacts, sorted)
     type(results_file_t), intent(in) :: self
@@ -400,15 +413,17 @@ contains
     type(contact_rows_t), intent(out) :: sorted
     integer(i8), allocatable :: records(:, :), ordered(:, :)
     real(dp), allocatable :: column(:, :)
-    integer :: nd
+    integer :: nd, nm
 
     nd = self%dimension
-    allocate (records(3 + 2*nd, size(contacts%candidate)))
+    nm = moment_entries(contacts)
+    allocate (records(3 + 2*nd + nm, size(contacts%candidate)))
     records(1, :) = contacts%candidate
     records(2, :) = contacts%antagonist
     call pack_reals(nd, contacts%normal, 3, records)
     call pack_reals(nd, contacts%impulse, 3 + nd, records)
     call pack_reals(1, contacts%gap, 3 + 2*nd, records)
+    if (nm > 0) call pack_reals(nm, contacts%moment, 4 + 2*nd, records)
     call order_rows(self%comm, 2, records, ordered)
     sorted%candidate = ordered(1, :)
     sorted%antagonist = ordered(2, :)
@@ -416,6 +431,7 @@ contains
     call unpack_reals(ordered, 3 + nd, nd, sorted%impulse)
     call unpack_reals(ordered, 3 + 2*nd, 1, column)
     sorted%gap = column(1, :)
+    if (nm > 0) call unpack_reals(ordered, 4 + 2*nd, nm, sorted%moment)
   end subroutine sort_contacts
 
   subroutine check_bodies(self, group, bodies, error)
@@ -451,6 +467,8 @@ contains
 
     call check_finite(self, group//"/normal", self%dimension, contacts%normal, contacts%candidate, error)
     call check_finite(self, group//"/impulse", self%dimension, contacts%impulse, contacts%candidate, error)
+    if (allocated(contacts%moment)) call check_finite(self, group//"/moment", size(contacts%moment, 1), contacts%moment, &
+      & contacts%candidate, error)
     call check_finite(self, group//"/gap", 1, contacts%gap, contacts%candidate, error)
   end subroutine check_contacts
 

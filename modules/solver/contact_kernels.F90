@@ -3,8 +3,10 @@
 !> Contacts are packed in sweep order, in blocks of `lanes`; contact c is lane lane_of(c) of block block_of(c):
 !>   pair(1:2, c)  local numbers of the candidate i and the antagonist j
 !>   hot           (lanes, nh, blocks): normal (nd), shift = max(gap, 0)/h, 1/W_nn, and with friction 1/W_tt, levers of i
-!>                 and j, mu
-!>   impulse       (lanes, nc, blocks): (n[, t[, s]]) [N s], compression positive
+!>                 and j, mu; with tangential restitution the tangential shift (nd - 1); with rolling R*, 1/W_rr, rolling
+!>                 friction and, of spheres, pivoting friction
+!>   impulse       (lanes, nc, blocks): (n[, t[, s]]) [N s], compression positive; with rolling the moment on i over R*: about
+!>                 the axis of disks, (t, s, n) of spheres [N s]
 !> What is left of the last block is filled with contacts of no effect: all zero, between the first body and itself.
 !> The first n_grouped contacts make whole blocks in which no two contacts share a moving body (gravier_sweep_order): these
 !> are relaxed `lanes` at a time. A body is
@@ -16,20 +18,27 @@
 !>
 !> Local operators are taken diagonal, which they are between bodies of equal components. With a body whose components
 !> differ, W_nn is the exact one, and W_tt the largest eigenvalue of the tangential block: a relaxation with these two
-!> lowers the energy of the contact whatever the entries off the diagonal, and its fixed points are the same.
+!> lowers the energy of the contact whatever the entries off the diagonal, and its fixed points are the same. What couples
+!> sliding and rolling, W_tr, is not zero but between grains of equal inverse inertia times radius: the rolling law is solved
+!> after the tangential one, with the spins that this one leaves (Acary & Bourrier 2021 state the law as a cone complementarity).
 module gravier_contact_kernels
   use gravier_kinds, only: dp
+  use gravier_effects, only: effects_t
   implicit none
   private
-  public :: kernels_t, contact_jacobian, global_impulse, tangents, local_operator
+  public :: kernels_t, contact_jacobian, global_impulse, global_moment, tangents, local_operator
   public :: lanes, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors, project_on_cones
+  public :: moment_vectors, project_moments, rolling_radius
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
 
-  ! rows of `hot` that hold 1/W_nn and 1/W_tt
+  ! rows of `hot` that hold 1/W_nn, 1/W_tt and 1/W_rr
   integer, parameter :: operators_2d_frictionless(1) = [4], operators_3d_frictionless(1) = [5]
   integer, parameter :: operators_2d_friction(2) = [4, 5], operators_3d_friction(2) = [5, 6]
+  integer, parameter :: operators_2d_friction_shift(2) = [4, 5], operators_3d_friction_shift(2) = [5, 6]
+  integer, parameter :: operators_2d_friction_roll(3) = [4, 5, 10], operators_3d_friction_roll(3) = [5, 6, 11]
+  integer, parameter :: operators_2d_friction_full(3) = [4, 5, 11], operators_3d_friction_full(3) = [5, 6, 13]
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
@@ -118,8 +127,12 @@ module gravier_contact_kernels
   end interface
 
   type :: kernels_t
-    !> space dimension, degrees of freedom of a body, rows of `weight`, components of an impulse, rows of `hot`
-    integer :: nd = 2, nv = 2, nw = 2, nc = 1, nh = 4
+    !> space dimension, degrees of freedom of a body, rows of `weight`, components of an impulse, those of them that are a
+    !> force's (the first ones; the others are moments), rows of `hot`
+    integer :: nd = 2, nv = 2, nw = 2, nc = 1, nf = 1, nh = 4
+    !> row of `hot` that holds mu, and the rows before the tangential shift and before those of the rolling law; 0 where the
+    !> kernels have no such effect
+    integer :: friction_row = 0, shift_row = 0, rolling_row = 0
     procedure(sweep_kernel), pointer, nopass :: sweep => null()
     procedure(recording_kernel), pointer, nopass :: sweep_recording => null()
     procedure(momentum_kernel), pointer, nopass :: sweep_momentum => null()
@@ -135,57 +148,92 @@ module gravier_contact_kernels
 contains
 
   !> Choose the loops for a dimension and the effects that the scene has.
-  subroutine kernels_choose(self, dimension, friction)
+  subroutine kernels_choose(self, dimension, effects)
     class(kernels_t), intent(inout) :: self
     !> 2 or 3
     integer, intent(in) :: dimension
-    !> some contact has mu > 0; without, no contact turns a grain and spins are none of its unknowns
-    logical, intent(in) :: friction
+    !> without friction no contact turns a grain, spins are none of its unknowns, and the other two effects have no meaning
+    type(effects_t), intent(in) :: effects
 
     self%nd = dimension
+    self%nf = merge(dimension, 1, effects%friction)
     self%nv = dimension
-    if (friction) self%nv = merge(3, 6, dimension == 2)
-    self%nw = dimension + merge(1, 0, friction)
-    self%nc = merge(dimension, 1, friction)
-    self%nh = dimension + merge(6, 2, friction)
-    if (friction .and. dimension == 2) then
-      self%sweep => sweep_2d_friction
-      self%sweep_recording => sweep_2d_friction_recording
-      self%sweep_momentum => sweep_2d_friction_momentum
-      self%sweep_momentum_recording => sweep_2d_friction_momentum_recording
-      self%add_reaction => add_reaction_2d_friction
-      self%contact_velocity => contact_velocity_2d_friction
-      self%set_operators => set_operators_2d_friction
-      self%residual => residual_2d_friction
-    else if (friction) then
-      self%sweep => sweep_3d_friction
-      self%sweep_recording => sweep_3d_friction_recording
-      self%sweep_momentum => sweep_3d_friction_momentum
-      self%sweep_momentum_recording => sweep_3d_friction_momentum_recording
-      self%add_reaction => add_reaction_3d_friction
-      self%contact_velocity => contact_velocity_3d_friction
-      self%set_operators => set_operators_3d_friction
-      self%residual => residual_3d_friction
-    else if (dimension == 2) then
-      self%sweep => sweep_2d_frictionless
-      self%sweep_recording => sweep_2d_frictionless_recording
-      self%sweep_momentum => sweep_2d_frictionless_momentum
-      self%sweep_momentum_recording => sweep_2d_frictionless_momentum_recording
-      self%add_reaction => add_reaction_2d_frictionless
-      self%contact_velocity => contact_velocity_2d_frictionless
-      self%set_operators => set_operators_2d_frictionless
-      self%residual => residual_2d_frictionless
+    if (effects%friction) self%nv = 3*dimension - 3
+    self%nw = dimension + merge(1, 0, effects%friction)
+    self%nc = self%nf
+    self%nh = dimension + merge(6, 2, effects%friction)
+    self%friction_row = merge(self%nh, 0, effects%friction)
+    self%shift_row = 0
+    self%rolling_row = 0
+    if (effects%friction .and. effects%tangential_restitution) then
+      self%shift_row = self%nh
+      self%nh = self%nh + dimension - 1
+    end if
+    if (effects%friction .and. effects%rolling) then
+      self%rolling_row = self%nh
+      self%nh = self%nh + dimension + 1
+      self%nc = self%nc + 2*dimension - 3
+    end if
+    if (dimension == 2) then
+      call choose_2d(self, effects)
     else
-      self%sweep => sweep_3d_frictionless
-      self%sweep_recording => sweep_3d_frictionless_recording
-      self%sweep_momentum => sweep_3d_frictionless_momentum
-      self%sweep_momentum_recording => sweep_3d_frictionless_momentum_recording
-      self%add_reaction => add_reaction_3d_frictionless
-      self%contact_velocity => contact_velocity_3d_frictionless
-      self%set_operators => set_operators_3d_frictionless
-      self%residual => residual_3d_frictionless
+      call choose_3d(self, effects)
     end if
   end subroutine kernels_choose
+
+  subroutine choose_2d(self, effects)
+    class(kernels_t), intent(inout) :: self
+    type(effects_t), intent(in) :: effects
+
+    if (.not. effects%friction) then
+#define OF(name) name/**/_2d_frictionless
+#include "contact_choice.inc"
+#undef OF
+    else if (effects%rolling .and. effects%tangential_restitution) then
+#define OF(name) name/**/_2d_friction_full
+#include "contact_choice.inc"
+#undef OF
+    else if (effects%rolling) then
+#define OF(name) name/**/_2d_friction_roll
+#include "contact_choice.inc"
+#undef OF
+    else if (effects%tangential_restitution) then
+#define OF(name) name/**/_2d_friction_shift
+#include "contact_choice.inc"
+#undef OF
+    else
+#define OF(name) name/**/_2d_friction
+#include "contact_choice.inc"
+#undef OF
+    end if
+  end subroutine choose_2d
+
+  subroutine choose_3d(self, effects)
+    class(kernels_t), intent(inout) :: self
+    type(effects_t), intent(in) :: effects
+
+    if (.not. effects%friction) then
+#define OF(name) name/**/_3d_frictionless
+#include "contact_choice.inc"
+#undef OF
+    else if (effects%rolling .and. effects%tangential_restitution) then
+#define OF(name) name/**/_3d_friction_full
+#include "contact_choice.inc"
+#undef OF
+    else if (effects%rolling) then
+#define OF(name) name/**/_3d_friction_roll
+#include "contact_choice.inc"
+#undef OF
+    else if (effects%tangential_restitution) then
+#define OF(name) name/**/_3d_friction_shift
+#include "contact_choice.inc"
+#undef OF
+    else
+#define OF(name) name/**/_3d_friction
+#include "contact_choice.inc"
+#undef OF
+    end if
+  end subroutine choose_3d
 
 #define LAW
 #define RELAX(name) name/**/_blocks
@@ -352,14 +400,32 @@ contains
     r(:) = impulse(lane_of(c), :, block_of(c))
     n(:) = hot(lane_of(c), 1:kernels%nd, block_of(c))
     p(:) = r(1)*n
-    if (kernels%nc == 2) then
+    if (kernels%nf == 2) then
       p(1) = p(1) - r(2)*n(2)
       p(2) = p(2) + r(2)*n(1)
-    else if (kernels%nc == 3) then
+    else if (kernels%nf == 3) then
       call contact_tangents(hot, c, t, s)
       p(:) = p + r(2)*t + r(3)*s
     end if
   end subroutine global_impulse
+
+  !> The moment of contact `c` on its candidate, of kernels with rolling [N m s].
+  pure subroutine global_moment(kernels, hot, impulse, c, m)
+    type(kernels_t), intent(in) :: kernels
+    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :)
+    integer, intent(in) :: c
+    !> (nv - nd)
+    real(dp), intent(out) :: m(:)
+    real(dp) :: r(kernels%nc), t(3), s(3)
+
+    r(:) = hot(lane_of(c), kernels%rolling_row + 1, block_of(c))*impulse(lane_of(c), :, block_of(c))
+    if (kernels%nd == 2) then
+      m(1) = r(3)
+    else
+      call contact_tangents(hot, c, t, s)
+      m(:) = r(4)*t + r(5)*s + r(6)*hot(lane_of(c), 1:3, block_of(c))
+    end if
+  end subroutine global_moment
 
   !> Unit vectors t and s of contact `c` of spheres.
   pure subroutine contact_tangents(hot, c, t, s)
@@ -402,24 +468,77 @@ contains
     end do
   end subroutine tangential_vectors
 
-  !> Bring impulses into Coulomb's cones: r_n >= 0, |r_t| <= mu r_n.
+  !> The moments of the impulses of a block of spheres, over R*, as vectors in global axes.
+  pure subroutine moment_vectors(hot, impulse, vector)
+    real(dp), intent(in) :: hot(lanes, 3), impulse(lanes, 6)
+    real(dp), intent(out) :: vector(lanes, 3)
+    real(dp) :: tx, ty, tz, sx, sy, sz
+    integer :: q
+
+    do q = 1, lanes
+      call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
+      vector(q, 1) = impulse(q, 4)*tx + impulse(q, 5)*sx + impulse(q, 6)*hot(q, 1)
+      vector(q, 2) = impulse(q, 4)*ty + impulse(q, 5)*sy + impulse(q, 6)*hot(q, 2)
+      vector(q, 3) = impulse(q, 4)*tz + impulse(q, 5)*sz + impulse(q, 6)*hot(q, 3)
+    end do
+  end subroutine moment_vectors
+
+  !> The inverse.
+  pure subroutine project_moments(hot, vector, impulse)
+    real(dp), intent(in) :: hot(lanes, 3), vector(lanes, 3)
+    !> its other parts are left
+    real(dp), intent(inout) :: impulse(lanes, 6)
+    real(dp) :: tx, ty, tz, sx, sy, sz
+    integer :: q
+
+    do q = 1, lanes
+      call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
+      impulse(q, 4) = vector(q, 1)*tx + vector(q, 2)*ty + vector(q, 3)*tz
+      impulse(q, 5) = vector(q, 1)*sx + vector(q, 2)*sy + vector(q, 3)*sz
+      impulse(q, 6) = vector(q, 1)*hot(q, 1) + vector(q, 2)*hot(q, 2) + vector(q, 3)*hot(q, 3)
+    end do
+  end subroutine project_moments
+
+  !> R* = R_i R_j/(R_i + R_j) of two levers [m]; of one where the other is 0, a boundary's.
+  pure real(dp) function rolling_radius(lever_i, lever_j) result(radius)
+    real(dp), intent(in) :: lever_i, lever_j
+
+    radius = max(lever_i, lever_j)
+    if (min(lever_i, lever_j) > 0.0_dp) radius = lever_i*lever_j/(lever_i + lever_j)
+  end function rolling_radius
+
+  !> Bring impulses into the cones of the laws: r_n >= 0, |r_t| <= mu r_n, and the moments in theirs.
   pure subroutine project_on_cones(kernels, n_contacts, hot, impulse)
     type(kernels_t), intent(in) :: kernels
     integer, intent(in) :: n_contacts
     real(dp), intent(in), contiguous :: hot(:, :, :)
     real(dp), intent(inout), contiguous :: impulse(:, :, :)
-    real(dp) :: bound, tangential
-    integer :: c, q, g
+    integer :: c, q, g, nd
 
+    nd = kernels%nd
     impulse(:, 1, :) = max(0.0_dp, impulse(:, 1, :))
     if (kernels%nc == 1) return
     do c = 1, n_contacts
       q = lane_of(c)
       g = block_of(c)
-      bound = hot(q, kernels%nh, g)*impulse(q, 1, g)
-      tangential = norm2(impulse(q, 2:, g))
-      if (tangential > bound) impulse(q, 2:, g) = impulse(q, 2:, g)*(bound/tangential)
+      call cut(hot(q, kernels%friction_row, g)*impulse(q, 1, g), impulse(q, 2:nd, g))
+      if (kernels%rolling_row == 0) cycle
+      call cut(hot(q, kernels%rolling_row + 3, g)*impulse(q, 1, g), impulse(q, nd + 1:2*nd - 1, g))
+      if (nd == 3) call cut(hot(q, kernels%rolling_row + 4, g)*impulse(q, 1, g), impulse(q, 6:6, g))
     end do
+
+  contains
+
+    !> Bring a part of an impulse into the disc of a radius.
+    pure subroutine cut(radius, part)
+      real(dp), intent(in) :: radius
+      real(dp), intent(inout) :: part(:)
+      real(dp) :: length
+
+      length = norm2(part)
+      if (length > radius) part(:) = part*(radius/length)
+    end subroutine cut
+
   end subroutine project_on_cones
 
   !> Rows of H^T of contact `c`: v = candidate . V_i + antagonist . V_j.
@@ -429,21 +548,25 @@ contains
     integer, intent(in) :: c
     !> (nc, nv)
     real(dp), intent(out) :: candidate(:, :), antagonist(:, :)
-    real(dp) :: column(kernels%nh), t(3), s(3)
+    real(dp) :: column(kernels%nh), t(3), s(3), radius
     integer :: nd, nc
 
     nd = kernels%nd
     nc = kernels%nc
+    radius = 0.0_dp
+    if (kernels%rolling_row > 0) radius = hot(lane_of(c), kernels%rolling_row + 1, block_of(c))
     column(:) = hot(lane_of(c), :, block_of(c))
     candidate(:, :) = 0.0_dp
     candidate(1, 1:nd) = column(1:nd)
     antagonist(:, :) = 0.0_dp
-    if (nc == 2) then
+    if (kernels%nf == 2) then
       candidate(2, 1) = -column(2)
       candidate(2, 2) = column(1)
       candidate(2, 3) = -column(6)
       antagonist(2, 3) = -column(7)
-    else if (nc == 3) then
+      if (nc > 2) candidate(3, 3) = radius
+      if (nc > 2) antagonist(3, 3) = -radius
+    else if (kernels%nf == 3) then
       call contact_tangents(hot, c, t, s)
       candidate(2, 1:3) = t
       candidate(3, 1:3) = s
@@ -451,6 +574,12 @@ contains
       candidate(3, 4:6) = column(7)*t
       antagonist(2, 4:6) = -column(8)*s
       antagonist(3, 4:6) = column(8)*t
+      if (nc > 3) then
+        candidate(4, 4:6) = radius*t
+        candidate(5, 4:6) = radius*s
+        candidate(6, 4:6) = radius*column(1:3)
+        antagonist(4:6, 4:6) = -candidate(4:6, 4:6)
+      end if
     end if
     antagonist(:, 1:nd) = -candidate(:, 1:nd)
   end subroutine contact_jacobian
@@ -467,8 +596,26 @@ contains
 #define OF(name) name/**/_3d_friction
 #include "contact_loops.inc"
 #undef OF
+#define OF(name) name/**/_2d_friction_shift
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_3d_friction_shift
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_2d_friction_roll
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_3d_friction_roll
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_2d_friction_full
+#include "contact_loops.inc"
+#undef OF
+#define OF(name) name/**/_3d_friction_full
+#include "contact_loops.inc"
+#undef OF
 
-  ! What the loops of contact_loops.inc do with one block, with the shapes of each law.
+  ! What the loops of contact_loops.inc do with one block, with the shapes of each law; those with friction are at the end.
 
   pure subroutine react_2d_frictionless(pair, hot, impulse, reaction)
     integer, intent(in) :: pair(2, lanes)
@@ -511,65 +658,6 @@ contains
     end do
   end subroutine react_3d_frictionless
 
-  pure subroutine react_2d_friction(pair, hot, impulse, reaction)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 8), impulse(lanes, 2)
-    real(dp), intent(inout) :: reaction(3, *)
-    integer :: q, i, j
-    real(dp) :: px(lanes), py(lanes)
-
-    px(:) = impulse(:, 1)*hot(:, 1) - impulse(:, 2)*hot(:, 2)
-    py(:) = impulse(:, 1)*hot(:, 2) + impulse(:, 2)*hot(:, 1)
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      reaction(1, i) = reaction(1, i) + px(q)
-      reaction(2, i) = reaction(2, i) + py(q)
-      reaction(3, i) = reaction(3, i) - hot(q, 6)*impulse(q, 2)
-      reaction(1, j) = reaction(1, j) - px(q)
-      reaction(2, j) = reaction(2, j) - py(q)
-      reaction(3, j) = reaction(3, j) - hot(q, 7)*impulse(q, 2)
-    end do
-  end subroutine react_2d_friction
-
-  pure subroutine react_3d_friction(pair, hot, impulse, reaction)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 9), impulse(lanes, 3)
-    real(dp), intent(inout) :: reaction(6, *)
-    integer :: q, i, j
-    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz
-    real(dp), dimension(lanes) :: px, py, pz, qx, qy, qz
-
-    do q = 1, lanes
-      nx = hot(q, 1)
-      ny = hot(q, 2)
-      nz = hot(q, 3)
-      call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
-      px(q) = impulse(q, 1)*nx + impulse(q, 2)*tx + impulse(q, 3)*sx
-      py(q) = impulse(q, 1)*ny + impulse(q, 2)*ty + impulse(q, 3)*sy
-      pz(q) = impulse(q, 1)*nz + impulse(q, 2)*tz + impulse(q, 3)*sz
-      qx(q) = impulse(q, 2)*sx - impulse(q, 3)*tx
-      qy(q) = impulse(q, 2)*sy - impulse(q, 3)*ty
-      qz(q) = impulse(q, 2)*sz - impulse(q, 3)*tz
-    end do
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      reaction(1, i) = reaction(1, i) + px(q)
-      reaction(2, i) = reaction(2, i) + py(q)
-      reaction(3, i) = reaction(3, i) + pz(q)
-      reaction(4, i) = reaction(4, i) - hot(q, 7)*qx(q)
-      reaction(5, i) = reaction(5, i) - hot(q, 7)*qy(q)
-      reaction(6, i) = reaction(6, i) - hot(q, 7)*qz(q)
-      reaction(1, j) = reaction(1, j) - px(q)
-      reaction(2, j) = reaction(2, j) - py(q)
-      reaction(3, j) = reaction(3, j) - pz(q)
-      reaction(4, j) = reaction(4, j) - hot(q, 8)*qx(q)
-      reaction(5, j) = reaction(5, j) - hot(q, 8)*qy(q)
-      reaction(6, j) = reaction(6, j) - hot(q, 8)*qz(q)
-    end do
-  end subroutine react_3d_friction
-
   pure subroutine velocity_2d_frictionless(pair, hot, velocity, v)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 4), velocity(2, *)
@@ -597,51 +685,6 @@ contains
     end do
   end subroutine velocity_3d_frictionless
 
-  pure subroutine velocity_2d_friction(pair, hot, velocity, v)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 8), velocity(3, *)
-    real(dp), intent(out) :: v(lanes, 2)
-    integer :: q, i, j
-    real(dp) :: dx, dy
-
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      dx = velocity(1, i) - velocity(1, j)
-      dy = velocity(2, i) - velocity(2, j)
-      v(q, 1) = dx*hot(q, 1) + dy*hot(q, 2)
-      v(q, 2) = dy*hot(q, 1) - dx*hot(q, 2) - (hot(q, 6)*velocity(3, i) + hot(q, 7)*velocity(3, j))
-    end do
-  end subroutine velocity_2d_friction
-
-  pure subroutine velocity_3d_friction(pair, hot, velocity, v)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 9), velocity(6, *)
-    real(dp), intent(out) :: v(lanes, 3)
-    integer :: q, i, j, d
-    real(dp) :: nx, ny, nz, tx, ty, tz, sx, sy, sz, dv(lanes, 3), spin(lanes, 3)
-
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      do d = 1, 3
-        dv(q, d) = velocity(d, i) - velocity(d, j)
-        spin(q, d) = hot(q, 7)*velocity(3 + d, i) + hot(q, 8)*velocity(3 + d, j)
-      end do
-    end do
-    do q = 1, lanes
-      nx = hot(q, 1)
-      ny = hot(q, 2)
-      nz = hot(q, 3)
-      call find_frame(nx, ny, nz, tx, ty, tz, sx, sy, sz)
-      v(q, 1) = dv(q, 1)*nx + dv(q, 2)*ny + dv(q, 3)*nz
-      v(q, 2) = dv(q, 1)*tx + dv(q, 2)*ty + dv(q, 3)*tz &
-        & - (spin(q, 1)*sx + spin(q, 2)*sy + spin(q, 3)*sz)
-      v(q, 3) = dv(q, 1)*sx + dv(q, 2)*sy + dv(q, 3)*sz &
-        & + (spin(q, 1)*tx + spin(q, 2)*ty + spin(q, 3)*tz)
-    end do
-  end subroutine velocity_3d_friction
-
   ! W_nn and W_tt of a block [1/kg], at least the least positive number: contacts of no effect between bodies that cannot move
   ! have W = 0.
 
@@ -666,45 +709,6 @@ contains
       w(q, 1) = max(normal_3d(hot(q, 2), hot(q, 3), weight(:, pair(1, q)), weight(:, pair(2, q))), tiny(1.0_dp))
     end do
   end subroutine weigh_3d_frictionless
-
-  pure subroutine weigh_2d_friction(pair, hot, weight, w)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 8), weight(3, *)
-    real(dp), intent(out) :: w(lanes, 2)
-    integer :: q, i, j
-
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      w(q, 1) = max(normal_2d(hot(q, 2), weight(1:2, i), weight(1:2, j)), tiny(1.0_dp))
-      w(q, 2) = max(tangential_2d(hot(q, 1), weight(1:2, i), weight(1:2, j)) + weight(3, i)*hot(q, 6)**2 &
-        & + weight(3, j)*hot(q, 7)**2, tiny(1.0_dp))
-    end do
-  end subroutine weigh_2d_friction
-
-  pure subroutine weigh_3d_friction(pair, hot, weight, w)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 9), weight(4, *)
-    real(dp), intent(out) :: w(lanes, 2)
-    integer :: q, i, j
-    real(dp) :: tx, ty, tz, sx, sy, sz, sum_w, y, z, tt, ss, ts
-
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      call find_frame(hot(q, 1), hot(q, 2), hot(q, 3), tx, ty, tz, sx, sy, sz)
-      ! as normal_3d and tangential_3d, written out: arrays of three would keep the lanes from becoming vectors
-      sum_w = weight(1, i) + weight(1, j)
-      y = (weight(2, i) - weight(1, i)) + (weight(2, j) - weight(1, j))
-      z = (weight(3, i) - weight(1, i)) + (weight(3, j) - weight(1, j))
-      tt = ty**2*y + tz**2*z
-      ss = sy**2*y + sz**2*z
-      ts = ty*sy*y + tz*sz*z
-      w(q, 1) = max(sum_w + (hot(q, 2)**2*y + hot(q, 3)**2*z), tiny(1.0_dp))
-      w(q, 2) = max(sum_w + (0.5_dp*(tt + ss) + sqrt((0.5_dp*(tt - ss))**2 + ts**2)) + weight(4, i)*hot(q, 7)**2 &
-        & + weight(4, j)*hot(q, 8)**2, tiny(1.0_dp))
-    end do
-  end subroutine weigh_3d_friction
 
   ! |r - P|^2 and |r|^2 added lane by lane.
 
@@ -740,41 +744,13 @@ contains
     end do
   end subroutine defect_3d_frictionless
 
-  pure subroutine defect_2d_friction(pair, hot, weight, velocity, impulse, parts)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 8), weight(3, *), velocity(3, *), impulse(lanes, 2)
-    real(dp), intent(inout) :: parts(lanes, 2)
-    integer :: q
-    real(dp) :: v(lanes, 2), w(lanes, 2), rn, rt
-
-    call velocity_2d_friction(pair, hot, velocity, v)
-    call weigh_2d_friction(pair, hot, weight, w)
-    do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/w(q, 1))
-      rt = max(-hot(q, 8)*rn, min(hot(q, 8)*rn, impulse(q, 2) - v(q, 2)/w(q, 2)))
-      parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2 + (rt - impulse(q, 2))**2
-      parts(q, 2) = parts(q, 2) + impulse(q, 1)**2 + impulse(q, 2)**2
-    end do
-  end subroutine defect_2d_friction
-
-  pure subroutine defect_3d_friction(pair, hot, weight, velocity, impulse, parts)
-    integer, intent(in) :: pair(2, lanes)
-    real(dp), intent(in) :: hot(lanes, 9), weight(4, *), velocity(6, *), impulse(lanes, 3)
-    real(dp), intent(inout) :: parts(lanes, 2)
-    integer :: q
-    real(dp) :: v(lanes, 3), w(lanes, 2), rn, rt, rs, bound, reduction
-
-    call velocity_3d_friction(pair, hot, velocity, v)
-    call weigh_3d_friction(pair, hot, weight, w)
-    do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/w(q, 1))
-      bound = hot(q, 9)*rn
-      rt = impulse(q, 2) - v(q, 2)/w(q, 2)
-      rs = impulse(q, 3) - v(q, 3)/w(q, 2)
-      reduction = bound/max(sqrt(rt*rt + rs*rs), bound, tiny(1.0_dp))
-      parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2 + (rt*reduction - impulse(q, 2))**2 + (rs*reduction - impulse(q, 3))**2
-      parts(q, 2) = parts(q, 2) + impulse(q, 1)**2 + impulse(q, 2)**2 + impulse(q, 3)**2
-    end do
-  end subroutine defect_3d_friction
+#include "contact_friction_blocks.inc"
+#define SHIFTED
+#include "contact_friction_blocks.inc"
+#define ROLLING
+#include "contact_friction_blocks.inc"
+#undef SHIFTED
+#include "contact_friction_blocks.inc"
+#undef ROLLING
 
 end module gravier_contact_kernels

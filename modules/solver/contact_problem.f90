@@ -5,7 +5,7 @@ module gravier_contact_problem
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_contact_kernels, only: kernels_t, local_operator, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, local_operator, lanes, n_blocks, lane_of, block_of
   implicit none
   private
   public :: subproblem_t, contact_problem_t
@@ -21,6 +21,8 @@ module gravier_contact_problem
     integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
     !> contacts in whole blocks without common bodies: the first ones
     integer :: n_grouped = 0
+    !> contacts that sweeps take, the first ones: all, or whole blocks where contacts that sleep follow
+    integer :: n_swept = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
@@ -75,13 +77,18 @@ module gravier_contact_problem
     !> their sums over all subdomains, once `sum_progress` was called; whoever changes `progress` clears the mark
     real(dp) :: progress_sums(2) = 0.0_dp
     logical :: progress_is_summed = .false.
-    !> contacts of the scene
-    integer(i8) :: n_contacts = 0
+    !> contacts of the scene, and those of them that sleep: no sweep takes them, their impulses stay
+    integer(i8) :: n_contacts = 0, n_asleep = 0
+    !> root mean square of the impulses, by the last `residual` [N s]
+    real(dp) :: impulse_scale = 0.0_dp
+    !> share of the squared defect that lies in contacts that sleep, by the last `residual`
+    real(dp) :: asleep_share = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
+    procedure :: wake => contact_problem_wake
     procedure :: sum_progress => contact_problem_sum_progress
     procedure :: jump => contact_problem_jump
     procedure :: received_jump => contact_problem_received_jump
@@ -111,13 +118,11 @@ contains
   pure subroutine subproblem_update_local_operator(self, kernels)
     class(subproblem_t), intent(inout) :: self
     type(kernels_t), intent(in) :: kernels
-    integer :: nd
 
     if (self%n_contacts == 0) return
     call kernels%set_operators(self%pair, self%hot, self%weight)
     ! contacts of no effect are all zero
-    nd = kernels%nd
-    self%hot(lane_of(self%n_contacts) + 1:, nd + 2:nd + min(kernels%nc, 2) + 1, block_of(self%n_contacts)) = 0.0_dp
+    self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
   end subroutine subproblem_update_local_operator
 
   !> W_nn and W_tt of contact `c` [1/kg], see gravier_contact_kernels; W_tt = W_nn without friction.
@@ -221,24 +226,31 @@ contains
     !> the same, not divided by the norm of the impulses [N s]
     real(dp), intent(out) :: defect
     real(dp), allocatable :: parts(:, :)
-    real(dp) :: sums(2)
+    real(dp) :: all_sums(merge(4, 2, self%n_asleep > 0)), sums(2)
     integer :: s
 
-    allocate (parts(2, size(self%sub)))
+    allocate (parts(merge(4, 2, self%n_asleep > 0), size(self%sub)), source=0.0_dp)
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s))
-        call self%kernels%residual(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, parts(:, s))
+      associate (sub => self%sub(s), g => n_blocks(self%sub(s)%n_swept))
+        call self%kernels%residual(sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%inverse_mass, sub%v_global, &
+          & sub%impulse(:, :, 1:g), parts(1:2, s))
+        if (sub%n_swept < sub%n_contacts) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
+          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(3:4, s))
       end associate
     end do
     call start_timer(phase_reduction)
-    call self%comm%sum_parts(parts, sums)
+    call self%comm%sum_parts(parts, all_sums)
     call stop_timer(phase_reduction)
+    sums(:) = all_sums(1:2)
+    if (self%n_asleep > 0) sums(:) = sums + all_sums(3:4)
     if (.not. all(ieee_is_finite(sums))) then
       residual = ieee_value(residual, ieee_quiet_nan)
       defect = residual
       return
     end if
+    if (self%n_asleep > 0) self%asleep_share = all_sums(3)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
+    self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
     if (defect <= rounding*self%force_scale*sqrt(real(self%n_contacts, dp))) then
       ! velocities are not known better; where impulses vanish, as in a group that flies on after a shock, no iteration
       ! would bring the defect below a part of them
@@ -251,6 +263,18 @@ contains
       residual = 0.0_dp
     end if
   end subroutine contact_problem_residual
+
+  !> Let sweeps take all contacts for the rest of the solve.
+  subroutine contact_problem_wake(self)
+    class(contact_problem_t), intent(inout) :: self
+    integer :: s
+
+    do s = 1, size(self%sub)
+      self%sub(s)%n_swept = self%sub(s)%n_contacts
+    end do
+    self%n_asleep = 0
+    self%asleep_share = 0.0_dp
+  end subroutine contact_problem_wake
 
   !> Sums of `progress` over all subdomains of the scene, for momentum, checks and safeguards: one reduction an iteration at
   !> most. Collective.

@@ -78,10 +78,12 @@ contains
     do c = 1, sub%n_contacts
       q = lane_of(c)
       g = block_of(c)
-      if (nc > 1) mu = sub%hot(q, kernels%nh, g)
+      if (nc > 1) mu = sub%hot(q, kernels%friction_row, g)
       x(1:nc) = (1.0_dp - a)*sub%impulse(q, :, g) + a*self%centre(q, :, g)
       x(1) = x(1) - self%softness(1, c)/b*(v(q, 1, g) + sub%hot(q, kernels%nd + 1, g))
       x(2:nc) = x(2:nc) - self%softness(2, c)/b*v(q, 2:, g)
+      if (kernels%shift_row > 0) x(2:nc) = x(2:nc) &
+        & - self%softness(2, c)/b*sub%hot(q, kernels%shift_row + 1:kernels%shift_row + nc - 1, g)
       if (x(1) <= 0.0_dp) then
         self%state(c) = is_open
         x(1:nc) = 0.0_dp
@@ -134,7 +136,7 @@ contains
         end do
       case (slides)
         ! across the sliding, D keeps a part and the inverse is 1/(1 - (1 - a) kept); along it D keeps nothing
-        mu = sub%hot(q, kernels%nh, g)
+        mu = sub%hot(q, kernels%friction_row, g)
         e(:) = self%along(:, c)
         across = 1.0_dp/((1.0_dp - self%kept(c)) + a*self%kept(c))
         self%offset(q, 1, g) = -f(1)/a

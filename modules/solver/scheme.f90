@@ -4,6 +4,7 @@ module gravier_scheme
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
   use gravier_communicator, only: communicator_t
+  use gravier_contact_kernels, only: lanes, n_blocks
   use gravier_contact_problem, only: contact_problem_t
   implicit none
   private
@@ -163,7 +164,8 @@ contains
     if (allocated(self%seconds)) deallocate (self%seconds)
   end subroutine scheme_forget_times
 
-  !> Masses as the method wants them, and velocities that agree with the impulses in all copies, v_global too. Collective.
+  !> Masses as the method wants them, and reactions and velocities that agree with the impulses in all copies, v_global too.
+  !> Collective.
   subroutine start_sweeps(scheme, problem, shared_masses)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
@@ -175,6 +177,7 @@ contains
       call problem%evaluate()
     else
       do s = 1, size(problem%sub)
+        problem%sub(s)%reaction(:, :) = 0.0_dp
         problem%sub(s)%v_global(:, :) = problem%sub(s)%v_free
       end do
     end if
@@ -289,24 +292,26 @@ contains
     real(dp) :: sums(2), start
 
     start = clock()
-    associate (sub => problem%sub(s), kernels => problem%kernels)
+    associate (sub => problem%sub(s), kernels => problem%kernels, g => n_blocks(problem%sub(s)%n_swept))
       if (scheme%momentum%on .and. k == 1) then
         associate (part => scheme%momentum%part(s), beta => scheme%momentum%beta)
           if (present(law_velocity)) then
-            call kernels%sweep_momentum_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
-              & beta, part%impulse, law_velocity)
+            call kernels%sweep_momentum_recording(sub%n_grouped, sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%weight, &
+              & sub%velocity, sub%impulse(:, :, 1:g), sums, beta, part%impulse(:, :, 1:g), law_velocity(:, :, 1:g))
           else
-            call kernels%sweep_momentum(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
-              & beta, part%impulse)
+            call kernels%sweep_momentum(sub%n_grouped, sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%weight, sub%velocity, &
+              & sub%impulse(:, :, 1:g), sums, beta, part%impulse(:, :, 1:g))
           end if
         end associate
       else if (present(law_velocity)) then
-        call kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, law_velocity)
+        call kernels%sweep_recording(sub%n_grouped, sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%weight, sub%velocity, &
+          & sub%impulse(:, :, 1:g), sums, law_velocity(:, :, 1:g))
       else
-        call kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
+        call kernels%sweep(sub%n_grouped, sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%weight, sub%velocity, &
+          & sub%impulse(:, :, 1:g), sums)
       end if
       if (k == 1) problem%progress(:, s) = sums
-      scheme%work%relaxations = scheme%work%relaxations + sub%n_contacts
+      scheme%work%relaxations = scheme%work%relaxations + sub%n_swept
     end associate
     scheme%seconds(s) = scheme%seconds(s) + clock() - start
   end subroutine sweep_once

@@ -52,6 +52,8 @@ module gravier_solve
     integer :: status = solve_exhausted
     integer :: iterations = 0
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
+    !> the contacts that slept were woken
+    logical :: woken = .false.
     !> relative error on the impulses, negative where no exact solution is known
     real(dp) :: error = -1.0_dp
     !> what the tolerance is compared with at the end: residual or error
@@ -146,9 +148,20 @@ contains
       if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, control%tolerance)
       if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%residual/progress
       call judge(defect, finished)
+      if (.not. finished .and. problem%n_asleep > 0) call wake_if_due()
       checking = checking + clock() - start
       call stop_timer(phase_check)
     end subroutine check
+
+    !> Where most of the defect lies in contacts that sleep, no sweep would lower it: they wake. Else the other contacts'
+    !> part has to fall first, and may do.
+    subroutine wake_if_due()
+      if (problem%asleep_share < 0.5_dp) return
+      call problem%wake()
+      report%woken = .true.
+      ! changes of all contacts are other changes
+      ratio = 0.0_dp
+    end subroutine wake_if_due
 
     subroutine judge(defect, finished)
       real(dp), intent(in) :: defect

@@ -1,6 +1,7 @@
 !> A plate that is free along one axis only, shared between subdomains and pushed by grains: all methods find the same
 !> velocities, and no component of inverse mass zero moves or stops a run.
 module free_plate
+  use gravier_effects, only: effects_t
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
@@ -39,7 +40,7 @@ contains
     integer :: s, first, last
 
     problem%comm => over
-    call problem%kernels%choose(dimension, friction > 0.0_dp)
+    call problem%kernels%choose(dimension, effects_t(friction=friction > 0.0_dp))
     problem%n_subdomains = n_subdomains
     first = over%first_subdomain(over%rank, n_subdomains)
     last = over%first_subdomain(over%rank + 1, n_subdomains) - 1

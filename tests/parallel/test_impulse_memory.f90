@@ -1,6 +1,7 @@
 !> Impulses from one step to the next: contacts that persist start from what they had, in whatever subdomain they are now.
 !> In scenes, all grains fly at one velocity, so that pairs persist while they cross subdomains.
 program test_impulse_memory
+  use gravier_effects, only: effects_t
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
@@ -322,7 +323,7 @@ contains
     call cloud%init(3, 220, 0.03_dp, 0.1_dp, 91)
     decomposition%rule = cloud%rule(0.02_dp, 0.04_dp, rule_dual)
     call make_decomposition(comm, cloud, 5, 6, .false., decomposition)
-    call kernels%choose(3, .true.)
+    call kernels%choose(3, effects_t(friction=.true.))
     call check_equal(impulse_entries(kernels), 4, "entries of an impulse in space with friction")
     call seen%build(decomposition, 4)
     call build_problem(decomposition, seen, kernels, physics, problem, figures)

@@ -1,6 +1,7 @@
 !> From grains to the packed contact problem, and back: against the comparison of all pairs, which every rank can make,
 !> places and velocities following from identifiers.
 program test_problem_builder
+  use gravier_effects, only: effects_t
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
@@ -169,7 +170,7 @@ contains
     integer :: s
 
     call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
-    call kernels%choose(nd, friction)
+    call kernels%choose(nd, effects_t(friction=friction))
     physics%gravity(:) = gravity
     physics%friction = 0.25_dp
     physics%h = h
@@ -454,7 +455,7 @@ contains
 
     call make_scene(nd, 0, n_subdomains, .true., rule_dual, .true., decomposition, truth)
     call check_equal(decomposition%nv, 3*nd - 3, "spins: bodies have them")
-    call kernels%choose(nd, .false.)
+    call kernels%choose(nd, effects_t(friction=.false.))
     physics%gravity(:) = gravity
     physics%h = h
     call neighbourhoods%build(decomposition, 4)
@@ -508,7 +509,7 @@ contains
     do s = 1, size(decomposition%home)
       decomposition%home(s)%radius(:) = 1.0e-6_dp
     end do
-    call kernels%choose(2, .false.)
+    call kernels%choose(2, effects_t(friction=.false.))
     physics%gravity(:) = gravity
     physics%h = h
     call neighbourhoods%build(decomposition, 4)
@@ -589,7 +590,7 @@ contains
     integer(i8) :: id
 
     call make_boundary_scene(n_subdomains, 0.0_dp, turning, decomposition)
-    call kernels%choose(2, .true.)
+    call kernels%choose(2, effects_t(friction=.true.))
     physics%friction = 0.1_dp
     physics%h = h
     call neighbourhoods%build(decomposition, 2)
@@ -721,7 +722,7 @@ contains
     type(interface_figures_t) :: figures
 
     call make_boundary_scene(n_subdomains, 0.01_dp, .false., decomposition)
-    call kernels%choose(2, .true.)
+    call kernels%choose(2, effects_t(friction=.true.))
     call neighbourhoods%build(decomposition, 2)
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")

@@ -97,7 +97,8 @@ def anchors(page):
 
 def run(command, directory, path=None):
     """Status and output of a command; a command that is not over in time is ended, with all that it started."""
-    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8"}
+    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8",
+                   "PYTHONPATH": f"{SOURCE / 'drivers/python'}:{os.environ.get('PYTHONPATH', '')}"}
     if path:
         environment["PATH"] = f"{path}:{environment['PATH']}"
     process = subprocess.Popen(command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,

@@ -56,7 +56,7 @@ class Commands(RunTestCase):
             run = gravier("--check", "case.nml", ranks=ranks, directory=directory)
             self.assert_status(run, 0)
             self.assertEqual(run.stderr, "")
-            for expected in ("a few disks", "30 grains, 3 boundaries", "subdomains 3", "2D, friction on", "rotation on", "gravity on",
+            for expected in ("a few disks", "30 grains, 3 boundaries", "subdomains 3", "2D: friction, rotation, gravity", "off         restitution",
                              "contacts", "interface", "multiplicity", "bytes of each item", " a contact, ", "nothing was run", "tolerance = 0.001"):
                 self.assertIn(expected, run.stdout)
             outputs.append([line for line in run.stdout.splitlines()
@@ -70,7 +70,8 @@ class Commands(RunTestCase):
         write(os.path.join(directory, "case.nml"),
               namelist(merged(SPHERES, {"scene": {"friction": 0.0, "gravity": [0.0, 0.0, 0.0]}})))
         run = gravier("--check", "case.nml", directory=directory)
-        for expected in ("3D, friction off", "rotation off", "gravity off", "3 degrees of freedom a grain", "1 unknowns a contact"):
+        for expected in ("3D: nothing", "off         friction, rotation, restitution, ", ", gravity, body force, removal\n", "3 degrees of freedom a grain",
+                         "1 unknowns a contact"):
             self.assertIn(expected, run.stdout)
 
     def test_options_in_force_are_an_input_file(self):

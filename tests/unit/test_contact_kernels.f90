@@ -3,9 +3,10 @@
 program test_contact_kernels
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
+  use gravier_effects, only: effects_t
   use gravier_random_hash, only: hash_uniform
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, global_impulse, tangents, local_operator, lanes, n_blocks, &
-    & lane_of, block_of
+    & lane_of, block_of, rolling_radius
   use gravier_test_contact_columns, only: contact_column, put_contact_column, same_contacts
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -30,23 +31,34 @@ program test_contact_kernels
   !> numbers of size 1 throughout; sums of some ten of them
   real(dp), parameter :: rounding = 1.0e-13_dp
   integer :: dimension, k
-  logical :: friction
+  !> of the scene, and with a law that nothing uses
+  type(effects_t) :: effects, more
 
   call MPI_Init()
   do dimension = 2, 3
-    do k = 1, 2
-      friction = k == 2
-      call test_choice(dimension, friction)
-      call test_adjoint(dimension, friction)
-      call test_velocity(dimension, friction)
-      call test_one_contact(dimension, friction)
-      call test_record(dimension, friction)
-      call test_components(dimension, friction)
-      call test_blocks(dimension, friction)
-      call test_momentum(dimension, friction)
-      call test_plain_loop(dimension, friction)
-      call test_padding(dimension, friction)
+    ! no friction, friction, and with tangential shift, rolling and both
+    do k = 1, 5
+      effects = effects_t(friction=k > 1, tangential_restitution=any(k == [3, 5]), rolling=k > 3)
+      call test_choice(dimension, effects)
+      call test_adjoint(dimension, effects)
+      call test_velocity(dimension, effects)
+      if (.not. effects%rolling) call test_one_contact(dimension, effects)
+      if (effects%rolling) call test_rolling_contact(dimension, effects)
+      call test_record(dimension, effects)
+      call test_components(dimension, effects)
+      call test_blocks(dimension, effects)
+      call test_momentum(dimension, effects)
+      call test_plain_loop(dimension, effects)
+      call test_padding(dimension, effects)
+      if (.not. effects%friction) cycle
+      more = effects
+      more%tangential_restitution = .true.
+      if (.not. effects%tangential_restitution) call test_neutral(dimension, effects, more)
+      more = effects
+      more%rolling = .true.
+      if (.not. effects%rolling) call test_neutral(dimension, effects, more)
     end do
+    call test_neutral(dimension, effects_t(), effects_t(friction=.true.))
     call test_local_operator(dimension)
   end do
   call test_no_contacts()
@@ -63,13 +75,13 @@ contains
   end function draw
 
   !> `n` contacts between random grains, every third on a wall.
-  subroutine make_case(dimension, friction, n, trial, problem)
+  subroutine make_case(dimension, effects, n, trial, problem)
     integer, intent(in) :: dimension, n, trial
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t), intent(out) :: problem
     integer :: c, b, d
 
-    call problem%kernels%choose(dimension, friction)
+    call problem%kernels%choose(dimension, effects)
     associate (kernels => problem%kernels)
       call allocate_contacts(n, problem)
       allocate (problem%weight(kernels%nw, n_columns), problem%velocity(kernels%nv, n_columns))
@@ -77,7 +89,7 @@ contains
       problem%velocity(:, :) = 0.0_dp
       do b = 1, n_grains
         problem%weight(1:dimension, b) = 1.5_dp + draw(trial, b, 1)
-        if (friction) problem%weight(kernels%nw, b) = 2.5_dp + draw(trial, b, 2)
+        if (effects%friction) problem%weight(kernels%nw, b) = 2.5_dp + draw(trial, b, 2)
         do d = 1, kernels%nv
           problem%velocity(d, b) = draw(trial, b, 2 + d)
         end do
@@ -138,34 +150,51 @@ contains
       do d = 2, nd
         impulse(d) = draw(trial, c, 18 + d)
       end do
+      do d = 1, merge(nd - 1, 0, problem%kernels%shift_row > 0)
+        hot(problem%kernels%shift_row + d) = 0.5_dp*draw(trial, c, 21 + d)
+      end do
+      if (problem%kernels%rolling_row > 0) then
+        associate (row => problem%kernels%rolling_row, nw => problem%kernels%nw)
+          hot(row + 1) = rolling_radius(hot(nd + 4), hot(nd + 5))
+          hot(row + 2) = 1.0_dp/(hot(row + 1)**2*(problem%weight(nw, i) + problem%weight(nw, j)))
+          do d = 3, nd + 1
+            hot(row + d) = 0.3_dp + 0.3_dp*draw(trial, c, 21 + d)
+          end do
+        end associate
+        do d = nd + 1, problem%kernels%nc
+          impulse(d) = 0.5_dp*draw(trial, c, 22 + d)
+        end do
+      end if
     end if
     call put_contact_column(hot, c, problem%hot)
     call put_contact_column(impulse, c, problem%impulse)
   end subroutine put_contact
 
-  subroutine test_choice(dimension, friction)
+  subroutine test_choice(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(kernels_t) :: kernels
 
-    call kernels%choose(dimension, friction)
+    call kernels%choose(dimension, effects)
     call check_equal(kernels%nd, dimension, "space dimension")
-    call check_equal(kernels%nv, merge(3*dimension - 3, dimension, friction), "degrees of freedom")
-    call check_equal(kernels%nw, dimension + merge(1, 0, friction), "rows of weight")
-    call check_equal(kernels%nc, merge(dimension, 1, friction), "components of an impulse")
-    call check_equal(kernels%nh, dimension + merge(6, 2, friction), "rows of hot")
+    call check_equal(kernels%nv, merge(3*dimension - 3, dimension, effects%friction), "degrees of freedom")
+    call check_equal(kernels%nw, dimension + merge(1, 0, effects%friction), "rows of weight")
+    call check_equal(kernels%nf, merge(dimension, 1, effects%friction), "components of a force")
+    call check_equal(kernels%nc, kernels%nf + merge(2*dimension - 3, 0, effects%rolling), "components of an impulse")
+    call check_equal(kernels%nh, dimension + merge(6, 2, effects%friction) + merge(dimension - 1, 0, &
+      & effects%tangential_restitution) + merge(dimension + 1, 0, effects%rolling), "rows of hot")
   end subroutine test_choice
 
   !> (H r) . V = r . (H^T V) for any r and V.
-  subroutine test_adjoint(dimension, friction)
+  subroutine test_adjoint(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: reaction(:, :), contact_velocity(:, :, :)
     integer :: trial
 
     do trial = 1, 20
-      call make_case(dimension, friction, 30, trial, problem)
+      call make_case(dimension, effects, 30, trial, problem)
       allocate (reaction(problem%kernels%nv, n_columns), source=0.25_dp)
       allocate (contact_velocity, mold=problem%impulse)
       contact_velocity(:, :, :) = huge(1.0_dp)
@@ -180,15 +209,15 @@ contains
 
   !> H^T V by the kernel, by the rows of the Jacobian, and by the motion of the two material points that touch:
   !> v = v_i + w_i x (-R_i n) - v_j - w_j x (R_j n), on (n, t, s).
-  subroutine test_velocity(dimension, friction)
+  subroutine test_velocity(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: contact_velocity(:, :, :), candidate(:, :), antagonist(:, :), expected(:), found(:), hot(:)
     integer :: c, k, i, j
     logical :: by_rows, by_points
 
-    call make_case(dimension, friction, 60, 31, problem)
+    call make_case(dimension, effects, 60, 31, problem)
     associate (kernels => problem%kernels)
       allocate (contact_velocity, mold=problem%impulse)
       allocate (candidate(kernels%nc, kernels%nv), antagonist(kernels%nc, kernels%nv))
@@ -226,8 +255,10 @@ contains
     n(1:nd) = hot(1:nd)
     relative(:) = 0.0_dp
     relative(1:nd) = vi(1:nd) - vj(1:nd)
+    spin(:, :) = 0.0_dp
+    t(:) = 0.0_dp
+    s(:) = 0.0_dp
     if (kernels%nc > 1) then
-      spin(:, :) = 0.0_dp
       if (nd == 2) then
         spin(3, 1) = vi(3)
         spin(3, 2) = vj(3)
@@ -239,11 +270,21 @@ contains
       call add_cross(relative, -hot(nd + 5), spin(:, 2), n)
     end if
     v(1) = sum(relative*n)
-    if (kernels%nc == 2) v(2) = relative(2)*n(1) - relative(1)*n(2)
-    if (kernels%nc == 3) then
+    if (kernels%nf == 2) v(2) = relative(2)*n(1) - relative(1)*n(2)
+    if (kernels%nf == 3) then
       call tangents(n, t, s)
       v(2) = sum(relative*t)
       v(3) = sum(relative*s)
+    end if
+    if (kernels%rolling_row == 0) return
+    ! R* times the difference of the spins, of which disks have one
+    spin(:, 1) = hot(kernels%rolling_row + 1)*(spin(:, 1) - spin(:, 2))
+    if (nd == 2) then
+      v(3) = spin(3, 1)
+    else
+      v(4) = sum(spin(:, 1)*t)
+      v(5) = sum(spin(:, 1)*s)
+      v(6) = sum(spin(:, 1)*n)
     end if
   end subroutine point_velocity
 
@@ -258,9 +299,9 @@ contains
 
   !> One relaxation of one contact, from any impulse, ends at the solution of the law with the bodies' masses, which is
   !> unique: what the residual calls P, from any impulse too.
-  subroutine test_one_contact(dimension, friction)
+  subroutine test_one_contact(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :), reaction(:, :)
     real(dp), allocatable, dimension(:, :, :) :: start, v, law_velocity, change
@@ -269,7 +310,7 @@ contains
 
     regimes(:) = 0
     do trial = 1, 300
-      call make_case(dimension, friction, 1, 1000 + trial, problem)
+      call make_case(dimension, effects, 1, 1000 + trial, problem)
       ! every other contact is with a wall
       if (mod(trial, 2) == 0) call put_on_wall(problem)
       associate (kernels => problem%kernels, impulse => problem%impulse)
@@ -305,7 +346,7 @@ contains
       end associate
     end do
     call check(regimes(1) > 10 .and. regimes(3) > 10, "open and closed contacts met")
-    if (friction) call check(regimes(2) > 10, "sliding contacts met")
+    if (effects%friction) call check(regimes(2) > 10, "sliding contacts met")
   end subroutine test_one_contact
 
   !> The first contact's antagonist becomes a wall.
@@ -324,6 +365,10 @@ contains
       hot(nd + 5) = 0.0_dp
       hot(nd + 3) = 1.0_dp/(wn + hot(nd + 4)**2*problem%weight(nd + 1, i))
     end if
+    if (problem%kernels%rolling_row > 0) then
+      hot(problem%kernels%rolling_row + 1) = hot(nd + 4)
+      hot(problem%kernels%rolling_row + 2) = 1.0_dp/(hot(nd + 4)**2*problem%weight(nd + 1, i))
+    end if
     call put_contact_column(hot, 1, problem%hot)
   end subroutine put_on_wall
 
@@ -332,7 +377,7 @@ contains
     type(case_t), intent(in) :: problem
     real(dp), intent(in) :: v(:)
     integer, intent(out) :: regime
-    real(dp) :: impulse(problem%kernels%nc), hot(problem%kernels%nh), shifted, rn, bound, length
+    real(dp) :: impulse(problem%kernels%nc), hot(problem%kernels%nh), sliding(size(v) - 1), shifted, rn, bound, length
     integer :: nd
 
     nd = problem%kernels%nd
@@ -347,20 +392,22 @@ contains
     if (problem%kernels%nc == 1) return
     bound = hot(nd + 6)*rn
     length = norm2(impulse(2:))
+    sliding(:) = v(2:)
+    if (problem%kernels%shift_row > 0) sliding(:) = sliding + hot(problem%kernels%shift_row + 1:problem%kernels%shift_row + nd - 1)
     call check(length <= bound*(1.0_dp + 4*epsilon(1.0_dp)), "Coulomb: in the cone")
-    if (norm2(v(2:)) > rounding) then
+    if (norm2(sliding) > rounding) then
       if (rn > 0.0_dp) regime = 2
       call check_close(length, bound, rounding, "Coulomb: sliding on the cone")
-      call check_close(sum(impulse(2:)*v(2:)), -length*norm2(v(2:)), rounding, "Coulomb: against the sliding")
+      call check_close(sum(impulse(2:)*sliding), -length*norm2(sliding), rounding, "Coulomb: against the sliding")
     end if
   end subroutine check_law
 
   !> Sweeps that keep the law velocities do the same, to rounding (the two loops are compiled apart, and may contract
   !> products and sums differently); what they keep is what each contact had right after its own update, as a sweep
-  !> cut off there shows.
-  subroutine test_record(dimension, friction)
+  !> cut off there shows. A moment changes the tangential velocity that the forces were solved with.
+  subroutine test_record(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     integer, parameter :: n = 25
     type(case_t) :: plain, recording, short, one
     real(dp), allocatable :: law_velocity(:, :, :), v(:, :, :)
@@ -368,8 +415,8 @@ contains
     integer :: sweep, c
     logical :: same, kept
 
-    call make_case(dimension, friction, n, 41, plain)
-    call make_case(dimension, friction, n, 41, recording)
+    call make_case(dimension, effects, n, 41, plain)
+    call make_case(dimension, effects, n, 41, recording)
     allocate (law_velocity, v, mold=plain%impulse)
     law_velocity(:, :, :) = 0.0_dp
     same = .true.
@@ -385,6 +432,7 @@ contains
         call take_contact(short, c, one)
         call one%kernels%sweep(0, one%pair, one%hot, one%weight, one%velocity, one%impulse, sums)
         call one%kernels%contact_velocity(one%pair, one%hot, one%velocity, v(:, :, 1:1))
+        if (effects%rolling) v(1, 2:dimension, 1) = law_velocity(lane_of(c), 2:dimension, block_of(c))
         kept = kept .and. all(abs(v(1, :, 1) - law_velocity(lane_of(c), :, block_of(c))) <= rounding)
         short%velocity(:, :) = one%velocity
       end do
@@ -423,14 +471,14 @@ contains
   !> Bodies in whole blocks without common moving bodies, then some contacts that share them at will. In each block the
   !> bodies take part in another order; every third contact is on one of two bodies that move as prescribed. Weights differ
   !> by component, and some components of some bodies cannot move.
-  subroutine make_blocks(dimension, friction, n_full, n_singles, trial, problem)
+  subroutine make_blocks(dimension, effects, n_full, n_singles, trial, problem)
     integer, intent(in) :: dimension, n_full, n_singles, trial
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t), intent(out) :: problem
     integer, parameter :: n_moving = 2*lanes
     integer :: b, c, d, i, j, stride
 
-    call problem%kernels%choose(dimension, friction)
+    call problem%kernels%choose(dimension, effects)
     associate (kernels => problem%kernels)
       call allocate_contacts(n_full*lanes + n_singles, problem)
       problem%n_grouped = n_full*lanes
@@ -502,16 +550,16 @@ contains
 
   !> Blocks relaxed together end where their contacts relaxed one after the other in the same order do: velocities,
   !> impulses, sums and what sweeps carry along, up to roundings. A plain loop ends there too.
-  subroutine test_blocks(dimension, friction)
+  subroutine test_blocks(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: singly, blocks
     type(memory_t) :: one_by_one, together
     real(dp) :: sums(2), singles(2)
     integer :: sweep, variant
 
     do variant = 1, 4
-      call make_blocks(dimension, friction, 3, 7, 80 + variant, singly)
+      call make_blocks(dimension, effects, 3, 7, 80 + variant, singly)
       blocks = singly
       call start_memory(singly, one_by_one)
       call start_memory(blocks, together)
@@ -527,7 +575,7 @@ contains
         call check(all(abs(sums - singles) <= 100*rounding*(1.0_dp + singles)), "blocks: sums as contact by contact")
       end do
     end do
-    call make_blocks(dimension, friction, 3, 7, 85, singly)
+    call make_blocks(dimension, effects, 3, 7, 85, singly)
     blocks = singly
     call start_memory(blocks, together)
     call sweep_once(1, blocks%n_grouped, blocks, together, sums)
@@ -538,9 +586,9 @@ contains
   end subroutine test_blocks
 
   !> A sweep with momentum is the plain one from y = r + beta (r - previous), and leaves r.
-  subroutine test_momentum(dimension, friction)
+  subroutine test_momentum(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem, plain
     type(memory_t) :: memory
     real(dp), allocatable :: start(:, :, :)
@@ -548,7 +596,7 @@ contains
     integer :: variant
 
     do variant = 3, 4
-      call make_blocks(dimension, friction, 2, 5, 86 + variant, problem)
+      call make_blocks(dimension, effects, 2, 5, 86 + variant, problem)
       plain = problem
       call start_memory(problem, memory)
       allocate (start, source=problem%impulse)
@@ -584,7 +632,16 @@ contains
           v(:) = v + candidate(:, d)*velocity(d, i) + antagonist(:, d)*velocity(d, j)
         end do
         change(:) = r
-        call solve_law(problem%kernels, hot, hot(nd + 2), hot(min(nd + 3, size(hot))), v, r)
+        call solve_forces(problem%kernels, hot, hot(nd + 2), hot(min(nd + 3, size(hot))), v, r)
+        if (problem%kernels%rolling_row > 0) then
+          ! the moments see the velocities that the forces leave
+          do d = 1, problem%kernels%nv
+            w = min(d, problem%kernels%nw)
+            v(:) = v + candidate(:, d)*weight(w, i)*sum((r - change)*candidate(:, d)) &
+              & + antagonist(:, d)*weight(w, j)*sum((r - change)*antagonist(:, d))
+          end do
+          call solve_moments(problem%kernels, hot, hot(problem%kernels%rolling_row + 2), v, r)
+        end if
         change(:) = r - change
         sums(1) = sums(1) + sum(change**2)
         sums(2) = sums(2) + sum(r**2)
@@ -598,8 +655,8 @@ contains
     end do
   end subroutine relax_plainly
 
-  !> r := P(r - v/W), v being the velocity under r.
-  subroutine solve_law(kernels, hot, per_wn, per_wt, v, r)
+  !> Forces r := P(r - v/W), v being the velocity under r.
+  subroutine solve_forces(kernels, hot, per_wn, per_wt, v, r)
     type(kernels_t), intent(in) :: kernels
     !> (nh), (nc)
     real(dp), intent(in) :: hot(:), v(:)
@@ -607,27 +664,177 @@ contains
     real(dp), intent(in) :: per_wn, per_wt
     !> (nc)
     real(dp), intent(inout) :: r(:)
-    real(dp) :: length, bound
+    integer :: nd
 
-    r(1) = max(0.0_dp, r(1) - (v(1) + hot(kernels%nd + 1))*per_wn)
+    nd = kernels%nd
+    r(1) = max(0.0_dp, r(1) - (v(1) + hot(nd + 1))*per_wn)
     if (kernels%nc == 1) return
-    r(2:) = r(2:) - v(2:)*per_wt
-    bound = hot(kernels%nh)*r(1)
-    length = norm2(r(2:))
-    if (length > bound) r(2:) = r(2:)*(bound/length)
-  end subroutine solve_law
+    r(2:nd) = r(2:nd) - v(2:nd)*per_wt
+    if (kernels%shift_row > 0) r(2:nd) = r(2:nd) - hot(kernels%shift_row + 1:kernels%shift_row + nd - 1)*per_wt
+    call cut(hot(nd + 6)*r(1), r(2:nd))
+  end subroutine solve_forces
+
+  !> The moments, with the normal force in r(1).
+  subroutine solve_moments(kernels, hot, per_wr, v, r)
+    type(kernels_t), intent(in) :: kernels
+    real(dp), intent(in) :: hot(:), v(:), per_wr
+    real(dp), intent(inout) :: r(:)
+    integer :: nd
+
+    nd = kernels%nd
+    r(nd + 1:) = r(nd + 1:) - v(nd + 1:)*per_wr
+    call cut(hot(kernels%rolling_row + 3)*r(1), r(nd + 1:2*nd - 1))
+    if (nd == 3) call cut(hot(kernels%rolling_row + 4)*r(1), r(6:6))
+  end subroutine solve_moments
+
+  pure subroutine cut(radius, part)
+    real(dp), intent(in) :: radius
+    real(dp), intent(inout) :: part(:)
+    real(dp) :: length
+
+    length = norm2(part)
+    if (length > radius) part(:) = part*(radius/length)
+  end subroutine cut
+
+  !> Relaxations of one contact whose sliding and rolling are coupled: each lowers the energy 1/2 r.W r + r.(v_free + shift), once the
+  !> normal impulse is that of the solution, and they end where all laws hold: r in the cones, and (-v) normal to them.
+  subroutine test_rolling_contact(dimension, effects)
+    integer, intent(in) :: dimension
+    type(effects_t), intent(in) :: effects
+    type(case_t) :: problem
+    real(dp), allocatable :: start(:, :, :), v(:, :, :)
+    real(dp) :: sums(2), energy, last, hot(20)
+    integer :: trial, k, rolls, closed, nd
+
+    nd = dimension
+    rolls = 0
+    closed = 0
+    do trial = 1, 200
+      call make_case(dimension, effects, 1, 2000 + trial, problem)
+      if (mod(trial, 2) == 0) call put_on_wall(problem)
+      associate (kernels => problem%kernels, r => problem%impulse)
+        allocate (v, start, mold=r)
+        hot(1:kernels%nh) = problem%hot(1, :, 1)
+        last = huge(1.0_dp)
+        do k = 1, 200
+          start(:, :, :) = r
+          call kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, r, sums)
+          call check_close(sums(1), sum((r - start)**2), rounding*(1.0_dp + sums(1)), "sums of a sweep: changes squared")
+          call check_close(sums(2), sum(r**2), rounding*(1.0_dp + sums(2)), "sums of a sweep: impulses squared")
+          ! 1/2 r.W r + r.v_free = 1/2 r.(v + v_free), and v_free = v - W r, which add_reaction and contact_velocity give
+          call find_energy(problem, energy)
+          call check(energy <= last + rounding, "a relaxation lowers the energy")
+          last = energy
+        end do
+        call kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, r, sums)
+        call check_close(sums(1), 0.0_dp, (100*rounding)**2, "residual at the solution")
+        call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
+        if (.not. r(1, 1, 1) > 0.0_dp) then
+          call check(all(abs(r) <= 0.0_dp), "an open contact has no moment")
+        else
+          closed = closed + 1
+          if (kernels%shift_row > 0) v(1, 2:nd, 1) = v(1, 2:nd, 1) + hot(kernels%shift_row + 1:kernels%shift_row + nd - 1)
+          call check_part(hot(nd + 6)*r(1, 1, 1), r(1, 2:nd, 1), v(1, 2:nd, 1))
+          call check_part(hot(kernels%rolling_row + 3)*r(1, 1, 1), r(1, nd + 1:2*nd - 1, 1), v(1, nd + 1:2*nd - 1, 1))
+          if (norm2(v(1, nd + 1:2*nd - 1, 1)) > 1.0e-3_dp) rolls = rolls + 1
+          if (nd == 3) call check_part(hot(kernels%rolling_row + 4)*r(1, 1, 1), r(1, 6:6, 1), v(1, 6:6, 1))
+        end if
+        deallocate (v, start)
+      end associate
+    end do
+    call check(rolls > 10 .and. closed - rolls > 10, "contacts that roll met, and contacts that do not")
+  end subroutine test_rolling_contact
+
+  !> Energy of contact 1 under its impulse.
+  subroutine find_energy(problem, energy)
+    type(case_t), intent(in) :: problem
+    real(dp), intent(out) :: energy
+    real(dp), allocatable :: v(:, :, :), wr(:, :, :), reaction(:, :)
+    integer :: d, nd
+
+    nd = problem%kernels%nd
+    allocate (v, wr, mold=problem%impulse)
+    allocate (reaction(problem%kernels%nv, n_columns), source=0.0_dp)
+    associate (kernels => problem%kernels, r => problem%impulse)
+      call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
+      call kernels%add_reaction(problem%pair, problem%hot, r, reaction)
+      do d = 1, kernels%nv
+        reaction(d, :) = reaction(d, :)*problem%weight(min(d, kernels%nw), :)
+      end do
+      call kernels%contact_velocity(problem%pair, problem%hot, reaction, wr)
+      v(1, 1, 1) = v(1, 1, 1) + problem%hot(1, nd + 1, 1)
+      if (kernels%shift_row > 0) v(1, 2:nd, 1) = v(1, 2:nd, 1) + problem%hot(1, kernels%shift_row + 1:kernels%shift_row + nd - 1, 1)
+      energy = sum(r(1, :, 1)*v(1, :, 1)) - 0.5_dp*sum(r(1, :, 1)*wr(1, :, 1))
+    end associate
+  end subroutine find_energy
+
+  !> A part of an impulse in its disc, and the velocity against it only at the rim.
+  subroutine check_part(bound, r, v)
+    real(dp), intent(in) :: bound, r(:), v(:)
+    real(dp), parameter :: settled = 1.0e-10_dp
+
+    call check(norm2(r) <= bound + settled, "within the disc")
+    ! r.v = -bound |v|: at rest, or at the rim and opposite
+    call check_close(sum(r*v), -bound*norm2(v), settled, "dissipation is maximal")
+  end subroutine check_part
+
+  !> An effect switched on with its neutral value: velocities and impulses of the same bits as without it, sweep by sweep, in all
+  !> versions of a sweep.
+  subroutine test_neutral(dimension, effects, more)
+    integer, intent(in) :: dimension
+    type(effects_t), intent(in) :: effects, more
+    type(case_t) :: plain, forced
+    type(memory_t) :: memory, forced_memory
+    real(dp) :: sums(2), forced_sums(2)
+    integer :: variant, sweep, nc, nh, nv
+
+    do variant = 1, 4
+      call make_blocks(dimension, effects, 3, 7, 180 + variant, plain)
+      call make_blocks(dimension, more, 3, 7, 180 + variant, forced)
+      nc = plain%kernels%nc
+      nh = plain%kernels%nh
+      nv = plain%kernels%nv
+      if (.not. effects%friction) then
+        ! mu = 0, and weights and velocities of the same numbers; a friction kernel knows more of both
+        forced%hot(:, dimension + 6, :) = 0.0_dp
+        forced%weight(1:dimension, :) = plain%weight
+        forced%velocity(1:nv, :) = plain%velocity
+        forced%hot(:, 1:nh, :) = plain%hot
+        forced%impulse(:, 2:, :) = 0.0_dp
+      else
+        forced%hot(:, 1:dimension + 6, :) = plain%hot(:, 1:dimension + 6, :)
+        if (more%tangential_restitution .and. .not. effects%tangential_restitution) &
+          & forced%hot(:, forced%kernels%shift_row + 1:forced%kernels%shift_row + dimension - 1, :) = 0.0_dp
+        if (more%rolling .and. .not. effects%rolling) then
+          forced%hot(:, forced%kernels%rolling_row + 3:, :) = 0.0_dp
+          forced%impulse(:, dimension + 1:, :) = 0.0_dp
+        end if
+      end if
+      call start_memory(plain, memory)
+      call start_memory(forced, forced_memory)
+      do sweep = 1, 4
+        call sweep_once(variant, plain%n_grouped, plain, memory, sums)
+        call sweep_once(variant, forced%n_grouped, forced, forced_memory, forced_sums)
+        call check(all(abs(forced%velocity(1:nv, :) - plain%velocity) <= 0.0_dp), "neutral: velocities")
+        call check(all(abs(forced%impulse(:, 1:nc, :) - plain%impulse) <= 0.0_dp), "neutral: impulses")
+        ! products may be contracted with sums otherwise
+        call check(all(abs(forced_sums - sums) <= rounding*sums), "neutral: sums")
+        call check(all(abs(forced%impulse(:, nc + 1:, :)) <= 0.0_dp), "neutral: nothing else")
+      end do
+    end do
+  end subroutine test_neutral
 
   !> Reactions, contact velocities and residual against a plain loop over the contacts, padding being none of them.
-  subroutine test_plain_loop(dimension, friction)
+  subroutine test_plain_loop(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: expected(:, :), reaction(:, :), v(:, :, :), wanted_v(:, :, :)
     real(dp) :: sums(2), wanted(2)
     integer :: n
 
     do n = 1, 3*lanes + 1, 5
-      call make_blocks(dimension, friction, 0, n, 90 + n, problem)
+      call make_blocks(dimension, effects, 0, n, 90 + n, problem)
       allocate (expected, reaction, mold=problem%velocity)
       allocate (v, wanted_v, source=problem%impulse)
       expected(:, :) = 0.5_dp
@@ -681,7 +888,9 @@ contains
         call local_operator(hot(1:nd), wi, wj, wn, wt)
         if (problem%kernels%nc > 1) wt = wt + hot(nd + 4)**2*wi(nd + 1) + hot(nd + 5)**2*wj(nd + 1)
         r(:) = old
-        call solve_law(problem%kernels, hot, 1.0_dp/wn, 1.0_dp/wt, local, r)
+        call solve_forces(problem%kernels, hot, 1.0_dp/wn, 1.0_dp/wt, local, r)
+        if (problem%kernels%rolling_row > 0) call solve_moments(problem%kernels, hot, &
+          & 1.0_dp/(hot(problem%kernels%rolling_row + 1)**2*(wi(nd + 1) + wj(nd + 1))), local, r)
         sums(1) = sums(1) + sum((r - old)**2)
         sums(2) = sums(2) + sum(old**2)
       end associate
@@ -692,9 +901,9 @@ contains
   !> What fills the last block does nothing: the first body, with which it is in contact, keeps its bits when no contact of
   !> its own moves it, in the padding impulses, fields and law velocities stay the zeros that they are, and a second problem
   !> with other velocities of that body gives the other bodies the same bits.
-  subroutine test_padding(dimension, friction)
+  subroutine test_padding(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem, other
     type(memory_t) :: memory, fast
     real(dp), allocatable :: before(:, :), v(:, :, :), reaction(:, :), hot(:, :, :)
@@ -702,7 +911,7 @@ contains
     integer :: n, variant
 
     do n = 1, 2*lanes - 1, 2
-      call make_blocks(dimension, friction, 0, n, 100 + n, problem)
+      call make_blocks(dimension, effects, 0, n, 100 + n, problem)
       where (problem%pair(:, 1:n) == 1) problem%pair(:, 1:n) = 2
       ! contacts of the second body with itself are left out
       call part_bodies(problem)
@@ -807,15 +1016,15 @@ contains
   end subroutine test_local_operator
 
   !> A relaxation changes velocities by W H (r - r_old) component by component: what has weight 0 stays as it is.
-  subroutine test_components(dimension, friction)
+  subroutine test_components(dimension, effects)
     integer, intent(in) :: dimension
-    logical, intent(in) :: friction
+    type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :), start(:, :, :), reaction(:, :)
     real(dp) :: sums(2)
     integer :: b, d
 
-    call make_case(dimension, friction, 30, 71, problem)
+    call make_case(dimension, effects, 30, 71, problem)
     associate (kernels => problem%kernels)
       do b = 1, n_columns
         do d = 1, dimension
@@ -842,7 +1051,7 @@ contains
     integer :: k
 
     do k = 0, 3
-      call make_case(2 + mod(k, 2), k > 1, 0, 1, problem)
+      call make_case(2 + mod(k, 2), effects_t(friction=k > 1), 0, 1, problem)
       allocate (before(problem%kernels%nv, n_columns), source=problem%velocity)
       call problem%kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
       call check_close(maxval(abs(sums)), 0.0_dp, 0.0_dp, "no contacts: no change")

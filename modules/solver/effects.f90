@@ -1,0 +1,62 @@
+!> The effects that a scene has: they choose the kernels and what is allocated and exchanged, and the log names them.
+module gravier_effects
+  implicit none
+  private
+  public :: effects_t, n_effects, effect_name_length
+
+  integer, parameter :: n_effects = 14, effect_name_length = 24
+
+  !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
+  type :: effects_t
+    !> some contact has mu > 0; some frictional contact sends its tangential velocity back; some moment resists rolling, or pivoting
+    !> (of spheres): these three choose the kernels
+    logical :: friction = .false., tangential_restitution = .false., rolling = .false.
+    !> what else contacts do: pivoting (in the kernels of rolling), normal restitution, cohesion
+    logical :: pivoting = .false., restitution = .false., cohesion = .false.
+    !> some grain turns; some axis is periodic; some boundary moves as prescribed, or is moved by forces; some grain is glued
+    logical :: rotation = .false., periodic = .false., drives = .false., forces = .false., glued = .false.
+    !> loads; grains are taken out
+    logical :: gravity = .false., body_force = .false., removal = .false.
+  contains
+    procedure :: list => effects_list
+  end type effects_t
+
+contains
+
+  !> All effects by name, and which of them there are.
+  pure subroutine effects_list(self, names, on)
+    class(effects_t), intent(in) :: self
+    character(len=effect_name_length), intent(out) :: names(n_effects)
+    logical, intent(out) :: on(n_effects)
+
+    names(1) = "friction"
+    on(1) = self%friction
+    names(2) = "rotation"
+    on(2) = self%rotation
+    names(3) = "restitution"
+    on(3) = self%restitution
+    names(4) = "tangential restitution"
+    on(4) = self%tangential_restitution
+    names(5) = "rolling resistance"
+    on(5) = self%rolling
+    names(6) = "pivoting resistance"
+    on(6) = self%pivoting
+    names(7) = "cohesion"
+    on(7) = self%cohesion
+    names(8) = "periodic images"
+    on(8) = self%periodic
+    names(9) = "drives"
+    on(9) = self%drives
+    names(10) = "driven by forces"
+    on(10) = self%forces
+    names(11) = "glued grains"
+    on(11) = self%glued
+    names(12) = "gravity"
+    on(12) = self%gravity
+    names(13) = "body force"
+    on(13) = self%body_force
+    names(14) = "removal"
+    on(14) = self%removal
+  end subroutine effects_list
+
+end module gravier_effects
