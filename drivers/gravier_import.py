@@ -19,10 +19,10 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
-#: a law of LMGC90: which of its parameters are which keys here, and which of its parameters must be 0
+#: a law of LMGC90: keys here, and the names of its parameters that they take
 LAWS = {
-    "IQS_CLB": ({"friction": "fric"}, ()),
-    "RST_CLB": ({"friction": "fric", "restitution": "rstn"}, ("rstt",)),
+    "IQS_CLB": {"friction": "fric"},
+    "RST_CLB": {"friction": "fric", "restitution": "rstn", "tangential_restitution": "rstt"},
 }
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
@@ -322,11 +322,7 @@ class Case:
         name = entry.words[1]
         if name not in LAWS:
             entry.refuse(f"law {name}", f"one of {', '.join(LAWS)}")
-        names, zeros = LAWS[name]
-        for zero in zeros:
-            if entry.get(zero, 0.0) != 0.0:
-                entry.refuse(f"{zero}= {entry.get(zero):g} of {name}", f"{zero}= 0")
-        return {key: entry.get(theirs) for key, theirs in names.items()}
+        return {key: entry.get(theirs) for key, theirs in LAWS[name].items()}
 
     def mass(self, body, volume):
         name = body.bulk.words[3] if len(body.bulk.words) > 3 else ""
