@@ -195,10 +195,10 @@ class Bonds(SmallScene):
         self.hang("nlgs", {})
 
     def test_hanging_chains_in_subdomains(self):
-        """Every second link is shared."""
+        """Links lie between subdomains, and pass from one to another with their bonds."""
         for method in ("nscdd", "nscdd_ep"):
             with self.subTest(method=method):
-                self.hang(method, {"solver": {"method": method, "tolerance": 1e-12}, "decomposition": {"grid": [1, 4]}})
+                self.hang(method, {"solver": {"method": method, "tolerance": 1e-12}, "decomposition": {"grid": [1, 4], "repartition_every": 5}})
 
     def hang(self, method, groups):
         """Two chains of six disks hang; link k carries the weight of 6 - k of them. The bonds of one hold, the first of the other is
