@@ -207,8 +207,11 @@ contains
 
   pure logical function comes_first(item)
     type(assignment_t), intent(in) :: item
-    comes_first = (item%group == "scene" .and. item%key == "dimension") .or. (item%key == "name" .and. &
-                   (item%group == "boundary" .or. item%group == "material"))
+    select case (item%group)
+    case ("scene"); comes_first = item%key == "dimension"
+    case ("boundary", "material"); comes_first = item%key == "name"
+    case default; comes_first = .false.
+    end select
   end function comes_first
 
   !> Reads one assignment and notes it; fails on a bad value and on an entry that is already given.

@@ -32,7 +32,7 @@ contains
                     "a name of its own, but the "//ordinal(k)//" has it too")
       end do
       call expect(report, config%materials(i)%density > 0.0_dp, "material", "density", error)
-      call expect(report, .not. config%materials(i)%density_given .or. config%scene%bodies /= "column", "material", "density", &
+      call expect(report, config%scene%bodies /= "column" .or. .not. config%materials(i)%density_given, "material", "density", &
                   error, "none where bodies = 'column': mass is the mass of each body")
     end do
     report%instance = 1

@@ -177,7 +177,7 @@ contains
     logical, intent(out) :: touched(most_entries)
     logical, intent(out) :: failed
     character(len=longest_text) :: values(most_entries)
-    integer :: status
+    integer :: status, i
 
     touched = .false.
     failed = .not. is_quoted(value)
@@ -186,7 +186,9 @@ contains
     touched = values /= ""
     failed = status /= 0 .or. any(len_trim(values) > text_length) .or. .not. fits(touched, size(slot%texts))
     if (failed) return
-    where (touched(:size(slot%texts))) slot%texts = values(:size(slot%texts))(:text_length)
+    do i = 1, size(slot%texts)
+      if (touched(i)) slot%texts(i) = values(i) (:text_length)
+    end do
   end subroutine read_texts
 
   !> Does it begin and end as texts in quotes do, and is it short enough for the reading?

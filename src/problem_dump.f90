@@ -2,8 +2,8 @@
 !>
 !> Bodies stand in the order of their identifiers, contacts in that of candidate and antagonist, so that the file depends neither
 !> on the decomposition nor on the ranks. What moves as prescribed, and the shift of the normal velocities, are in w. A component
-!> that cannot move has mass 1 and no entry in H. Contacts without friction have tangential components, too, with mu = 0. Attractions
-!> are loads: they are in f, and r has r_n + h F.
+!> that cannot move has mass 1 and no entry in H. Contacts without friction have tangential components, too, with mu = 0.
+!> Attractions are loads: they are in f, and r has r_n + h F.
 module gravier_problem_dump
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t

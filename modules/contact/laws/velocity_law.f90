@@ -23,7 +23,7 @@ module gravier_velocity_law
     & [law_key_t("static_friction", "", ">= 0", "", "friction coefficient without slip, mu_s"), &
     &  law_key_t("dynamic_friction", "", ">= 0", "", "friction coefficient at large slip, mu_d"), &
     &  law_key_t("slip_scale", "", "> 0", "m/s", &
-    &           "slip v_s in mu_d + (mu_s - mu_d) exp(-|v_t|/v_s), v_t the slip at the start of the step"), &
+    &           "slip v_s in mu_d + (mu_s - mu_d) exp(-v_t/v_s), v_t the slip at the start of the step"), &
     &  law_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient"), &
     &  law_key_t("tangential_restitution", "0.0", "in [0, 1]", "", "tangential restitution coefficient, where there is friction")]
 
