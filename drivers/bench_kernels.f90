@@ -1,9 +1,12 @@
-!> The loops over contacts: relaxations a second of each kernel, in cache and out of it, and the bytes that they stream.
+!> The loops over contacts: relaxations a second of each kernel, in cache and out of it, and the bytes that they stream; and what
+!> each effect of a scene costs, against the same contacts without it.
 module gravier_bench_kernels
   use mpi_f08, only: MPI_Wtime, MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
+  use gravier_text, only: to_text
+  use gravier_effects, only: effects_t
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: subproblem_t
   use gravier_scheme, only: start_sweeps
@@ -14,11 +17,16 @@ module gravier_bench_kernels
   use gravier_bench_record, only: record_t, case_t
   implicit none
   private
-  public :: kernel_problem_t, kernel_names, make_kernels, measure_kernels, sweep_kernel
+  public :: kernel_problem_t, kernel_names, make_kernels, measure_kernels, sweep_kernel, make_effects, measure_effects
 
   integer, parameter :: name_length = 32
   character(len=name_length), parameter :: kernel_names(*) = [character(len=name_length) :: &
     & "2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
+  !> what effects add to a dimension, and the place in this list of what each is compared with
+  character(len=24), parameter :: effect_names(*) = [character(len=24) :: &
+    & "frictionless", "frictionless_restitution", "friction", "friction_restitution", "friction_tangential", "friction_rolling", &
+    & "friction_tangential_roll"]
+  integer, parameter :: effect_base(size(effect_names)) = [1, 1, 1, 3, 3, 3, 3]
   !> versions of a kernel: as it is; recording the velocities which solved the laws; from extrapolated impulses
   integer, parameter :: plain = 1, recording = 2, momentum = 3
   !> what each adds to the name of a kernel
@@ -30,6 +38,8 @@ module gravier_bench_kernels
   !> contacts of a problem in the first caches of a core, and share of the last cache that one beyond them takes
   integer, parameter :: few_contacts = 2000
   real(dp), parameter :: share_of_cache = 0.1_dp
+  !> coefficients of rolling and pivoting
+  real(dp), parameter :: rolling_friction = 0.1_dp
   !> the largest problem streams so many times the last cache
   integer, parameter :: times_cache = 4
 
@@ -45,6 +55,7 @@ module gravier_bench_kernels
   contains
     procedure :: sweep_once
     procedure :: streamed
+    procedure :: bytes_of_contact
   end type kernel_problem_t
 
 contains
@@ -124,7 +135,32 @@ contains
     end if
   end function wanted_contacts
 
-  !> A problem of about `n` contacts for the kernel of a name, with the masses and velocities that a solve starts from.
+  !> One problem an effect and dimension, in the last cache, on this rank. Not collective.
+  subroutine make_effects(options, problems, error)
+    type(options_t), intent(in) :: options
+    type(kernel_problem_t), allocatable, intent(out) :: problems(:)
+    type(error_t), allocatable, intent(inout) :: error
+    type(kernel_problem_t) :: small
+    integer :: k, nd, n
+
+    allocate (problems(2*size(effect_names)))
+    if (allocated(error)) return
+    do nd = 2, 3
+      n = few_contacts
+      if (options%contacts > 0) n = min(n, options%contacts)
+      call make_problem(to_text(nd)//"d_friction", n, small, error)
+      if (allocated(error)) return
+      n = wanted_contacts(options, small, .false.)
+      deallocate (small%sub, small%law_velocity, small%previous)
+      do k = 1, size(effect_names)
+        call make_problem(to_text(nd)//"d_"//trim(effect_names(k)), n, problems((nd - 2)*size(effect_names) + k), error)
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine make_effects
+
+  !> A problem of about `n` contacts for the kernel of a name, with the masses and velocities that a solve starts from. All of a
+  !> dimension have the same contacts: restitution is another shift, tangential restitution is that of no velocity.
   subroutine make_problem(name, n, problem, error)
     character(len=*), intent(in) :: name
     integer, intent(in) :: n
@@ -134,6 +170,7 @@ contains
     type(packing_t) :: packing
     type(simulation_t) :: simulation
     type(step_figures_t) :: figures
+    type(effects_t) :: effects
 
     if (index(name, "2d") == 1) then
       packing = make_packing(2, nint(n/contacts_2d))
@@ -144,7 +181,16 @@ contains
     call alone%init(MPI_COMM_SELF)
     call make_simulation(packing, alone, simulation, error)
     if (.not. allocated(error)) then
+      effects = simulation%effects
+      effects%tangential_restitution = index(name, "tangential") > 0
+      effects%rolling = index(name, "roll") > 0
+      call simulation%problem%kernels%choose(packing%nd, effects)
+      simulation%physics%rolling_friction = rolling_friction
+      simulation%physics%pivoting_friction = rolling_friction
       call simulation%assemble(figures)
+      associate (sub => simulation%problem%sub(1))
+        if (index(name, "restitution") > 0) sub%hot(:, packing%nd + 1, :) = 0.5_dp*sub%hot(:, packing%nd + 1, :)
+      end associate
       call start_sweeps(simulation%scheme, simulation%problem, shared_masses=.false.)
       problem%name = name
       problem%kernels = simulation%problem%kernels
@@ -183,6 +229,39 @@ contains
       end associate
     end do
   end subroutine measure_kernels
+
+  !> One round over all effects: what a relaxation and a contact take, and what they take of the same without the effect. Not
+  !> collective.
+  subroutine measure_effects(options, problems, record)
+    type(options_t), intent(in) :: options
+    type(kernel_problem_t), intent(inout) :: problems(:)
+    type(record_t), intent(inout) :: record
+    type(case_t) :: of
+    real(dp) :: seconds(size(problems)), bytes(size(problems))
+    integer :: k, base
+
+    do k = 1, size(problems)
+      seconds(k) = 1.0_dp/relaxation_rate(problems(k), plain, options%seconds)
+      bytes(k) = problems(k)%bytes_of_contact()
+      base = effect_base(mod(k - 1, size(effect_names)) + 1) + (k - 1)/size(effect_names)*size(effect_names)
+      of = case_t("effect", trim(problems(k)%name), int(problems(k)%sub(1)%n_contacts, i8), 1)
+      call record%note(of, "seconds_per_relaxation", "s", seconds(k))
+      call record%note(of, "unknowns", "1", real(problems(k)%kernels%nc, dp))
+      call record%note(of, "bytes_per_contact", "B", bytes(k))
+      call record%note(of, "seconds_over_without", "1", seconds(k)/seconds(base))
+      call record%note(of, "bytes_over_without", "1", bytes(k)/bytes(base))
+    end do
+  end subroutine measure_effects
+
+  !> Bytes that a sweep knows of a contact, from the sizes of the arrays.
+  pure real(dp) function bytes_of_contact(self) result(bytes)
+    class(kernel_problem_t), intent(in) :: self
+
+    associate (sub => self%sub(1))
+      bytes = real(storage_size(sub%hot)/8*(size(sub%hot) + size(sub%impulse)) + storage_size(sub%pair)/8*size(sub%pair), dp) &
+        & /size(sub%pair, 2)
+    end associate
+  end function bytes_of_contact
 
   !> Relaxations a second, over at least so many seconds after one sweep that brings the data near.
   real(dp) function relaxation_rate(problem, version, seconds) result(rate)

@@ -9,7 +9,8 @@ program gravier_bench
   use gravier_command_line, only: leave
   use gravier_file_system, only: check_creatable
   use gravier_bench_groups, only: measure_exchange, measure_interface, measure_steps, measure_scaling
-  use gravier_bench_kernels, only: kernel_problem_t, kernel_names, make_kernels, measure_kernels, sweep_kernel
+  use gravier_bench_kernels, only: kernel_problem_t, kernel_names, make_kernels, measure_kernels, sweep_kernel, &
+    & make_effects, measure_effects
   use gravier_bench_options, only: options_t, read_options, usage
   use gravier_bench_record, only: record_t, case_t
   use gravier_bench_triad, only: triad_t, triad_bytes
@@ -89,13 +90,14 @@ contains
 
   !> Rounds of the triad, on one core and on all at once, and of all kernels on one core. Collective.
   subroutine sweep_and_triad()
-    type(kernel_problem_t), allocatable :: problems(:)
+    type(kernel_problem_t), allocatable :: problems(:), effects(:)
     type(triad_t) :: triad
     real(dp) :: bandwidth
     integer :: r
 
     call triad%init(options%triad, world%size)
     if (world%rank == 0) call make_kernels(options, problems, error)
+    if (world%rank == 0) call make_effects(options, effects, error)
     do r = 1, options%rounds
       call world%barrier_asleep()
       call world%agree(error)
@@ -104,12 +106,14 @@ contains
       if (world%rank > 0) cycle
       call note_triad(alone, triad, bandwidth)
       call measure_kernels(options, problems, bandwidth, record)
+      call measure_effects(options, effects, record)
     end do
     call world%barrier_asleep()
     call say("triad")
     call say("kernel_core_cache")
     call say("kernel_last_cache")
     call say("kernel_memory")
+    call say("effect")
   end subroutine sweep_and_triad
 
   !> Bandwidth of the ranks of `comm` at once. Collective over them.

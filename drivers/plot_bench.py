@@ -103,6 +103,10 @@ def print_tables(rows, machine):
             *(text(cases[name][1]["relaxations"], 1e-6) for cases in places.values()), str(size),
             text(case["ratio_to_triad"], digits=2)]
            for name, (size, case) in places["kernel_memory"].items()])
+    table(["effect", "unknowns", "bytes a contact", "times the bytes without it", "ns a relaxation", "times the time without it"],
+          [[f"`{name}`", f"{case['unknowns'][0]:.0f}", f"{case['bytes_per_contact'][0]:.0f}", f"{case['bytes_over_without'][0]:.2f}",
+            text(case["seconds_per_relaxation"], 1e9), text(case["seconds_over_without"])]
+           for (group, name, _, _), case in rows.items() if group == "effect"])
     table(["one exchange", "spheres", "ranks", "ms", "shared bodies", "numbers of all copies", "ns a number"],
           [[name, str(size), str(ranks), text(case["exchange"], 1e3), f"{case['shared_bodies'][0]:.0f}",
             f"{case['copies_values'][0]:.0f}", text(case["seconds_per_value"], 1e9)]

@@ -15,6 +15,15 @@ KERNELS = ["2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
 # rows of hot, components of an impulse, of a velocity and of the weights of a body
 SHAPES = {"2d_frictionless": (4, 1, 2, 2), "2d_friction": (8, 2, 3, 3),
           "3d_frictionless": (5, 1, 3, 3), "3d_friction": (9, 3, 6, 4)}
+# what effects make of them: rows of hot, components of an impulse, and the one compared with
+EFFECTS = {"2d_frictionless": (4, 1, "2d_frictionless"), "2d_frictionless_restitution": (4, 1, "2d_frictionless"),
+           "2d_friction": (8, 2, "2d_frictionless"), "2d_friction_restitution": (8, 2, "2d_friction"),
+           "2d_friction_tangential": (9, 2, "2d_friction"), "2d_friction_rolling": (11, 3, "2d_friction"),
+           "2d_friction_tangential_roll": (12, 3, "2d_friction"),
+           "3d_frictionless": (5, 1, "3d_frictionless"), "3d_frictionless_restitution": (5, 1, "3d_frictionless"),
+           "3d_friction": (9, 3, "3d_frictionless"), "3d_friction_restitution": (9, 3, "3d_friction"),
+           "3d_friction_tangential": (11, 3, "3d_friction"), "3d_friction_rolling": (13, 6, "3d_friction"),
+           "3d_friction_tangential_roll": (15, 6, "3d_friction")}
 SCENE = ["list_build", "contacts", "iterations", "step", "solve", "solve_per_contact_iteration", "list_build_over_step"]
 SHARES = ["share_" + name for name in ("sweeps", "exchange", "checks", "reductions", "detection", "lists_and_ghosts", "setup", "bodies",
                                        "rest")]
@@ -118,6 +127,8 @@ class Bench(RunTestCase):
             wanted |= {(place, name + version, 1, quantity) for place in PLACES for name in KERNELS
                        for version in ("", "_recording", "_momentum") for quantity in
                        ("relaxations", "bytes_per_relaxation", "ratio_to_triad", "bodies", "share_of_pressing_contacts")}
+            wanted |= {("effect", name, 1, quantity) for name in EFFECTS for quantity in
+                       ("seconds_per_relaxation", "unknowns", "bytes_per_contact", "seconds_over_without", "bytes_over_without")}
             self.assertEqual(had, wanted)
             for key, row in rows.items():
                 values = [float(row[name]) for name in ("low", "median", "high")]
@@ -152,6 +163,20 @@ class Bench(RunTestCase):
             expected = (8 * padded * (1 + hot + passes * impulse) + 8 * (2 * velocity + weight) * bodies) / size
             # a quotient and its text of 17 digits
             self.assertAlmostEqual(float(row["median"]), expected, delta=1e-12 * expected, msg=f"{group} {case}")
+
+    def test_effects_are_of_the_same_contacts(self):
+        """All of a dimension have as many, and bytes are those of pair, hot and impulse."""
+        rows, _ = self.table(1)
+        for dimension in "23":
+            self.assertEqual(len({size for group, case, size, _, _ in rows if group == "effect" and case[0] == dimension}), 1)
+        value = {(case, quantity): float(row["median"]) for (group, case, _, _, quantity), row in rows.items() if group == "effect"}
+        for name, (hot, impulse, base) in EFFECTS.items():
+            self.assertEqual(value[name, "unknowns"], impulse)
+            self.assertEqual(value[name, "bytes_per_contact"], 8 * (1 + hot + impulse), name)
+            self.assertAlmostEqual(value[name, "bytes_over_without"], value[name, "bytes_per_contact"] / value[base, "bytes_per_contact"],
+                                   delta=1e-12)
+            if name == base:
+                self.assertEqual(value[name, "seconds_over_without"], 1.0)
 
     def test_ratio_is_of_rate_and_bandwidth(self):
         """With one round it can be told from the table."""

@@ -1331,6 +1331,9 @@ contains
       // "  ! pivot = the value of `point`" // newline // "  free = .false., .true., .false." // newline &
       // "  force = 0.0, 0.0, 0.0" // newline // "  mass = 3.0" // newline // "  table = ''" // newline &
       // "  friction = 0.5" // newline // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
+      // "  ! tangential_restitution = the value of `wall_tangential_restitution` of `&scene`" // newline &
+      // "  ! rolling_friction = the value of `wall_rolling_friction` of `&scene`" // newline &
+      // "  ! pivoting_friction = the value of `wall_pivoting_friction` of `&scene`" // newline &
       // "  ! material = the value of `wall_material` of `&scene`" // newline &
       // "  ! remove_at = never" // newline // "/" // newline // "&boundary" // newline &
       // "  name = 'boundary 2'" // newline // "  shape = 'plane'" // newline // "  point = 0.0, 0.0, 0.0" // newline &
@@ -1340,8 +1343,11 @@ contains
       // "  pressure = 0.0" // newline // "  table = ''" // newline &
       // "  ! friction = the value of `wall_friction` of `&scene`" // newline &
       // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
-      // "  ! material = the value of `wall_material` of `&scene`" // newline // "  ! remove_at = never" // newline &
-      // "/" // newline, "boundaries written back")
+      // "  ! tangential_restitution = the value of `wall_tangential_restitution` of `&scene`" // newline &
+      // "  ! rolling_friction = the value of `wall_rolling_friction` of `&scene`" // newline &
+      // "  ! pivoting_friction = the value of `wall_pivoting_friction` of `&scene`" // newline &
+      // "  ! material = the value of `wall_material` of `&scene`" // newline &
+      // "  ! remove_at = never" // newline // "/" // newline, "boundaries written back")
     call accept(sample("count = 10 radius = 0.5 box = 4"), "a sample to write back", config)
     call write_active(text, config)
     call check_equal(text(index(text, "&sample"):index(text, "&time") - 1), "&sample" // newline &

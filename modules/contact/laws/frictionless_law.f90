@@ -34,6 +34,7 @@ contains
     class(frictionless_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
     self%restitution = values(1)
+    self%largest_restitution = self%restitution
   end subroutine frictionless_set
 
   pure subroutine frictionless_evaluate(self, pair)
