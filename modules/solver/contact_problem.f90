@@ -21,8 +21,8 @@ module gravier_contact_problem
     integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
     !> contacts in whole blocks without common bodies: the first ones
     integer :: n_grouped = 0
-    !> contacts that sweeps take, the first ones: all, or whole blocks where contacts that sleep follow
-    integer :: n_swept = 0
+    !> contacts that do not sleep, the first ones: all, or whole blocks; of those that sleep, what n_grouped is of these
+    integer :: n_awake = 0, n_grouped_asleep = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
@@ -233,10 +233,10 @@ contains
 
     allocate (parts(merge(4, 2, self%n_asleep > 0), size(self%sub)), source=0.0_dp)
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s), g => n_blocks(self%sub(s)%n_swept))
+      associate (sub => self%sub(s), g => n_blocks(merge(self%sub(s)%n_awake, self%sub(s)%n_contacts, self%n_asleep > 0)))
         call self%kernels%residual(sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%inverse_mass, sub%v_global, &
           & sub%impulse(:, :, 1:g), parts(1:2, s))
-        if (sub%n_swept < sub%n_contacts) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
+        if (g < size(sub%hot, 3)) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
           & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(3:4, s))
       end associate
     end do
@@ -269,11 +269,6 @@ contains
   !> Let sweeps take all contacts for the rest of the solve.
   subroutine contact_problem_wake(self)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s
-
-    do s = 1, size(self%sub)
-      self%sub(s)%n_swept = self%sub(s)%n_contacts
-    end do
     self%n_asleep = 0
     self%asleep_share = 0.0_dp
   end subroutine contact_problem_wake
