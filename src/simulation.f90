@@ -629,7 +629,7 @@ contains
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
     call start_timer(phase_bodies)
-    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, .not. figures%solve%woken, &
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
       & self%neighbourhoods, self%problem)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)

@@ -175,7 +175,7 @@ contains
       real(dp) :: closing
 
       closing = problem%closing()
-      if (report%residual > 0.0_dp .and. .not. problem%impulse_scale > 0.0_dp) closing = 1.0_dp
+      if (.not. problem%impulse_scale > 0.0_dp) closing = 1.0_dp
       if (closing > min(most_closing, closing_of_tolerance*control%tolerance)) report%closing = closing
     end subroutine weigh_bodies
 
@@ -190,7 +190,7 @@ contains
       end if
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
       report%closing = 0.0_dp
-      if (report%figure <= control%tolerance) call weigh_bodies()
+      if (report%figure <= control%tolerance .and. report%residual > 0.0_dp .and. .not. present(exact)) call weigh_bodies()
       if (report%figure <= control%tolerance .and. .not. report%closing > 0.0_dp) then
         report%status = solve_converged
       else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
