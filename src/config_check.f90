@@ -235,9 +235,9 @@ contains
                   .not. solver%relaxation_given, "solver", "acceleration", error, &
                   "'none' where relaxation is given: momentum needs a factor that adapts itself")
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
-      call expect(report, .not. solver%sleeping .or. any(solver%method == ["nlgs   ", "nscdd  ", "schwarz"]), "solver", &
+      call expect(report, any(solver%method == ["nlgs   ", "nscdd  ", "schwarz"]) .or. .not. solver%sleeping, "solver", &
                   "sleeping", error, ".false. with this method: sleeping serves 'nlgs', 'nscdd' and 'schwarz'")
-      call expect(report, .not. solver%sleeping .or. solver%warm_start, "solver", "sleeping", error, &
+      call expect(report, solver%warm_start .or. .not. solver%sleeping, "solver", "sleeping", error, &
                   ".false. where warm_start = .false.: contacts that sleep keep their impulses from step to step")
       call expect(report, solver%sleep_after >= 1, "solver", "sleep_after", error)
       call expect(report, solver%sleep_speed > 0.0_dp .or. .not. solver%sleep_given, "solver", "sleep_speed", error)

@@ -420,6 +420,11 @@ contains
         text = "DIVERGED: step "//to_text(simulation%step + 1)//" after "//to_text(solve%iterations)//" iterations of "// &
           & trim(solver%method)//"; the step is not kept"
       else
+        if (solve%closing > 0.0_dp) then
+          text = "NOT CONVERGED: a heavy body goes through a light one with "//to_text(solve%closing, 3)// &
+            & " of the largest momentum after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
+          return
+        end if
         text = "NOT CONVERGED: "//trim(solver%criterion)//" "// &
           & to_text(merge(solve%error, solve%residual, solver%criterion == "error"), 3)//" above the tolerance "// &
           & to_text(solver%tolerance, 3)//" after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)

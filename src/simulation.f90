@@ -644,7 +644,7 @@ contains
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
     call start_timer(phase_bodies)
-    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, .not. figures%solve%woken, &
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
       & self%neighbourhoods, self%problem)
     if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &

@@ -69,8 +69,8 @@ module gravier_problem_builder
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: found_t
     integer :: n = 0
-    !> those that sweeps take: the first ones, in whole blocks where others follow
-    integer :: n_swept = 0
+    !> those that do not sleep: the first ones, in whole blocks where others follow
+    integer :: n_awake = 0
     !> place in the list (n)
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
@@ -134,7 +134,7 @@ contains
       associate (view => neighbourhoods%view(s))
         call start_timer(phase_detection)
         call find_contacts(view, decomposition, physics, found)
-        found%n_swept = found%n
+        found%n_awake = found%n
         if (physics%sleep_after > 0) call put_sleepers_last(view, decomposition%boundaries, physics%sleep_after, found)
         call stop_timer(phase_detection)
         call start_timer(phase_setup)
@@ -244,15 +244,15 @@ contains
       b = boundary_of(view, found%source(c))
       if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
     end do
-    found%n_swept = min(found%n, lanes*n_blocks(count(.not. asleep)))
-    n = found%n_swept - count(.not. asleep)
+    found%n_awake = min(found%n, lanes*n_blocks(count(.not. asleep)))
+    n = found%n_awake - count(.not. asleep)
     do c = 1, found%n
       if (n == 0) exit
       if (.not. asleep(c)) cycle
       asleep(c) = .false.
       n = n - 1
     end do
-    if (found%n_swept == found%n) return
+    if (found%n_awake == found%n) return
     old = found
     n = 0
     do round = 1, 2
@@ -444,11 +444,10 @@ contains
     nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
     call find_pairs()
-    sub%n_swept = found%n_swept
-    call group_contacts(pair(:, 1:sub%n_swept), sub%n_bodies, order(1:sub%n_swept), sub%n_grouped)
-    do c = sub%n_swept + 1, found%n
-      order(c) = c
-    end do
+    sub%n_awake = found%n_awake
+    call group_contacts(pair(:, 1:sub%n_awake), sub%n_bodies, order(1:sub%n_awake), sub%n_grouped)
+    call group_contacts(pair(:, sub%n_awake + 1:), sub%n_bodies, order(sub%n_awake + 1:), sub%n_grouped_asleep)
+    order(sub%n_awake + 1:) = sub%n_awake + order(sub%n_awake + 1:)
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
@@ -934,7 +933,7 @@ contains
         counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(neighbourhoods%view(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
-        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_swept
+        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_awake
         deallocate (counted_elsewhere)
       end associate
     end do

@@ -33,11 +33,11 @@ module gravier_sleeping
 contains
 
   !> Count the steps at rest of the contacts of a solved problem, before its impulses are kept. Collective.
-  subroutine count_rest(rule, boundaries, stop_grains, neighbourhoods, problem)
+  subroutine count_rest(rule, boundaries, woken, neighbourhoods, problem)
     type(sleeping_rule_t), intent(in) :: rule
     type(boundary_t), intent(in) :: boundaries(:)
-    !> let the grains at rest stand still: their v_global becomes zero
-    logical, intent(in) :: stop_grains
+    !> contacts that slept were woken: nothing is stopped. Else grains at rest stand still: their v_global becomes zero
+    logical, intent(in) :: woken
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
     !> v_global is evaluated
     type(contact_problem_t), intent(inout) :: problem
@@ -50,7 +50,7 @@ contains
     do s = 1, size(problem%sub)
       call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s))
     end do
-    if (.not. stop_grains) return
+    if (woken) return
     call sum_over_copies(problem)
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_grains

@@ -19,6 +19,9 @@ module gravier_solve
   !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
+  !> momentum with which a heavier body may go through a lighter one, see `closing`: at most, and over the tolerance; packings that
+  !> have converged have a third of it and less
+  real(dp), parameter :: most_closing = 0.5_dp, closing_of_tolerance = 1.0e3_dp
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 5
 
@@ -52,6 +55,9 @@ module gravier_solve
     integer :: status = solve_exhausted
     integer :: iterations = 0
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
+    !> above 0, a heavy body went through a light one with this share of the largest momentum, and the solve had not converged
+    !> whatever the figure
+    real(dp) :: closing = 0.0_dp
     !> the contacts that slept were woken
     logical :: woken = .false.
     !> relative error on the impulses, negative where no exact solution is known
@@ -163,6 +169,16 @@ contains
       ratio = 0.0_dp
     end subroutine wake_if_due
 
+    !> A residual below the tolerance says little where a heavy body goes through a light one, or where there is no impulse yet
+    !> and some contact asks for one.
+    subroutine weigh_bodies()
+      real(dp) :: closing
+
+      closing = problem%closing()
+      if (.not. problem%impulse_scale > 0.0_dp) closing = 1.0_dp
+      if (closing > min(most_closing, closing_of_tolerance*control%tolerance)) report%closing = closing
+    end subroutine weigh_bodies
+
     subroutine judge(defect, finished)
       real(dp), intent(in) :: defect
       logical, intent(out) :: finished
@@ -173,7 +189,9 @@ contains
         return
       end if
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
-      if (report%figure <= control%tolerance) then
+      report%closing = 0.0_dp
+      if (report%figure <= control%tolerance .and. report%residual > 0.0_dp .and. .not. present(exact)) call weigh_bodies()
+      if (report%figure <= control%tolerance .and. .not. report%closing > 0.0_dp) then
         report%status = solve_converged
       else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
         report%status = solve_diverged
