@@ -56,6 +56,8 @@ module gravier_scheme
     logical :: resting = .false.
     !> the plain iterations are those at the end of a solve; the memory was shortened in this solve
     logical :: finishing = .false., shortened = .false.
+    !> the last change was less than the one before by what plain iterations at the end are asked for
+    logical :: falls = .false.
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
@@ -365,6 +367,7 @@ contains
       self%t = max(1.0_dp, memory_kept*self%t)
       self%shortened = .true.
     end if
+    self%falls = change < settling*self%change
     self%change = change
     self%window_change = self%window_change + change
     self%iterations = self%iterations + 1
@@ -384,7 +387,7 @@ contains
     !> |r - y|/|r| of the first sweep
     real(dp), intent(in) :: progress
 
-    if (self%resting .or. .not. self%shortened .or. self%iterations < self%finish_after) return
+    if (self%resting .or. self%falls .or. .not. self%shortened .or. self%iterations < self%finish_after) return
     if (residual_ratio*progress > self%finish_from*self%tolerance) return
     self%finishing = .true.
     self%resting = .true.

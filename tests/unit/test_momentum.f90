@@ -128,6 +128,9 @@ contains
     call check(.not. momentum%resting, "finish: not far from the tolerance")
     call momentum%steer(1.0_dp)
     call momentum%finish(1e-3_dp)
+    call check(.not. momentum%resting, "finish: not while momentum itself gains")
+    call momentum%steer(1.0_dp)
+    call momentum%finish(1e-3_dp)
     call check(momentum%resting, "finish: near the tolerance, after growth")
     beta = momentum%beta
     call momentum%steer(0.95_dp)
