@@ -54,8 +54,8 @@ module gravier_scheme
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
     logical :: resting = .false.
-    !> the plain iterations are those at the end of a solve; the memory was shortened in this solve
-    logical :: finishing = .false., shortened = .false.
+    !> the memory was shortened in this solve
+    logical :: shortened = .false.
     !> the last change was less than the one before by what plain iterations at the end are asked for
     logical :: falls = .false.
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
@@ -68,6 +68,8 @@ module gravier_scheme
     !> iterations of this solve but the finishing ones, windows since `lowest`, plain iterations to come, iteration
     !> before which no finishing ones begin
     integer :: iterations = 0, idle_windows = 0, plain = 0, finish_after = 0
+    !> finishing iterations to come, at most
+    integer :: finishing = 0
     type(momentum_part_t), allocatable :: part(:)
   contains
     procedure :: steer => momentum_steer
@@ -357,10 +359,11 @@ contains
     real(dp), intent(in) :: change
     real(dp) :: t
 
-    if (self%finishing) then
-      self%finishing = change < settling*self%change
+    if (self%finishing > 0) then
+      self%finishing = self%finishing - 1
+      if (change >= settling*self%change) self%finishing = 0
       self%change = change
-      if (.not. self%finishing) call go_on(self)
+      if (self%finishing == 0) call go_on(self)
       return
     end if
     if (change > growth_allowed*self%change) then
@@ -389,7 +392,7 @@ contains
 
     if (self%resting .or. self%falls .or. .not. self%shortened .or. self%iterations < self%finish_after) return
     if (residual_ratio*progress > self%finish_from*self%tolerance) return
-    self%finishing = .true.
+    self%finishing = window
     self%resting = .true.
     self%finish_change = self%change
     self%finish_began = residual_ratio*progress/self%tolerance
