@@ -158,7 +158,7 @@ contains
     type(neighbour_load_t), intent(inout) :: load(:)
     integer :: s
 
-    if (.not. momentum%on) return
+    if (.not. momentum%on .or. momentum%resting) return
     do s = 1, size(load)
       call extrapolate(momentum%beta, load(s)%value, load(s)%previous)
     end do
