@@ -122,6 +122,11 @@ contains
     if (report%status == solve_exhausted .and. scheme%keeps_best) then
       call scheme%conclude(problem)
       call problem%residual(report%residual, ignored)
+      report%figure = report%residual
+      if (present(exact)) then
+        report%error = exact%error(problem)
+        report%figure = report%error
+      end if
     end if
     report%seconds = clock() - began
 

@@ -103,6 +103,9 @@ class Newton(RunTestCase):
         with open(run.path("results", "history.csv"), encoding="utf-8") as file:
             row = list(csv.DictReader(file))[-1]
         self.assertLessEqual(float(row["residual"]), min(run.trace()["residual"]))
+        # and the log says so, to three digits
+        said = float(re.search(r"accuracy    residual at most (\S+) at the end of a solve", run.stdout)[1])
+        self.assertAlmostEqual(said / float(row["residual"]), 1.0, delta=6e-3)
 
 
 if __name__ == "__main__":
