@@ -28,6 +28,8 @@ GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
 #: `name= number`; forces and gaps of contacts stand without the sign
 VALUE = re.compile(r"(?:([A-Za-z]\w*(?:\(\d\))?)\s*=|\b(rl[nts]/H|gapTT))\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[DdEe][-+]?\d+|[-+]\d{3})?)")
+#: relative error of radii of gyration and moments of inertia: files have them to four digits
+ROUND = 1e-3
 #: rows to a period of a drive that oscillates
 ROWS_PER_PERIOD = 200
 
@@ -351,10 +353,10 @@ class Case:
             body.contactors[-1].refuse(f"body {body.rank} has several contactors or one beside its centre and is not driven",
                                        "one disk or sphere: clusters have no counterpart")
         radius, gyration = contactor.get("byrd"), body.bulk.get("gyrd", 0.0)
-        if self.dimension == 2 and gyration > 0.0 and abs(gyration - radius / math.sqrt(2.0)) > 1e-5 * radius:
+        if self.dimension == 2 and gyration > 0.0 and abs(gyration - radius / math.sqrt(2.0)) > ROUND * radius:
             body.bulk.refuse(f"gyrd= {gyration:g}", f"0 or byrd/sqrt(2) = {radius / math.sqrt(2.0):g}, a homogeneous disk")
         inertia = [body.bulk.get(name, 0.0) for name in ("I1", "I2", "I3")]
-        if max(inertia) - min(inertia) > 1e-5 * max(inertia):
+        if max(inertia) - min(inertia) > ROUND * max(inertia):
             body.bulk.refuse(f"moments of inertia {inertia}", "three equal ones")
 
     def motion(self, body, whole):
