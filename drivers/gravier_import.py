@@ -428,7 +428,8 @@ class Case:
             keys = {"shape": "circle", "point": list(centre), "radius": contactor.get("byrd")}
             if shape == "DNLYC":
                 keys.update(shape="cylinder", axis=list(frame[:, 2]))
-                self.remarks.append(f"body {body.rank} DNLYC: the cylinder is endless here, its height 2 x {contactor.get('High'):g} m is not kept")
+                self.remarks.append(f"body {body.rank} DNLYC: the cylinder is endless here, its height "
+                                    f"2 x {contactor.get('High'):g} m is not kept")
             return [("", keys)], []
         half, thick = contactor.get("axe1"), contactor.get("axe2" if d == 2 else "axe3")
         normal, along = frame[:, -1], frame[:, 0] * half
@@ -444,7 +445,8 @@ class Case:
                 keys = {"shape": "segment", "point": list(face - along), "end": list(face + along)}
             else:
                 across = frame[:, 1] * contactor.get("axe2")
-                keys = {"shape": "rectangle", "point": list(face - along - across), "edge_a": list(2.0 * along), "edge_b": list(2.0 * across)}
+                keys = {"shape": "rectangle", "point": list(face - along - across), "edge_a": list(2.0 * along),
+                        "edge_b": list(2.0 * across)}
             found.append((label, keys))
         if d == 3 and not self.planes:
             self.remarks.append(f"body {body.rank} PLANx: its edges are sharp here, round with {thick:g} m in LMGC90")
