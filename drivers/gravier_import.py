@@ -28,6 +28,8 @@ GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
 #: `name= number`; forces and gaps of contacts stand without the sign
 VALUE = re.compile(r"(?:([A-Za-z]\w*(?:\(\d\))?)\s*=|\b(rl[nts]/H|gapTT))\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[DdEe][-+]?\d+|[-+]\d{3})?)")
+#: relative error of radii of gyration and moments of inertia: files have them to four digits
+ROUND = 1e-3
 #: rows to a period of a drive that oscillates
 ROWS_PER_PERIOD = 200
 
@@ -351,10 +353,10 @@ class Case:
             body.contactors[-1].refuse(f"body {body.rank} has several contactors or one beside its centre and is not driven",
                                        "one disk or sphere: clusters have no counterpart")
         radius, gyration = contactor.get("byrd"), body.bulk.get("gyrd", 0.0)
-        if self.dimension == 2 and gyration > 0.0 and abs(gyration - radius / math.sqrt(2.0)) > 1e-5 * radius:
+        if self.dimension == 2 and gyration > 0.0 and abs(gyration - radius / math.sqrt(2.0)) > ROUND * radius:
             body.bulk.refuse(f"gyrd= {gyration:g}", f"0 or byrd/sqrt(2) = {radius / math.sqrt(2.0):g}, a homogeneous disk")
         inertia = [body.bulk.get(name, 0.0) for name in ("I1", "I2", "I3")]
-        if max(inertia) - min(inertia) > 1e-5 * max(inertia):
+        if max(inertia) - min(inertia) > ROUND * max(inertia):
             body.bulk.refuse(f"moments of inertia {inertia}", "three equal ones")
 
     def motion(self, body, whole):
@@ -426,7 +428,8 @@ class Case:
             keys = {"shape": "circle", "point": list(centre), "radius": contactor.get("byrd")}
             if shape == "DNLYC":
                 keys.update(shape="cylinder", axis=list(frame[:, 2]))
-                self.remarks.append(f"body {body.rank} DNLYC: the cylinder is endless here, its height 2 x {contactor.get('High'):g} m is not kept")
+                self.remarks.append(f"body {body.rank} DNLYC: the cylinder is endless here, its height "
+                                    f"2 x {contactor.get('High'):g} m is not kept")
             return [("", keys)], []
         half, thick = contactor.get("axe1"), contactor.get("axe2" if d == 2 else "axe3")
         normal, along = frame[:, -1], frame[:, 0] * half
@@ -442,7 +445,8 @@ class Case:
                 keys = {"shape": "segment", "point": list(face - along), "end": list(face + along)}
             else:
                 across = frame[:, 1] * contactor.get("axe2")
-                keys = {"shape": "rectangle", "point": list(face - along - across), "edge_a": list(2.0 * along), "edge_b": list(2.0 * across)}
+                keys = {"shape": "rectangle", "point": list(face - along - across), "edge_a": list(2.0 * along),
+                        "edge_b": list(2.0 * across)}
             found.append((label, keys))
         if d == 3 and not self.planes:
             self.remarks.append(f"body {body.rank} PLANx: its edges are sharp here, round with {thick:g} m in LMGC90")

@@ -207,8 +207,10 @@ class Import(RunTestCase):
 
     def test_laws_by_wall(self):
         """A wall has its own law: RST_CLB on the ground, IQS_CLB between disks."""
-        bodies = body(2, 1, [0.0, 0.06], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
-            body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        disk = body(2, 1, [0.0, 0.06], [("DISKx", "BLUEx", values(byrd=0.05))])
+        # as public files have it
+        disk = disk.replace(values(gyrd=0.0), values(gyrd=0.05 * 0.70706))
+        bodies = disk + body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
         bounce = LAW.replace("IQS_CLB", "RST_CLB").replace("iqsc0", "rstc0") + " " * 40 + values(rstn=0.5, rstt=0.25) + "\n"
         laws = LAW + bounce + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + \
             SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx").replace("iqsc0", "rstc0")
