@@ -29,10 +29,11 @@ SPHERES = merged(DISKS, {"scene": {"dimension": 3, "lattice_count": [4, 4, 4], "
 def vtk_python():
     """A python3 that can read VTKHDF; None where there is none."""
     for python in (os.environ.get("GRAVIER_VTK_PYTHON"), sys.executable):
-        if python and subprocess.run([python, "-c", "import numpy, vtkmodules.vtkIOHDF; from vtkmodules.vtkCommonCore import vtkVersion; "
-                                      "assert (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 4)"],
-                                     capture_output=True, check=False).returncode == 0:
-            return python
+        if python and os.path.exists(python):
+            test = ("import numpy, vtkmodules.vtkIOHDF; from vtkmodules.vtkCommonCore import vtkVersion; "
+                    "assert (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 4)")
+            if subprocess.run([python, "-c", test], capture_output=True, check=False).returncode == 0:
+                return python
     return None
 
 
