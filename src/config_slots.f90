@@ -327,6 +327,7 @@ contains
     case ("stress"); slot%logical => config%output%stress
     case ("structure"); slot%logical => config%output%structure
     case ("boundary_forces"); slot%logical => config%output%boundary_forces
+    case ("vtk"); slot%logical => config%output%vtk
     end select
   end subroutine output_slot
 

@@ -329,6 +329,8 @@ module gravier_config_table
     [key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
      key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
      key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
+     key_t("output", "vtk", kind_logical, ".false.", "", &
+           & "write `bodies.vtkhdf` and, with `contacts`, `contacts.vtkhdf` for ParaView, with each written state"), &
      key_t("output", "trace", kind_logical, ".false.", "", "write the convergence of every solve, check by check"), &
      key_t("output", "final_bodies", kind_logical, ".false.", "", &
            "write `final_bodies.h5`, a bodies file from which another scene starts"), &

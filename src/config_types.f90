@@ -143,7 +143,7 @@ module gravier_config_types
     !> s: the run writes a checkpoint and stops before it has run so long; 0: no limit
     real(dp) :: walltime
     !> groups of diagnostics
-    logical :: energy, stress, structure, boundary_forces
+    logical :: energy, stress, structure, boundary_forces, vtk
   end type output_config_t
 
   !> &boundary: one boundary. What does not belong to its shape keeps the default.

@@ -1,4 +1,4 @@
-!> The files of a run: results.h5, history.csv, trace.csv and the final bodies.
+!> The files of a run: results.h5, history.csv, trace.csv, those for ParaView and the final bodies.
 module gravier_run_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -15,6 +15,7 @@ module gravier_run_output
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
+  use gravier_picture_files, only: picture_files_t
   use gravier_problem_dump, only: write_problem
   use gravier_checkpoint, only: save_checkpoint, checkpoint_name
   implicit none
@@ -27,6 +28,7 @@ module gravier_run_output
     character(len=:), allocatable :: directory
     type(results_file_t) :: results
     type(csv_writer_t) :: history, trace
+    type(picture_files_t) :: pictures
     integer :: last_written = -1
   contains
     procedure :: open => run_output_open
@@ -60,6 +62,7 @@ contains
         & simulation%config%scene%dimension, error)
       call write_boundaries(self, simulation, error)
     end if
+    if (simulation%config%output%vtk) call self%pictures%open(simulation, self%directory, error)
     if (self%comm%rank == 0) then
       call open_table(self%history, self%directory//"history.csv", history_header(simulation), simulation, error)
       if (simulation%config%output%trace) call open_table(self%trace, self%directory//"trace.csv", trace_header(simulation), &
@@ -217,6 +220,7 @@ contains
       call self%results%write_step(simulation%step, simulation%time, bodies, error, boundaries=boundaries, &
         & figures=figures)
     end if
+    if (simulation%config%output%vtk) call self%pictures%write_step(simulation, error)
     self%last_written = simulation%step
     call stop_timer(phase_output)
   end subroutine run_output_write_state
@@ -365,6 +369,7 @@ contains
       if (simulation%config%output%final_bodies) call write_final_bodies(simulation, self%directory//"final_bodies.h5", error)
     end if
     call self%results%close(error)
+    call self%pictures%close(error)
     call self%history%close(error)
     if (self%trace%is_open()) call self%trace%close(error)
     call self%comm%agree(error)

@@ -76,10 +76,10 @@ contains
     !> of the whole run, of its solves with ten times the tolerance (negative: not known) [s]
     real(dp), intent(in) :: seconds, looser_seconds
     character(len=:), allocatable :: text
-    real(dp) :: half, common, lost
+    real(dp) :: half, shared, lost
 
     half = 0.5_dp*seconds
-    common = phases(phase_exchange) + phases(phase_factorise) + phases(phase_interface_solve) + phases(phase_reduction) + &
+    shared = phases(phase_exchange) + phases(phase_factorise) + phases(phase_interface_solve) + phases(phase_reduction) + &
       & phases(phase_interface)
     associate (effort => simulation%effort, config => simulation%config)
       lost = real(effort%iterations - effort%reached(at_tolerance), dp)/real(max(effort%iterations, 1_i8), dp)
@@ -93,7 +93,7 @@ contains
           & to_text(config%solver%max_iterations)//", or another method"
       else if (looser_seconds >= 0.0_dp .and. seconds - effort%seconds + looser_seconds <= half) then
         text = "ten times the tolerance: about "//duration_text(seconds - effort%seconds + looser_seconds)//" in all (estimated)"
-      else if (common > half .and. simulation%decomposition%n_subdomains > 1) then
+      else if (shared > half .and. simulation%decomposition%n_subdomains > 1) then
         text = "the interface takes most of it: fewer &decomposition subdomains, now "// &
           & to_text(simulation%decomposition%n_subdomains)//", on fewer ranks"
       else if (phases(phase_neighbourhood) > half) then

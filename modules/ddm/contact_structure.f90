@@ -5,7 +5,7 @@ module gravier_contact_structure
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: contact_structure_t, n_bins, bin_width
+  public :: contact_structure_t, n_bins, bin_width, unused
 
   !> bins of the histogram of normal forces over their mean; one more counts what lies beyond
   integer, parameter :: n_bins = 100

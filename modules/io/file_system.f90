@@ -2,7 +2,7 @@
 !> write is checked, and whether the standard output is a terminal. The only file with bindings to the C library.
 module gravier_file_system
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
-    & c_f_pointer, c_associated
+    & c_f_pointer, c_associated, c_loc
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
@@ -162,10 +162,10 @@ module gravier_file_system
     end function c_isatty
 
     integer(c_int64_t) function c_readlink(path, target, room) bind(C, name="readlink")
-      import :: c_int64_t, c_size_t, c_char
+      import :: c_int64_t, c_size_t, c_char, c_ptr
       implicit none
       character(kind=c_char), intent(in) :: path(*)
-      character(kind=c_char), intent(inout) :: target(*)
+      type(c_ptr), value :: target
       integer(c_size_t), value :: room
     end function c_readlink
 
@@ -342,10 +342,10 @@ contains
   function output_of(process) result(place)
     integer, intent(in) :: process
     character(len=:), allocatable :: place
-    character(kind=c_char, len=256) :: buffer
+    character(kind=c_char, len=256), target :: buffer
     integer(c_int64_t) :: length
 
-    length = c_readlink(c_text("/proc/"//to_text(process)//"/fd/1"), buffer, int(len(buffer), c_size_t))
+    length = c_readlink(c_text("/proc/"//to_text(process)//"/fd/1"), c_loc(buffer), int(len(buffer), c_size_t))
     place = buffer(1:max(0, int(length)))
   end function output_of
 

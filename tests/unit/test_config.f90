@@ -172,7 +172,7 @@ contains
       // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
       // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, fclib_step = 3, stress = .true." // newline &
       // "  energy = .true." // newline &
-      // "  structure = .true., boundary_forces = .true. /" // newline
+      // "  structure = .true., boundary_forces = .true., vtk = .true. /" // newline
   end function whole_file
 
   subroutine check_whole_methods(config)
@@ -210,6 +210,7 @@ contains
     call check(config%output%energy, "energy")
     call check(config%output%stress, "stress")
     call check(config%output%structure, "structure")
+    call check(config%output%vtk, "vtk")
     call check(config%output%boundary_forces, "boundary_forces")
   end subroutine check_whole_methods
 
@@ -292,6 +293,7 @@ contains
     call check(.not. config%output%energy, "default energy")
     call check(.not. config%output%stress, "default stress")
     call check(.not. config%output%structure, "default structure")
+    call check(.not. config%output%vtk, "default vtk")
     call check(.not. config%output%boundary_forces, "default boundary_forces")
   end subroutine check_default_methods
 
