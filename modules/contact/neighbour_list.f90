@@ -10,6 +10,8 @@ module gravier_neighbour_list
   !> global axes.
   type :: neighbour_list_t
     integer :: n = 0
+    !> pairs have states
+    logical :: remembers = .false.
     !> place of the candidate among the bodies searched (n)
     integer, allocatable :: candidate(:)
     !> place of the antagonist among the bodies searched, or minus the number of a boundary (n)
@@ -103,6 +105,7 @@ contains
     call permute(self%antagonist, order)
     if (size(self%shift) > 0) call permute(self%shift, order)
     allocate (self%impulse(n_impulse, self%n), source=0.0_dp)
+    self%remembers = remembers
     allocate (self%state(merge(self%n, 0, remembers)), source=0)
   end subroutine neighbour_list_finish
 

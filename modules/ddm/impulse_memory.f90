@@ -33,7 +33,7 @@ contains
   !> Words of what a list keeps with a pair: the entries of an impulse and, where pairs have one, the state.
   pure integer function kept_entries(list) result(n)
     type(neighbour_list_t), intent(in) :: list
-    n = size(list%impulse, 1) + merge(1, 0, size(list%state) > 0)
+    n = size(list%impulse, 1) + merge(1, 0, list%remembers)
   end function kept_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists.
