@@ -696,8 +696,8 @@ contains
     if (length > radius) part(:) = part*(radius/length)
   end subroutine cut
 
-  !> Relaxations of one contact whose sliding and rolling are coupled: each lowers the energy 1/2 r.W r + r.(v_free + shift), once the
-  !> normal impulse is that of the solution, and they end where all laws hold: r in the cones, and (-v) normal to them.
+  !> Relaxations of one contact whose sliding and rolling are coupled: each lowers the energy 1/2 r.W r + r.(v_free + shift),
+  !> once the normal impulse is that of the solution, and they end where all laws hold: r in the cones, and (-v) normal to them.
   subroutine test_rolling_contact(dimension, effects)
     integer, intent(in) :: dimension
     type(effects_t), intent(in) :: effects

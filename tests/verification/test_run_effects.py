@@ -35,7 +35,7 @@ class Rolling(SmallScene):
         def check(dimension):
             for slope, rolling in ((0.2, 0.19), (0.2, 0.21)):
                 record, speed, spin, angle = self.on_incline(f"incline {dimension} {slope} {rolling}", dimension, slope, rolling,
-                                                             solver={"warm_start": True})
+                                                             solver={"warm_start": True, "tolerance": 1e-11})
                 a = max(0.0, G * (np.sin(angle) - rolling * np.cos(angle))) / (1 + INERTIA[dimension])
                 case = f"{dimension}D grain on an incline of {slope}, rolling friction {rolling}"
                 # a solve ends at 1e-13 of the impulses m g h
@@ -48,8 +48,8 @@ class Rolling(SmallScene):
                 moment = record.contacts[-1]["moment"]
                 if dimension == 3:
                     self.assertLess(abs(moment[0, 0]), 1e-12, "about the normal")
-                # moments are kept from step to step: what rests, and what slows down at a constant rate, is solved by the last ones
-                self.assertEqual(table["iterations"][2:].max(), 0)
+                # moments are kept from step to step: without them 9 and 10 iterations
+                self.assertLessEqual(table["iterations"][2:].max(), 1)
                 largest = rolling * RADIUS * MASS * G * np.cos(angle) * self.step
                 if a > 0:
                     self.verify(case, "moment over its bound", np.abs(moment).sum() / largest, 1.0, 1e-9)
@@ -116,13 +116,22 @@ class Rolling(SmallScene):
 
 class TangentialRestitution(SmallScene):
 
-    def strike(self, title, dimension, friction, normal, tangential, velocity, spin):
+    def strike(self, title, dimension, friction, normal, tangential, velocity, spin, **solver):
         place = np.zeros(dimension)
         place[-1] = RADIUS
         record = self.play(title, [Grain(place, velocity, spin, RADIUS, MASS)], [plane(np.zeros(dimension), np.eye(dimension)[-1])], steps=2,
                            scene={"friction": friction, "restitution": normal, "tangential_restitution": tangential,
-                                  "overlap_projection": False}, output={"every": 1})
+                                  "overlap_projection": False}, output={"every": 1}, solver=solver)
         return record.velocity[-1, 0], record.spin[-1, 0]
+
+    def test_methods(self):
+        """Newton's method and the enriched ones know the tangential shift: sticking and sliding."""
+        for friction in (5.0, 0.05):
+            found = [self.strike(f"method {friction} {method}", 2, friction, 0.5, 0.6, (0.8, -0.5), 3.0, method=method)
+                     for method in ("nlgs", "newton", "nscdd_ep", "schwarz_ec")]
+            for velocity, spin in found[1:]:
+                self.verify(f"disk strikes a plane, mu {friction}, Newton's method and enriched ones", "velocity and R spin [m/s]",
+                            np.append(velocity, RADIUS * spin), np.append(found[0][0], RADIUS * found[0][1]), 1e-10)
 
     def test_oblique(self):
         """A grain strikes a plane: the point of contact leaves with -e_t of its velocity where it sticks, and with what the cone allows
