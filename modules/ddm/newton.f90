@@ -23,15 +23,15 @@ module gravier_newton
   public :: newton_t
 
   !> turns of sweeps with momentum; in later ones they are plain
-  integer, parameter :: turns_with_momentum = 2
-  !> iterations of a window of sweeps in the first turn, doubled in the next; what is left of the least change of the last window
-  !> where sweeps do well
+  integer, parameter :: turns_with_momentum = 3
+  !> iterations of a window of sweeps in the first turn, doubled in the next ones; what is left of the least change of the last
+  !> window where sweeps do well
   integer, parameter :: first_window = 100
   real(dp), parameter :: little_gain = 0.5_dp
   !> plain sweeps of the first turn that has them, doubled from turn to turn, so often at most
   integer, parameter :: plain_sweeps = 4000, most_doublings = 6
-  !> Newton's steps without progress that end the first turn, doubled in the next, and those that end a turn of plain sweeps; times
-  !> which a residual must fall to be progress
+  !> Newton's steps without progress that end the first turn, doubled in the next ones, and those that end a turn of plain sweeps;
+  !> times which a residual must fall to be progress
   integer, parameter :: first_patience = 100, late_patience = 40
   real(dp), parameter :: progress_made = 0.8_dp
   !> alpha at the start of a turn and its bounds
