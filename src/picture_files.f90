@@ -179,19 +179,19 @@ contains
     type(simulation_t), intent(in) :: simulation
     integer, intent(in) :: s, c
     real(dp), intent(inout) :: value(n_contact_values)
-    real(dp) :: normal, tangential
+    real(dp) :: held, tangential
     integer :: status
 
     associate (sub => simulation%problem%sub(s), kernels => simulation%problem%kernels, q => lane_of(c), g => block_of(c))
-      normal = sub%impulse(q, 1, g)
+      held = sub%held_impulse(c)
       tangential = 0.0_dp
       status = idle
-      if (normal > 0.0_dp) status = sliding
-      if (kernels%nc > 1) then
-        tangential = norm2(sub%impulse(q, 2:kernels%nc, g))
-        if (normal > 0.0_dp .and. tangential < (1.0_dp - unused)*sub%hot(q, kernels%nd + 6, g)*normal) status = sticking
+      if (held > 0.0_dp) status = sliding
+      if (kernels%nf > 1) then
+        tangential = norm2(sub%impulse(q, 2:kernels%nf, g))
+        if (held > 0.0_dp .and. tangential < (1.0_dp - unused)*sub%hot(q, kernels%nd + 6, g)*held) status = sticking
       end if
-      value(1) = normal/simulation%physics%h
+      value(1) = sub%impulse(q, 1, g)/simulation%physics%h
       value(2) = tangential/simulation%physics%h
       value(3) = sub%gap(c)
       value(4) = real(status, dp)
