@@ -104,6 +104,7 @@ contains
       call items(3)%add("position", 8, nd)
       call items(3)%add("radius", 8, 1)
       call items(3)%add("v_free", 8, nv)
+      if (simulation%physics%laws%attracts) call items(3)%add("pull", 8, nv)
       call items(3)%add("velocity", 8, nv)
       call items(3)%add("v_global", 8, nv)
       call items(3)%add("reaction", 8, nv)

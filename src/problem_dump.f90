@@ -44,6 +44,7 @@ contains
     call simulation%problem%evaluate()
     call order_bodies(simulation%problem, bodies, rows)
     call order_contacts(simulation, bodies, rows)
+    call simulation%problem%shift_impulses(-1)
     ! bit by bit what they were
     do s = 1, size(bodies)
       call move_alloc(bodies(s)%impulse, simulation%problem%sub(s)%impulse)

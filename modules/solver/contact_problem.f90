@@ -35,7 +35,7 @@ module gravier_contact_problem
     integer, allocatable :: boundary(:)
     !> centres of grains at q_m (nd, n_grains), radii (n_grains) [m]
     real(dp), allocatable :: position(:, :), radius(:)
-    !> velocity without contacts, M^-1 R^d (nv, n_columns) [m/s, rad/s]
+    !> velocity without contacts, M^-1 R^d, in a solve with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
     !> velocity under the scheme's present loads (nv, n_columns)
     real(dp), allocatable :: velocity(:, :)
@@ -51,9 +51,9 @@ module gravier_contact_problem
     integer, allocatable :: pair(:, :)
     real(dp), allocatable :: hot(:, :, :)
     real(dp), allocatable :: impulse(:, :, :)
-    !> h F of the attraction F of each contact, where some law of the scene attracts (lanes, blocks) [N s]: impulses of a solve are
-    !> r + h F n, and -h F n is in v_free
-    real(dp), allocatable :: attraction(:, :)
+    !> where some law of the scene attracts: h F of the attraction F of each contact (lanes, blocks) [N s], and their load on the
+    !> bodies, H (-h F n), of all copies (nv, n_columns) [N s, N m s]
+    real(dp), allocatable :: attraction(:, :), pull(:, :)
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
@@ -194,24 +194,39 @@ contains
     class(contact_problem_t), intent(inout) :: self
     integer :: s
 
-    call self%shift_impulses(-1)
+    do s = 1, size(self%sub)
+      self%sub(s)%impulse(:, 1, :) = -self%sub(s)%attraction
+    end do
     call self%evaluate()
     do s = 1, size(self%sub)
-      self%sub(s)%v_free(:, :) = self%sub(s)%v_global
-      self%sub(s)%impulse(:, :, :) = 0.0_dp
+      associate (sub => self%sub(s))
+        sub%pull = sub%reaction
+        sub%v_free(:, :) = sub%v_global
+        sub%impulse(:, :, :) = 0.0_dp
+      end associate
     end do
   end subroutine contact_problem_load_attraction
 
-  !> Turn the impulses of a solve into those on the bodies, r_n = r~_n - h F, where there are attractions, or back.
+  !> Where there are attractions, turn the problem as it was solved, in r~_n = r_n + h F, into that of the impulses on the bodies,
+  !> r_n under loads without attractions, or back: impulses, H r and v_free. v_global is the same in both.
   subroutine contact_problem_shift_impulses(self, sign)
     class(contact_problem_t), intent(inout) :: self
     !> -1 or 1, back
     integer, intent(in) :: sign
-    integer :: s
+    integer :: s, b, nd, nw
 
+    nd = self%kernels%nd
+    nw = self%kernels%nw
     do s = 1, size(self%sub)
-      if (.not. allocated(self%sub(s)%attraction)) cycle
-      self%sub(s)%impulse(:, 1, :) = self%sub(s)%impulse(:, 1, :) + sign*self%sub(s)%attraction
+      associate (sub => self%sub(s))
+        if (.not. allocated(sub%attraction)) cycle
+        sub%impulse(:, 1, :) = sub%impulse(:, 1, :) + sign*sub%attraction
+        sub%reaction(:, :) = sub%reaction - sign*sub%pull
+        do b = 1, sub%n_columns
+          sub%v_free(1:nd, b) = sub%v_free(1:nd, b) + sign*(sub%inverse_mass(1:nd, b)*sub%pull(1:nd, b))
+          sub%v_free(nd + 1:, b) = sub%v_free(nd + 1:, b) + sign*(sub%inverse_mass(nw, b)*sub%pull(nd + 1:, b))
+        end do
+      end associate
     end do
   end subroutine contact_problem_shift_impulses
 

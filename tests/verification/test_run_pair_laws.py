@@ -58,6 +58,13 @@ class Materials(SmallScene):
         self.assert_status(run, 0)
         self.verify("two densities", "speed after the impact [m/s]", run.results()["/steps/1/bodies/velocity"][:, 0], -0.5, 1e-12)
 
+    def test_unknown_material_of_a_grain(self):
+        path = write(self.here("three.csv"), "id,x,y,radius,material\n7,0,0,0.05,1\n8,1,0,0.05,3\n")
+        run = run_case({"scene": {"bodies": "file", "bodies_file": path}, "material": named("a", "b"), "time": {"step": 1e-3, "steps": 1}},
+                       directory=self.here("unknown"))
+        self.assert_status(run, 2)
+        self.assertIn("three.csv: id 8: material 3: expected 1 to 2, the number of a &material of case.nml", run.stderr)
+
 
 class SlipDependentFriction(SmallScene):
     values = {"static_friction": 0.5, "dynamic_friction": 0.2, "slip_scale": 0.01}
