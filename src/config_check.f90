@@ -6,7 +6,7 @@ module gravier_config_check
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_config_types, only: config_t
   use gravier_config_table, only: key_t, keys, kind_real, kind_logical
-  use gravier_config_keys, only: choices_text, has_word
+  use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
   use gravier_config_check_boundary, only: check_boundaries, is_pivoting, pivoting_text
@@ -266,37 +266,19 @@ contains
     end associate
   end subroutine check_decomposition
 
-  !> One domain for nlgs; no moments in what is written for two or three components a contact.
+  !> One domain for nlgs.
   subroutine check_method(report, config, error)
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: key
 
-    if (rolls(config)) then
-      call expect(report, has_word("nlgs nscdd schwarz", trim(config%solver%method)), "solver", "method", error, &
-                  "'nlgs', 'nscdd' or 'schwarz' with rolling or pivoting friction")
-      call expect(report, config%output%fclib_step == 0, "output", "fclib_step", error, &
-                  "0 with rolling or pivoting friction, which a file of FCLIB cannot say")
-    end if
     if (config%solver%method /= "nlgs") return
     key = "subdomains"
     if (.not. is_given(report, "decomposition", key)) key = "grid"
     call expect(report, config%decomposition%subdomains == 1, "decomposition", key, error, &
                 "one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'")
   end subroutine check_method
-
-  !> Whether some contact may resist rolling or pivoting.
-  pure logical function rolls(config)
-    type(config_t), intent(in) :: config
-
-    associate (scene => config%scene, boundaries => config%boundaries)
-      rolls = max(scene%rolling_friction, scene%wall_rolling_friction) > 0.0_dp
-      rolls = rolls .or. max(scene%pivoting_friction, scene%wall_pivoting_friction) > 0.0_dp
-      rolls = rolls .or. any(boundaries%rolling_friction > 0.0_dp) .or. any(boundaries%pivoting_friction > 0.0_dp)
-      rolls = rolls .and. scene%rotation
-    end associate
-  end function rolls
 
   subroutine check_enriched(report, config, error)
     type(report_t), intent(in) :: report

@@ -14,6 +14,7 @@ module gravier_scene
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_law_set, only: law_set_t
   use gravier_config_types, only: config_t, scene_config_t
+  use gravier_config_keys, only: has_word
   use gravier_config_laws, only: density_of, collect_laws
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
   use gravier_scene_boundaries, only: make_boundaries
@@ -71,6 +72,7 @@ contains
     call check_data(comm, config, data, error)
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
+    call check_moments(config, scene%effects, error)
     call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
@@ -169,6 +171,20 @@ contains
     end do
     call comm%agree(error)
   end subroutine glue
+
+  !> Some methods, and files of FCLIB, are for two or three components a contact.
+  subroutine check_moments(config, effects, error)
+    type(config_t), intent(in) :: config
+    type(effects_t), intent(in) :: effects
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. effects%rolling) return
+    if (.not. has_word("nlgs nscdd schwarz", trim(config%solver%method))) call raise(error, status_input, config%file// &
+      & ": &solver method = '"//trim(config%solver%method)//"': expected 'nlgs', 'nscdd' or 'schwarz' with rolling or "// &
+      & "pivoting friction")
+    if (config%output%fclib_step > 0) call raise(error, status_input, config%file//": &output fclib_step = "// &
+      & to_text(config%output%fclib_step)//": expected 0 with rolling or pivoting friction, which a file of FCLIB cannot say")
+  end subroutine check_moments
 
   !> The criterion 'error' knows the impulses of a column that gravity presses on the ground.
   subroutine check_exact_solution(config, error)
