@@ -169,7 +169,8 @@ contains
         iterations = figures%solve%iterations
         call simulation%free()
         call solve_column(problem + 2, problem + 1, 2, "method = 'nscdd', "//options, simulation, figures, "momentum")
-        call check_equal(iterations, figures%solve%iterations, "newton, problem "//to_text(problem)//", n_GS = "//to_text(n_gs(k)))
+        call check_equal(iterations, figures%solve%iterations, "newton, problem "//to_text(problem)//", n_GS = "// &
+          & to_text(n_gs(k)))
         call simulation%free()
       end do
     end do
