@@ -23,6 +23,11 @@ module gravier_sleeping
   !> change of the impulses on a body at rest over what momentum it may have; either over the impulses on it at most
   real(dp), parameter :: settled = 10.0_dp, share = 0.1_dp
 
+  !> Sums over the contacts of each body of a subdomain (nv, n_columns).
+  type :: sums_t
+    real(dp), allocatable :: of(:, :)
+  end type sums_t
+
   type :: sleeping_rule_t
     !> steps at rest after which a contact sleeps; 0: none does
     integer :: after = 0
@@ -41,20 +46,22 @@ contains
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
     !> v_global is evaluated
     type(contact_problem_t), intent(inout) :: problem
+    type(sums_t) :: sums(size(problem%sub))
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call sum_impulses(boundaries, neighbourhoods%view(s)%list, problem%sub(s))
+      call sum_impulses(boundaries, neighbourhoods%view(s)%list, problem%sub(s), problem%kernels%nv, sums(s))
     end do
-    call sum_over_copies(problem)
+    call sum_over_copies(problem, sums)
     do s = 1, size(problem%sub)
-      call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s))
+      call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s), &
+        & sums(s))
     end do
     if (woken) return
-    call sum_over_copies(problem)
+    call sum_over_copies(problem, sums)
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_grains
-        if (.not. problem%sub(s)%reaction(1, b) > 0.0_dp) problem%sub(s)%v_global(:, b) = 0.0_dp
+        if (.not. sums(s)%of(1, b) > 0.0_dp) problem%sub(s)%v_global(:, b) = 0.0_dp
       end do
     end do
   end subroutine count_rest
@@ -72,37 +79,41 @@ contains
     end do
   end subroutine wake_all
 
-  !> Sum what `reaction` holds over the copies of each body. Collective.
-  subroutine sum_over_copies(problem)
+  !> Sum over the copies of each body. Collective.
+  subroutine sum_over_copies(problem, sums)
     type(contact_problem_t), intent(inout) :: problem
+    type(sums_t), intent(inout) :: sums(:)
     integer :: s
 
     do s = 1, size(problem%sub)
-      call problem%shared%load(s, problem%sub(s)%reaction)
+      call problem%shared%load(s, sums(s)%of)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
-      call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
+      call problem%shared%sum_copies(s, sums(s)%of, mean=.false.)
     end do
   end subroutine sum_over_copies
 
-  !> Into the first two rows of `reaction`: normal impulses on each body, and by how much they have changed since the step before.
-  !> Under a boundary that moves they count as changed.
-  subroutine sum_impulses(boundaries, list, sub)
+  !> Into the first two rows: normal impulses on each body, and by how much they have changed since the step before. Under a
+  !> boundary that moves they count as changed.
+  subroutine sum_impulses(boundaries, list, sub, nv, sums)
     type(boundary_t), intent(in) :: boundaries(:)
     type(neighbour_list_t), intent(in) :: list
-    type(subproblem_t), intent(inout) :: sub
+    type(subproblem_t), intent(in) :: sub
+    !> degrees of freedom of a body, those of an exchange
+    integer, intent(in) :: nv
+    type(sums_t), intent(out) :: sums
     real(dp) :: r, change
     integer :: c, k
 
-    sub%reaction(:, :) = 0.0_dp
+    allocate (sums%of(nv, sub%n_columns), source=0.0_dp)
     do c = 1, sub%n_contacts
       r = sub%impulse(lane_of(c), 1, block_of(c))
       change = abs(r - list%impulse(1, sub%source(c)))
       if (is_moved(boundaries, sub, sub%pair(1, c)) .or. is_moved(boundaries, sub, sub%pair(2, c))) change = r
       do k = 1, 2
-        sub%reaction(1, sub%pair(k, c)) = sub%reaction(1, sub%pair(k, c)) + r
-        sub%reaction(2, sub%pair(k, c)) = sub%reaction(2, sub%pair(k, c)) + change
+        sums%of(1, sub%pair(k, c)) = sums%of(1, sub%pair(k, c)) + r
+        sums%of(2, sub%pair(k, c)) = sums%of(2, sub%pair(k, c)) + change
       end do
     end do
   end subroutine sum_impulses
@@ -118,14 +129,15 @@ contains
   end function is_moved
 
   !> Count the steps at rest, and put the number of the contacts of each body that have not counted half of `after` into the
-  !> first row of `reaction`, which comes with the sums of sum_impulses.
-  subroutine count_steps(after, limit, boundaries, list, sub)
+  !> first row of the sums, which comes as sum_impulses and sum_over_copies leave it.
+  subroutine count_steps(after, limit, boundaries, list, sub, sums)
     integer, intent(in) :: after
     !> momentum of a body at rest [N s]
     real(dp), intent(in) :: limit
     type(boundary_t), intent(in) :: boundaries(:)
     type(neighbour_list_t), intent(inout) :: list
-    type(subproblem_t), intent(inout) :: sub
+    type(subproblem_t), intent(in) :: sub
+    type(sums_t), intent(inout) :: sums
     logical, allocatable :: rests(:)
     integer, allocatable :: steps(:)
     integer :: c, b, last, nd
@@ -136,19 +148,19 @@ contains
     do b = 1, sub%n_columns
       rests(b) = .not. is_moved(boundaries, sub, b)
       if (b > sub%n_bodies) cycle
-      rests(b) = max(momentum(b), sub%reaction(2, b)/settled) <= min(limit, share*sub%reaction(1, b))
+      rests(b) = max(momentum(b), sums%of(2, b)/settled) <= min(limit, share*sums%of(1, b))
     end do
     do c = 1, sub%n_contacts
       steps(c) = 0
       if (rests(sub%pair(1, c)) .and. rests(sub%pair(2, c))) steps(c) = min(after, nint(list%impulse(last, sub%source(c))) + 1)
     end do
     list%impulse(last, :) = 0.0_dp
-    sub%reaction(:, :) = 0.0_dp
+    sums%of(:, :) = 0.0_dp
     do c = 1, sub%n_contacts
       list%impulse(last, sub%source(c)) = steps(c)
       if (2*steps(c) >= after) cycle
-      sub%reaction(1, sub%pair(1, c)) = sub%reaction(1, sub%pair(1, c)) + 1.0_dp
-      sub%reaction(1, sub%pair(2, c)) = sub%reaction(1, sub%pair(2, c)) + 1.0_dp
+      sums%of(1, sub%pair(1, c)) = sums%of(1, sub%pair(1, c)) + 1.0_dp
+      sums%of(1, sub%pair(2, c)) = sums%of(1, sub%pair(2, c)) + 1.0_dp
     end do
 
   contains
