@@ -3,19 +3,20 @@ function(gravier_compile_options target)
   target_compile_options(${target} PRIVATE
     -std=f2008 -Wall -Wextra -Wimplicit-interface -Warray-temporaries
     $<$<BOOL:${GRAVIER_WERROR}>:-Werror>
-    $<$<CONFIG:Release>:-O3 -march=${GRAVIER_ARCH}>
+    $<$<CONFIG:Release>:-O3> $<$<AND:$<CONFIG:Release>,$<BOOL:${GRAVIER_ARCH}>>:-march=${GRAVIER_ARCH}>
     $<$<CONFIG:Debug>:-Og -g -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow>
     $<$<CONFIG:Sanitize>:-O1 -g -fbacktrace -fsanitize=address,undefined -fno-omit-frame-pointer>)
   target_link_options(${target} PRIVATE $<$<CONFIG:Sanitize>:-fsanitize=address,undefined>)
 endfunction()
 
-set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds")
+set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds; empty: none")
 
-# gravier_layer(NAME [USES LOWER] [LIBRARIES ...]): the static library gravier_NAME of modules/NAME/*.f90,
+# gravier_layer(NAME [USES LOWER] [LIBRARIES ...]): the static library gravier_NAME of modules/NAME/*.f90 and modules/NAME/*/*.f90,
 # with a module directory of its own. USES names the next layer below, whose modules and those beneath it are seen.
 function(gravier_layer name)
   cmake_parse_arguments(LAYER "" "USES" "LIBRARIES" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.f90 ${PROJECT_SOURCE_DIR}/modules/${name}/*.F90)
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.f90 ${PROJECT_SOURCE_DIR}/modules/${name}/*.F90
+    ${PROJECT_SOURCE_DIR}/modules/${name}/*/*.f90)
   set(target gravier_${name})
   add_library(${target} STATIC ${sources})
   add_library(gravier::${name} ALIAS ${target})

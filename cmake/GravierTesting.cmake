@@ -77,8 +77,10 @@ function(gravier_python_test name file)
   endif()
   get_filename_component(directory ${file} DIRECTORY)
   get_filename_component(script ${file} NAME)
-  gravier_add_test(${name} ${TEST_TIMEOUT} 2 "${TEST_LABELS}"
+  gravier_add_test(${name} ${TEST_TIMEOUT} 1 "${TEST_LABELS}"
     "${GRAVIER_PYTHON};-m;unittest;discover;-v;-s;${directory};-p;${script}")
+  # most of their runs are on one rank; the longest tests start first
+  set_tests_properties(${name} PROPERTIES COST 100)
 endfunction()
 
 # gravier_add_test(NAME TIMEOUT RANKS LABELS COMMAND): in a directory of its own, with the environment of tests

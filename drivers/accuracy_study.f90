@@ -7,7 +7,7 @@ module gravier_accuracy_study
   use gravier_command_line, only: positive_integer, positive_real
   use gravier_config, only: config_t, parse_config
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
-  use gravier_config_table, only: keys
+  use gravier_config_table, only: keys, fill_keys
   use gravier_config_keys, only: has_word, choices_text
   use gravier_run, only: read_input
   implicit none
@@ -51,7 +51,7 @@ module gravier_accuracy_study
   !> those that a solve has no use for
   character(len=*), parameter :: run_keys = "vary values reference samples quantities knee"
   !> groups that have no place in a variant: where results go, and those that stand several times or are made before
-  character(len=*), parameter :: other_groups = "output boundary sample"
+  character(len=*), parameter :: other_groups = "output boundary sample material law"
   !> durations that agree so well, relative to the longer one, are the same
   real(dp), parameter :: same_time = 1.0e-9_dp
 

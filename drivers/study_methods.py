@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """The four decomposition methods side by side: iterations and seconds of one step of settled packings, and on columns.
 
-    python3 drivers/study_methods.py [--out DIR] [--quick] [--redraw]
+    python3 drivers/study_methods.py [--out DIR] [--quick | --large] [--redraw]
 
 Packings of disks and spheres settle in a box; then each method solves one step of them from zero impulses: NSCDD, NSCDD-EP,
 Schwarz and Schwarz-EC, with 1 to 64 subdomains, 1 to 50 sweeps an iteration, friction 0 and 0.3, search directions from 0 to
 1e12, plain and with momentum. Columns of 4 disks a subdomain show what a growing number of subdomains costs. Writes
-methods.csv, methods_columns.csv and methods.svg into DIR; --redraw draws from the CSV files that are there. --quick takes the
-small packings only.
+methods.csv, methods_columns.csv and methods.svg into DIR; --redraw draws from the CSV files that are there. --quick takes few
+iterations. --large takes packings of 10^4 and 10^5 grains instead, without columns, and writes methods_large.csv and
+methods_large.svg; an enriched method is left out of it where its interface solves, or its factors, take more than minutes.
 """
 
 import argparse
@@ -19,9 +20,9 @@ from pathlib import Path
 import numpy as np
 from study_support import plt, read_history, run, write_csv
 
-#: name: dimension, grains along each axis, steps of settling
-PACKINGS = {"disks 1e3": (2, [32, 31], 500), "disks 1e4": (2, [100, 100], 900), "spheres 1e3": (3, [10, 10, 10], 450),
-            "spheres 1e4": (3, [21, 21, 23], 600)}
+#: name: dimension, grains along each axis, steps of settling; 1e5 as high as 1e4
+PACKINGS = {"disks 1e3": (2, [32, 31], 500), "disks 1e4": (2, [100, 100], 900), "disks 1e5": (2, [1000, 100], 900),
+            "spheres 1e3": (3, [10, 10, 10], 450), "spheres 1e4": (3, [21, 21, 23], 600), "spheres 1e5": (3, [66, 66, 23], 600)}
 SMALL = ("disks 1e3", "spheres 1e3")
 TOLERANCES = (1e-2, 1e-3, 1e-4)
 PHASES = {"seconds in sweeps": "sweeps", "in interface": "interface solve", "in factors": "factorisation"}
@@ -108,11 +109,34 @@ def cases(quick):
                 yield case(packing, 0.3, "nscdd_ep", direction, "active", momentum, sweeps=3), small // 2
         for direction in ("1", "3", "100", "1e12"):
             yield case(packing, 0.3, "nscdd_ep", direction, "all", sweeps=3), small // 2
-    if quick:
-        return
-    for packing in PACKINGS:
-        if packing not in SMALL:
-            yield from methods(packing, 0.3, 150, subdomains=32, sweeps=3)
+
+
+def large_cases():
+    """(case, iterations allowed) on packings of 10^4 and 10^5 grains, the quick ones first."""
+    def case(packing, friction, method, momentum, subdomains, sweeps, direction="automatic"):
+        enriched = (direction, "active") if method == "nscdd_ep" else ("3", "all") if method == "schwarz_ec" else ("", "")
+        return dict(zip(COLUMNS, (packing, friction, method, *enriched, momentum, subdomains, sweeps)))
+
+    for packing in ("disks 1e4", "spheres 1e4", "disks 1e5", "spheres 1e5"):
+        allowed, parts = 600, ((1, 3), (8, 3), (32, 1), (32, 3), (32, 10), (64, 3))
+        if packing.endswith("1e5"):
+            allowed, parts = 300, ((1, 3), (32, 3), (64, 3))
+        for friction in (0.3, 0.0):
+            for momentum in (False, True):
+                for subdomains, sweeps in parts:
+                    yield case(packing, friction, "nscdd", momentum, subdomains, sweeps), allowed
+            yield case(packing, friction, "schwarz", False, 32, 3), allowed
+    for friction, subdomains, sweeps, allowed in ((0.3, 32, 3, 50), (0.0, 32, 3, 25), (0.3, 8, 3, 50), (0.3, 1, 3, 50),
+                                                  (0.3, 32, 10, 40), (0.3, 64, 3, 50)):
+        for momentum in (True, False):
+            yield case("disks 1e4", friction, "nscdd_ep", momentum, subdomains, sweeps), allowed
+    for direction in ("10", "1000"):
+        yield case("disks 1e4", 0.3, "nscdd_ep", True, 32, 3, direction), 30
+    yield case("disks 1e4", 0.3, "schwarz_ec", False, 32, 3), 50
+    # one domain: factors, no interface
+    for packing in ("spheres 1e4", "disks 1e5"):
+        for friction in (0.3, 0.0):
+            yield case(packing, friction, "nscdd_ep", True, 1, 3), 30
 
 
 def column(directory, subdomains, method, groups, sweeps):
@@ -179,22 +203,57 @@ def draw(rows, columns, path):
     figure.savefig(path)
 
 
+def draw_large(rows, path):
+    """Iterations to 1e-3 against subdomains, of each large packing with friction."""
+    packings = [name for name in PACKINGS if name not in SMALL]
+    figure, axes = plt.subplots(1, len(packings), figsize=(13, 3.6), sharey=True)
+    labels = {"nscdd": "NSCDD", "nscdd_ep": "NSCDD-EP"}
+    for axis, packing in zip(axes, packings):
+        for method in labels:
+            for momentum in ("False", "True"):
+                points = sorted((int(row["subdomains"]), int(row["to 0.001"])) for row in rows
+                                if row["packing"] == packing and row["friction"] == "0.3" and row["method"] == method and
+                                row["momentum"] == momentum and row["direction"] in ("", "automatic") and
+                                row["sweeps"] == "3" and row["to 0.001"] != "")
+                if points:
+                    axis.loglog(*np.array(points).T, "o-" if momentum == "False" else "s--", color=COLOURS[method],
+                                label=labels[method] + (", momentum" if momentum == "True" else ""))
+        axis.set_title(f"{packing}, friction 0.3, 3 sweeps", fontsize=9)
+        axis.set_xlabel("subdomains")
+    axes[0].set_ylabel("iterations to a residual of 1e-3")
+    axes[0].legend(frameon=False, fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path)
+
+
+def study(directory, listed, path):
+    """Solve each case into the table `path`."""
+    rows = []
+    for case, iterations in listed:
+        rows.append(solve(directory, settle(directory, case["packing"]), case, iterations))
+        # after every case: a study that is stopped has what it has done
+        write_csv(path, {key: [row[key] for row in rows] for key in rows[0]})
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", default="methods", help="directory of the results")
-    parser.add_argument("--quick", action="store_true", help="small packings and few iterations")
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--quick", action="store_true", help="few iterations")
+    size.add_argument("--large", action="store_true", help="packings of 10^4 and 10^5 grains")
     parser.add_argument("--redraw", action="store_true", help="draw from the CSV files")
     options = parser.parse_args()
     directory = Path(options.out)
     os.makedirs(directory, exist_ok=True)
+    if options.large:
+        if not options.redraw:
+            study(directory, large_cases(), directory / "methods_large.csv")
+        draw_large(read_rows(directory / "methods_large.csv"), directory / "methods_large.svg")
+        return
     if not options.redraw:
         columns = study_columns(directory, options.quick)
         write_csv(directory / "methods_columns.csv", {key: [row[key] for row in columns] for key in columns[0]})
-        rows = []
-        for case, iterations in cases(options.quick):
-            rows.append(solve(directory, settle(directory, case["packing"]), case, iterations))
-            # after every case: a study that is stopped has what it has done
-            write_csv(directory / "methods.csv", {key: [row[key] for row in rows] for key in rows[0]})
+        study(directory, cases(options.quick), directory / "methods.csv")
     draw(read_rows(directory / "methods.csv"), read_rows(directory / "methods_columns.csv"), directory / "methods.svg")
 
 

@@ -1,15 +1,17 @@
 """What the studies and the scenes share: loose grains, bodies files, runs of the program, pictures of disks."""
 import csv
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent / "python"))
 try:
     import h5py
     import matplotlib
     import numpy as np
+
+    import gravier
 except ImportError as missing:
     sys.exit(f"{Path(sys.argv[0]).name}: {missing}; expected a python3 with h5py, numpy and matplotlib")
 matplotlib.use("Agg")
@@ -18,7 +20,6 @@ from matplotlib.collections import EllipseCollection
 
 SOURCE = Path(__file__).resolve().parent.parent
 BINARIES = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin"))
-ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 # ---- grains
@@ -95,33 +96,14 @@ def read_bodies(path):
 
 # ---- runs
 
-def value_text(value):
-    """A value as a namelist has it."""
-    if isinstance(value, (bool, np.bool_)):
-        return ".true." if value else ".false."
-    if isinstance(value, str):
-        return f"'{value}'"
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return ", ".join(value_text(one) for one in value)
-    return repr(value.item() if isinstance(value, np.generic) else value)
-
-
 def run(directory, groups, boundaries=(), ranks=1, program=BINARIES / "gravier"):
     """Run the program in `directory` on the groups {name: {key: value}} and boundaries [{key: value}]; seconds it took."""
-    directory = Path(directory)
-    directory.mkdir(parents=True, exist_ok=True)
-    all_groups = list(groups.items()) + [("boundary", keys) for keys in boundaries]
-    (directory / "case.nml").write_text("".join(
-        f"&{name}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
-        for name, keys in all_groups))
     start = time.time()
-    with open(directory / "terminal.log", "w", encoding="utf-8") as log:
-        done = subprocess.run([os.environ.get("MPIEXEC", "mpiexec"), "-n", str(ranks), str(Path(program).resolve()), "case.nml"],
-                              cwd=directory, env={**ENVIRONMENT, **os.environ}, stdout=log, stderr=subprocess.STDOUT,
-                              stdin=subprocess.DEVNULL, check=False)
-    # 3: some solve missed its tolerance, which history.csv tells
-    if done.returncode not in (0, 3):
-        sys.exit(f"{directory}: gravier ended with status {done.returncode}: {(directory / 'terminal.log').read_text()[-500:]}")
+    try:
+        # a solve that missed its tolerance is told by history.csv
+        gravier.run({**groups, "boundary": list(boundaries)}, directory, ranks, Path(program).resolve())
+    except gravier.CaseError as reason:
+        sys.exit(str(reason))
     seconds = time.time() - start
     print(f"{directory}: {seconds:.0f} s", flush=True)
     return seconds
@@ -129,9 +111,7 @@ def run(directory, groups, boundaries=(), ranks=1, program=BINARIES / "gravier")
 
 def read_history(directory):
     """history.csv as {column: array}."""
-    with open(Path(directory) / "history.csv", encoding="ascii") as file:
-        rows = list(csv.DictReader(file))
-    return {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
+    return gravier.read_table(Path(directory) / "history.csv")
 
 
 def states(path):

@@ -6,6 +6,7 @@ module gravier_checkpoint
   use gravier_text, only: to_text
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_time_table, only: time_table_t
+  use gravier_body_store, only: place_word
   use gravier_boundary, only: boundary_t, boundary_words
   use gravier_impulse_memory, only: impulse_entries, list_impulses, match_impulses
   use gravier_energy_balance, only: energy_words
@@ -18,7 +19,7 @@ module gravier_checkpoint
   character(len=*), parameter :: checkpoint_name = "checkpoint.h5"
   character(len=*), parameter :: newline = achar(10)
   !> groups of the input that a run must go on with as it began
-  character(len=*), parameter :: fixed_groups = "&scene &boundary &sample"
+  character(len=*), parameter :: fixed_groups = "&scene &boundary &sample &material &law"
 
 contains
 
@@ -281,7 +282,8 @@ contains
     end do
   end subroutine take_reals
 
-  !> By subdomain: the grains where they were when the lists were made, each with its place now; the impulses; the cells.
+  !> By subdomain: the grains where they were when the lists were made, each with its place now; the impulses and states; the
+  !> cells.
   subroutine save_tables(simulation, file, error)
     type(simulation_t), intent(in) :: simulation
     type(checkpoint_file_t), intent(inout) :: file
@@ -295,9 +297,10 @@ contains
       call pack_grains(simulation, records, counts)
       call file%write_table("grains", n_subdomains, records, counts, error)
       if (simulation%neighbourhoods%builds > 0) then
-        n_words = 2 + impulse_entries(simulation%problem%kernels)
+        n_words = 2 + impulse_entries(simulation%problem%kernels, simulation%sleeping%after > 0) + &
+          & merge(1, 0, simulation%decomposition%rule%remembers)
         do s = 1, size(home)
-          counts(s) = count(simulation%neighbourhoods%view(s)%list%impulse(1, :) > 0.0_dp)
+          counts(s) = simulation%neighbourhoods%view(s)%list%n_kept()
         end do
         deallocate (records)
         allocate (records(n_words, sum(counts)))
@@ -336,7 +339,7 @@ contains
     integer :: s, k, n, d, words, nd
 
     nd = simulation%decomposition%nd
-    words = 5 + nd + simulation%decomposition%nv + simulation%decomposition%ni
+    words = place_word - 1 + nd + simulation%decomposition%nv + simulation%decomposition%ni
     associate (home => simulation%decomposition%home)
       do s = 1, size(home)
         counts(s) = home(s)%n
@@ -349,7 +352,7 @@ contains
           call home(s)%get_record(k, records(1:words, n))
           do d = 1, nd
             records(words + d, n) = transfer(home(s)%position(d, k), 0_i8)
-            if (simulation%neighbourhoods%builds > 0) records(5 + d, n) = &
+            if (simulation%neighbourhoods%builds > 0) records(place_word - 1 + d, n) = &
               & transfer(simulation%neighbourhoods%reference(s)%position(d, k), 0_i8)
           end do
         end do
@@ -384,7 +387,7 @@ contains
 
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
-      n_words = 5 + nd + decomposition%nv + decomposition%ni
+      n_words = place_word - 1 + nd + decomposition%nv + decomposition%ni
       call file%read_table("grains", decomposition%n_subdomains, records, counts, error)
       if (builds > 0) call file%read_array("boundaries_when_listed", words, error)
       call file%read_array("boundaries", now, error)
@@ -400,7 +403,8 @@ contains
       if (builds > 0) then
         call unpack_boundaries(words, decomposition%boundaries, simulation%config%file, error)
         if (allocated(error)) return
-        call simulation%neighbourhoods%build(decomposition, impulse_entries(simulation%problem%kernels))
+        call simulation%neighbourhoods%build(decomposition, impulse_entries(simulation%problem%kernels, &
+          & simulation%sleeping%after > 0))
         simulation%neighbourhoods%builds = builds
         call load_impulses(simulation, file, error)
       end if

@@ -4,8 +4,9 @@ module gravier_config
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
-                                  enriched_config_t, output_config_t, boundary_config_t, sample_config_t
-  use gravier_config_table, only: groups, keys
+                                  enriched_config_t, output_config_t, boundary_config_t, sample_config_t, material_config_t, &
+                                  law_config_t
+  use gravier_config_table, only: groups, keys, fill_keys, kind_real
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
   use gravier_config_slots, only: slot_t, slot_of, group_count
@@ -17,7 +18,7 @@ module gravier_config
   private
   public :: parse_config, write_active, write_key_reference
   public :: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t, output_config_t
-  public :: boundary_config_t, sample_config_t
+  public :: boundary_config_t, sample_config_t, material_config_t, law_config_t
 
 contains
 
@@ -35,7 +36,9 @@ contains
     type(assignment_t), intent(in), optional :: changes(:)
     type(scan_t) :: found
     type(report_t) :: report
+    integer :: k
 
+    call fill_keys()
     config%file = file
     config%text = text
     report%file = file
@@ -44,7 +47,11 @@ contains
     if (.not. allocated(error)) call check_names(file, found, error)
     if (allocated(error)) return
     allocate (config%boundaries(number_of_groups(found, "boundary")))
-    allocate (report%given(size(keys), max(1, size(config%boundaries))))
+    allocate (config%materials(number_of_groups(found, "material")), config%laws(number_of_groups(found, "law")))
+    do k = 1, size(config%laws)
+      allocate (config%laws(k)%value(count(keys%group == "law" .and. keys%kind == kind_real)))
+    end do
+    allocate (report%given(size(keys), max(1, size(config%boundaries), size(config%materials), size(config%laws))))
     call set_defaults(config, error)
     call read_first(config, found, report, error)
     if (.not. allocated(error)) call read_others(config, found, report, error)
@@ -74,14 +81,16 @@ contains
     integer :: k, instance, n
 
     do k = 1, size(keys)
+      ! &sample has defaults where it does not belong
       n = 1
-      if (keys(k)%group == "boundary") n = size(config%boundaries)
+      if (groups(find_group(keys(k)%group))%repeated) n = group_count(config, keys(k)%group)
       do instance = 1, n
         slot = slot_of(config, keys(k), instance)
         if (keys(k)%default == "''") then
           ! no word: a required choice, or an empty text
           if (associated(slot%choice)) slot%choice = ""
           if (associated(slot%text)) slot%text = ""
+          if (associated(slot%texts)) slot%texts = ""
           cycle
         end if
         call read_value(keys(k), "", trim(keys(k)%default), slot, touched, failed)
@@ -162,8 +171,8 @@ contains
     end do
   end function unknown_key
 
-  !> Reads what others hang on: the dimension, and sets the defaults that depend on it; the names of the boundaries, which
-  !> messages quote.
+  !> Reads what others hang on: the dimension, and sets the defaults that depend on it; the names of boundaries and
+  !> materials, which messages quote.
   subroutine read_first(config, found, report, error)
     type(config_t), target, intent(inout) :: config
     type(scan_t), intent(in) :: found
@@ -198,7 +207,11 @@ contains
 
   pure logical function comes_first(item)
     type(assignment_t), intent(in) :: item
-    comes_first = (item%group == "scene" .and. item%key == "dimension") .or. (item%group == "boundary" .and. item%key == "name")
+    select case (item%group)
+    case ("scene"); comes_first = item%key == "dimension"
+    case ("boundary", "material"); comes_first = item%key == "name"
+    case default; comes_first = .false.
+    end select
   end function comes_first
 
   !> Reads one assignment and notes it; fails on a bad value and on an entry that is already given.
@@ -284,6 +297,10 @@ contains
       if (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
           (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
     end if
+    if (.not. config%solver%sleep_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)
+    do i = 1, size(config%materials)
+      if (.not. config%materials(i)%density_given) config%materials(i)%density = config%scene%density
+    end do
     do i = 1, size(config%boundaries)
       report%instance = i
       call settle_boundary(config%scene, report, config%boundaries(i))
@@ -304,6 +321,7 @@ contains
     if (.not. boundary%tangential_restitution_given) boundary%tangential_restitution = scene%wall_tangential_restitution
     if (.not. boundary%rolling_given) boundary%rolling_friction = scene%wall_rolling_friction
     if (.not. boundary%pivoting_given) boundary%pivoting_friction = scene%wall_pivoting_friction
+    if (.not. boundary%material_given) boundary%material = scene%wall_material
     if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)
   end subroutine settle_boundary
 

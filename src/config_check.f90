@@ -10,6 +10,7 @@ module gravier_config_check
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
   use gravier_config_check_boundary, only: check_boundaries, is_pivoting, pivoting_text
+  use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
   implicit none
   private
@@ -38,7 +39,9 @@ contains
     call check_scene(report, config, error)
     if (config%scene%bodies == "column") call check_column(report, config, error)
     if (config%scene%bodies == "lattice") call check_lattice(report, config, error)
+    call check_materials(report, config, error)
     call check_boundaries(report, config, error)
+    call check_laws(report, config, error)
     if (config%scene%bodies == "sample") call check_sample(report, config, error)
     call check_time(report, config, error)
     call check_solver(report, config, error)
@@ -232,6 +235,12 @@ contains
                   .not. solver%relaxation_given, "solver", "acceleration", error, &
                   "'none' where relaxation is given: momentum needs a factor that adapts itself")
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
+      call expect(report, any(solver%method == ["nlgs   ", "nscdd  ", "schwarz"]) .or. .not. solver%sleeping, "solver", &
+                  "sleeping", error, ".false. with this method: sleeping serves 'nlgs', 'nscdd' and 'schwarz'")
+      call expect(report, solver%warm_start .or. .not. solver%sleeping, "solver", "sleeping", error, &
+                  ".false. where warm_start = .false.: contacts that sleep keep their impulses from step to step")
+      call expect(report, solver%sleep_after >= 1, "solver", "sleep_after", error)
+      call expect(report, solver%sleep_speed > 0.0_dp .or. .not. solver%sleep_given, "solver", "sleep_speed", error)
     end associate
   end subroutine check_solver
 
@@ -277,6 +286,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     associate (enriched => config%enriched)
+      call expect(report, enriched%interface == "mumps" .or. config%solver%method /= "newton", "enriched", "interface", error, &
+                  "'mumps' where &solver method = 'newton': its interface problem is not symmetric")
       call expect(report, enriched%direction >= 0.0_dp, "enriched", "direction", error)
       call expect(report, enriched%cg_tolerance > 0.0_dp .and. enriched%cg_tolerance < 1.0_dp, "enriched", "cg_tolerance", &
                   error)

@@ -18,6 +18,7 @@ module gravier_config_slots
     logical, pointer :: logicals(:) => null()
     character(len=choice_length), pointer :: choice => null()
     character(len=text_length), pointer :: text => null()
+    character(len=text_length), pointer :: texts(:) => null()
     !> is the key in the file? associated where the config_t has room for the answer
     logical, pointer :: given => null()
   end type slot_t
@@ -39,6 +40,10 @@ contains
       call boundary_slot(config, instance, key%name, slot)
     case ("sample")
       call sample_slot(config, key%name, slot)
+    case ("material")
+      call material_slot(config, instance, key%name, slot)
+    case ("law")
+      call law_slot(config, instance, key%name, slot)
     case ("time")
       call time_slot(config, key%name, slot)
     case ("solver")
@@ -52,7 +57,7 @@ contains
     end select
   end function slot_of
 
-  !> How many groups of a name count: each &boundary of the file, &sample where it belongs, one of any other.
+  !> How many groups of a name count: each &boundary, &material and &law of the file, &sample where it belongs, one of any other.
   pure integer function group_count(config, group)
     type(config_t), intent(in) :: config
     character(len=*), intent(in) :: group
@@ -61,7 +66,9 @@ contains
     g = find_group(group)
     group_count = 1
     if (groups(g)%bodies /= "" .and. groups(g)%bodies /= config%scene%bodies) group_count = 0
-    if (groups(g)%repeated) group_count = size(config%boundaries)
+    if (group == "boundary") group_count = size(config%boundaries)
+    if (group == "material") group_count = size(config%materials)
+    if (group == "law") group_count = size(config%laws)
   end function group_count
 
   !> Does a key belong to its group as the choice stands on which that hangs?
@@ -118,6 +125,7 @@ contains
     case ("wall_rolling_friction"); slot%real => config%scene%wall_rolling_friction
     case ("pivoting_friction"); slot%real => config%scene%pivoting_friction
     case ("wall_pivoting_friction"); slot%real => config%scene%wall_pivoting_friction
+    case ("wall_material"); slot%text => config%scene%wall_material
     case ("rotation"); slot%logical => config%scene%rotation
     case ("period"); slot%reals => config%scene%period
     case ("period_origin"); slot%reals => config%scene%period_origin
@@ -164,6 +172,7 @@ contains
     case ("tangential_restitution"); slot%real => config%boundaries(instance)%tangential_restitution
     case ("rolling_friction"); slot%real => config%boundaries(instance)%rolling_friction
     case ("pivoting_friction"); slot%real => config%boundaries(instance)%pivoting_friction
+    case ("material"); slot%text => config%boundaries(instance)%material
     case ("remove_at"); slot%real => config%boundaries(instance)%remove_at
     end select
     select case (name)
@@ -173,6 +182,7 @@ contains
     case ("tangential_restitution"); slot%given => config%boundaries(instance)%tangential_restitution_given
     case ("rolling_friction"); slot%given => config%boundaries(instance)%rolling_given
     case ("pivoting_friction"); slot%given => config%boundaries(instance)%pivoting_given
+    case ("material"); slot%given => config%boundaries(instance)%material_given
     case ("remove_at"); slot%given => config%boundaries(instance)%remove_given
     end select
   end subroutine boundary_slot
@@ -203,6 +213,34 @@ contains
     end select
   end subroutine sample_slot
 
+  subroutine material_slot(config, instance, name, slot)
+    type(config_t), target, intent(inout) :: config
+    !> number of the material
+    integer, intent(in) :: instance
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("name"); slot%text => config%materials(instance)%name
+    case ("density"); slot%real => config%materials(instance)%density
+    end select
+    if (name == "density") slot%given => config%materials(instance)%density_given
+  end subroutine material_slot
+
+  subroutine law_slot(config, instance, name, slot)
+    type(config_t), target, intent(inout) :: config
+    !> number of the group
+    integer, intent(in) :: instance
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("materials"); slot%texts => config%laws(instance)%materials
+    case ("kind"); slot%choice => config%laws(instance)%kind
+    case default; slot%real => config%laws(instance)%value(find_key("law", name) - find_key("law", "kind"))
+    end select
+  end subroutine law_slot
+
   subroutine time_slot(config, name, slot)
     type(config_t), target, intent(inout) :: config
     character(len=*), intent(in) :: name
@@ -230,9 +268,13 @@ contains
     case ("acceleration"); slot%choice => config%solver%acceleration
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
+    case ("sleeping"); slot%logical => config%solver%sleeping
+    case ("sleep_after"); slot%integer => config%solver%sleep_after
+    case ("sleep_speed"); slot%real => config%solver%sleep_speed
     case ("on_failure"); slot%choice => config%solver%on_failure
     end select
     if (name == "relaxation") slot%given => config%solver%relaxation_given
+    if (name == "sleep_speed") slot%given => config%solver%sleep_given
   end subroutine solver_slot
 
   subroutine decomposition_slot(config, name, slot)
@@ -285,6 +327,7 @@ contains
     case ("stress"); slot%logical => config%output%stress
     case ("structure"); slot%logical => config%output%structure
     case ("boundary_forces"); slot%logical => config%output%boundary_forces
+    case ("vtk"); slot%logical => config%output%vtk
     end select
   end subroutine output_slot
 

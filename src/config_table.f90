@@ -1,9 +1,11 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table.
+!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact come from
+!> their modules.
 module gravier_config_table
+  use gravier_law_registry, only: registered_key_t, registered_keys, kind_length
   implicit none
   private
-  public :: group_t, key_t, groups, keys
+  public :: group_t, key_t, groups, keys, fill_keys
   public :: kind_integer, kind_real, kind_logical, kind_choice, kind_text
 
   !> what a value is
@@ -36,7 +38,7 @@ module gravier_config_table
     !> the default, as it would be typed after the equal sign
     character(len=16) :: default
     !> a choice: the words, separated by blanks; otherwise a rule that follows "a finite real number", "an integer"
-    character(len=56) :: allowed
+    character(len=kind_length) :: allowed
     character(len=200) :: meaning
     !> number of entries
     integer :: count = 1
@@ -48,7 +50,7 @@ module gravier_config_table
     !> the choice of the same group on which it hangs whether the key may be given; blank: always
     character(len=16) :: chooser = ""
     !> the words of that choice to which the key belongs, separated by blanks
-    character(len=56) :: chosen = ""
+    character(len=kind_length) :: chosen = ""
     !> must each group give it? with the note "required" only: a key that has the note and a chooser, where it belongs
     logical :: required = .false.
   end type key_t
@@ -65,6 +67,10 @@ module gravier_config_table
     [group_t("scene", .true., "The bodies, their loads and their contact laws."), &
      group_t("boundary", .false., "A boundary: a wall of some shape, glued grains, or an outlet.", repeated=.true.), &
      group_t("sample", .false., "The grains that are generated.", bodies="sample"), &
+     group_t("material", .false., "A material of grains and boundaries: the first one is that of all grains unless the "// &
+             "bodies file says another.", repeated=.true.), &
+     group_t("law", .false., "The law of contact between two materials, in the place of friction and restitution of "// &
+             "`&scene` and `&boundary`.", repeated=.true.), &
      group_t("time", .true., "The time steps."), &
      group_t("solver", .false., "The method that solves the contacts of every step, and when it stops."), &
      group_t("decomposition", .false., "The subdomains of the domain decomposition methods."), &
@@ -122,6 +128,8 @@ module gravier_config_table
            "pivoting friction coefficient between bodies: the same for the moment about the normal; 0 in 2D"), &
      key_t("scene", "wall_pivoting_friction", kind_real, "-1", ">= 0", &
            "pivoting friction coefficient between bodies and boundaries; 0 in 2D", note="the value of `pivoting_friction`"), &
+     key_t("scene", "wall_material", kind_text, "''", "", &
+           "name of the `&material` of the boundaries; without one no `&law` is theirs"), &
      key_t("scene", "rotation", kind_logical, ".true.", "", "grains turn where friction asks; `.false.`: they never turn"), &
      key_t("scene", "period", kind_real, "3*0", ">= 0", &
            "length after which the scene repeats itself along each axis, 0: it does not; the third is 0 in 2D", &
@@ -197,6 +205,8 @@ module gravier_config_table
      key_t("boundary", "pivoting_friction", kind_real, "-1", ">= 0", &
            "pivoting friction coefficient between grains and this boundary; 0 in 2D", &
            note="the value of `wall_pivoting_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
+     key_t("boundary", "material", kind_text, "''", "", "name of its `&material`, and of that of grains glued to it", &
+           note="the value of `wall_material` of `&scene`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is taken away", &
            unit="s", note="never")]
 
@@ -239,6 +249,17 @@ module gravier_config_table
      key_t("sample", "file", kind_text, "'sample.h5'", "not empty", &
            "the bodies file that `gravier_sample` writes, with the ending .h5 or .hdf5")]
 
+  type(key_t), parameter :: material_keys(*) = &
+    [key_t("material", "name", kind_text, "''", "not empty", "a name of its own", note="required", required=.true.), &
+     key_t("material", "density", kind_real, "-1", "> 0", "density of its grains, where the bodies file gives no masses", &
+           unit="kg/m^3, kg/m^2 in 2D", note="the value of `density` of `&scene`")]
+
+  !> those of all laws; `kind` comes with its words, and each law has its own
+  type(key_t), parameter :: law_keys(*) = &
+    [key_t("law", "materials", kind_text, "''", "", &
+           "names of the two materials; one name: of pairs of that material", count=2, note="required", required=.true.), &
+     key_t("law", "kind", kind_choice, "''", "", "the law, see [laws](laws.md)", note="required", required=.true.)]
+
   type(key_t), parameter :: time_keys(*) = &
     [key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
      key_t("time", "steps", kind_integer, "0", ">= 0", "number of time steps", note="required", required=.true.), &
@@ -263,6 +284,12 @@ module gravier_config_table
            note="by the method"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
+     key_t("solver", "sleeping", kind_logical, ".false.", "", &
+           "contacts of bodies at rest leave the sweeps until these are disturbed (`nlgs`, `nscdd` and `schwarz` only)"), &
+     key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
+     key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
+           "momentum of a body at rest, at most, over the root mean square of the impulses; and over a tenth of those on it", &
+           note="100 times `tolerance`"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
            "after a solve that gave up: go on; write the step and stop; stop without it. "// &
            "One that diverged always stops without it")]
@@ -292,7 +319,7 @@ module gravier_config_table
            "contacts that take part: all, as in the paper; those that carry an impulse, and `nscdd_ep` feeds their impulses back", &
            note="`'all'`; `nscdd_ep` without `direction`: `'active'`"), &
      key_t("enriched", "interface", kind_choice, "'mumps'", "mumps cg", &
-           "interface solve: direct, or conjugate gradient (`nscdd_ep` only)"), &
+           "interface solve: direct, or conjugate gradient (`nscdd_ep` only; `newton` takes no other than `mumps`)"), &
      key_t("enriched", "cg_tolerance", kind_real, "1e-12", "in (0, 1)", &
            "relative residual at which the conjugate gradient stops (`nscdd_ep` with `interface = 'cg'` only)"), &
      key_t("enriched", "cg_max_iterations", kind_integer, "10000", ">= 1", &
@@ -302,6 +329,8 @@ module gravier_config_table
     [key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
      key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
      key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
+     key_t("output", "vtk", kind_logical, ".false.", "", &
+           & "write `bodies.vtkhdf` and, with `contacts`, `contacts.vtkhdf` for ParaView, with each written state"), &
      key_t("output", "trace", kind_logical, ".false.", "", "write the convergence of every solve, check by check"), &
      key_t("output", "final_bodies", kind_logical, ".false.", "", &
            "write `final_bodies.h5`, a bodies file from which another scene starts"), &
@@ -317,7 +346,60 @@ module gravier_config_table
      key_t("output", "boundary_forces", kind_logical, ".false.", "", "write force and place of each boundary")]
   !&>
 
-  type(key_t), parameter :: keys(*) = [scene_keys, boundary_keys, sample_keys, time_keys, solver_keys, decomposition_keys, &
-                                       enriched_keys, output_keys]
+  !> all keys, once `fill_keys` was called
+  type(key_t), allocatable, protected :: keys(:)
+
+contains
+
+  !> Complete the table. Whoever reads it has called this before.
+  subroutine fill_keys()
+    type(registered_key_t), allocatable :: own(:)
+    type(key_t) :: row(1)
+    character(len=kind_length) :: kinds
+    integer :: k, n
+
+    if (allocated(keys)) return
+    allocate (keys(0))
+    call add(scene_keys)
+    call add(boundary_keys)
+    call add(sample_keys)
+    call add(material_keys)
+    call add(law_keys)
+    call registered_keys(own, n, kinds)
+    keys(size(keys))%allowed = kinds
+    do k = 1, n
+      row(1) = row_of(own(k))
+      call add(row)
+    end do
+    call add(time_keys)
+    call add(solver_keys)
+    call add(decomposition_keys)
+    call add(enriched_keys)
+    call add(output_keys)
+
+  contains
+
+    subroutine add(more)
+      type(key_t), intent(in) :: more(:)
+      type(key_t), allocatable :: longer(:)
+
+      allocate (longer(size(keys) + size(more)))
+      longer(:size(keys)) = keys
+      longer(size(keys) + 1:) = more
+      call move_alloc(longer, keys)
+    end subroutine add
+
+  end subroutine fill_keys
+
+  !> The row of a key of some laws.
+  pure type(key_t) function row_of(own) result(row)
+    type(registered_key_t), intent(in) :: own
+
+    row = key_t("law", own%key%name, kind_real, own%key%default, own%key%allowed, own%key%meaning, unit=own%key%unit, &
+      & chooser="kind", chosen=own%kinds)
+    if (own%key%default /= "") return
+    row%default = "0"
+    row%note = "required"
+  end function row_of
 
 end module gravier_config_table

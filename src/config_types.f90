@@ -5,7 +5,7 @@ module gravier_config_types
   implicit none
   private
   public :: scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t
-  public :: output_config_t, boundary_config_t, sample_config_t, config_t
+  public :: output_config_t, boundary_config_t, sample_config_t, material_config_t, law_config_t, config_t
   public :: text_length, choice_length
 
   !> longest title or path
@@ -40,6 +40,8 @@ module gravier_config_types
     real(dp) :: tangential_restitution, wall_tangential_restitution
     !> >= 0, times R*: the lever of the largest moment; 0 in 2D: pivoting
     real(dp) :: rolling_friction, wall_rolling_friction, pivoting_friction, wall_pivoting_friction
+    !> of the boundaries; blank: none
+    character(len=text_length) :: wall_material
     !> false: no grain turns; true: grains turn where friction asks
     logical :: rotation
     !> m; 0 along an axis that is not periodic; the third is 0 in 2D
@@ -88,6 +90,11 @@ module gravier_config_types
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start
+    logical :: sleeping
+    !> steps; momentum of a body at rest over the root mean square of the impulses
+    integer :: sleep_after
+    real(dp) :: sleep_speed
+    logical :: sleep_given = .false.
     !> continue, stop or discard
     character(len=choice_length) :: on_failure
   end type solver_config_t
@@ -136,7 +143,7 @@ module gravier_config_types
     !> s: the run writes a checkpoint and stops before it has run so long; 0: no limit
     real(dp) :: walltime
     !> groups of diagnostics
-    logical :: energy, stress, structure, boundary_forces
+    logical :: energy, stress, structure, boundary_forces, vtk
   end type output_config_t
 
   !> &boundary: one boundary. What does not belong to its shape keeps the default.
@@ -185,6 +192,9 @@ module gravier_config_types
     !> the value for walls of &scene when not given
     real(dp) :: tangential_restitution, rolling_friction, pivoting_friction
     logical :: tangential_restitution_given = .false., rolling_given = .false., pivoting_given = .false.
+    !> name; wall_material of &scene when not given; blank: none
+    character(len=text_length) :: material
+    logical :: material_given = .false.
     !> s; the largest real number when not given
     real(dp) :: remove_at
     logical :: remove_given = .false.
@@ -221,6 +231,25 @@ module gravier_config_types
     character(len=text_length) :: file
   end type sample_config_t
 
+  !> &material: one material.
+  type :: material_config_t
+    !> unique
+    character(len=text_length) :: name
+    !> kg/m^3 (kg/m^2 in 2D); that of &scene when not given
+    real(dp) :: density
+    logical :: density_given = .false.
+  end type material_config_t
+
+  !> &law: the law of a pair of materials.
+  type :: law_config_t
+    !> names of the materials; a blank one stands for the other
+    character(len=text_length) :: materials(2)
+    !> one of the registered kinds
+    character(len=choice_length) :: kind
+    !> of the keys of all laws, in their order in the table
+    real(dp), allocatable :: value(:)
+  end type law_config_t
+
   !> A whole input file.
   type :: config_t
     !> path and content of the file
@@ -233,6 +262,9 @@ module gravier_config_types
     type(output_config_t) :: output
     !> in the order of the file; shape (0) when it has none
     type(boundary_config_t), allocatable :: boundaries(:)
+    !> in the order of the file; shapes (0) when it has none
+    type(material_config_t), allocatable :: materials(:)
+    type(law_config_t), allocatable :: laws(:)
     !> defaults unless bodies is sample
     type(sample_config_t) :: sample
   end type config_t

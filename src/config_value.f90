@@ -45,7 +45,8 @@ contains
     case (kind_logical)
       call read_logical(key, index, value, slot, touched, failed)
     case default
-      call read_text(key, value, slot, touched, failed)
+      if (key%count == 1) call read_text(key, value, slot, touched, failed)
+      if (key%count > 1) call read_texts(index, value, slot, touched, failed)
     end select
   end subroutine read_value
 
@@ -167,7 +168,30 @@ contains
     touched(1) = .not. failed
   end subroutine read_text
 
-  !> Is it one text in quotes, short enough for the reading?
+  !> Texts in quotes, of at most text_length characters and not empty.
+  subroutine read_texts(index, value, slot, touched, failed)
+    !> with its parentheses, or empty
+    character(len=*), intent(in) :: index
+    character(len=*), intent(in) :: value
+    type(slot_t), intent(inout) :: slot
+    logical, intent(out) :: touched(most_entries)
+    logical, intent(out) :: failed
+    character(len=longest_text) :: values(most_entries)
+    integer :: status, i
+
+    touched = .false.
+    failed = .not. is_quoted(value)
+    if (failed) return
+    call texts_of_record(index//" = "//value, values, status)
+    touched = values /= ""
+    failed = status /= 0 .or. any(len_trim(values) > text_length) .or. .not. fits(touched, size(slot%texts))
+    if (failed) return
+    do i = 1, size(slot%texts)
+      if (touched(i)) slot%texts(i) = values(i) (:text_length)
+    end do
+  end subroutine read_texts
+
+  !> Does it begin and end as texts in quotes do, and is it short enough for the reading?
   pure logical function is_quoted(value)
     character(len=*), intent(in) :: value
     integer :: n
@@ -239,6 +263,21 @@ contains
     read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
   end subroutine text_of_record
+
+  subroutine texts_of_record(assignment, value, status)
+    !> `(index) = values`
+    character(len=*), intent(in) :: assignment
+    character(len=longest_text), intent(out) :: value(most_entries)
+    !> not 0: it is not a list of texts
+    integer, intent(out) :: status
+    character(len=:), allocatable :: record
+    namelist /one/ value
+
+    value = ""
+    record = "&one value"//assignment//" /"
+    read (record, nml=one, iostat=status)
+    if (status /= 0) call forget_failed_read()
+  end subroutine texts_of_record
 
   !> The real number that a text says, infinite when it is too large; the text must be a number.
   function number_of(text) result(number)

@@ -3,7 +3,7 @@ module gravier_config_write
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
   use gravier_config_types, only: config_t
-  use gravier_config_table, only: group_t, key_t, groups, keys, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_table, only: group_t, key_t, groups, keys, fill_keys, kind_integer, kind_real, kind_logical, kind_choice
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs
   use gravier_config_value, only: number_of
@@ -132,7 +132,11 @@ contains
     case (kind_choice)
       text = "'"//trim(slot%choice)//"'"
     case default
-      text = quoted(trim(slot%text))
+      if (key%count == 1) text = quoted(trim(slot%text))
+      if (key%count > 1) text = quoted(trim(slot%texts(1)))
+      do i = 2, key%count
+        if (slot%texts(i) /= "") text = text//", "//quoted(trim(slot%texts(i)))
+      end do
     end select
   end function value_text
 
@@ -202,6 +206,7 @@ contains
     integer, intent(in) :: unit
     integer :: g, k
 
+    call fill_keys()
     call write_lines(unit, preface())
     do g = 1, size(groups)
       call write_lines(unit, group_heading(groups(g)))
@@ -220,7 +225,7 @@ contains
            //"A list takes blanks or commas between its entries, `2*0.5` for `0.5, 0.5`, and `grid(2) = 4` for one entry." &
            //newline &
            //"A group or a key that is not on this page is refused, and so is one that is given twice;"//newline &
-           //"`&boundary` alone may stand any number of times."//newline//newline &
+           //"`&boundary`, `&material` and `&law` may stand any number of times."//newline//newline &
            //"The shortest input:"//newline//newline &
            //"    &scene bodies = 'column' /"//newline &
            //"    &time  step = 0.01, steps = 10 /"//newline

@@ -37,6 +37,7 @@ contains
             data%velocity(1:nv, n) = home%velocity(:, k)
             data%radius(n) = home%radius(k)
             data%mass(n) = home%mass(k)
+            data%material(n) = home%material(k)
             if (home%glued(k) > 0) data%group(n) = decomposition%boundaries(home%glued(k))%group
           end do
         end associate

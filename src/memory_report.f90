@@ -4,6 +4,7 @@ module gravier_memory_report
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_impulse_memory, only: impulse_entries
+  use gravier_newton, only: newton_t
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -72,6 +73,7 @@ contains
       call items(1)%add("pair", 4, 2)
       call items(1)%add("hot", 8, kernels%nh)
       call items(1)%add("impulse", 8, kernels%nc)
+      if (simulation%physics%laws%attracts) call items(1)%add("attraction", 8, 1)
       call items(1)%add("gap", 8, 1)
       call items(1)%add("source", 4, 1)
       ! a projection of places borrows these
@@ -81,11 +83,19 @@ contains
         call items(1)%add("velocity of projections", 8, kernels%nc)
       end if
       if (simulation%scheme%momentum%on) call items(1)%add("impulse of momentum", 8, kernels%nc)
+      select type (scheme => simulation%scheme)
+      class is (newton_t)
+        call items(1)%add("impulses of Newton's method", 8, 4*kernels%nc)
+        call items(1)%add("velocity of Newton's method", 8, kernels%nc)
+        call items(1)%add("law of Newton's method", 8, 3*kernels%nc + kernels%nc**2 + 5)
+        call items(1)%add("state of Newton's method", 4, 1)
+      end select
       items(2)%name = "near pair"
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
       call items(2)%add("shift", 4, merge(1, 0, ni > 0))
-      call items(2)%add("impulse", 8, impulse_entries(kernels))
+      call items(2)%add("impulse", 8, impulse_entries(kernels, simulation%sleeping%after > 0))
+      if (simulation%decomposition%rule%remembers) call items(2)%add("state", 4, 1)
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
       call items(3)%add("home", 4, 1)
@@ -98,6 +108,11 @@ contains
       call items(3)%add("v_global", 8, nv)
       call items(3)%add("reaction", 8, nv)
       if (simulation%scheme%momentum%on) call items(3)%add("velocity of momentum", 8, nv)
+      select type (scheme => simulation%scheme)
+      class is (newton_t)
+        call items(3)%add("velocity of the sweeps of Newton's method", 8, nv)
+        call items(3)%add("velocity of Newton's steps", 8, nv)
+      end select
       call items(3)%add("inverse_mass", 8, nw)
       call items(3)%add("weight", 8, nw)
       items(4)%name = "grain seen, ghosts included"
@@ -120,6 +135,7 @@ contains
       call item%add("mass", 8, 1)
       call item%add("inertia", 8, 1)
       call item%add("glued", 4, 1)
+      call item%add("material", 4, 1)
       call item%add("image", 4, ni)
     end subroutine add_grain
 

@@ -3,6 +3,7 @@
 !> Bodies stand in the order of their identifiers, contacts in that of candidate and antagonist, so that the file depends neither
 !> on the decomposition nor on the ranks. What moves as prescribed, and the shift of the normal velocities, are in w. A component
 !> that cannot move has mass 1 and no entry in H. Contacts without friction have tangential components, too, with mu = 0.
+!> Attractions are loads: they are in f, and r has r_n + h F.
 module gravier_problem_dump
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -16,9 +17,10 @@ module gravier_problem_dump
   private
   public :: write_problem
 
-  !> Places of the bodies of a subdomain in the global problem, from 1 on (n_bodies).
+  !> Of a subdomain: places of its bodies in the global problem, from 1 on (n_bodies), and impulses put aside.
   type :: places_t
     integer(i8), allocatable :: place(:)
+    real(dp), allocatable :: impulse(:, :, :)
   end type places_t
 
 contains
@@ -30,13 +32,22 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(fclib_rows_t) :: rows
     type(places_t) :: bodies(size(simulation%problem%sub))
+    integer :: s
 
     if (allocated(error)) return
     rows%dimension = simulation%problem%kernels%nd
+    do s = 1, size(bodies)
+      bodies(s)%impulse = simulation%problem%sub(s)%impulse
+    end do
+    call simulation%problem%shift_impulses(1)
     ! a projection of overlaps has used the velocities for its own
     call simulation%problem%evaluate()
     call order_bodies(simulation%problem, bodies, rows)
     call order_contacts(simulation, bodies, rows)
+    ! bit by bit what they were
+    do s = 1, size(bodies)
+      call move_alloc(bodies(s)%impulse, simulation%problem%sub(s)%impulse)
+    end do
     call write_fclib_global(simulation%comm, path, rows, error)
   end subroutine write_problem
 

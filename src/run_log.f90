@@ -6,7 +6,7 @@ module gravier_run_log
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, mpi_library
   use gravier_timers, only: gather_timers, phase_names, n_phases
-  use gravier_file_system, only: text_file_t
+  use gravier_file_system, only: text_file_t, on_terminal
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
@@ -16,21 +16,30 @@ module gravier_run_log
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
+  use gravier_progress, only: progress_t, warn_unconverged, warn_fast, warn_lowered, warn_partition, note_balance
+  use gravier_run_summary, only: converged_text, time_text, halving_text
   implicit none
   private
   public :: run_log_t, banner_text
 
   character(len=*), parameter :: newline = new_line("a")
+  !> back to the begin of a line of a terminal, which is wiped out; and how much of it is used
+  character(len=*), parameter :: wipe = achar(13)//achar(27)//"[K"
+  integer, parameter :: live_width = 79
 
-  !> Lines go to the standard output, and to a file once it is open. On other ranks than 0 nothing is written, but
-  !> collective calls must still be made there.
+  !> Lines go to the standard output, and to a file once it is open. On a terminal the steps are one line that changes, and their
+  !> lines go to the file alone. On other ranks than 0 nothing is written, but collective calls must still be made there.
   type :: run_log_t
     type(communicator_t), pointer :: comm => null()
     type(text_file_t) :: file
     !> kept until the file is open
     character(len=:), allocatable :: early
-    !> whether the safeguard of an enriched method has been mentioned
-    logical :: said_lowered = .false.
+    !> how often what is said
+    type(progress_t) :: progress
+    !> rank 0 writes to a terminal; a live line stands there
+    logical :: live = .false., line_stands = .false.
+    !> of search directions, in the last step
+    integer(i8) :: lowered = 0
   contains
     procedure :: init => run_log_init
     procedure :: open => run_log_open
@@ -52,6 +61,8 @@ contains
     type(communicator_t), target, intent(in) :: comm
     self%comm => comm
     self%early = ""
+    if (comm%rank == 0) self%live = on_terminal()
+    call self%progress%begin()
   end subroutine run_log_init
 
   !> Open DIRECTORY/run.log and write into it what was said so far. Rank 0 may fail; the caller makes it known.
@@ -78,14 +89,48 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     if (self%comm%rank /= 0) return
+    call wipe_live_line(self)
     write (output_unit, "(a)") text
     flush (output_unit)
+    call note_line(self, text, error)
+  end subroutine run_log_line
+
+  !> A line of the file alone.
+  subroutine note_line(self, text, error)
+    class(run_log_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (self%comm%rank /= 0) return
     if (self%file%is_open()) then
       call self%file%append(text//newline, error)
     else
       self%early = self%early//text//newline
     end if
-  end subroutine run_log_line
+  end subroutine note_line
+
+  subroutine wipe_live_line(self)
+    class(run_log_t), intent(inout) :: self
+
+    if (.not. self%line_stands) return
+    write (output_unit, "(a)", advance="no") wipe
+    flush (output_unit)
+    self%line_stands = .false.
+  end subroutine wipe_live_line
+
+  !> A warning of a kind, `number` times, where one is due.
+  subroutine warn(self, kind, number, text, error)
+    class(run_log_t), intent(inout) :: self
+    integer, intent(in) :: kind
+    integer(i8), intent(in) :: number
+    character(len=*), intent(in) :: text
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: addition
+    logical :: say
+
+    call self%progress%warn(kind, number, say, addition)
+    if (say) call self%line(text//addition, error)
+  end subroutine warn
 
   !> Lines of a text, each ended by a newline.
   subroutine write_lines(self, text, indent, error)
@@ -130,6 +175,8 @@ contains
       call self%line("effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.), error)
       call self%line("off         "//effects_text(simulation%effects, .false.), error)
       call self%line("unknowns    "//cost_text(simulation), error)
+      if (config%solver%sleeping) call self%line("sleeping    contacts of bodies at rest for "// &
+        & to_text(config%solver%sleep_after)//" steps leave the sweeps; the residual is that of all contacts", error)
       call self%line("options in force", error)
       call write_active(options, config)
       call write_lines(self, options, "  ", error)
@@ -153,8 +200,8 @@ contains
   subroutine run_log_write_head(self, error)
     class(run_log_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
-    call self%line("    step       time [s]    contacts  iterations   residual       jump    overlap [m]  energy [J]  wall [s]", &
-      & error)
+    call self%line("    step       time [s]    contacts  iterations   residual       jump    overlap [m]  energy [J]  wall [s]"// &
+      & "       left", error)
   end subroutine run_log_write_head
 
   function boxes_text(simulation) result(text)
@@ -268,7 +315,7 @@ contains
       & " KiB on the rank with most", error)
   end subroutine run_log_write_memory
 
-  !> One line a step.
+  !> A line of a step where one is due, and what there is to warn of.
   subroutine run_log_write_step(self, simulation, figures, seconds, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -277,26 +324,79 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=160) :: row
 
+    call self%progress%note_step(seconds)
     if (figures%solve%status == solve_diverged) then
       call self%line("  *** "//failure_text(simulation, figures), error)
       return
     end if
-    write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3)") simulation%step, simulation%time, figures%contacts, &
-      & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, seconds
-    call self%line(trim(row), error)
-    if (figures%divided) call self%line("balance     "//balance_text(figures%rank_balance, figures%subdomain_balance)// &
-      & " of the mean until this partition", error)
-    if (figures%refused) call self%line("warning     the grains fill fewer cells than there are subdomains: "// &
-      & "the old partition stays", error)
-    if (figures%fast > 0 .and. simulation%fast == figures%fast) call self%line("warning     "//to_text(figures%fast)// &
-      & " grains move by more than their radius in a step (said once; history.csv counts them)", error)
-    if (simulation%scheme%work%lowered > 0 .and. .not. self%said_lowered) then
-      self%said_lowered = .true.
-      call self%line("warning     changes grew or went round in circles under l: lowered "// &
-        & to_text(simulation%scheme%work%lowered)//" times (said once; the closing table counts)", error)
+    if (self%progress%line_due(simulation%step == simulation%config%time%steps)) then
+      write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3,a11)") simulation%step, simulation%time, figures%contacts, &
+        & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, &
+        & seconds, left_text(self, simulation)
+      if (self%live) then
+        call note_line(self, trim(row), error)
+      else
+        call self%line(trim(row), error)
+      end if
     end if
-    if (figures%solve%status /= solve_converged) call self%line("  *** "//failure_text(simulation, figures), error)
+    call write_warnings(self, simulation, figures, error)
+    if (self%live) call write_live_line(self, simulation, figures)
   end subroutine run_log_write_step
+
+  !> Time left, where the number of steps is known.
+  function left_text(self, simulation) result(text)
+    class(run_log_t), intent(in) :: self
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (simulation%config%time%steps >= simulation%step) &
+      & text = self%progress%left(simulation%config%time%steps - simulation%step)
+  end function left_text
+
+  !> The line on a terminal that changes, where it is due.
+  subroutine write_live_line(self, simulation, figures)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    character(len=:), allocatable :: text
+    character(len=12) :: time, residual
+
+    if (.not. self%progress%live_due()) return
+    write (time, "(es9.3e2)") simulation%time
+    write (residual, "(es8.1e2)") figures%solve%residual
+    text = "step "//to_text(simulation%step)
+    if (simulation%config%time%steps >= simulation%step) text = text//"/"//to_text(simulation%config%time%steps)
+    text = text//"  "//trim(adjustl(time))//" s  "//to_text(figures%contacts)//" contacts  "// &
+      & to_text(figures%solve%iterations)//" iterations  "//trim(adjustl(residual))
+    if (left_text(self, simulation) /= "") text = text//"  "//left_text(self, simulation)//" left"
+    write (output_unit, "(2a)", advance="no") wipe, text(1:min(len(text), live_width))
+    flush (output_unit)
+    self%line_stands = .true.
+  end subroutine write_live_line
+
+  !> What a step has to warn of.
+  subroutine write_warnings(self, simulation, figures, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: lowered
+
+    if (figures%divided) call warn(self, note_balance, 1_i8, "balance     "// &
+      & balance_text(figures%rank_balance, figures%subdomain_balance)//" of the mean until this partition", error)
+    if (figures%refused) call warn(self, warn_partition, 1_i8, "warning     the grains fill fewer cells than there are "// &
+      & "subdomains: the old partition stays", error)
+    if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "//to_text(figures%fast)// &
+      & " grains move by more than their radius in step "//to_text(simulation%step), error)
+    lowered = int(simulation%scheme%work%lowered, i8) - self%lowered
+    self%lowered = self%lowered + lowered
+    if (lowered > 0) call warn(self, warn_lowered, lowered, &
+      & "warning     changes grew or went round in circles under l: lowered "//to_text(lowered)//" times in step "// &
+      & to_text(simulation%step), error)
+    if (figures%solve%status /= solve_converged) call warn(self, warn_unconverged, 1_i8, "  *** "// &
+      & failure_text(simulation, figures)//" in step "//to_text(simulation%step), error)
+  end subroutine write_warnings
 
   !> How unevenly sweeps took time.
   function balance_text(ranks, subdomains) result(text)
@@ -320,6 +420,11 @@ contains
         text = "DIVERGED: step "//to_text(simulation%step + 1)//" after "//to_text(solve%iterations)//" iterations of "// &
           & trim(solver%method)//"; the step is not kept"
       else
+        if (solve%closing > 0.0_dp) then
+          text = "NOT CONVERGED: a heavy body goes through a light one with "//to_text(solve%closing, 3)// &
+            & " of the largest momentum after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
+          return
+        end if
         text = "NOT CONVERGED: "//trim(solver%criterion)//" "// &
           & to_text(merge(solve%error, solve%residual, solver%criterion == "error"), 3)//" above the tolerance "// &
           & to_text(solver%tolerance, 3)//" after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
@@ -348,7 +453,27 @@ contains
     call self%line(trim(row), error)
     call write_work(self, simulation, error)
     call write_accuracy(self, simulation, error)
+    call write_summary(self, simulation, mean, seconds, error)
   end subroutine run_log_write_end
+
+  !> In words, for a person: warnings, convergence, time. Collective.
+  subroutine write_summary(self, simulation, phases, seconds, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    !> (n_phases), mean over the ranks, and of the run [s]
+    real(dp), intent(in) :: phases(n_phases), seconds
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: warnings
+    real(dp) :: looser_seconds
+
+    looser_seconds = self%comm%highest(simulation%effort%seconds_of(simulation%effort%looser()))
+    warnings = self%progress%warnings()
+    if (warnings /= "") call self%line("warnings    "//warnings, error)
+    if (simulation%effort%solves == 0) return
+    call self%line("converged   "//converged_text(simulation), error)
+    call self%line("time        "//time_text(phases, seconds, simulation%effort%solves), error)
+    call self%line("to halve it "//halving_text(simulation, phases, seconds, looser_seconds), error)
+  end subroutine write_summary
 
   subroutine write_work(self, simulation, error)
     class(run_log_t), intent(inout) :: self
@@ -370,6 +495,8 @@ contains
     call self%line("interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
       & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
       & " factorisations", error)
+    if (simulation%config%solver%sleeping) call self%line("sleeping    "//to_text(simulation%slept)// &
+      & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance", error)
     if (simulation%scheme%direction_text /= "") call self%line("direction   "//simulation%scheme%direction_text//"; lowered "// &
       & to_text(work%lowered)//" times", error)
     if (simulation%decomposition%n_subdomains > 1) then
@@ -413,18 +540,19 @@ contains
     end associate
   end subroutine write_accuracy
 
-  !> How far energies balance, where they are measured.
+  !> How far energies balance: of the whole scene where its terms are measured, else of the grains.
   function energy_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    real(dp) :: off, turnover
 
-    if (.not. allocated(simulation%diagnostics%energy)) then
-      text = "energy balance not measured; &output energy = .true. does"
-      return
+    off = simulation%balance%error()
+    turnover = simulation%balance%turnover()
+    if (allocated(simulation%diagnostics%energy)) then
+      off = simulation%diagnostics%energy%error()
+      turnover = simulation%diagnostics%energy%turnover()
     end if
-    associate (energy => simulation%diagnostics%energy)
-      text = "energy balance off by "//to_text(abs(energy%error()), 2)//" J, of "//to_text(energy%turnover(), 3)//" J turned over"
-    end associate
+    text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
   end function energy_text
 
   !> What so many iterations would have taken. Collective.
@@ -444,6 +572,7 @@ contains
   subroutine run_log_close(self, error)
     class(run_log_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
+    call wipe_live_line(self)
     call self%file%close(error)
   end subroutine run_log_close
 

@@ -1,4 +1,4 @@
-!> The files of a run: results.h5, history.csv, trace.csv and the final bodies.
+!> The files of a run: results.h5, history.csv, trace.csv, those for ParaView and the final bodies.
 module gravier_run_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -15,6 +15,7 @@ module gravier_run_output
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_final_bodies, only: write_final_bodies
+  use gravier_picture_files, only: picture_files_t
   use gravier_problem_dump, only: write_problem
   use gravier_checkpoint, only: save_checkpoint, checkpoint_name
   implicit none
@@ -27,6 +28,7 @@ module gravier_run_output
     character(len=:), allocatable :: directory
     type(results_file_t) :: results
     type(csv_writer_t) :: history, trace
+    type(picture_files_t) :: pictures
     integer :: last_written = -1
   contains
     procedure :: open => run_output_open
@@ -60,8 +62,9 @@ contains
         & simulation%config%scene%dimension, error)
       call write_boundaries(self, simulation, error)
     end if
+    if (simulation%config%output%vtk) call self%pictures%open(simulation, self%directory, error)
     if (self%comm%rank == 0) then
-      call open_table(self%history, self%directory//"history.csv", history_header(simulation%diagnostics), simulation, error)
+      call open_table(self%history, self%directory//"history.csv", history_header(simulation), simulation, error)
       if (simulation%config%output%trace) call open_table(self%trace, self%directory//"trace.csv", trace_header(simulation), &
         & simulation, error)
     end if
@@ -82,16 +85,17 @@ contains
   end subroutine open_table
 
   !> The columns, those of the diagnostics last.
-  pure function history_header(diagnostics) result(header)
-    type(diagnostics_t), intent(in) :: diagnostics
+  pure function history_header(simulation) result(header)
+    type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: header
     integer :: k
 
     header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
       & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,most_messages,most_values,"// &
       & "ghosts,solve_seconds"
-    do k = 1, diagnostics%n_columns
-      header = header//","//trim(diagnostics%name(k))
+    if (simulation%config%solver%sleeping) header = header//",sleeping,woken"
+    do k = 1, simulation%diagnostics%n_columns
+      header = header//","//trim(simulation%diagnostics%name(k))
     end do
   end function history_header
 
@@ -162,6 +166,10 @@ contains
       call self%history%add(figures%sharing%most_values)
       call self%history%add(figures%sharing%ghosts)
       call self%history%add(figures%solve%seconds)
+      if (simulation%config%solver%sleeping) then
+        call self%history%add(figures%asleep)
+        call self%history%add(merge(1, 0, figures%solve%woken))
+      end if
       do k = 1, simulation%diagnostics%n_columns
         call self%history%add(simulation%diagnostics%value(k))
       end do
@@ -212,6 +220,7 @@ contains
       call self%results%write_step(simulation%step, simulation%time, bodies, error, boundaries=boundaries, &
         & figures=figures)
     end if
+    if (simulation%config%output%vtk) call self%pictures%write_step(simulation, error)
     self%last_written = simulation%step
     call stop_timer(phase_output)
   end subroutine run_output_write_state
@@ -360,6 +369,7 @@ contains
       if (simulation%config%output%final_bodies) call write_final_bodies(simulation, self%directory//"final_bodies.h5", error)
     end if
     call self%results%close(error)
+    call self%pictures%close(error)
     call self%history%close(error)
     if (self%trace%is_open()) call self%trace%close(error)
     call self%comm%agree(error)

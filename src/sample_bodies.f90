@@ -12,6 +12,7 @@ module gravier_sample_bodies
   use gravier_lattice_packing, only: lattice_t, cell_edge
   use gravier_loose_packing, only: place_loosely
   use gravier_config_types, only: config_t
+  use gravier_config_laws, only: density_of
   implicit none
   private
   public :: make_lattice, make_sample, farthest_place
@@ -39,7 +40,7 @@ contains
     radii%radius_min = config%scene%radius_min
     radii%radius_max = config%scene%radius_max
     data%total = product(int(config%scene%lattice_count(1:box%nd), i8))
-    call draw_grains(comm, radii, config%scene%density, config%scene%seed, data)
+    call draw_grains(comm, radii, density_of(config, 1), config%scene%seed, data)
     call check_box(comm, config, box, data, error)
     if (allocated(error)) return
     call lattice%init(box, config%scene%radius_max, data%total, never)
@@ -111,7 +112,7 @@ contains
     call set_radii(comm, config, radii, error)
     if (allocated(error)) return
     data%total = config%sample%count
-    call draw_grains(comm, radii, config%scene%density, config%sample%seed, data)
+    call draw_grains(comm, radii, density_of(config, 1), config%sample%seed, data)
     box%nd = config%scene%dimension
     box%lower(:) = config%scene%period_origin
     box%upper(:) = box%lower + config%sample%box
@@ -199,7 +200,7 @@ contains
     integer :: nd
 
     nd = box%nd
-    box%upper(nd) = box%lower(nd) + comm%sum_real(data%mass)/config%scene%density/ &
+    box%upper(nd) = box%lower(nd) + comm%sum_real(data%mass)/density_of(config, 1)/ &
       & (config%sample%solid_fraction*product(config%sample%box(1:nd - 1)))
   end subroutine set_height
 

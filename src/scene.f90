@@ -12,8 +12,10 @@ module gravier_scene
   use gravier_boundary, only: boundary_t, shape_outlet
   use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
+  use gravier_law_set, only: law_set_t
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_keys, only: has_word
+  use gravier_config_laws, only: density_of, collect_laws
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
   use gravier_scene_boundaries, only: make_boundaries
   implicit none
@@ -32,6 +34,8 @@ module gravier_scene
     !> of all ranks [m]; 0 without grains
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
     type(effects_t) :: effects
+    !> of contact, by pairs of materials
+    type(law_set_t) :: laws
   end type scene_t
 
 contains
@@ -64,7 +68,10 @@ contains
     do b = 1, size(scene%boundaries)
       scene%boundaries(b)%period(:) = scene%period%length
     end do
-    call take_data(comm, config%scene, data, scene)
+    call collect_laws(config, scene%laws)
+    call check_data(comm, config, data, error)
+    if (allocated(error)) return
+    call take_data(comm, config, data, scene)
     call check_moments(config, scene%effects, error)
     call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)
@@ -121,6 +128,25 @@ contains
     end subroutine check
 
   end subroutine check_places
+
+  !> Refuse grains of a material that the input does not have; without materials their numbers say nothing. Errors are the same
+  !> on all ranks. Collective.
+  subroutine check_data(comm, config, data, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k, n
+
+    n = size(config%materials)
+    do k = 1, data%n
+      if (n == 0 .or. data%material(k) <= n) cycle
+      call raise(error, status_input, trim(config%scene%bodies_file)//": id "//to_text(data%id(k))//": material "// &
+        & to_text(data%material(k))//": expected 1 to "//to_text(n)//", the number of a &material of "//config%file)
+      exit
+    end do
+    call comm%agree(error)
+  end subroutine check_data
 
   !> Glue the grains of a group to the boundary of that group. Errors are the same on all ranks. Collective.
   subroutine glue(comm, config, data, scene, error)
@@ -221,6 +247,11 @@ contains
             & boundary%tangential_restitution, boundary%rolling_friction, boundary%pivoting_friction)
         end associate
       end do
+      if (scene%laws%n > 0) then
+        call add_law(scene%laws%largest_friction, scene%laws%largest_restitution, scene%laws%largest_tangential_restitution, &
+          & scene%laws%largest_rolling, scene%laws%largest_pivoting)
+        effects%cohesion = scene%laws%attracts
+      end if
       ! moments are in the kernels of friction
       effects%friction = effects%friction .or. effects%rolling
       turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. config%rotation
@@ -257,15 +288,15 @@ contains
   end subroutine deduce_effects
 
   !> Turn the rows of a file, or made rows, into bodies. Collective.
-  subroutine take_data(comm, scene_config, data, scene)
+  subroutine take_data(comm, config, data, scene)
     type(communicator_t), intent(in) :: comm
-    type(scene_config_t), intent(in) :: scene_config
+    type(config_t), intent(in) :: config
     type(bodies_data_t), intent(in) :: data
     type(scene_t), intent(inout) :: scene
     integer :: k, nd, nv
 
-    nd = scene_config%dimension
-    call deduce_effects(comm, scene_config, data, scene)
+    nd = config%scene%dimension
+    call deduce_effects(comm, config%scene, data, scene)
     nv = merge(3*nd - 3, nd, scene%effects%rotation)
     call scene%grains%init(nd, nv, merge(nd, 0, scene%period%on()), data%n)
     scene%grains%glued(:) = 0
@@ -274,12 +305,13 @@ contains
       scene%grains%id(k) = data%id(k)
       scene%grains%position(:, k) = data%position(:, k)
       scene%grains%velocity(:, k) = data%velocity(1:nv, k)
-      if (.not. scene_config%rotation) scene%grains%velocity(nd + 1:, k) = 0.0_dp
+      if (.not. config%scene%rotation) scene%grains%velocity(nd + 1:, k) = 0.0_dp
       scene%grains%radius(k) = data%radius(k)
+      if (size(config%materials) > 0) scene%grains%material(k) = data%material(k)
       if (allocated(data%mass)) then
         scene%grains%mass(k) = data%mass(k)
       else
-        scene%grains%mass(k) = grain_mass(nd, data%radius(k), scene_config%density)
+        scene%grains%mass(k) = grain_mass(nd, data%radius(k), density_of(config, data%material(k)))
       end if
       scene%grains%inertia(k) = grain_inertia(nd, data%radius(k), scene%grains%mass(k))
     end do

@@ -8,6 +8,7 @@ module gravier_scene_boundaries
   use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, &
     & shape_grains, shape_outlet, drive_names
   use gravier_config_types, only: config_t, boundary_config_t
+  use gravier_config_laws, only: material_number
   implicit none
   private
   public :: make_boundaries
@@ -39,6 +40,7 @@ contains
         wall%tangential_restitution = config%scene%wall_tangential_restitution
         wall%rolling_friction = config%scene%wall_rolling_friction
         wall%pivoting_friction = config%scene%wall_pivoting_friction
+        wall%material = material_number(config, config%scene%wall_material)
       end associate
     end do
     last_id = 0
@@ -49,6 +51,7 @@ contains
       associate (boundary => boundaries(data%n_walls + b))
         boundary%id = last_id + b
         call set_boundary(config%boundaries(b), nd, boundary)
+        boundary%material = material_number(config, config%boundaries(b)%material)
         if (config%boundaries(b)%table /= "") call boundary%table%read(trim(config%boundaries(b)%table), drive_names(nd), error)
       end associate
     end do

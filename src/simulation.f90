@@ -26,6 +26,9 @@ module gravier_simulation
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
   use gravier_overlap_projection, only: project_overlaps
   use gravier_diagnostics, only: diagnostics_t
+  use gravier_grain_balance, only: grain_balance_t
+  use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
+  use gravier_pair_laws, only: conclude_pairs
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
@@ -51,6 +54,8 @@ module gravier_simulation
     !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
     !> space was divided anew
     real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
+    !> contacts that slept at the start of the solve; where they can
+    integer(i8) :: asleep = 0
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
@@ -74,6 +79,8 @@ module gravier_simulation
     type(column_solution_t) :: column
     !> figures that the user asked for
     type(diagnostics_t) :: diagnostics
+    !> energies of the grains since this run began or went on from a checkpoint
+    type(grain_balance_t) :: balance
     !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
     real(dp), allocatable :: boundary_impulses(:, :)
     !> grains of the scene now, and those of them that are glued to boundaries
@@ -100,6 +107,9 @@ module gravier_simulation
     type(effort_t) :: effort
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
+    type(sleeping_rule_t) :: sleeping
+    !> over all steps of this run: contacts that slept at the start of a solve, and solves that woke them
+    integer(i8) :: slept = 0, woken = 0
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
     !> the same just after space was last divided in a step; 0 before
@@ -112,7 +122,6 @@ module gravier_simulation
     procedure :: make_subdomains => simulation_make_subdomains
     procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
-    procedure :: kinetic_energy => simulation_kinetic_energy
     procedure :: facing_area => simulation_facing_area
     procedure :: free => simulation_free
   end type simulation_t
@@ -191,10 +200,11 @@ contains
     call self%start_diagnostics()
   end subroutine simulation_start
 
-  !> Prepare the diagnostics that &output asks for, of the scene as it is. Collective.
+  !> Prepare the balance of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
   subroutine simulation_start_diagnostics(self)
     class(simulation_t), intent(inout) :: self
 
+    call self%balance%begin(self%decomposition, self%physics)
     associate (output => self%config%output)
       call self%diagnostics%init(self%decomposition, output%energy, output%stress, output%structure, output%boundary_forces)
     end associate
@@ -220,15 +230,22 @@ contains
       self%physics%friction = config%friction
       self%physics%restitution = config%restitution
       self%physics%rotation = config%rotation
+      self%physics%laws = scene%laws
       self%physics%h = self%config%time%step
       self%physics%tangential_restitution = config%tangential_restitution
       self%physics%rolling_friction = config%rolling_friction
       self%physics%pivoting_friction = config%pivoting_friction
+      associate (solver => self%config%solver)
+        self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
+      end associate
+      self%physics%sleep_after = self%sleeping%after
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
+      rule%alert_distance = max(rule%alert_distance, scene%laws%range)
+      rule%remembers = scene%laws%remembers
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
@@ -367,6 +384,7 @@ contains
 
     call start_timer(phase_bodies)
     listed = .false.
+    self%physics%first = self%step == 0
     call move_to_middle(self, listed)
     call drive(self)
     call count_fast(self, figures)
@@ -383,6 +401,7 @@ contains
     if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
     figures%contacts = self%problem%n_contacts
+    figures%asleep = self%problem%n_asleep
     do s = 1, size(self%problem%sub)
       if (self%problem%sub(s)%n_contacts > 0) figures%max_overlap = max(figures%max_overlap, -minval(self%problem%sub(s)%gap))
     end do
@@ -422,6 +441,7 @@ contains
         if (.not. boundary%present .or. self%time < boundary%remove_at) cycle
         boundary%present = .false.
         listed = .true.
+        if (self%sleeping%after > 0) call wake_all(self%neighbourhoods)
       end associate
     end do
   end subroutine move_to_middle
@@ -503,7 +523,10 @@ contains
     end_time = self%time + self%physics%h
     if (allocated(self%gravity_table%has)) then
       do d = 1, nd
-        if (self%gravity_table%has(d)) self%physics%gravity(d) = self%gravity_table%at(d, end_time)
+        if (.not. self%gravity_table%has(d)) cycle
+        self%physics%gravity(d) = self%gravity_table%at(d, end_time)
+        if (self%sleeping%after > 0 .and. abs(self%physics%gravity(d) - self%gravity_table%at(d, self%time)) > 0.0_dp) &
+          & call wake_all(self%neighbourhoods)
       end do
     end if
     do b = 1, size(self%decomposition%boundaries)
@@ -586,12 +609,12 @@ contains
 
     if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
     if (.not. figures%listed) return
-    remembered = self%config%solver%warm_start .and. self%neighbourhoods%builds > 0
+    remembered = (self%config%solver%warm_start .or. self%physics%laws%remembers) .and. self%neighbourhoods%builds > 0
     if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
     call let_grains_out(self, figures)
     if (figures%divided) call divide_again(self, figures%refused)
     call self%decomposition%settle()
-    call self%neighbourhoods%build(self%decomposition, impulse_entries(self%problem%kernels))
+    call self%neighbourhoods%build(self%decomposition, impulse_entries(self%problem%kernels, self%sleeping%after > 0))
     if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)
   end subroutine list_neighbours
 
@@ -621,23 +644,29 @@ contains
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
     call start_timer(phase_bodies)
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
+      & self%neighbourhoods, self%problem)
+    if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
+    if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
+      & self%neighbourhoods)
+    call self%problem%shift_impulses(-1)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
     call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
       & self%time, figures%left > 0)
+    call self%balance%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, figures%left > 0)
     call move_to_end(self)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
-    call start_timer(phase_bodies)
-    if (self%config%solver%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
-    call stop_timer(phase_bodies)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
-    figures%kinetic_energy = self%kinetic_energy()
+    figures%kinetic_energy = self%balance%kinetic
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
+    self%slept = self%slept + figures%asleep
+    if (figures%solve%woken) self%woken = self%woken + 1
     call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
       & self%n_grains - self%n_glued)
     call check_numbers(self, figures, error)
@@ -730,26 +759,6 @@ contains
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
   end subroutine move_to_end
 
-  !> Kinetic energy of all grains [J]. Collective.
-  real(dp) function simulation_kinetic_energy(self) result(energy)
-    class(simulation_t), intent(in) :: self
-    real(dp), allocatable :: part(:)
-    integer :: s, k, nd
-
-    nd = self%decomposition%nd
-    allocate (part(size(self%decomposition%home)), source=0.0_dp)
-    do s = 1, size(part)
-      associate (home => self%decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) > 0) cycle
-          part(s) = part(s) + 0.5_dp*home%mass(k)*sum(home%velocity(1:nd, k)**2) + &
-            & 0.5_dp*home%inertia(k)*sum(home%velocity(nd + 1:, k)**2)
-        end do
-      end associate
-    end do
-    energy = self%comm%sum_real(part)
-  end function simulation_kinetic_energy
-
   !> Give back what the method holds.
   subroutine simulation_free(self)
     class(simulation_t), intent(inout) :: self
@@ -766,6 +775,8 @@ contains
     self%failed = 0
     self%left = 0
     self%fast = 0
+    self%slept = 0
+    self%woken = 0
     self%last_written = -1
     self%restarted = .false.
     self%worst_overlap = 0.0_dp

@@ -6,7 +6,7 @@ module gravier_body_store
   public :: body_set_t, append_bodies, place_word
 
   !> first of the words of a record that hold the grain's place
-  integer, parameter :: place_word = 6
+  integer, parameter :: place_word = 7
 
   !> Grains of one subdomain, or of any batch. Velocities hold the translation first, then the spin where the
   !> scene has one: (vx, vy[, omega]) in 2D, (vx, vy, vz[, wx, wy, wz]) in 3D, all in global axes.
@@ -32,6 +32,8 @@ module gravier_body_store
     real(dp), allocatable :: inertia(:)
     !> number of the boundary that a grain is glued to, 0 for a free one (n)
     integer, allocatable :: glued(:)
+    !> number of its material, 1 at first (n)
+    integer, allocatable :: material(:)
     !> periods that lie between a grain's place and the place it would have without periods (ni, n)
     integer, allocatable :: image(:, :)
   contains
@@ -55,15 +57,16 @@ contains
     self%nv = nv
     self%ni = ni
     if (allocated(self%id)) deallocate (self%id, self%position, self%velocity, self%radius, self%mass, self%inertia, self%glued, &
-      & self%image)
+      & self%material, self%image)
     allocate (self%id(n), self%position(nd, n), self%velocity(nv, n), self%radius(n), self%mass(n), self%inertia(n), &
       & self%glued(n), self%image(ni, n))
+    allocate (self%material(n), source=1)
   end subroutine body_set_init
 
   !> Words of one grain when it travels between subdomains.
   pure integer function body_set_record_words(self) result(words)
     class(body_set_t), intent(in) :: self
-    words = 5 + self%nd + self%nv + self%ni
+    words = place_word - 1 + self%nd + self%nv + self%ni
   end function body_set_record_words
 
   !> Write grain `k` into `record` (record_words).
@@ -78,14 +81,15 @@ contains
     record(3) = transfer(self%mass(k), 0_i8)
     record(4) = transfer(self%inertia(k), 0_i8)
     record(5) = self%glued(k)
+    record(6) = self%material(k)
     do d = 1, self%nd
-      record(5 + d) = transfer(self%position(d, k), 0_i8)
+      record(place_word - 1 + d) = transfer(self%position(d, k), 0_i8)
     end do
     do d = 1, self%nv
-      record(5 + self%nd + d) = transfer(self%velocity(d, k), 0_i8)
+      record(place_word - 1 + self%nd + d) = transfer(self%velocity(d, k), 0_i8)
     end do
     do d = 1, self%ni
-      record(5 + self%nd + self%nv + d) = self%image(d, k)
+      record(place_word - 1 + self%nd + self%nv + d) = self%image(d, k)
     end do
   end subroutine body_set_get_record
 
@@ -101,14 +105,15 @@ contains
     self%mass(k) = transfer(record(3), 0.0_dp)
     self%inertia(k) = transfer(record(4), 0.0_dp)
     self%glued(k) = int(record(5))
+    self%material(k) = int(record(6))
     do d = 1, self%nd
-      self%position(d, k) = transfer(record(5 + d), 0.0_dp)
+      self%position(d, k) = transfer(record(place_word - 1 + d), 0.0_dp)
     end do
     do d = 1, self%nv
-      self%velocity(d, k) = transfer(record(5 + self%nd + d), 0.0_dp)
+      self%velocity(d, k) = transfer(record(place_word - 1 + self%nd + d), 0.0_dp)
     end do
     do d = 1, self%ni
-      self%image(d, k) = int(record(5 + self%nd + self%nv + d))
+      self%image(d, k) = int(record(place_word - 1 + self%nd + self%nv + d))
     end do
   end subroutine body_set_set_record
 
@@ -129,6 +134,7 @@ contains
       self%mass(k) = old%mass(order(k))
       self%inertia(k) = old%inertia(order(k))
       self%glued(k) = old%glued(order(k))
+      self%material(k) = old%material(order(k))
       self%image(:, k) = old%image(:, order(k))
     end do
   end subroutine body_set_reorder
@@ -170,6 +176,7 @@ contains
       bodies%mass(1:n) = old%mass
       bodies%inertia(1:n) = old%inertia
       bodies%glued(1:n) = old%glued
+      bodies%material(1:n) = old%material
       bodies%image(:, 1:n) = old%image
     end if
     bodies%id(n + 1:) = more%id
@@ -179,6 +186,7 @@ contains
     bodies%mass(n + 1:) = more%mass
     bodies%inertia(n + 1:) = more%inertia
     bodies%glued(n + 1:) = more%glued
+    bodies%material(n + 1:) = more%material
     bodies%image(:, n + 1:) = more%image
   end subroutine append_bodies
 

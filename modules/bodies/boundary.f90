@@ -52,6 +52,8 @@ module gravier_boundary
     type(time_table_t) :: table
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
     real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
+    !> number of its material, 0 for none
+    integer :: material = 0
     !> [s]
     real(dp) :: remove_at = huge(1.0_dp)
     !> false once removed
@@ -61,6 +63,7 @@ module gravier_boundary
   contains
     procedure :: touches => boundary_touches
     procedure :: is_driven => boundary_is_driven
+    procedure :: is_moved => boundary_is_moved
     procedure :: turns => boundary_turns
     procedure :: turns_about => boundary_turns_about
     procedure :: half_width => boundary_half_width
@@ -106,6 +109,12 @@ contains
     class(boundary_t), intent(in) :: self
     boundary_is_driven = any(self%free)
   end function boundary_is_driven
+
+  !> Whether it moves now, but for what forces make of it.
+  pure logical function boundary_is_moved(self)
+    class(boundary_t), intent(in) :: self
+    boundary_is_moved = any(abs(self%velocity) > 0.0_dp .and. .not. self%free) .or. any(abs(self%spin) > 0.0_dp)
+  end function boundary_is_moved
 
   !> Whether it turns, now or later.
   pure logical function boundary_turns(self)

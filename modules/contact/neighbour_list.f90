@@ -10,6 +10,8 @@ module gravier_neighbour_list
   !> global axes.
   type :: neighbour_list_t
     integer :: n = 0
+    !> pairs have states
+    logical :: remembers = .false.
     !> place of the candidate among the bodies searched (n)
     integer, allocatable :: candidate(:)
     !> place of the antagonist among the bodies searched, or minus the number of a boundary (n)
@@ -17,15 +19,39 @@ module gravier_neighbour_list
     !> periods by which the antagonist's place is shifted to meet the candidate, see shift_code; without periods of no
     !> size (n or 0)
     integer, allocatable :: shift(:)
-    !> (entries of an impulse, n) [N s]
+    !> (entries of an impulse, n) [N s]; the last entry is the number of steps at rest where contacts may sleep
     real(dp), allocatable :: impulse(:, :)
+    !> what pairs remember under laws with a memory, 0 at first; without such laws of no size (n or 0)
+    integer, allocatable :: state(:)
   contains
     procedure :: init => neighbour_list_init
     procedure :: add => neighbour_list_add
     procedure :: finish => neighbour_list_finish
+    procedure :: keeps => neighbour_list_keeps
+    procedure :: n_kept => neighbour_list_n_kept
   end type neighbour_list_t
 
 contains
+
+  !> Whether pair `p` keeps something from the last step: an impulse, steps at rest or a state.
+  pure logical function neighbour_list_keeps(self, p) result(keeps)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p
+
+    keeps = any(abs(self%impulse(:, p)) > 0.0_dp)
+    if (size(self%state) > 0) keeps = keeps .or. self%state(p) /= 0
+  end function neighbour_list_keeps
+
+  !> Pairs that keep something from the last step.
+  pure integer function neighbour_list_n_kept(self) result(n)
+    class(neighbour_list_t), intent(in) :: self
+    integer :: p
+
+    n = 0
+    do p = 1, self%n
+      if (self%keeps(p)) n = n + 1
+    end do
+  end function neighbour_list_n_kept
 
   !> An empty list with room for `room` pairs.
   subroutine neighbour_list_init(self, periodic, room)
@@ -35,7 +61,7 @@ contains
 
     self%n = 0
     if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
-    if (allocated(self%impulse)) deallocate (self%impulse)
+    if (allocated(self%impulse)) deallocate (self%impulse, self%state)
     allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
   end subroutine neighbour_list_init
 
@@ -65,18 +91,22 @@ contains
     call move_alloc(longer, list)
   end subroutine lengthen
 
-  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses to zero.
-  subroutine neighbour_list_finish(self, order, n_impulse)
+  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses and states to zero.
+  subroutine neighbour_list_finish(self, order, n_impulse, remembers)
     class(neighbour_list_t), intent(inout) :: self
     !> (n) a permutation
     integer, intent(in), contiguous :: order(:)
     !> entries of an impulse
     integer, intent(in) :: n_impulse
+    !> pairs have states
+    logical, intent(in) :: remembers
 
     call permute(self%candidate, order)
     call permute(self%antagonist, order)
     if (size(self%shift) > 0) call permute(self%shift, order)
     allocate (self%impulse(n_impulse, self%n), source=0.0_dp)
+    self%remembers = remembers
+    allocate (self%state(merge(self%n, 0, remembers)), source=0)
   end subroutine neighbour_list_finish
 
   subroutine permute(list, order)

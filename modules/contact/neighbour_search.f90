@@ -27,6 +27,8 @@ module gravier_neighbour_search
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
     !> rule_dual or rule_primal
     integer :: kind = rule_dual
+    !> pairs have states
+    logical :: remembers = .false.
   contains
     procedure :: range => rule_range
     procedure :: reach => rule_reach
@@ -315,7 +317,7 @@ contains
       end do
       if (list%n > 0) lower(:) = minval(point, dim=2)
       call sweep_order(point, lower, rule%sweep_edge(), id, order)
-      call list%finish(order, n_impulse)
+      call list%finish(order, n_impulse, rule%remembers)
     end subroutine sort_list
 
   end subroutine find_neighbours

@@ -5,7 +5,7 @@ module gravier_contact_structure
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: contact_structure_t, n_bins, bin_width
+  public :: contact_structure_t, n_bins, bin_width, unused
 
   !> bins of the histogram of normal forces over their mean; one more counts what lies beyond
   integer, parameter :: n_bins = 100
@@ -13,7 +13,7 @@ module gravier_contact_structure
   !> a contact slides whose friction is used but for this part
   real(dp), parameter :: unused = 1.0e-6_dp
 
-  !> The same on every rank. A contact carries where its normal impulse is not zero.
+  !> The same on every rank. A contact carries where its bodies touch: where the normal impulse of its solve is not zero.
   type :: contact_structure_t
     !> carrying contacts of a free grain on average: of all, and of those that two or more contacts hold
     real(dp) :: coordination = 0.0_dp, mechanical_coordination = 0.0_dp
@@ -23,7 +23,7 @@ module gravier_contact_structure
     real(dp), allocatable :: fabric(:, :)
     !> part of the contacts that carries; part of the carrying contacts with friction that slides
     real(dp) :: carrying_fraction = 0.0_dp, sliding_fraction = 0.0_dp
-    !> normal force of the carrying contacts: mean, largest [N]; standard deviation over mean
+    !> normal force of the carrying contacts: mean size, largest compression [N]; standard deviation over mean, of the sizes
     real(dp) :: force_mean = 0.0_dp, force_max = 0.0_dp, force_deviation = 0.0_dp
     !> over the contacts with overlap [m]
     real(dp) :: overlap_mean = 0.0_dp
@@ -94,7 +94,7 @@ contains
     integer(i8), intent(inout) :: counts(n_counts)
     !> (nd**2 + 2)
     real(dp), intent(inout) :: part(:)
-    real(dp) :: bound
+    real(dp) :: bound, held
     integer :: c, d, q, g
 
     do c = 1, sub%n_contacts
@@ -104,11 +104,12 @@ contains
       end if
       q = lane_of(c)
       g = block_of(c)
-      if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
+      held = sub%held_impulse(c)
+      if (.not. held > 0.0_dp) cycle
       counts(carrying) = counts(carrying) + 1
-      part(nd**2 + 1) = part(nd**2 + 1) + sub%impulse(q, 1, g)
+      part(nd**2 + 1) = part(nd**2 + 1) + abs(sub%impulse(q, 1, g))
       if (nf > 1) then
-        bound = sub%hot(q, nd + 6, g)*sub%impulse(q, 1, g)
+        bound = sub%hot(q, nd + 6, g)*held
         if (bound > 0.0_dp) then
           counts(with_friction) = counts(with_friction) + 1
           if (norm2(sub%impulse(q, 2:nf, g)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
@@ -135,7 +136,7 @@ contains
         ! the first row of `reaction` serves as number of contacts
         sub%reaction(:, :) = 0.0_dp
         do c = 1, sub%n_contacts
-          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+          if (.not. sub%held_impulse(c) > 0.0_dp) cycle
           do k = 1, 2
             sub%reaction(1, sub%pair(k, c)) = sub%reaction(1, sub%pair(k, c)) + 1.0_dp
           end do
@@ -175,11 +176,14 @@ contains
 
     part(:) = 0.0_dp
     self%histogram(:) = 0
+    self%force_deviation = 0.0_dp
+    ! attractions alone leave no force in a contact
+    if (.not. self%force_mean > 0.0_dp) return
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
-          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
-          force = sub%impulse(lane_of(c), 1, block_of(c))/(h*self%force_mean)
+          if (.not. sub%held_impulse(c) > 0.0_dp) cycle
+          force = abs(sub%impulse(lane_of(c), 1, block_of(c)))/(h*self%force_mean)
           part(s) = part(s) + (force - 1.0_dp)**2
           bin = n_bins + 1
           if (force < n_bins*bin_width) bin = min(int(force/bin_width) + 1, n_bins)

@@ -27,7 +27,7 @@ module gravier_enriched_matrix
 
   !> What one subdomain adds to its contact problem.
   type :: enriched_part_t
-    !> l of each component (lanes, nc, blocks) [kg]
+    !> l of each component (lanes, nc, blocks) [kg]; like the next two, unallocated where l has blocks that are not symmetric
     real(dp), allocatable :: direction(:, :, :)
     !> velocity that solved the law at each contact's last update (lanes, nc, blocks) [m/s]
     real(dp), allocatable :: law_velocity(:, :, :)
@@ -72,21 +72,25 @@ contains
     if (.not. allocated(self%part)) allocate (self%part(size(problem%sub)))
     do s = 1, size(self%part)
       if (.not. self%part(s)%factor%is_alive()) call self%part(s)%factor%init_local(error, general=self%general)
-      call make_room(self%part(s), problem%kernels, problem%sub(s))
+      call make_room(self%part(s), problem%kernels, problem%sub(s), self%general)
     end do
   end subroutine enriched_matrix_start
 
-  subroutine make_room(part, kernels, sub)
+  subroutine make_room(part, kernels, sub, general)
     type(enriched_part_t), intent(inout) :: part
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
+    !> the caller keeps the blocks of l
+    logical, intent(in) :: general
 
-    if (allocated(part%direction)) deallocate (part%direction, part%law_velocity, part%contact_work, part%body_work)
+    if (allocated(part%body_work)) deallocate (part%body_work)
+    allocate (part%body_work(kernels%nv, sub%n_columns), source=0.0_dp)
+    if (general) return
+    if (allocated(part%direction)) deallocate (part%direction, part%law_velocity, part%contact_work)
     allocate (part%direction(lanes, kernels%nc, n_blocks(sub%n_contacts)), source=0.0_dp)
     allocate (part%law_velocity, part%contact_work, mold=part%direction)
     part%law_velocity(:, :, :) = 0.0_dp
     part%contact_work(:, :, :) = 0.0_dp
-    allocate (part%body_work(kernels%nv, sub%n_columns), source=0.0_dp)
   end subroutine make_room
 
   !> Take another share of l, from the next `update` on, which is due at once.

@@ -1,5 +1,6 @@
 !> Impulses kept from one step to the next, so that a solve starts from those of contacts that persist. They stay with the
-!> pairs of the neighbour lists, and move with them when the lists are made anew.
+!> pairs of the neighbour lists, and move with them when the lists are made anew; so do the states of pairs under laws with a
+!> memory.
 module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
@@ -7,6 +8,7 @@ module gravier_impulse_memory
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_neighbour_list, only: neighbour_list_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
@@ -18,24 +20,35 @@ contains
 
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
   !> over R*, or its vector.
-  pure integer function impulse_entries(kernels) result(n)
+  pure integer function impulse_entries(kernels, counts_rest) result(n)
     type(kernels_t), intent(in) :: kernels
+    !> one more entry for the steps at rest
+    logical, intent(in), optional :: counts_rest
+
     n = kernels%nc
     if (kernels%nf == 3) n = merge(7, 4, kernels%rolling_row > 0)
+    if (present(counts_rest)) n = n + merge(1, 0, counts_rest)
   end function impulse_entries
+
+  !> Words of what a list keeps with a pair: the entries of an impulse and, where pairs have one, the state.
+  pure integer function kept_entries(list) result(n)
+    type(neighbour_list_t), intent(in) :: list
+    n = size(list%impulse, 1) + merge(1, 0, list%remembers)
+  end function kept_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists.
   subroutine keep_impulses(problem, neighbourhoods)
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
-    integer :: s, c, q, g
+    integer :: s, c, q, g, n
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
+    n = impulse_entries(problem%kernels)
     rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
-        list%impulse(:, :) = 0.0_dp
+        list%impulse(1:n, :) = 0.0_dp
         do g = 1, n_blocks(sub%n_contacts)
           if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
           if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
@@ -45,7 +58,7 @@ contains
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
             if (problem%kernels%nf < 3) then
-              list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
+              list%impulse(1:n, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
               list%impulse(2:4, sub%source(c)) = vector(q, :)
@@ -62,10 +75,11 @@ contains
   subroutine recall_impulses(neighbourhoods, problem)
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, c, q, g
+    integer :: s, c, q, g, n
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
+    n = impulse_entries(problem%kernels)
     rolls = problem%kernels%rolling_row > 0
     vector(:, :) = 0.0_dp
     moment(:, :) = 0.0_dp
@@ -75,7 +89,7 @@ contains
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
             if (problem%kernels%nf < 3) then
-              sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
+              sub%impulse(q, :, g) = list%impulse(1:n, sub%source(c))
             else
               sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
               vector(q, :) = list%impulse(2:4, sub%source(c))
@@ -91,31 +105,28 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist and the impulse, for the pairs of a list that carry one; the antagonist of a
-  !> boundary is minus its number.
+  !> Identifiers of candidate and antagonist, the impulse and, where pairs have one, the state, for the pairs of a list that carry
+  !> an impulse or a state; the antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, records)
     type(neighbourhood_t), intent(in) :: view
     !> words left free before those of a record
     integer, intent(in) :: lead
-    !> (lead + 2 + entries of an impulse, pairs with an impulse)
+    !> (lead + 2 + kept_entries, pairs that keep something)
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer :: p, e, n
 
     associate (list => view%list)
+      allocate (records(lead + 2 + kept_entries(list), list%n_kept()), source=0_i8)
       n = 0
       do p = 1, list%n
-        if (list%impulse(1, p) > 0.0_dp) n = n + 1
-      end do
-      allocate (records(lead + 2 + size(list%impulse, 1), n), source=0_i8)
-      n = 0
-      do p = 1, list%n
-        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        if (.not. list%keeps(p)) cycle
         n = n + 1
         records(lead + 1, n) = view%bodies%id(list%candidate(p))
         records(lead + 2, n) = antagonist_id(view, p)
         do e = 1, size(list%impulse, 1)
           records(lead + 2 + e, n) = transfer(list%impulse(e, p), 0_i8)
         end do
+        if (size(list%state) > 0) records(size(records, 1), n) = list%state(p)
       end do
     end associate
   end subroutine list_impulses
@@ -128,22 +139,20 @@ contains
     if (id > 0) id = view%bodies%id(view%list%antagonist(p))
   end function antagonist_id
 
-  !> All impulses kept on this rank, each with the point that decides the owner of its pair, as records for
+  !> All impulses and states kept on this rank, each with the point that decides the owner of its pair, as records for
   !> spread_impulses. The views must be up to date.
   subroutine gather_impulses(decomposition, neighbourhoods, records)
     type(decomposition_t), intent(in) :: decomposition
     type(neighbourhoods_t), intent(in) :: neighbourhoods
-    !> (1 + nd + 2 + entries of an impulse, n): subdomain (to be set), point, candidate, antagonist, impulse
+    !> (1 + nd + 2 + kept_entries, n): subdomain (to be set), point, candidate, antagonist, impulse, state
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer(i8), allocatable :: own(:, :)
     integer :: s, n, words
 
-    words = 3 + decomposition%nd + neighbourhoods%n_impulse
+    words = 3 + decomposition%nd + neighbourhoods%n_impulse + merge(1, 0, decomposition%rule%remembers)
     n = 0
     do s = 1, size(neighbourhoods%view)
-      associate (list => neighbourhoods%view(s)%list)
-        n = n + count(list%impulse(1, :) > 0.0_dp)
-      end associate
+      n = n + neighbourhoods%view(s)%list%n_kept()
     end do
     allocate (records(words, n))
     n = 0
@@ -155,7 +164,7 @@ contains
     end do
   end subroutine gather_impulses
 
-  !> The owner points of the pairs that carry an impulse.
+  !> The owner points of the pairs that keep something.
   subroutine write_points(decomposition, view, records)
     type(decomposition_t), intent(in) :: decomposition
     type(neighbourhood_t), intent(in) :: view
@@ -166,7 +175,7 @@ contains
     n = 0
     associate (list => view%list, position => view%bodies%position)
       do p = 1, list%n
-        if (.not. list%impulse(1, p) > 0.0_dp) cycle
+        if (.not. list%keeps(p)) cycle
         n = n + 1
         point(:) = position(:, list%candidate(p))
         if (list%antagonist(p) > 0) then
@@ -187,7 +196,7 @@ contains
     end associate
   end subroutine write_points
 
-  !> Bring each impulse to the subdomain that owns its pair now. Collective.
+  !> Bring each impulse and state to the subdomain that owns its pair now. Collective.
   subroutine spread_impulses(decomposition, records, neighbourhoods)
     type(decomposition_t), intent(in) :: decomposition
     !> of gather_impulses
@@ -216,25 +225,28 @@ contains
     end do
   end subroutine spread_impulses
 
-  !> Give impulses to the pairs of a list that have the same bodies.
+  !> Give impulses and states to the pairs of a list that have the same bodies; of a checkpoint without steps at rest, these are
+  !> none.
   subroutine match_impulses(records, view)
-    !> (2 + entries of an impulse, n): candidate, antagonist, impulse
+    !> (2 + kept_entries, n): candidate, antagonist, impulse, state
     integer(i8), intent(in), contiguous :: records(:, :)
     type(neighbourhood_t), intent(inout) :: view
     integer(i8), allocatable :: keys(:, :)
     integer, allocatable :: order(:)
-    integer :: p, k, e
+    integer :: p, k, e, n_states
 
     allocate (keys(2, size(records, 2)), order(size(records, 2)))
     keys(:, :) = records(1:2, :)
     call argsort_rows(keys, order)
     associate (list => view%list)
+      n_states = merge(1, 0, size(list%state) > 0)
       do p = 1, list%n
         k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p))
         if (k == 0) cycle
-        do e = 1, size(list%impulse, 1)
+        do e = 1, min(size(list%impulse, 1), size(records, 1) - 2 - n_states)
           list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
         end do
+        if (n_states > 0) list%state(p) = int(records(size(records, 1), k))
       end do
     end associate
   end subroutine match_impulses

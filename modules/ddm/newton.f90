@@ -12,7 +12,7 @@ module gravier_newton
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
   use gravier_contact_kernels, only: project_on_cones
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: work_t
+  use gravier_scheme, only: work_t, start_sweeps
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
   use gravier_enriched_matrix, only: enriched_matrix_t
@@ -22,14 +22,18 @@ module gravier_newton
   private
   public :: newton_t
 
-  !> iterations of a window of sweeps in the first turn; what is left of the least change of the last window where sweeps do well
+  !> turns of sweeps with momentum; in later ones they are plain
+  integer, parameter :: turns_with_momentum = 3
+  !> iterations of a window of sweeps in the first turn, doubled in the next ones; what is left of the least change of the last
+  !> window where sweeps do well
   integer, parameter :: first_window = 100
   real(dp), parameter :: little_gain = 0.5_dp
-  !> Newton's steps without progress that end the first turn; times which a residual must fall to be progress
-  integer, parameter :: first_patience = 100
+  !> plain sweeps of the first turn that has them, doubled from turn to turn, so often at most
+  integer, parameter :: plain_sweeps = 4000, most_doublings = 6
+  !> Newton's steps without progress that end the first turn, doubled in the next ones, and those that end a turn of plain sweeps;
+  !> times which a residual must fall to be progress
+  integer, parameter :: first_patience = 100, late_patience = 40
   real(dp), parameter :: progress_made = 0.8_dp
-  !> doublings of window and patience from turn to turn
-  integer, parameter :: most_doublings = 8
   !> alpha at the start of a turn and its bounds
   real(dp), parameter :: alpha_start = 1.0e-2_dp, alpha_least = 1.0e-10_dp, alpha_most = 10.0_dp
   !> what it is multiplied with after a proximal point found in very few steps, in few, in many, not found
@@ -72,6 +76,8 @@ module gravier_newton
     real(dp), private :: reached(0:most_inner_steps) = 0.0_dp
     !> residuals: of the best impulses, of the last centre, of the last progress
     real(dp), private :: least = 0.0_dp, before = 0.0_dp, mark = 0.0_dp
+    !> the least when the sweeps were left
+    real(dp), private :: least_swept = 0.0_dp
   contains
     procedure :: start => newton_start
     procedure :: iterate => newton_iterate
@@ -89,6 +95,7 @@ contains
     integer :: s
 
     if (allocated(error)) return
+    self%momentum%on = .true.
     call self%nscdd_t%start(problem, error)
     self%matrix%general = .true.
     call self%matrix%start(problem, error)
@@ -113,11 +120,12 @@ contains
     call begin_sweeps(self)
   end subroutine newton_start
 
-  !> Sweeps come next.
+  !> Sweeps come next: with momentum in the first turns, plain in later ones. Where momentum goes round, plain sweeps creep on.
   subroutine begin_sweeps(self)
     class(newton_t), intent(inout) :: self
 
     self%sweeping = .true.
+    self%momentum%on = self%turn < turns_with_momentum
     self%check_next = .false.
     self%keeps_best = .true.
     self%taken = 0
@@ -144,15 +152,19 @@ contains
     end if
   end subroutine newton_iterate
 
-  !> Whether windows of sweeps have come to bring little.
+  !> Whether windows of sweeps have come to bring little, or the plain sweeps of a turn are done.
   subroutine close_window(self, stagnant)
     class(newton_t), intent(inout) :: self
     logical, intent(out) :: stagnant
 
     stagnant = .false.
     self%taken = self%taken + 1
+    if (.not. self%momentum%on) then
+      stagnant = self%taken == plain_sweeps*2**min(self%turn - turns_with_momentum, most_doublings)
+      return
+    end if
     self%lowest = min(self%lowest, self%momentum%change)
-    if (mod(self%taken, first_window*2**min(self%turn, most_doublings)) /= 0) return
+    if (mod(self%taken, first_window*2**self%turn) /= 0) return
     stagnant = self%lowest > little_gain**2*self%last_lowest
     self%last_lowest = self%lowest
     self%lowest = huge(1.0_dp)
@@ -178,6 +190,7 @@ contains
         part%swept_velocity(:, :) = sub%velocity
       end associate
     end do
+    self%least_swept = self%least
     self%mark = residual
     self%before = residual
     call begin_point(self)
@@ -251,25 +264,27 @@ contains
     call keep_best(self, problem, residual)
     self%reached(self%inner) = min(self%reached(self%inner - 1), self%size_of_f)
     if (allocated(singular) .or. self%size_of_f <= self%goal .or. is_stuck(self)) call end_point(self, problem, residual)
-    if (self%sweeping) then
-      call take_swept(self, problem)
-    else
-      call take_best(self, problem)
-    end if
+    call take_best(self, problem)
+    if (self%sweeping) call resume_sweeps(self, problem)
     call stop_timer(phase_check)
   end subroutine make_step
 
-  !> Sweeps go on from where they were left, as if nothing had been between.
-  subroutine take_swept(self, problem)
-    class(newton_t), intent(in) :: self
+  !> Sweeps go on from where they were left, as if nothing had been between; plain ones from the best impulses where Newton's steps
+  !> have found them. Collective.
+  subroutine resume_sweeps(self, problem)
+    class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     integer :: s
 
-    do s = 1, size(self%part)
-      problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
-      problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
-    end do
-  end subroutine take_swept
+    if (self%momentum%on .or. .not. self%least < self%least_swept) then
+      do s = 1, size(self%part)
+        problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
+        problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
+      end do
+    else
+      call start_sweeps(self, problem, shared_masses=.true.)
+    end if
+  end subroutine resume_sweeps
 
   !> Whether the proximal point is not in reach.
   pure logical function is_stuck(self)
@@ -432,7 +447,8 @@ contains
     if (residual <= progress_made*self%mark) then
       self%mark = residual
       self%taken = 0
-    else if (self%taken >= first_patience*2**min(self%turn, most_doublings)) then
+    else if (self%taken >= merge(first_patience*2**min(self%turn, turns_with_momentum), late_patience, &
+        & self%momentum%on)) then
       self%turn = self%turn + 1
       call begin_sweeps(self)
       return

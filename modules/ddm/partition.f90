@@ -36,7 +36,7 @@ module gravier_partition
     integer :: boxes(3) = 1
     !> boxes or cells
     type(cell_map_t) :: cells
-    !> graph: the subdomains of the cells
+    !> the subdomains of the cells of a graph
     type(cell_groups_t) :: groups
     !> one of the kind_ constants
     integer, private :: kind = kind_boxes

@@ -10,11 +10,14 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_contact_law, only: contact_pair_t, contact_terms_t
+  use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
   implicit none
   private
   public :: physics_t, interface_figures_t, build_problem, take_velocities, take_displacements, n_multiplicities
@@ -29,10 +32,16 @@ module gravier_problem_builder
     real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
     !> tangential restitution, rolling and pivoting friction, likewise
     real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
+    !> laws of pairs of materials, which take their place
+    type(law_set_t) :: laws
+    !> the step is the first of the run
+    logical :: first = .false.
     !> grains turn
     logical :: rotation = .true.
     !> step [s]
     real(dp) :: h = 1.0_dp
+    !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
+    integer :: sleep_after = 0
   contains
     procedure :: accelerate => physics_accelerate
   end type physics_t
@@ -60,10 +69,14 @@ module gravier_problem_builder
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: found_t
     integer :: n = 0
+    !> those that do not sleep: the first ones, in whole blocks where others follow
+    integer :: n_awake = 0
     !> place in the list (n)
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
     real(dp), allocatable :: gap(:), normal(:, :)
+    !> where a law is given (n)
+    type(contact_terms_t), allocatable :: terms(:)
   end type found_t
 
   !> Columns of a subproblem by what else is known of a body.
@@ -103,7 +116,8 @@ contains
   !> them. Collective.
   subroutine build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    !> states of pairs are those of the step afterwards
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(inout) :: problem
@@ -120,6 +134,8 @@ contains
       associate (view => neighbourhoods%view(s))
         call start_timer(phase_detection)
         call find_contacts(view, decomposition, physics, found)
+        found%n_awake = found%n
+        if (physics%sleep_after > 0) call put_sleepers_last(view, decomposition%boundaries, physics%sleep_after, found)
         call stop_timer(phase_detection)
         call start_timer(phase_setup)
         problem%sub(s)%subdomain = decomposition%subdomain_of(s)
@@ -130,6 +146,7 @@ contains
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
     call count_figures(decomposition, neighbourhoods, problem, figures)
+    if (physics%laws%attracts) call problem%load_attraction()
     call find_scales(problem)
     call stop_timer(phase_interface)
   end subroutine build_problem
@@ -137,16 +154,18 @@ contains
   !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
   !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
   subroutine find_contacts(view, decomposition, physics, found)
-    type(neighbourhood_t), intent(in) :: view
+    type(neighbourhood_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(found_t), intent(inout) :: found
     integer :: p, i, j, nd
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
+    type(contact_terms_t) :: terms
 
     nd = decomposition%nd
-    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal)
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms)
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
+    allocate (found%terms(merge(view%list%n, 0, physics%laws%n > 0)))
     found%n = 0
     alert = decomposition%rule%alert_distance
     do p = 1, view%list%n
@@ -157,7 +176,7 @@ contains
         if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
-        if (gap > alert) cycle
+        if (is_far()) cycle
         if (distance > 0.0_dp) then
           normal(:) = branch/distance
         else
@@ -169,18 +188,84 @@ contains
         if (.not. decomposition%boundaries(-j)%present) cycle
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
         gap = distance - view%bodies%radius(i)
-        if (gap > alert) cycle
+        if (is_far()) cycle
       end if
-      if (gap > 0.0_dp) then
-        if (restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
-        if (tangential_restitution_of(view, decomposition%boundaries, physics, p) > 0.0_dp) cycle
-      end if
+      call find_terms()
+      if (is_far()) cycle
+      if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) cycle
       found%n = found%n + 1
       found%source(found%n) = p
       found%gap(found%n) = gap
       found%normal(:, found%n) = normal
+      if (size(found%terms) > 0) found%terms(found%n) = terms
     end do
+
+  contains
+
+    !> Whether the pair is no contact: beyond the alert distance, and with nothing to remember.
+    logical function is_far()
+      is_far = gap > alert
+      if (is_far .and. size(view%list%state) > 0) is_far = view%list%state(p) == 0
+    end function is_far
+
+    subroutine find_terms()
+      type(contact_pair_t) :: pair
+      integer :: l
+
+      l = law_of(view, decomposition%boundaries, physics%laws, p)
+      if (l == 0) then
+        terms = scene_terms(view, decomposition%boundaries, physics, p, gap)
+        return
+      end if
+      pair%first = physics%first
+      pair%gap = gap
+      if (size(view%list%state) > 0) pair%state = view%list%state(p)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, normal, pair)
+      if (size(view%list%state) > 0) view%list%state(p) = pair%state
+      terms = pair%terms
+    end subroutine find_terms
+
   end subroutine find_contacts
+
+  !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
+  !> whole blocks. A contact with a boundary that moves as prescribed does not sleep.
+  subroutine put_sleepers_last(view, boundaries, after, found)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: after
+    type(found_t), intent(inout) :: found
+    type(found_t) :: old
+    logical, allocatable :: asleep(:)
+    integer :: c, b, n, round
+
+    allocate (asleep(found%n))
+    do c = 1, found%n
+      asleep(c) = view%list%impulse(size(view%list%impulse, 1), found%source(c)) >= after
+      b = boundary_of(view, found%source(c))
+      if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
+    end do
+    found%n_awake = min(found%n, lanes*n_blocks(count(.not. asleep)))
+    n = found%n_awake - count(.not. asleep)
+    do c = 1, found%n
+      if (n == 0) exit
+      if (.not. asleep(c)) cycle
+      asleep(c) = .false.
+      n = n - 1
+    end do
+    if (found%n_awake == found%n) return
+    old = found
+    n = 0
+    do round = 1, 2
+      do c = 1, found%n
+        if (asleep(c) .neqv. round == 2) cycle
+        n = n + 1
+        found%source(n) = old%source(c)
+        found%gap(n) = old%gap(c)
+        found%normal(:, n) = old%normal(:, c)
+        if (size(old%terms) > 0) found%terms(n) = old%terms(c)
+      end do
+    end do
+  end subroutine put_sleepers_last
 
   !> Take the shift of the antagonist into account in the way from it to the candidate.
   pure subroutine shift_back(period, code, branch)
@@ -196,42 +281,33 @@ contains
     end do
   end subroutine shift_back
 
-  !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
-  pure integer function boundary_of(view, p) result(b)
+  !> The terms of pair `p` where no law is given: the scene's values, or those of the boundary that takes part.
+  pure type(contact_terms_t) function scene_terms(view, boundaries, physics, p, gap) result(terms)
     type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap
+    integer :: b
 
-    if (view%list%antagonist(p) < 0) then
-      b = -view%list%antagonist(p)
-    else
-      b = max(view%bodies%glued(view%list%candidate(p)), view%bodies%glued(view%list%antagonist(p)))
+    b = boundary_of(view, p)
+    terms%play = max(gap, 0.0_dp)
+    terms%friction = physics%friction
+    terms%restitution = physics%restitution
+    terms%tangential_restitution = physics%tangential_restitution
+    terms%rolling = physics%rolling_friction
+    terms%pivoting = physics%pivoting_friction
+    if (b > 0) then
+      terms%friction = boundaries(b)%friction
+      terms%restitution = boundaries(b)%restitution
+      terms%tangential_restitution = boundaries(b)%tangential_restitution
+      terms%rolling = boundaries(b)%rolling_friction
+      terms%pivoting = boundaries(b)%pivoting_friction
     end if
-  end function boundary_of
-
-  pure real(dp) function restitution_of(view, boundaries, physics, p) result(e)
-    type(neighbourhood_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    integer :: b
-
-    b = boundary_of(view, p)
-    e = physics%restitution
-    if (b > 0) e = boundaries(b)%restitution
-  end function restitution_of
-
-  !> Tangential restitution of pair `p`; 0 without friction, which alone can send anything back.
-  pure real(dp) function tangential_restitution_of(view, boundaries, physics, p) result(e)
-    type(neighbourhood_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    integer :: b
-
-    b = boundary_of(view, p)
-    e = merge(physics%tangential_restitution, 0.0_dp, physics%friction > 0.0_dp)
-    if (b > 0) e = merge(boundaries(b)%tangential_restitution, 0.0_dp, boundaries(b)%friction > 0.0_dp)
-  end function tangential_restitution_of
+    ! friction alone can send a tangential velocity back
+    if (.not. terms%friction > 0.0_dp) terms%tangential_restitution = 0.0_dp
+  end function scene_terms
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
   !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
@@ -363,17 +439,21 @@ contains
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: pair(:, :), order(:)
     integer :: c, f, p, b, i, j, q, g, nd
-    real(dp) :: e
+    type(contact_terms_t) :: terms
 
     nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
     call find_pairs()
-    call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
+    sub%n_awake = found%n_awake
+    call group_contacts(pair(:, 1:sub%n_awake), sub%n_bodies, order(1:sub%n_awake), sub%n_grouped)
+    call group_contacts(pair(:, sub%n_awake + 1:), sub%n_bodies, order(sub%n_awake + 1:), sub%n_grouped_asleep)
+    order(sub%n_awake + 1:) = sub%n_awake + order(sub%n_awake + 1:)
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
     allocate (sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
+    if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
     do c = 1, found%n
       f = order(c)
       q = lane_of(c)
@@ -389,18 +469,22 @@ contains
         if (boundaries(b)%turns()) call add_column()
       end if
       sub%hot(q, 1:nd, g) = found%normal(:, f)
-      e = restitution_of(view, boundaries, physics, p)
-      if (e > 0.0_dp) then
-        sub%hot(q, nd + 1, g) = e*returned()
+      if (size(found%terms) > 0) then
+        terms = found%terms(f)
       else
-        sub%hot(q, nd + 1, g) = max(found%gap(f), 0.0_dp)/physics%h
+        terms = scene_terms(view, boundaries, physics, p, found%gap(f))
       end if
+      if (terms%restitution > 0.0_dp) then
+        sub%hot(q, nd + 1, g) = terms%restitution*returned()
+      else
+        sub%hot(q, nd + 1, g) = terms%play/physics%h
+      end if
+      if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) cycle
       sub%hot(q, nd + 4, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
       sub%hot(q, nd + 5, g) = 0.0_dp
       if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
-      sub%hot(q, nd + 6, g) = physics%friction
-      if (b > 0) sub%hot(q, nd + 6, g) = boundaries(b)%friction
+      sub%hot(q, nd + 6, g) = terms%friction
       if (kernels%shift_row > 0) call pack_tangential_shift()
       if (kernels%rolling_row > 0) call pack_rolling()
     end do
@@ -451,15 +535,14 @@ contains
 
     !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
     subroutine pack_tangential_shift()
-      real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), returned
+      real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
       integer :: d
 
       call contact_jacobian(kernels, sub%hot, c, rows(:, :, 1), rows(:, :, 2))
       call find_start_velocity(i, vi)
       call find_start_velocity(j, vj)
-      returned = tangential_restitution_of(view, boundaries, physics, p)
       do d = 2, nd
-        sub%hot(q, kernels%shift_row + d - 1, g) = returned*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
+        sub%hot(q, kernels%shift_row + d - 1, g) = terms%tangential_restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
       end do
     end subroutine pack_tangential_shift
 
@@ -487,11 +570,8 @@ contains
     subroutine pack_rolling()
       associate (row => kernels%rolling_row)
         sub%hot(q, row + 1, g) = rolling_radius(sub%hot(q, nd + 4, g), sub%hot(q, nd + 5, g))
-        sub%hot(q, row + 3, g) = physics%rolling_friction
-        if (b > 0) sub%hot(q, row + 3, g) = boundaries(b)%rolling_friction
-        if (nd == 2) return
-        sub%hot(q, row + 4, g) = physics%pivoting_friction
-        if (b > 0) sub%hot(q, row + 4, g) = boundaries(b)%pivoting_friction
+        sub%hot(q, row + 3, g) = terms%rolling
+        if (nd == 3) sub%hot(q, row + 4, g) = terms%pivoting
       end associate
     end subroutine pack_rolling
 
@@ -822,7 +902,7 @@ contains
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
     type(interface_figures_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 5)
+    integer(i8) :: counts(n_multiplicities + 6)
     real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
     integer :: s, b, c, k, m
@@ -853,6 +933,7 @@ contains
         counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(neighbourhoods%view(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
+        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_awake
         deallocate (counted_elsewhere)
       end associate
     end do
@@ -869,6 +950,7 @@ contains
     figures%most_neighbours = nint(extremes(3), i8)
     figures%most_values = nint(extremes(4), i8)
     problem%n_contacts = counts(n_multiplicities + 2)
+    problem%n_asleep = counts(n_multiplicities + 6)
   end subroutine count_figures
 
   !> Scales of the residual and of the jump: largest |R^d|, over the components that can move, and largest free speed of a

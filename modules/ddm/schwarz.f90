@@ -122,6 +122,7 @@ contains
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
+      call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
       do k = 1, problem%shared%part(s)%n_shared
         call problem%shared%add_copies(s, k, load(s)%value(:, k))
         do d = 1, problem%kernels%nv
@@ -157,7 +158,7 @@ contains
     type(neighbour_load_t), intent(inout) :: load(:)
     integer :: s
 
-    if (.not. momentum%on) return
+    if (.not. momentum%on .or. momentum%resting) return
     do s = 1, size(load)
       call extrapolate(momentum%beta, load(s)%value, load(s)%previous)
     end do

@@ -13,7 +13,7 @@ module gravier_bodies_csv
 
   !> Places of the columns in the table, 0 for a column that the file does not have.
   type :: layout_t
-    integer :: id = 0, radius = 0, mass = 0, shape = 0, group = 0
+    integer :: id = 0, radius = 0, mass = 0, shape = 0, group = 0, material = 0
     !> (dimension)
     integer, allocatable :: position(:), normal(:)
     !> (3 or 6)
@@ -73,6 +73,7 @@ contains
     layout%mass = table%column("mass")
     layout%shape = table%column("shape")
     layout%group = table%column("group")
+    layout%material = table%column("material")
     call find_columns(table, position_names(dimension), layout%position)
     call find_columns(table, normal_names(dimension), layout%normal)
     call find_columns(table, velocity_names(dimension), layout%velocity)
@@ -130,14 +131,14 @@ contains
     integer :: k
 
     required = "id, "//position_names(dimension)//", radius"
-    known = required//", "//velocity_names(dimension)//", mass, shape, "//normal_names(dimension)//", group"
+    known = required//", "//velocity_names(dimension)//", mass, shape, "//normal_names(dimension)//", group, material"
     if (layout%id == 0 .or. layout%radius == 0 .or. any(layout%position == 0)) then
       call table%refuse_file("in "//to_text(dimension)//"D the columns "//required//" are required, but the first line is: "// &
         & header_text(table), error)
     end if
     do k = 1, table%column_count()
       if (k == layout%id .or. k == layout%radius .or. k == layout%mass .or. k == layout%shape .or. &
-        & k == layout%group) cycle
+        & k == layout%group .or. k == layout%material) cycle
       if (any(k == layout%position) .or. any(k == layout%normal) .or. any(k == layout%velocity)) cycle
       call table%refuse_file("column "//table%column_name(k)//" is unknown in "//to_text(dimension)//"D; known are "//known, error)
       return
@@ -238,7 +239,8 @@ contains
     call read_numbers(table, layout%normal, .false., ignored, error)
     call read_positive(table, layout%radius, "a radius > 0", bodies%radius(i), error)
     if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
-    call read_group(table, layout%group, bodies%group(i), error)
+    call read_number(table, layout%group, "a group", 0, bodies%group(i), error)
+    call read_number(table, layout%material, "a material", 1, bodies%material(i), error)
   end subroutine read_grain
 
   subroutine read_plane(table, layout, i, bodies, error)
@@ -248,7 +250,7 @@ contains
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: ignored(6)
-    integer :: group
+    integer :: number
     logical :: possible
 
     call read_id(table, layout%id, bodies%wall_id(i), error)
@@ -256,7 +258,8 @@ contains
     call read_numbers(table, layout%velocity, .false., ignored, error)
     if (.not. table%is_empty(layout%radius)) call table%get_real(layout%radius, ignored(1), error)
     if (.not. table%is_empty(layout%mass)) call table%get_real(layout%mass, ignored(1), error)
-    call read_group(table, layout%group, group, error)
+    call read_number(table, layout%group, "a group", 0, number, error)
+    call read_number(table, layout%material, "a material", 1, number, error)
     if (any(layout%normal == 0)) then
       call table%refuse(layout%shape, "a grain (a plane needs the columns "//normal_names(bodies%dimension)//")", error)
       return
@@ -278,24 +281,27 @@ contains
     if (id < 1) call table%refuse(column, "an id >= 1", error)
   end subroutine read_id
 
-  !> Read the group that a grain is glued to; a cell that is empty or missing is 0.
-  subroutine read_group(table, column, group, error)
+  !> Read the number of the group that a grain is glued to, or of its material; a cell that is empty or missing is the least.
+  subroutine read_number(table, column, what, least, number, error)
     type(csv_table_t), intent(in) :: table
     integer, intent(in) :: column
-    integer, intent(out) :: group
+    !> for messages
+    character(len=*), intent(in) :: what
+    integer, intent(in) :: least
+    integer, intent(out) :: number
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: value
 
-    group = 0
+    number = least
     if (table%is_empty(column)) return
     call table%get_integer(column, value, error)
     if (allocated(error)) return
-    if (value < 0 .or. value > huge(group)) then
-      call table%refuse(column, "a group from 0 to "//to_text(huge(group)), error)
+    if (value < least .or. value > huge(number)) then
+      call table%refuse(column, what//" from "//to_text(least)//" to "//to_text(huge(number)), error)
     else
-      group = int(value)
+      number = int(value)
     end if
-  end subroutine read_group
+  end subroutine read_number
 
   subroutine read_positive(table, column, expected, value, error)
     type(csv_table_t), intent(in) :: table

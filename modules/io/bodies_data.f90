@@ -29,6 +29,8 @@ module gravier_bodies_data
     real(dp), allocatable :: mass(:)
     !> (n): 0 a free grain, k >= 1 a grain glued to the boundary of group k; zero where the file has none
     integer, allocatable :: group(:)
+    !> (n): >= 1, number of the material; 1 where the file has none
+    integer, allocatable :: material(:)
     !> the same on all ranks
     integer :: n_walls = 0
     !> (n_walls)
@@ -42,7 +44,7 @@ module gravier_bodies_data
 
 contains
 
-  !> Room for n bodies at rest, free, without masses.
+  !> Room for n bodies at rest, free, of the first material, without masses.
   subroutine allocate_bodies(bodies, dimension, n)
     type(bodies_data_t), intent(inout) :: bodies
     integer, intent(in) :: dimension, n
@@ -51,6 +53,7 @@ contains
     bodies%n = n
     allocate (bodies%id(n), bodies%position(dimension, n), bodies%radius(n))
     allocate (bodies%group(n), source=0)
+    allocate (bodies%material(n), source=1)
     allocate (bodies%velocity(3*(dimension - 1), n), source=0.0_dp)
   end subroutine allocate_bodies
 

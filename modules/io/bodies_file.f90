@@ -77,6 +77,7 @@ contains
     else
       allocate (bodies%group(bodies%n), source=0)
     end if
+    allocate (bodies%material(bodies%n), source=1)
     bodies%has_box = present(origin) .and. present(period)
     if (bodies%has_box) then
       bodies%origin(1:dimension) = origin

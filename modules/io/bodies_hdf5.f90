@@ -1,4 +1,4 @@
-!> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group}, /walls/{id, point,
+!> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group, material}, /walls/{id, point,
 !> normal} and /box/{origin, period}.
 module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
@@ -15,7 +15,8 @@ module gravier_bodies_hdf5
   private
   public :: read_bodies_hdf5, write_bodies_hdf5
 
-  character(len=*), parameter :: body_sets(6) = [character(len=8) :: "id", "position", "velocity", "radius", "mass", "group"]
+  character(len=*), parameter :: body_sets(7) = [character(len=8) :: "id", "position", "velocity", "radius", "mass", "group", &
+    & "material"]
   character(len=*), parameter :: wall_sets(3) = [character(len=8) :: "id", "point", "normal"]
   character(len=*), parameter :: box_sets(2) = [character(len=8) :: "origin", "period"]
   !> kinds of numbers: any of which only ratios count; of a place or velocity; of a size above 0
@@ -93,7 +94,7 @@ contains
     integer(i8) :: first
     integer :: n
 
-    call check_lengths(file, path, "/bodies", body_sets, [.true., .true., .false., .true., .false., .false.], &
+    call check_lengths(file, path, "/bodies", body_sets, [.true., .true., .false., .true., .false., .false., .false.], &
       & bodies%total, error)
     if (allocated(error)) return
     call find_own_rows(comm, bodies%total, first, n)
@@ -113,26 +114,27 @@ contains
       call file%read_rows("/bodies/mass", first, bodies%mass, error)
       call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, extent, error)
     end if
-    if (file%exists("/bodies/group")) call read_groups(comm, file, path, first, bodies, error)
+    if (file%exists("/bodies/group")) call read_places("group", 0, bodies%group)
+    if (file%exists("/bodies/material")) call read_places("material", 1, bodies%material)
+
+  contains
+
+    !> Numbers of groups, or of materials.
+    subroutine read_places(name, least, numbers)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: least
+      integer, intent(inout) :: numbers(:)
+      integer(i8), allocatable :: values(:)
+
+      if (allocated(error)) return
+      allocate (values(bodies%n), source=0_i8)
+      call file%read_rows("/bodies/"//name, first, values, error)
+      call check_whole(comm, path, name, least, bodies%id, values, error)
+      if (allocated(error)) return
+      numbers(:) = int(values)
+    end subroutine read_places
+
   end subroutine read_grains
-
-  !> Read the groups that grains are glued to.
-  subroutine read_groups(comm, file, path, first, bodies, error)
-    type(communicator_t), intent(in) :: comm
-    type(h5_file_t), intent(in) :: file
-    character(len=*), intent(in) :: path
-    integer(i8), intent(in) :: first
-    type(bodies_data_t), intent(inout) :: bodies
-    type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: group(:)
-
-    if (allocated(error)) return
-    allocate (group(bodies%n), source=0_i8)
-    call file%read_rows("/bodies/group", first, group, error)
-    call check_groups(comm, path//": /bodies/group", bodies%id, group, error)
-    if (allocated(error)) return
-    bodies%group = int(group)
-  end subroutine read_groups
 
   !> Read the periodic box, if the file has one; the same on all ranks.
   subroutine read_box(file, path, dimension, bodies, error)
@@ -297,22 +299,25 @@ contains
     end do
   end subroutine check_own_numbers
 
-  subroutine check_groups(comm, place, id, group, error)
+  !> Refuse a number of a group or a material that is below the least one or too large.
+  subroutine check_whole(comm, path, name, least, id, values, error)
     type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: place
-    integer(i8), intent(in), contiguous :: id(:), group(:)
+    !> of the file; of the dataset
+    character(len=*), intent(in) :: path, name
+    integer, intent(in) :: least
+    integer(i8), intent(in), contiguous :: id(:), values(:)
     type(error_t), allocatable, intent(inout) :: error
     integer :: i
 
     if (allocated(error)) return
     do i = 1, size(id)
-      if (group(i) >= 0 .and. group(i) <= huge(i)) cycle
-      call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(group(i))//", but a group from 0 to "// &
-        & to_text(huge(i))//" was expected")
+      if (values(i) >= least .and. values(i) <= huge(i)) cycle
+      call raise(error, status_input, path//": /bodies/"//name//": id "//to_text(id(i))//": "//to_text(values(i))//", but a "// &
+        & name//" from "//to_text(least)//" to "//to_text(huge(i))//" was expected")
       exit
     end do
     call comm%agree(error)
-  end subroutine check_groups
+  end subroutine check_whole
 
   !> Refuse a box that is not finite or has a negative length.
   subroutine check_box(path, bodies, error)
@@ -337,7 +342,8 @@ contains
     end if
   end subroutine check_box
 
-  !> Write the bodies of all ranks in the order of the ids, the walls, groups where a grain has one, and the box. The
+  !> Write the bodies of all ranks in the order of the ids, the walls, groups where a grain has one, materials where
+  !> one is not the first, and the box. The
   !> file appears under its name only when it is complete. Failure: status_failure; what had that name before is left as
   !> it was. Collective.
   subroutine write_bodies_hdf5(comm, path, bodies, error)
@@ -353,7 +359,7 @@ contains
     call refuse_bad_numbers(comm, path, sorted, error)
     if (allocated(error)) return
     call file%create(comm, path//".part", error)
-    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(4 + 4*sorted%dimension) + &
+    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(5 + 4*sorted%dimension) + &
       & sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
     call write_groups(comm, file, sorted, error)
     call file%flush(error)
@@ -370,7 +376,7 @@ contains
     type(h5_file_t), intent(inout) :: file
     type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: group(:)
+    integer(i8), allocatable :: numbers(:)
     integer :: n
 
     call file%make_group("/bodies", error)
@@ -385,8 +391,10 @@ contains
       call file%write_rows("/bodies/mass", bodies%mass, error)
       call file%write_attribute("/bodies/mass", "unit", "kg", error)
     end if
-    group = bodies%group
-    if (comm%any_true(any(group > 0))) call file%write_rows("/bodies/group", group, error)
+    numbers = bodies%group
+    if (comm%any_true(any(numbers > 0))) call file%write_rows("/bodies/group", numbers, error)
+    numbers = bodies%material
+    if (comm%any_true(any(numbers > 1))) call file%write_rows("/bodies/material", numbers, error)
     if (bodies%has_box) call write_box(comm, file, bodies, error)
     if (bodies%n_walls == 0) return
     n = merge(bodies%n_walls, 0, comm%rank == 0)
@@ -423,13 +431,14 @@ contains
 
     nd = bodies%dimension
     nv = size(bodies%velocity, 1)
-    allocate (records(4 + nd + nv, bodies%n), source=0_i8)
+    allocate (records(5 + nd + nv, bodies%n), source=0_i8)
     records(1, :) = bodies%id
     call pack_reals(1, bodies%radius, 2, records)
     if (allocated(bodies%mass)) call pack_reals(1, bodies%mass, 3, records)
     call pack_reals(nd, bodies%position, 4, records)
     call pack_reals(nv, bodies%velocity, 4 + nd, records)
     records(4 + nd + nv, :) = bodies%group
+    records(5 + nd + nv, :) = bodies%material
     call order_rows(comm, 1, records, ordered)
     sorted%dimension = nd
     sorted%n = size(ordered, 2)
@@ -444,6 +453,7 @@ contains
     call unpack_reals(ordered, 4, nd, sorted%position)
     call unpack_reals(ordered, 4 + nd, nv, sorted%velocity)
     sorted%group = int(ordered(4 + nd + nv, :))
+    sorted%material = int(ordered(5 + nd + nv, :))
     sorted%n_walls = bodies%n_walls
     sorted%wall_id = bodies%wall_id
     sorted%wall_point = bodies%wall_point
@@ -459,15 +469,17 @@ contains
     character(len=*), intent(in) :: path
     type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: group(:)
+    integer(i8), allocatable :: numbers(:)
 
     call check_ids(comm, path//": /bodies/id", comm%offset(int(bodies%n, i8)), bodies%id, error)
     call check_numbers(comm, path//": /bodies/position", bodies%dimension, bodies%id, bodies%position, quantity, error)
     call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, quantity, error)
     call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, extent, error)
     if (allocated(bodies%mass)) call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, extent, error)
-    group = bodies%group
-    call check_groups(comm, path//": /bodies/group", bodies%id, group, error)
+    numbers = bodies%group
+    call check_whole(comm, path, "group", 0, bodies%id, numbers, error)
+    numbers = bodies%material
+    call check_whole(comm, path, "material", 1, bodies%id, numbers, error)
     call check_box(path, bodies, error)
     call check_ids(comm, path//": /walls/id", 0_i8, bodies%wall_id, error)
     call check_numbers(comm, path//": /walls/point", bodies%dimension, bodies%wall_id, bodies%wall_point, quantity, error)

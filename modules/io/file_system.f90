@@ -1,15 +1,15 @@
-!> What Fortran leaves to the operating system: directories, atomic renames, reserved disk space, and text files
-!> whose every write is checked. The only file with bindings to the C library.
+!> What Fortran leaves to the operating system: directories, atomic renames, reserved disk space, text files whose every
+!> write is checked, and whether the standard output is a terminal. The only file with bindings to the C library.
 module gravier_file_system
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
-    & c_f_pointer, c_associated
+    & c_f_pointer, c_associated, c_loc
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   implicit none
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file
+  public :: extend_file, replace_file, on_terminal
   public :: path_t, add_path, list_files, text_file_t, text_at
 
   !> A path of any length.
@@ -42,6 +42,8 @@ module gravier_file_system
   integer, parameter :: statvfs_words = 32
   !> more than the length of struct glob_t of 64-bit Linux, which begins with the number of paths and their address
   integer, parameter :: glob_words = 16
+  !> processes between a rank and its launcher, at most
+  integer, parameter :: highest_ancestor = 16
   !> permissions before the user's umask
   integer(c_int), parameter :: file_mode = int(o"666", c_int), directory_mode = int(o"777", c_int)
 
@@ -152,6 +154,20 @@ module gravier_file_system
       import :: c_int
       implicit none
     end function c_getpid
+
+    integer(c_int) function c_isatty(descriptor) bind(C, name="isatty")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: descriptor
+    end function c_isatty
+
+    integer(c_int64_t) function c_readlink(path, target, room) bind(C, name="readlink")
+      import :: c_int64_t, c_size_t, c_char, c_ptr
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+      type(c_ptr), value :: target
+      integer(c_size_t), value :: room
+    end function c_readlink
 
     type(c_ptr) function c_errno_location() bind(C, name="__errno_location")
       import :: c_ptr
@@ -302,6 +318,53 @@ contains
     end if
     ignored = c_close(descriptor)
   end subroutine reserve_space
+
+  !> Whether a person looks at the standard output of this process. Open MPI gives a rank a pseudo terminal whatever its own
+  !> output is: where it has started the process, the first process above that writes elsewhere is asked, the launcher.
+  logical function on_terminal()
+    character(len=:), allocatable :: mine, place
+    integer :: process, level, length
+
+    on_terminal = c_isatty(1_c_int) == 1
+    call get_environment_variable("OMPI_COMM_WORLD_SIZE", length=length)
+    if (.not. on_terminal .or. length == 0) return
+    process = int(c_getpid())
+    mine = output_of(process)
+    do level = 1, highest_ancestor
+      process = parent_of(process)
+      place = output_of(process)
+      if (process <= 1 .or. place /= mine) exit
+    end do
+    on_terminal = index(place, "/dev/pts/") == 1 .or. index(place, "/dev/tty") == 1
+  end function on_terminal
+
+  !> What a process has as its standard output; empty where that is not known.
+  function output_of(process) result(place)
+    integer, intent(in) :: process
+    character(len=:), allocatable :: place
+    character(kind=c_char, len=256), target :: buffer
+    integer(c_int64_t) :: length
+
+    length = c_readlink(c_text("/proc/"//to_text(process)//"/fd/1"), c_loc(buffer), int(len(buffer), c_size_t))
+    place = buffer(1:max(0, int(length)))
+  end function output_of
+
+  !> The process that started another one; 0 where that is not known.
+  integer function parent_of(process) result(parent)
+    integer, intent(in) :: process
+    character(len=1024) :: row
+    character :: state
+    integer :: unit, stat
+
+    parent = 0
+    open (newunit=unit, file="/proc/"//to_text(process)//"/stat", action="read", status="old", iostat=stat)
+    if (stat /= 0) return
+    read (unit, "(a)", iostat=stat) row
+    close (unit)
+    ! the name of the program, in brackets, may hold anything
+    if (stat == 0) read (row(index(row, ")", back=.true.) + 1:), *, iostat=stat) state, parent
+    if (stat /= 0) parent = 0
+  end function parent_of
 
   !> Length of a file in bytes, 0 when there is none.
   integer(i8) function file_length(path) result(length)

@@ -6,21 +6,25 @@ module gravier_hdf5_file
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_loc, c_long, c_null_char, c_null_ptr, &
     & c_ptr, c_size_t
   use mpi_f08, only: MPI_INFO_NULL
-  use hdf5, only: h5aclose_f, h5acreate_f, h5aget_space_f, h5aget_type_f, h5aopen_by_name_f, h5aread_f, h5awrite_f, h5dclose_f, &
-    & h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5dwrite_f, h5eset_auto_f, &
+  use hdf5, only: h5aclose_f, h5acreate_f, h5aget_space_f, h5aget_type_f, h5aopen_f, h5aopen_by_name_f, h5aread_f, h5awrite_f, &
+    & h5dclose_f, &
+    & h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dset_extent_f, h5dvlen_reclaim_f, &
+    & h5dwrite_f, h5eset_auto_f, &
     & h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, &
     & h5gn_members_f, h5kind_to_type, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5odecr_refcount_f, &
     & h5oincr_refcount_f, h5olink_f, h5oopen_f, h5open_f, &
     & h5pclose_f, h5pcreate_f, h5pset_create_inter_group_f, h5pset_dxpl_mpio_f, &
-    & h5pset_est_link_info_f, h5pset_fapl_mpio_f, h5pset_link_creation_order_f, h5pset_link_phase_change_f, &
+    & h5pset_alloc_time_f, h5pset_chunk_f, h5pset_istore_k_f, h5pset_est_link_info_f, &
+    & h5pset_fapl_mpio_f, h5pset_link_creation_order_f, h5pset_link_phase_change_f, &
     & h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_f, &
     & h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, &
     & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tcopy_f, h5tget_class_f, h5tget_size_f, &
     & h5tis_variable_str_f, h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, hsize_t, size_t, &
-    & H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, &
+    & H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, &
+    & H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, &
     & H5F_CLOSE_STRONG_F, H5F_SCOPE_GLOBAL_F, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F, &
     & H5P_CRT_ORDER_TRACKED_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, H5P_LINK_CREATE_F, &
-    & H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_CSET_UTF8_F, H5T_C_S1, H5T_FLOAT_F, &
+    & H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_IEEE_F32LE, H5T_CSET_UTF8_F, H5T_C_S1, H5T_FLOAT_F, &
     & H5T_IEEE_F64LE, H5T_INTEGER_F, H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING, H5T_STRING_F, H5T_STR_NULLPAD_F, &
     & H5_INDEX_NAME_F, H5_INTEGER_KIND, H5_ITER_INC_F, H5_REAL_KIND
   use gravier_kinds, only: dp, i4, i8
@@ -31,6 +35,7 @@ module gravier_hdf5_file
   implicit none
   private
   public :: h5_file_t
+  public :: table_integer, table_single, table_double
 
   !> An open HDF5 file. Paths start at the root: "/steps/12/bodies/id".
   type :: h5_file_t
@@ -73,6 +78,14 @@ module gravier_hdf5_file
     procedure, private :: write_reals => h5_write_reals
     procedure, private :: write_real_columns => h5_write_real_columns
 
+    !> put_rows(path, first_row, values, error): write the rows of all ranks into a table, in the order of the ranks, from row
+    !> first_row (from 0) on; the table grows
+    procedure :: make_table => h5_make_table
+    procedure :: cut_rows => h5_cut_rows
+    generic :: put_rows => put_integer_rows, put_real_rows
+    procedure, private :: put_integer_rows => h5_put_integer_rows
+    procedure, private :: put_real_rows => h5_put_real_rows
+
     !> read_rows(path, first_row, values, error): fill `values` with rows first_row (from 0) and following; each rank
     !> asks for its own block, empty if it likes
     generic :: read_rows => read_integers, read_integer_columns, read_reals, read_real_columns
@@ -88,6 +101,7 @@ module gravier_hdf5_file
     procedure, private :: write_i8 => h5_write_i8
     procedure, private :: write_i8_list => h5_write_i8_list
     procedure, private :: write_real => h5_write_real
+    procedure :: change_attribute => h5_change_attribute
 
     !> read_attribute(path, name, value, error)
     generic :: read_attribute => read_text, read_i8, read_real
@@ -98,11 +112,15 @@ module gravier_hdf5_file
     procedure, private :: locate
     procedure, private :: fail
     procedure, private :: write_block
+    procedure, private :: put_block
     procedure, private :: read_block
     procedure, private :: check_shape
     procedure, private :: write_value
     procedure, private :: read_value
   end type h5_file_t
+
+  !> what a table holds
+  integer, parameter :: table_integer = 1, table_single = 2, table_double = 3
 
   !> H5AC_cache_config_t of HDF5's C library, which its Fortran interface does not have
   type, bind(C) :: cache_config_t
@@ -164,11 +182,13 @@ contains
   ! ------------------------------------------------------------------------------------------------ the file itself
 
   !> Create a file, replacing an older one.
-  subroutine h5_create(self, comm, path, error)
+  subroutine h5_create(self, comm, path, error, chunks)
     class(h5_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
+    !> keep room for so many chunks of each table in one block: to add one more of them is then a single write
+    integer, intent(in), optional :: chunks
     integer(hid_t) :: access, creation
     integer :: stat, ignored
 
@@ -184,6 +204,7 @@ contains
     access = parallel_access(comm)
     call h5pcreate_f(H5P_FILE_CREATE_F, creation, ignored)
     call ask_for_one_block(creation, members_of_root)
+    if (present(chunks)) call h5pset_istore_k_f(creation, (chunks + 1)/2, ignored)
     call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, stat, creation_prp=creation, access_prp=access)
     call h5pclose_f(creation, ignored)
     call h5pclose_f(access, ignored)
@@ -740,7 +761,8 @@ contains
     if (n_columns > 0) extent(1) = int(n_columns, hsize_t)
   end subroutine get_shape
 
-  subroutine create_dataset(self, path, file_type, n_columns, n_rows, dataset, stat)
+  !> A dataset of a given length, or a table that grows by chunks of `rows_a_chunk`.
+  subroutine create_dataset(self, path, file_type, n_columns, n_rows, dataset, stat, rows_a_chunk)
     type(h5_file_t), intent(in) :: self
     character(len=*), intent(in) :: path
     integer(hid_t), intent(in) :: file_type
@@ -748,8 +770,9 @@ contains
     integer(i8), intent(in) :: n_rows
     integer(hid_t), intent(out) :: dataset
     integer, intent(out) :: stat
+    integer(i8), intent(in), optional :: rows_a_chunk
     integer(hid_t) :: place, space, creation, links
-    integer(hsize_t) :: extent(2)
+    integer(hsize_t) :: extent(2), chunk(2), greatest(2)
     character(len=:), allocatable :: name
     integer :: n_dims, ignored
 
@@ -760,7 +783,14 @@ contains
     call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, ignored)
     call h5pset_obj_track_times_f(creation, .false., ignored)
     call get_shape(n_columns, n_rows, n_dims, extent)
-    call h5screate_simple_f(n_dims, extent(1:n_dims), space, ignored)
+    greatest = extent
+    if (present(rows_a_chunk)) then
+      call get_shape(n_columns, rows_a_chunk, n_dims, chunk)
+      call h5pset_chunk_f(creation, n_dims, chunk(1:n_dims), ignored)
+      call h5pset_alloc_time_f(creation, H5D_ALLOC_TIME_EARLY_F, ignored)
+      greatest(n_dims) = H5S_UNLIMITED_F
+    end if
+    call h5screate_simple_f(n_dims, extent(1:n_dims), space, ignored, greatest(1:n_dims))
     call h5dcreate_f(place, name, file_type, space, dataset, stat, dcpl_id=creation, lcpl_id=links)
     call h5sclose_f(space, ignored)
     call h5pclose_f(creation, ignored)
@@ -808,6 +838,120 @@ contains
     call h5sclose_f(memory_space, ignored)
     call h5sclose_f(file_space, ignored)
   end subroutine transfer_block
+
+  ! ------------------------------------------------------------------------------------------------ tables that grow
+
+  !> Make a table without rows, which put_rows lengthens: (N) with n_columns = 0, (N, n_columns) otherwise.
+  subroutine h5_make_table(self, path, n_columns, kind, rows_a_chunk, error)
+    class(h5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: n_columns
+    !> table_integer (64 bits), table_single or table_double
+    integer, intent(in) :: kind
+    !> the file grows by so many rows at a time; the same on all ranks
+    integer(i8), intent(in) :: rows_a_chunk
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: dataset, type
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    type = H5T_STD_I64LE
+    if (kind == table_single) type = H5T_IEEE_F32LE
+    if (kind == table_double) type = H5T_IEEE_F64LE
+    call create_dataset(self, path, type, n_columns, 0_i8, dataset, stat, rows_a_chunk)
+    if (stat < 0) then
+      call self%fail(path, "cannot make this dataset", error)
+    else
+      call h5dclose_f(dataset, ignored)
+    end if
+    call self%comm%agree(error)
+  end subroutine h5_make_table
+
+  subroutine h5_put_integer_rows(self, path, first_row, values, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, or 1, rows of this rank)
+    integer(i8), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    type(c_ptr) :: buffer
+
+    buffer = c_null_ptr
+    if (size(values) > 0) buffer = c_loc(values(1, 1))
+    call self%put_block(path, first_row, size(values, 2), h5kind_to_type(i8, H5_INTEGER_KIND), buffer, error)
+  end subroutine h5_put_integer_rows
+
+  !> Reals; a table of integers takes them too, rounded towards zero.
+  subroutine h5_put_real_rows(self, path, first_row, values, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, or 1, rows of this rank)
+    real(dp), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    type(c_ptr) :: buffer
+
+    buffer = c_null_ptr
+    if (size(values) > 0) buffer = c_loc(values(1, 1))
+    call self%put_block(path, first_row, size(values, 2), h5kind_to_type(dp, H5_REAL_KIND), buffer, error)
+  end subroutine h5_put_real_rows
+
+  !> Leave the first rows of a table alone.
+  subroutine h5_cut_rows(self, path, n_rows, error)
+    class(h5_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: n_rows
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place, dataset
+    integer(hsize_t) :: extent(2)
+    character(len=:), allocatable :: name
+    integer :: n_dims, stat, ignored
+
+    if (allocated(error)) return
+    call self%locate(path, place, name)
+    call get_shape(max(self%columns(path), 0), n_rows, n_dims, extent)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat == 0) then
+      call h5dset_extent_f(dataset, extent(1:n_dims), stat)
+      call h5dclose_f(dataset, ignored)
+    end if
+    if (stat < 0) call self%fail(path, "cannot cut this table", error)
+    call self%comm%agree(error)
+  end subroutine h5_cut_rows
+
+  !> Lengthen a table where need be and write the rows of all ranks into it.
+  subroutine put_block(self, path, first_row, n_rows, memory_type, buffer, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    integer, intent(in) :: n_rows
+    integer(hid_t), intent(in) :: memory_type
+    type(c_ptr), intent(in) :: buffer
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place, dataset
+    integer(hsize_t) :: extent(2)
+    integer(i8) :: first, total, length
+    character(len=:), allocatable :: name
+    integer :: n_columns, n_dims, stat, ignored
+
+    call self%row_count(path, length, error)
+    if (allocated(error)) return
+    n_columns = self%columns(path)
+    total = self%comm%total(int(n_rows, i8))
+    first = first_row + self%comm%offset(int(n_rows, i8))
+    call self%locate(path, place, name)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat == 0) then
+      if (first_row + total > length) then
+        call get_shape(n_columns, first_row + total, n_dims, extent)
+        call h5dset_extent_f(dataset, extent(1:n_dims), stat)
+      end if
+      if (stat == 0 .and. total > 0) call transfer_block(dataset, n_columns, first, n_rows, memory_type, buffer, .true., stat)
+      call h5dclose_f(dataset, ignored)
+    end if
+    if (stat < 0) call self%fail(path, "cannot write rows of this table: is the disk full?", error)
+    call self%comm%agree(error)
+  end subroutine put_block
 
   ! ------------------------------------------------------------------------------------------------ reading rows
 
@@ -1044,6 +1188,35 @@ contains
     copy = value
     call self%write_value(path, name, H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND), 0, c_loc(copy), error)
   end subroutine h5_write_real
+
+  !> Give an integer attribute that is there another value, in its place.
+  subroutine h5_change_attribute(self, path, name, value, error)
+    class(h5_file_t), intent(in) :: self
+    character(len=*), intent(in) :: path, name
+    integer(i8), intent(in) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place, object, attribute
+    integer(i8), target :: copy
+    character(len=:), allocatable :: object_name
+    type(c_ptr) :: address
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    copy = value
+    address = c_loc(copy)
+    call self%locate(path, place, object_name)
+    call h5oopen_f(place, object_name, object, stat)
+    if (stat == 0) then
+      call h5aopen_f(object, name, attribute, stat)
+      if (stat == 0) then
+        call h5awrite_f(attribute, h5kind_to_type(i8, H5_INTEGER_KIND), address, stat)
+        call h5aclose_f(attribute, ignored)
+      end if
+      call h5oclose_f(object, ignored)
+    end if
+    if (stat < 0) call self%fail(path, "cannot write attribute "//name, error)
+    call self%comm%agree(error)
+  end subroutine h5_change_attribute
 
   !> Write one attribute; length = 0 makes a scalar.
   subroutine write_value(self, path, name, file_type, memory_type, length, buffer, error)

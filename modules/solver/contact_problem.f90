@@ -5,7 +5,7 @@ module gravier_contact_problem
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_contact_kernels, only: kernels_t, local_operator, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, local_operator, lanes, n_blocks, lane_of, block_of
   implicit none
   private
   public :: subproblem_t, contact_problem_t
@@ -21,6 +21,8 @@ module gravier_contact_problem
     integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
     !> contacts in whole blocks without common bodies: the first ones
     integer :: n_grouped = 0
+    !> contacts that do not sleep, the first ones: all, or whole blocks; of those that sleep, what n_grouped is of these
+    integer :: n_awake = 0, n_grouped_asleep = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
@@ -49,6 +51,9 @@ module gravier_contact_problem
     integer, allocatable :: pair(:, :)
     real(dp), allocatable :: hot(:, :, :)
     real(dp), allocatable :: impulse(:, :, :)
+    !> h F of the attraction F of each contact, where some law of the scene attracts (lanes, blocks) [N s]: impulses of a solve are
+    !> r + h F n, and -h F n is in v_free
+    real(dp), allocatable :: attraction(:, :)
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
@@ -59,6 +64,7 @@ module gravier_contact_problem
     procedure :: local_operator => subproblem_local_operator
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
+    procedure :: held_impulse => subproblem_held_impulse
   end type subproblem_t
 
   type :: contact_problem_t
@@ -75,18 +81,26 @@ module gravier_contact_problem
     !> their sums over all subdomains, once `sum_progress` was called; whoever changes `progress` clears the mark
     real(dp) :: progress_sums(2) = 0.0_dp
     logical :: progress_is_summed = .false.
-    !> contacts of the scene
-    integer(i8) :: n_contacts = 0
+    !> contacts of the scene, and those of them that sleep: no sweep takes them, their impulses stay
+    integer(i8) :: n_contacts = 0, n_asleep = 0
+    !> root mean square of the impulses, by the last `residual` [N s]
+    real(dp) :: impulse_scale = 0.0_dp
+    !> share of the squared defect that lies in contacts that sleep, by the last `residual`
+    real(dp) :: asleep_share = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
+    procedure :: wake => contact_problem_wake
+    procedure :: closing => contact_problem_closing
     procedure :: sum_progress => contact_problem_sum_progress
     procedure :: jump => contact_problem_jump
     procedure :: received_jump => contact_problem_received_jump
     procedure :: own_reactions => contact_problem_own_reactions
     procedure :: any_impulse => contact_problem_any_impulse
+    procedure :: load_attraction => contact_problem_load_attraction
+    procedure :: shift_impulses => contact_problem_shift_impulses
   end type contact_problem_t
 
 contains
@@ -166,6 +180,41 @@ contains
     end do
   end subroutine subproblem_multiply_mass
 
+  !> Normal impulse of contact `c` of a step that is over as the solve had it, r_n + h F [N s]: it is not 0 where the bodies touch.
+  pure real(dp) function subproblem_held_impulse(self, c) result(impulse)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: c
+
+    impulse = self%impulse(lane_of(c), 1, block_of(c))
+    if (allocated(self%attraction)) impulse = impulse + self%attraction(lane_of(c), block_of(c))
+  end function subproblem_held_impulse
+
+  !> Add the attractions to the loads, v_free := v_free + M^-1 H (-h F n). Impulses are zero before and after. Collective.
+  subroutine contact_problem_load_attraction(self)
+    class(contact_problem_t), intent(inout) :: self
+    integer :: s
+
+    call self%shift_impulses(-1)
+    call self%evaluate()
+    do s = 1, size(self%sub)
+      self%sub(s)%v_free(:, :) = self%sub(s)%v_global
+      self%sub(s)%impulse(:, :, :) = 0.0_dp
+    end do
+  end subroutine contact_problem_load_attraction
+
+  !> Turn the impulses of a solve into those on the bodies, r_n = r~_n - h F, where there are attractions, or back.
+  subroutine contact_problem_shift_impulses(self, sign)
+    class(contact_problem_t), intent(inout) :: self
+    !> -1 or 1, back
+    integer, intent(in) :: sign
+    integer :: s
+
+    do s = 1, size(self%sub)
+      if (.not. allocated(self%sub(s)%attraction)) cycle
+      self%sub(s)%impulse(:, 1, :) = self%sub(s)%impulse(:, 1, :) + sign*self%sub(s)%attraction
+    end do
+  end subroutine contact_problem_shift_impulses
+
   !> R_E = H_E r_E of subdomain `s` of this rank, into `reaction`.
   subroutine contact_problem_own_reactions(self, s)
     class(contact_problem_t), intent(inout) :: self
@@ -219,24 +268,31 @@ contains
     !> the same, not divided by the norm of the impulses [N s]
     real(dp), intent(out) :: defect
     real(dp), allocatable :: parts(:, :)
-    real(dp) :: sums(2)
+    real(dp) :: all_sums(merge(4, 2, self%n_asleep > 0)), sums(2)
     integer :: s
 
-    allocate (parts(2, size(self%sub)))
+    allocate (parts(merge(4, 2, self%n_asleep > 0), size(self%sub)), source=0.0_dp)
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s))
-        call self%kernels%residual(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, parts(:, s))
+      associate (sub => self%sub(s), g => n_blocks(merge(self%sub(s)%n_awake, self%sub(s)%n_contacts, self%n_asleep > 0)))
+        call self%kernels%residual(sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%inverse_mass, sub%v_global, &
+          & sub%impulse(:, :, 1:g), parts(1:2, s))
+        if (g < size(sub%hot, 3)) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
+          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(3:4, s))
       end associate
     end do
     call start_timer(phase_reduction)
-    call self%comm%sum_parts(parts, sums)
+    call self%comm%sum_parts(parts, all_sums)
     call stop_timer(phase_reduction)
+    sums(:) = all_sums(1:2)
+    if (self%n_asleep > 0) sums(:) = sums + all_sums(3:4)
     if (.not. all(ieee_is_finite(sums))) then
       residual = ieee_value(residual, ieee_quiet_nan)
       defect = residual
       return
     end if
+    if (self%n_asleep > 0) self%asleep_share = all_sums(3)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
+    self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
     if (defect <= rounding*self%force_scale*sqrt(real(self%n_contacts, dp))) then
       ! velocities are not known better; where impulses vanish, as in a group that flies on after a shock, no iteration
       ! would bring the defect below a part of them
@@ -249,6 +305,86 @@ contains
       residual = 0.0_dp
     end if
   end subroutine contact_problem_residual
+
+  !> The largest momentum with which a body presses on a contact that closes under v_global against its law: the mass of one of the
+  !> bodies in contact, or of the heaviest that leans on one of them, times the lesser of the velocity at which the contact
+  !> closes and that of this body along the normal; relative to the larger of force_scale and impulse_scale. The residual goes by
+  !> the lighter of two bodies, and knows little of what a heavy one lacks. Collective.
+  real(dp) function contact_problem_closing(self) result(closing)
+    class(contact_problem_t), intent(in) :: self
+    !> the heaviest body that leans on each
+    integer, allocatable :: heaviest(:)
+    real(dp) :: v
+    integer :: s, c, k, nd
+
+    nd = self%kernels%nd
+    closing = 0.0_dp
+    do s = 1, size(self%sub)
+      associate (sub => self%sub(s))
+        allocate (heaviest(sub%n_columns), source=0)
+        do c = 1, sub%n_contacts
+          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+          do k = 1, 2
+            call lean(sub%pair(3 - k, c), heaviest(sub%pair(k, c)))
+          end do
+        end do
+        do c = 1, sub%n_contacts
+          v = approach(sub%pair(2, c)) - approach(sub%pair(1, c)) - sub%hot(lane_of(c), nd + 1, block_of(c))
+          if (.not. v > 0.0_dp) cycle
+          do k = 1, 2
+            call press(sub%pair(k, c))
+            if (heaviest(sub%pair(k, c)) > 0) call press(heaviest(sub%pair(k, c)))
+          end do
+        end do
+        deallocate (heaviest)
+      end associate
+    end do
+    closing = self%comm%highest(closing)/max(self%force_scale, self%impulse_scale, tiny(1.0_dp))
+
+  contains
+
+    !> 1/M of body `b`, 0 for what cannot move [1/kg].
+    pure real(dp) function inverse_mass(b)
+      integer, intent(in) :: b
+      inverse_mass = maxval(self%sub(s)%inverse_mass(1:nd, b))
+    end function inverse_mass
+
+    !> Put body `b` in the place of one that is lighter, or of none.
+    pure subroutine lean(b, place)
+      integer, intent(in) :: b
+      integer, intent(inout) :: place
+
+      if (.not. inverse_mass(b) > 0.0_dp) return
+      if (place > 0) then
+        if (inverse_mass(b) >= inverse_mass(place)) return
+      end if
+      place = b
+    end subroutine lean
+
+    !> Velocity of body `b` along the normal of contact c.
+    real(dp) function approach(b)
+      integer, intent(in) :: b
+      integer :: d
+
+      approach = 0.0_dp
+      do d = 1, nd
+        approach = approach + self%sub(s)%v_global(d, b)*self%sub(s)%hot(lane_of(c), d, block_of(c))
+      end do
+    end function approach
+
+    subroutine press(b)
+      integer, intent(in) :: b
+      if (inverse_mass(b) > 0.0_dp) closing = max(closing, min(v, abs(approach(b)))/inverse_mass(b))
+    end subroutine press
+
+  end function contact_problem_closing
+
+  !> Let sweeps take all contacts for the rest of the solve.
+  subroutine contact_problem_wake(self)
+    class(contact_problem_t), intent(inout) :: self
+    self%n_asleep = 0
+    self%asleep_share = 0.0_dp
+  end subroutine contact_problem_wake
 
   !> Sums of `progress` over all subdomains of the scene, for momentum, checks and safeguards: one reduction an iteration at
   !> most. Collective.

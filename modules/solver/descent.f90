@@ -4,7 +4,7 @@ module gravier_descent
   use gravier_kinds, only: dp, i8
   implicit none
   private
-  public :: descent_t, effort_t, tenfold, unknown_effort
+  public :: descent_t, effort_t, at_tolerance, tenfold, unknown_effort
 
   !> places of the levels: tolerance 10^(k/2), so that the last one is ten times the tolerance
   integer, parameter :: at_tolerance = 0, half_a_decade = 1, tenfold = 2

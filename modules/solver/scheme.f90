@@ -4,6 +4,7 @@ module gravier_scheme
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
   use gravier_communicator, only: communicator_t
+  use gravier_contact_kernels, only: lanes, n_blocks
   use gravier_contact_problem, only: contact_problem_t
   implicit none
   private
@@ -13,12 +14,17 @@ module gravier_scheme
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
   real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)
   !> growth of |r - y|^2 between iterations that shortens the memory, and what is left of t then
-  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.7_dp
+  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.75_dp
   !> least 1 - beta: at the start, after an idle phase, ever; its factor after a window that grew, and after one that shrank
   real(dp), parameter :: first_margin = 0.1_dp, wary_margin = 0.3_dp, least_margin = 0.02_dp, widen = 3.0_dp, narrow = 0.7_dp
   !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
   integer, parameter :: window = 10, idle_limit = 20
   real(dp), parameter :: progress_made = 0.8_dp
+  !> ratio of the residual to |r - y|/|r| of the last sweep, on packings 0.55 to 0.65
+  real(dp), parameter :: residual_ratio = 0.62_dp
+  !> plain sweeps may finish a solve from so many times the tolerance; |r - y|^2 goes down by more in each, or momentum goes on;
+  !> what of their gain they are expected to have again
+  real(dp), parameter :: first_finish = 1.6_dp, settling = 0.97_dp, gain_expected = 0.95_dp
 
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
@@ -43,17 +49,32 @@ module gravier_scheme
   !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
   !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 22: growth from one iteration to the next shortens the
   !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
-  !> without progress come as many plain iterations as the solve has had.
+  !> without progress come as many plain iterations as the solve has had. Near the tolerance a few plain iterations take away
+  !> what momentum has stirred up.
   type :: momentum_t
     logical :: on = .false.
+    !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
+    logical :: resting = .false.
+    !> the memory was shortened in this solve
+    logical :: shortened = .false.
+    !> the last change was less than the one before by what plain iterations at the end are asked for
+    logical :: falls = .false.
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
-    !> iterations of this solve, windows since `lowest`, plain iterations to come
-    integer :: iterations = 0, idle_windows = 0, plain = 0
+    !> tolerance of the residual, 0 where it is not what a solve is judged by; times it from which plain iterations finish
+    real(dp) :: tolerance = 0.0_dp, finish_from = first_finish
+    !> where they began: |r - y|^2, and times the tolerance
+    real(dp) :: finish_change = unknown, finish_began = 0.0_dp
+    !> iterations of this solve but the finishing ones, windows since `lowest`, plain iterations to come, iteration
+    !> before which no finishing ones begin
+    integer :: iterations = 0, idle_windows = 0, plain = 0, finish_after = 0
+    !> finishing iterations to come, at most
+    integer :: finishing = 0
     type(momentum_part_t), allocatable :: part(:)
   contains
     procedure :: steer => momentum_steer
+    procedure :: finish => momentum_finish
   end type momentum_t
 
   type, abstract :: scheme_t
@@ -163,7 +184,8 @@ contains
     if (allocated(self%seconds)) deallocate (self%seconds)
   end subroutine scheme_forget_times
 
-  !> Masses as the method wants them, and velocities that agree with the impulses in all copies, v_global too. Collective.
+  !> Masses as the method wants them, and reactions and velocities that agree with the impulses in all copies, v_global too.
+  !> Collective.
   subroutine start_sweeps(scheme, problem, shared_masses)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
@@ -175,6 +197,7 @@ contains
       call problem%evaluate()
     else
       do s = 1, size(problem%sub)
+        problem%sub(s)%reaction(:, :) = 0.0_dp
         problem%sub(s)%v_global(:, :) = problem%sub(s)%v_free
       end do
     end if
@@ -256,7 +279,7 @@ contains
 
     call start_timer(phase_sweep)
     problem%progress_is_summed = .false.
-    if (.not. scheme%momentum%on) return
+    if (.not. scheme%momentum%on .or. scheme%momentum%resting) return
     do s = 1, size(problem%sub)
       call extrapolate(scheme%momentum%beta, problem%sub(s)%velocity, scheme%momentum%part(s)%velocity)
     end do
@@ -267,48 +290,74 @@ contains
     real(dp), intent(in) :: beta
     !> (nv, n_columns)
     real(dp), intent(inout), contiguous :: velocity(:, :), previous(:, :)
-    real(dp) :: v
-    integer :: b, d
-
-    do b = 1, size(velocity, 2)
-      do d = 1, size(velocity, 1)
-        v = velocity(d, b)
-        velocity(d, b) = v + beta*(v - previous(d, b))
-        previous(d, b) = v
-      end do
-    end do
+    call extrapolate_numbers(size(velocity), beta, velocity, previous)
   end subroutine extrapolate
 
-  !> Sweep `k` of an iteration in subdomain `s` of this rank.
+  !> The same in one loop over all numbers, which the compiler makes vectors of.
+  pure subroutine extrapolate_numbers(n, beta, velocity, previous)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: beta
+    real(dp), intent(inout) :: velocity(n), previous(n)
+    real(dp) :: v
+    integer :: k
+
+    do k = 1, n
+      v = velocity(k)
+      velocity(k) = v + beta*(v - previous(k))
+      previous(k) = v
+    end do
+  end subroutine extrapolate_numbers
+
+  !> Sweep `k` of an iteration in subdomain `s` of this rank; contacts that have woken come after the others.
   subroutine sweep_once(scheme, problem, s, k, law_velocity)
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s, k
     !> takes the velocity that solves the law at each contact (lanes, nc, blocks) [m/s]
     real(dp), intent(inout), contiguous, optional :: law_velocity(:, :, :)
-    real(dp) :: sums(2), start
+    real(dp) :: sums(2), more(2), start
 
     start = clock()
-    associate (sub => problem%sub(s), kernels => problem%kernels)
-      if (scheme%momentum%on .and. k == 1) then
-        associate (part => scheme%momentum%part(s), beta => scheme%momentum%beta)
-          if (present(law_velocity)) then
-            call kernels%sweep_momentum_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
-              & beta, part%impulse, law_velocity)
-          else
-            call kernels%sweep_momentum(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
-              & beta, part%impulse)
-          end if
-        end associate
-      else if (present(law_velocity)) then
-        call kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, law_velocity)
-      else
-        call kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
+    associate (sub => problem%sub(s))
+      call sweep_blocks(1, n_blocks(sub%n_awake), sub%n_grouped, sums)
+      scheme%work%relaxations = scheme%work%relaxations + sub%n_awake
+      if (problem%n_asleep == 0 .and. sub%n_awake < sub%n_contacts) then
+        call sweep_blocks(n_blocks(sub%n_awake) + 1, size(sub%hot, 3), sub%n_grouped_asleep, more)
+        sums(:) = sums + more
+        scheme%work%relaxations = scheme%work%relaxations + sub%n_contacts - sub%n_awake
       end if
-      if (k == 1) problem%progress(:, s) = sums
-      scheme%work%relaxations = scheme%work%relaxations + sub%n_contacts
     end associate
+    if (k == 1) problem%progress(:, s) = sums
     scheme%seconds(s) = scheme%seconds(s) + clock() - start
+
+  contains
+
+    !> Sweep blocks `a` to `z`, of which the first n_grouped contacts have no common bodies.
+    subroutine sweep_blocks(a, z, n_grouped, sums)
+      integer, intent(in) :: a, z, n_grouped
+      real(dp), intent(out) :: sums(2)
+
+      associate (sub => problem%sub(s), kernels => problem%kernels, first => (a - 1)*lanes + 1, last => z*lanes)
+        if (scheme%momentum%on .and. k == 1 .and. .not. scheme%momentum%resting) then
+          associate (previous => scheme%momentum%part(s)%impulse, beta => scheme%momentum%beta)
+            if (present(law_velocity)) then
+              call kernels%sweep_momentum_recording(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, &
+                & sub%velocity, sub%impulse(:, :, a:z), sums, beta, previous(:, :, a:z), law_velocity(:, :, a:z))
+            else
+              call kernels%sweep_momentum(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, sub%velocity, &
+                & sub%impulse(:, :, a:z), sums, beta, previous(:, :, a:z))
+            end if
+          end associate
+        else if (present(law_velocity)) then
+          call kernels%sweep_recording(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, sub%velocity, &
+            & sub%impulse(:, :, a:z), sums, law_velocity(:, :, a:z))
+        else
+          call kernels%sweep(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, sub%velocity, &
+            & sub%impulse(:, :, a:z), sums)
+        end if
+      end associate
+    end subroutine sweep_blocks
+
   end subroutine sweep_once
 
   !> Count the sweeps, and choose the extrapolation of the next iteration. Collective with momentum.
@@ -323,25 +372,65 @@ contains
     if (.not. scheme%momentum%on) return
     call problem%sum_progress(sums)
     call scheme%momentum%steer(sums(1))
+    if (sums(2) > 0.0_dp) call scheme%momentum%finish(sqrt(sums(1)/sums(2)))
   end subroutine end_sweeps
 
-  !> Choose beta of the next iteration by what this one has changed.
+  !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
   pure subroutine momentum_steer(self, change)
     class(momentum_t), intent(inout) :: self
     !> |r - y|^2 of the first sweep, over all subdomains [N^2 s^2]
     real(dp), intent(in) :: change
     real(dp) :: t
 
-    t = self%t
-    if (change > growth_allowed*self%change) t = max(1.0_dp, memory_kept*t)
-    self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
+    if (self%finishing > 0) then
+      self%finishing = self%finishing - 1
+      if (change >= settling*self%change) self%finishing = 0
+      self%change = change
+      if (self%finishing == 0) call go_on(self)
+      return
+    end if
+    if (change > growth_allowed*self%change) then
+      self%t = max(1.0_dp, memory_kept*self%t)
+      self%shortened = .true.
+    end if
+    self%falls = change < settling*self%change
     self%change = change
     self%window_change = self%window_change + change
     self%iterations = self%iterations + 1
     if (mod(self%iterations, window) == 0) call close_window(self)
+    self%resting = self%plain > 0
+    self%beta = 0.0_dp
+    if (self%resting) return
+    t = self%t
+    self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
     self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin)
-    if (self%plain > 0) self%beta = 0.0_dp
   end subroutine momentum_steer
+
+  !> Near the tolerance: plain iterations, which take away within a few what momentum has stirred up, in a solve in which
+  !> changes have grown; the momentum of the last iteration waits.
+  pure subroutine momentum_finish(self, progress)
+    class(momentum_t), intent(inout) :: self
+    !> |r - y|/|r| of the first sweep
+    real(dp), intent(in) :: progress
+
+    if (self%resting .or. self%falls .or. .not. self%shortened .or. self%iterations < self%finish_after) return
+    if (residual_ratio*progress > self%finish_from*self%tolerance) return
+    self%finishing = window
+    self%resting = .true.
+    self%finish_change = self%change
+    self%finish_began = residual_ratio*progress/self%tolerance
+  end subroutine momentum_finish
+
+  !> Momentum goes on after plain iterations that have not met the tolerance: the next ones begin a window later at the
+  !> earliest, and nearer to it, where those would have met it.
+  pure subroutine go_on(momentum)
+    type(momentum_t), intent(inout) :: momentum
+
+    momentum%resting = .false.
+    momentum%finish_from = gain_expected*min(momentum%finish_began, sqrt(momentum%finish_change/momentum%change))
+    momentum%finish_after = momentum%iterations + window
+    momentum%change = unknown
+  end subroutine go_on
 
   !> The end of a window of iterations: the margin, and whether momentum still pays.
   pure subroutine close_window(momentum)

@@ -19,13 +19,19 @@ module gravier_solve
   !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
+  !> momentum with which a heavier body may go through a lighter one, see `closing`: at most, and over the tolerance; packings that
+  !> have converged have a third of it and less
+  real(dp), parameter :: most_closing = 0.5_dp, closing_of_tolerance = 1.0e3_dp
+  !> ratio of a residual to what the sweeps before it moved impulses by, until a check has measured it, with momentum
+  real(dp), parameter :: first_ratio = 0.5_dp
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 5
 
   type :: solve_control_t
     real(dp) :: tolerance = 1.0e-4_dp
     integer :: max_iterations = 10000
-    !> iterations between two checks; of these, some that would tell nothing new are left out
+    !> iterations between two checks; of these, some that would tell nothing new are left out; with momentum, whose sums are
+    !> there after each iteration, a check comes as soon as they speak for one
     integer :: check_every = 10
     !> keep the figures of every check, and leave none out
     logical :: trace = .false.
@@ -52,6 +58,11 @@ module gravier_solve
     integer :: status = solve_exhausted
     integer :: iterations = 0
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
+    !> above 0, a heavy body went through a light one with this share of the largest momentum, and the solve had not converged
+    !> whatever the figure
+    real(dp) :: closing = 0.0_dp
+    !> the contacts that slept were woken
+    logical :: woken = .false.
     !> relative error on the impulses, negative where no exact solution is known
     real(dp) :: error = -1.0_dp
     !> what the tolerance is compared with at the end: residual or error
@@ -94,12 +105,15 @@ contains
     call scheme%start(problem, error)
     call stop_timer(phase_setup)
     if (allocated(error)) return
+    if (.not. present(exact)) scheme%momentum%tolerance = control%tolerance
     report%start_seconds = clock() - began
     call check(done)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
-      if (measure .and. .not. (control%trace .or. present(exact))) measure = is_worth_a_check()
+      ! sums of the iterations before are there with momentum
+      if (.not. (control%trace .or. present(exact)) .and. (measure .or. (scheme%momentum%on .and. report%iterations > 1))) &
+        & measure = is_worth_a_check(measure)
       measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
@@ -108,25 +122,43 @@ contains
     if (report%status == solve_exhausted .and. scheme%keeps_best) then
       call scheme%conclude(problem)
       call problem%residual(report%residual, ignored)
+      report%figure = report%residual
+      if (present(exact)) then
+        report%error = exact%error(problem)
+        report%figure = report%error
+      end if
     end if
     report%seconds = clock() - began
 
   contains
 
     !> Whether the sweeps of the iteration before speak for a check. Collective.
-    logical function is_worth_a_check() result(is_worth)
-      real(dp) :: sums(2)
+    logical function is_worth_a_check(regular) result(is_worth)
+      !> whether check_every asks for one
+      logical, intent(in) :: regular
+      real(dp) :: sums(2), expected, enough
 
       call problem%sum_progress(sums)
       progress = 0.0_dp
-      is_worth = .true.
+      is_worth = regular
+      expected = 0.0_dp
       if (all(ieee_is_finite(sums))) then
         if (sums(2) > 0.0_dp) progress = sqrt(sums(1)/sums(2))
-        if (ratio > 0.0_dp .and. progress > 0.0_dp .and. skips < most_skips) &
-          & is_worth = ratio*progress <= worth_a_check*control%tolerance .or. sqrt(sums(1)) > growth_limit*reference
+        expected = ratio*progress
+        enough = worth_a_check
+        if (scheme%momentum%on) then
+          if (.not. ratio > 0.0_dp) expected = first_ratio*progress
+          enough = 1.0_dp
+        end if
+        if (expected > 0.0_dp) is_worth = expected <= enough*control%tolerance .or. &
+          & (regular .and. (skips >= most_skips .or. sqrt(sums(1)) > growth_limit*reference))
       end if
-      skips = merge(0, skips + 1, is_worth)
-      if (.not. is_worth) call report%descent%note(report%iterations, ratio*progress, control%tolerance)
+      if (is_worth) then
+        skips = 0
+      else if (regular) then
+        skips = skips + 1
+        call report%descent%note(report%iterations, expected, control%tolerance)
+      end if
     end function is_worth_a_check
 
     subroutine check(finished)
@@ -146,9 +178,30 @@ contains
       if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, control%tolerance)
       if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%residual/progress
       call judge(defect, finished)
+      if (.not. finished .and. problem%n_asleep > 0) call wake_if_due()
       checking = checking + clock() - start
       call stop_timer(phase_check)
     end subroutine check
+
+    !> Where most of the defect lies in contacts that sleep, no sweep would lower it: they wake. Else the other contacts'
+    !> part has to fall first, and may do.
+    subroutine wake_if_due()
+      if (problem%asleep_share < 0.5_dp) return
+      call problem%wake()
+      report%woken = .true.
+      ! changes of all contacts are other changes
+      ratio = 0.0_dp
+    end subroutine wake_if_due
+
+    !> A residual below the tolerance says little where a heavy body goes through a light one, or where there is no impulse yet
+    !> and some contact asks for one.
+    subroutine weigh_bodies()
+      real(dp) :: closing
+
+      closing = problem%closing()
+      if (.not. problem%impulse_scale > 0.0_dp) closing = 1.0_dp
+      if (closing > min(most_closing, closing_of_tolerance*control%tolerance)) report%closing = closing
+    end subroutine weigh_bodies
 
     subroutine judge(defect, finished)
       real(dp), intent(in) :: defect
@@ -160,7 +213,9 @@ contains
         return
       end if
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
-      if (report%figure <= control%tolerance) then
+      report%closing = 0.0_dp
+      if (report%figure <= control%tolerance .and. report%residual > 0.0_dp .and. .not. present(exact)) call weigh_bodies()
+      if (report%figure <= control%tolerance .and. .not. report%closing > 0.0_dp) then
         report%status = solve_converged
       else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
         report%status = solve_diverged

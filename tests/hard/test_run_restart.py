@@ -7,15 +7,14 @@ import os
 import random
 import shutil
 import signal
-import subprocess
 import time
 import unittest
 
 import h5py
 import numpy as np
 
-from gravier_runs import (ENVIRONMENT, GRAVIER, MPIEXEC, RunTestCase, contents, differences, each, gravier, merged, namelist,
-                          read_csv, run_case, steps_of, write)
+from gravier_runs import RunTestCase, contents, differences, each, gravier, merged, namelist, read_csv, run_case, steps_of, write
+from killed_runs import Going, compile_shim
 
 # what moves grains in every way: periods, a belt, a lid moved by a force, an outlet, a boundary that goes, tables, glued
 # grains that turn, METIS by schedule and by imbalance
@@ -49,34 +48,6 @@ BOX = {
 BOX_3D = merged(BOX, {"scene": {"dimension": 3, "lattice_count": [5, 4, 4], "wall_friction": 0.5},
                       "time": {"steps": 24}, "decomposition": {"subdomains": 4}})
 
-# a process that dies just before its n-th write to results.h5
-SHIM = r"""
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/types.h>
-#include <unistd.h>
-static void count(int fd) {
-  static long n = 0;
-  char link[64], path[4096];
-  snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
-  ssize_t length = readlink(link, path, sizeof path - 1);
-  if (length < 0) return;
-  path[length] = 0;
-  if (strstr(path, "results.h5") && ++n == atol(getenv("DIES_AT"))) kill(getpid(), SIGKILL);
-}
-#define WRITES_AT(name) ssize_t name(int fd, const void *buffer, size_t n, off_t at) { \
-  static ssize_t (*next)(int, const void *, size_t, off_t); \
-  if (!next) next = (ssize_t (*)(int, const void *, size_t, off_t))dlsym(RTLD_NEXT, #name); \
-  count(fd); return next(fd, buffer, n, at); }
-WRITES_AT(pwrite)
-WRITES_AT(pwrite64)
-"""
-
-
 def write_drum(directory):
     """The files that DRUM reads: 200 grains, of which five are glued."""
     os.makedirs(directory, exist_ok=True)
@@ -99,65 +70,6 @@ def content(path):
 
 def restart(directory, ranks=1, **changes):
     return gravier("--restart", "case.nml", ranks=ranks, directory=directory, **changes)
-
-
-class Going:
-    """A run that goes on while it is looked at; its ranks are this process's grandchildren, each known by its id."""
-
-    def __init__(self, groups, ranks, directory, options=(), shim=None):
-        os.makedirs(directory, exist_ok=True)
-        write(os.path.join(directory, "case.nml"), namelist(groups))
-        self.directory, self.ranks = directory, ranks
-        for name in os.listdir(directory):
-            if name.startswith("pid."):
-                os.remove(os.path.join(directory, name))
-        script = 'echo $$ >pid.$$.part; mv pid.$$.part pid.$$; '
-        if shim:
-            library, rank, count = shim
-            script += f'if [ "${{OMPI_COMM_WORLD_RANK:-$PMI_RANK}}" = {rank} ]; then export LD_PRELOAD={library} DIES_AT={count}; fi; '
-        environment = {**ENVIRONMENT, **os.environ}
-        self.process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", script + 'exec "$0" "$@"', GRAVIER, *options,
-                                         "case.nml"], cwd=directory, env=environment, stdin=subprocess.DEVNULL,
-                                        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-
-    def wait_for(self, condition, what, timeout=30):
-        end = time.monotonic() + timeout
-        while not condition():
-            if self.process.poll() is not None or time.monotonic() > end:
-                self.process.terminate()
-                raise AssertionError(f"{self.directory}: {what} did not come: {self.process.communicate()[0]}")
-            time.sleep(0.002)
-
-    def pids(self):
-        names = [name for name in os.listdir(self.directory) if name.startswith("pid.") and name.count(".") == 1]
-        return [int(name[4:]) for name in names]
-
-    def rows(self):
-        try:
-            with open(os.path.join(self.directory, "results", "history.csv"), encoding="ascii") as file:
-                return file.read().count("\n") - 1
-        except FileNotFoundError:
-            return -1
-
-    def wait_for_rows(self, n):
-        self.wait_for(lambda: len(self.pids()) == self.ranks and self.rows() >= n, f"step {n}")
-
-    def send(self, number, ranks=None):
-        for pid in self.pids()[:ranks]:
-            try:
-                os.kill(pid, number)
-            except ProcessLookupError:
-                pass
-
-    def end(self, timeout=60):
-        """Status and what was said."""
-        try:
-            said = self.process.communicate(timeout=timeout)[0]
-        except subprocess.TimeoutExpired:
-            self.send(signal.SIGKILL)
-            self.process.kill()
-            raise AssertionError(f"{self.directory}: did not end in {timeout} s: {self.process.communicate()[0]}") from None
-        return self.process.returncode, said
 
 
 class Restart(RunTestCase):
@@ -380,11 +292,7 @@ class Restart(RunTestCase):
 
     def test_kill_before_each_write(self):
         """Killed just before one write to results.h5 or another, of rank 0, which writes all headers: the file is whole."""
-        library = self.here("shim.so")
-        write(self.here("shim.c"), SHIM)
-        compiler = shutil.which("cc") or shutil.which("gcc")
-        self.assertTrue(compiler, "a C compiler is needed for this test")
-        subprocess.run([compiler, "-shared", "-fPIC", "-o", library, self.here("shim.c"), "-ldl"], check=True)
+        library = compile_shim(self.scratch)
         case = merged(BOX, {"time": {"steps": 6}, "solver": {"max_iterations": 10, "tolerance": 0.1},
                             "output": {"checkpoint_every": 2}})
         straight = self.straight("all written", case)

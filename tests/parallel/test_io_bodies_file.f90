@@ -22,6 +22,7 @@ program test_io_bodies_file
   call test_hdf5(2, 0)
   call test_same_file()
   call test_groups()
+  call test_materials()
   call test_box()
   call test_csv_2d()
   call test_csv_3d()
@@ -305,6 +306,40 @@ contains
     call read_bodies(comm, base//".h5", 2, bodies, error)
     call expect(error, status_input, "/bodies/group: id 26: "//to_text(group)//", but a group from 0 to", "a group out of range")
   end subroutine refuse_groups
+
+  !> Materials are read as written, and are 1 where there are none.
+  subroutine test_materials()
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+    type(h5_file_t) :: file
+    integer(i8), allocatable :: numbers(:)
+    integer :: k
+
+    do k = 1, 2
+      call make_bodies(2, 8, bodies)
+      allocate (numbers(bodies%n))
+      numbers(:) = mod(bodies%id, 5_i8) + 1
+      if (k == 2) where (bodies%id == 26) numbers = 0
+      call file%create(comm, base//".h5", error)
+      call file%write_rows("/bodies/id", bodies%id, error)
+      call file%write_rows("/bodies/position", bodies%position, error)
+      call file%write_rows("/bodies/radius", bodies%radius, error)
+      call file%write_rows("/bodies/material", numbers, error)
+      call file%close(error)
+      call expect_none(error, "writing materials")
+      call read_bodies(comm, base//".h5", 2, bodies, error)
+      if (k == 1) call check(all(bodies%material == mod(bodies%id, 5_i8) + 1), "materials")
+      deallocate (numbers)
+    end do
+    call expect(error, status_input, "/bodies/material: id 26: 0, but a material from 1 to", "a material out of range")
+    call put(base//".csv", "id,x,y,radius,material"//lf//"5,1,2,0.5,3"//lf//"6,2,3,0.5,")
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect_none(error, "CSV with materials")
+    call check(all(bodies%material == merge(3, 1, bodies%id == 5)), "materials of CSV")
+    call put(base//".csv", "id,x,y,radius,material"//lf//"5,1,2,0.5,0")
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    call expect(error, status_input, "a material from 1 to 2147483647", "a material of 0")
+  end subroutine test_materials
 
   !> A periodic box is read as written, and absent where there is none.
   subroutine test_box()
@@ -627,7 +662,8 @@ contains
     call refuse_layout("/bodies/id", "/bodies/id: missing")
     call refuse_layout("/bodies/position", "/bodies/position: missing")
     call refuse_layout("/bodies/radius", "/bodies/radius: missing")
-    call refuse_layout("/bodies", "/bodies: missing; a group with id, position, velocity, radius, mass, group was expected")
+    call refuse_layout("/bodies", "/bodies: missing; a group with id, position, velocity, radius, mass, group, material was "// &
+      & "expected")
     call refuse_layout("+/bodies/masses", "/bodies/masses: unknown; known are id, position, velocity, radius, mass, group")
     call refuse_layout("+/walls/point", "/walls/id: missing")
     call refuse_layout("+/bodies/mass", "/bodies/mass: "//to_text(comm%size)//" rows, but /bodies/id has 8")

@@ -1,7 +1,8 @@
 """The documentation says what is: keys, links, procedures and commands exist, examples run.
 
-Blocks of a page are run down the page in one directory that holds a link to data/, with the programs on PATH:
-- a block sh or python whose first line is `# tested` must end with status 0;
+Blocks of a page are run down the page in one directory that holds links to data/ and drivers/, with the programs on PATH:
+- a block sh or python whose first line is `# tested` must end with status 0; any other one has a line
+  `<!-- not run: REASON -->` above it, and the test lists them;
 - a block fortran that is a complete case (it has &scene and &time) must pass `gravier --check`; a first line
   `! NAME.nml` leaves it under that name for the blocks after it.
 """
@@ -23,6 +24,8 @@ PROGRAMS = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin"))
 MPIEXEC = shutil.which(os.environ.get("MPIEXEC", "mpiexec")) or "mpiexec"
 PAGES = [SOURCE / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted((SOURCE / "doc").glob("*.md"))
 BANNED = ["TODO", "FIXME", "XXX", "coming soon", "not yet implemented"]
+# pages whose blocks need no line to say why they are not run
+UNMARKED = {"README.md": "builds the program, or installs packages"}
 PATIENCE = 300  # seconds for one block
 
 ENVIRONMENT = {
@@ -38,6 +41,8 @@ class Block:
 
     def __init__(self, page, line, language):
         self.page, self.line, self.language, self.lines = page, line, language, []
+        #: why it is not run
+        self.reason = None
 
     @property
     def text(self):
@@ -62,16 +67,19 @@ class Block:
 def read(page):
     """Blocks of a page, and its text without them (their lines left empty)."""
     blocks, prose, block = [], [], None
+    reason = None
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         fence = re.match(r"\s*```(\w*)\s*$", line)
         if fence and block is None:
             block = Block(page, number, fence[1])
+            block.reason = reason
         elif fence:
             blocks.append(block)
             block = None
         elif block is not None:
             block.lines.append(line)
         prose.append("" if fence or block is not None else line)
+        reason = re.match(r"\s*<!-- not run: (.+) -->$", line)
     if block is not None:
         raise AssertionError(f"{block.place}: this block is not closed")
     return blocks, "\n".join(prose)
@@ -89,7 +97,8 @@ def anchors(page):
 
 def run(command, directory, path=None):
     """Status and output of a command; a command that is not over in time is ended, with all that it started."""
-    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8"}
+    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8",
+                   "PYTHONPATH": f"{SOURCE / 'drivers/python'}:{os.environ.get('PYTHONPATH', '')}"}
     if path:
         environment["PATH"] = f"{path}:{environment['PATH']}"
     process = subprocess.Popen(command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -200,13 +209,30 @@ class Words(unittest.TestCase):
 
     def test_options_of_the_programs_exist(self):
         count = 0
-        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_fclib", "gravier_sample"):
-            usage = run([str(PROGRAMS / program), "--help"], ".")[1]
+        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_fclib", "gravier_import", "gravier_sample"):
+            interpreter = [sys.executable] if program == "gravier_import" else []
+            usage = run([*interpreter, str(PROGRAMS / program), "--help"], ".")[1]
             for page in PAGES:
                 for option in re.findall(rf"(?<!/)\b{program} [^`\n]*?(--[a-z]+)", page.read_text(encoding="utf-8")):
                     count += 1
                     self.assertTrue(option in usage, f"{page.name}: {program} {option}: no such option")
         self.assertGreater(count, 5)
+
+
+class Recipes(unittest.TestCase):
+
+    def test_recipes_install_what_the_launcher_asks_for(self):
+        launcher = (SOURCE / "gravier").read_text(encoding="utf-8")
+        needed = set(re.findall(r"\|\| need ([a-z][\w.+-]*)", launcher))
+        self.assertGreater(len(needed), 8, needed)
+        for path in ("doc/install.md", "cmake/packaging/Dockerfile", "cmake/packaging/gravier.def"):
+            text = (SOURCE / path).read_text(encoding="utf-8")
+            self.assertEqual({name for name in needed if name not in text}, set(), path)
+        names = re.findall(r"conda:[^)]*\) name=(?:'([^'=]*)|([\w-]+)) *", launcher)
+        conda = (SOURCE / "cmake/packaging/environment.yml").read_text(encoding="utf-8")
+        self.assertGreaterEqual(len(names), 4)
+        for name in (quoted or plain for quoted, plain in names):
+            self.assertIn(f"- {name}", conda)
 
 
 class Blocks(unittest.TestCase):
@@ -217,10 +243,13 @@ class Blocks(unittest.TestCase):
         self.work, self.bin = self.directory / "work", self.directory / "bin"
         self.work.mkdir()
         self.bin.mkdir()
-        (self.work / "data").symlink_to(SOURCE / "data")
-        launcher = self.bin / "mpirun"
-        launcher.write_text(f'#!/bin/sh\nexec "{MPIEXEC}" "$@"\n', encoding="utf-8")
-        launcher.chmod(0o755)
+        for name in ("data", "drivers"):
+            (self.work / name).symlink_to(SOURCE / name)
+        # `python3` is the one that has h5py
+        for name, program in (("mpirun", MPIEXEC), ("python3", sys.executable)):
+            launcher = self.bin / name
+            launcher.write_text(f'#!/bin/sh\nexec "{program}" "$@"\n', encoding="utf-8")
+            launcher.chmod(0o755)
 
     def run_page(self, page):
         """Run the blocks of a page; how many."""
@@ -241,6 +270,24 @@ class Blocks(unittest.TestCase):
                 how = "did not end" if status is None else f"status {status}"
                 self.fail(f"{block.place}: {how}:\n{block.text}\n{output[-3000:]}")
         return count
+
+    def test_blocks_that_are_not_run_say_why(self):
+        """They are few, parse, and name files that exist."""
+        left_out = []
+        for page in PAGES:
+            for block in read(page)[0]:
+                if block.language not in ("sh", "python") or block.is_tested():
+                    continue
+                reason = block.reason[1] if block.reason else UNMARKED.get(page.name)
+                self.assertTrue(reason, f"{block.place}: expected `# tested` as its first line, or <!-- not run: REASON --> above it")
+                left_out.append(f"{block.place}: {reason}")
+                if block.language == "sh":
+                    status, output = run(["sh", "-n", "-c", block.text], ".")
+                    self.assertEqual(status, 0, f"{block.place}: {output}")
+                for path in re.findall(r"(?<![\w/.])(?:data|doc|drivers|tests)/[\w./]+\w", block.text):
+                    self.assertTrue((SOURCE / path).exists(), f"{block.place}: {path}: no such file")
+        print("blocks that are not run:", *left_out, sep="\n  ")
+        self.assertLessEqual(len(left_out), 25)
 
     def test_readme(self):
         self.assertGreaterEqual(self.run_page(SOURCE / "README.md"), 2)

@@ -196,6 +196,8 @@ FILES = [
     key("decomposition", "partition", "'scotch'", "'grid' or 'metis'"),
     key("decomposition", "kind", "'mixed'", "'dual' or 'primal'"),
     key("enriched", "interface", "'gmres'", "'mumps' or 'cg'"),
+    key("enriched", "interface", "'cg'", "'mumps' where &solver method = 'newton': its interface problem is not symmetric",
+        also={"solver": {"method": "newton"}}),
     key("enriched", "contacts", "'some'", "'all' or 'active'"),
     key("enriched", "direction_unit", "'miles'", "'relative' or 'absolute'"),
     # what does not go together

@@ -1,7 +1,14 @@
-"""What a solve leaves out and what the log tells of its time: checks that can tell nothing new, and the balance of sweeps."""
+"""What a solve leaves out and what the log tells of its time: checks that can tell nothing new, the balance of sweeps, lines of
+steps, warnings and the closing summary."""
+import os
 import re
+import subprocess
+import threading
 
-from gravier_runs import RunTestCase, merged, run_case, settled_disks
+from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, RunTestCase, merged, namelist, run_case, settled_disks, write
+
+#: begin of the line of a step: number, time, contacts
+STEP = re.compile(r"^ +(\d+) +\d\.\d{6}E[+-]\d+ +\d+ ", re.M)
 
 
 class Progress(RunTestCase):
@@ -46,3 +53,80 @@ class Progress(RunTestCase):
         alone = run_case(self.case, 1, self.here("alone"))
         self.assert_status(alone, 0)
         self.assertNotIn("balance  ", alone.stdout)
+
+    def test_lines_of_steps(self):
+        """In a log the first ten steps and the last one have a line, the others now and then; nothing but text is written."""
+        run = run_case(merged(self.case, {"time": {"steps": 200}, "solver": {"tolerance": 1e-1, "warm_start": True},
+                                          "output": {"every": 0}}), 1, self.here("lines"))
+        self.assert_status(run, 0)
+        with open(run.path("results", "run.log"), encoding="ascii") as file:
+            self.assertEqual(file.read(), run.stdout)
+        said = [int(number) for number in STEP.findall(run.stdout)]
+        self.assertEqual(said[:10], list(range(1, 11)))
+        self.assertEqual(said[-1], 200)
+        # one a second at most
+        self.assertLessEqual(len(said), 12 + run.history()["wall_seconds"].sum())
+        self.assertNotIn("\033", run.stdout)
+        self.assertNotIn("\r", run.stdout)
+
+    def on_terminal(self, command, directory):
+        """Status of a command, and what it writes to a terminal."""
+        master, slave = os.openpty()
+        said = []
+
+        def listen():
+            try:
+                while text := os.read(master, 65536):
+                    said.append(text)
+            except OSError:
+                pass  # the other end is closed
+
+        listener = threading.Thread(target=listen)
+        with subprocess.Popen(command, cwd=directory, env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=slave,
+                              stderr=subprocess.STDOUT) as process:
+            os.close(slave)
+            listener.start()
+            status = process.wait(timeout=120)
+        listener.join()
+        os.close(master)
+        return status, b"".join(said).decode()
+
+    def test_live_line(self):
+        """On a terminal, with and without the launcher, steps are one line that is wiped out at the end; run.log has their lines."""
+        case = namelist(merged(self.case, {"time": {"steps": 30}, "solver": {"tolerance": 1e-1}, "output": {"every": 0}}))
+        for title, command in (("by itself", []), ("launched", [MPIEXEC, "-n", "2"])):
+            with self.subTest(title):
+                os.makedirs(self.here(title))
+                write(self.here(title, "case.nml"), case)
+                status, said = self.on_terminal([*command, GRAVIER, "case.nml"], self.here(title))
+                self.assertEqual(status, 0, said)
+                self.assertRegex(said, r"\r\033\[Kstep 1/30  1.000E-03 s  \d+ contacts  \d+ iterations  \S+E-\d+  .* left")
+                self.assertEqual(STEP.findall(said), [])
+                self.assertTrue(max(len(line) for line in re.findall(r"\033\[K(step [^\r]*)", said)) < 80)
+                with open(self.here(title, "results", "run.log"), encoding="ascii") as file:
+                    log = file.read()
+                self.assertEqual(STEP.findall(log)[-1], "30")
+                self.assertNotIn("\033", log)
+                # what stays on the terminal is the text of the log without its steps
+                kept = [line for line in re.sub(r"\r\033\[K[^\r]*(?=\r\033)", "", said).replace("\r\033[K", "").splitlines() if line]
+                self.assertEqual(kept, [line for line in log.splitlines() if not STEP.match(line)])
+
+    def test_warnings(self):
+        """Of 30 warnings of a kind the first five, the 10th and the 20th are said; the end counts all of them."""
+        run = run_case(merged(self.case, {"time": {"steps": 30}, "solver": {"tolerance": 1e-9, "max_iterations": 2},
+                                          "output": {"every": 0}}), 1, self.here("warnings"))
+        self.assert_status(run, 3)
+        said = [int(number) for number in re.findall(r"NOT CONVERGED: .* in step (\d+)", run.stdout)]
+        self.assertEqual(said, [1, 2, 3, 4, 5, 10, 20])
+        self.assertIn("\nwarnings    solves above the tolerance 30\n", run.stdout)
+
+    def test_summary(self):
+        """Whether it converged, where the time went, what would halve it: as the history has it."""
+        idle = run_case(self.case, 2, self.here("idle"))
+        self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-004; [\d.]+ iterations a solve\n")
+        self.assertRegex(idle.stdout, r"\ntime        [\d.]+ s, [\d.]+ m?s a step: [a-z]+.* \d+ %")
+        self.assertIn("\nto halve it 2 ranks wait for those that own a subdomain", idle.stdout)
+        lost = run_case(merged(self.case, {"time": {"steps": 5}, "solver": {"tolerance": 1e-16, "max_iterations": 3000},
+                                           "output": {"every": 0}}), 1, self.here("lost"))
+        self.assertIn("\nconverged   NO: 5 of 5 solves did not reach the tolerance 1.00E-016; at worst", lost.stdout)
+        self.assertIn("\nto halve it solves that give up take most iterations", lost.stdout)

@@ -9,6 +9,7 @@ import itertools
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -16,6 +17,8 @@ import h5py
 import numpy as np
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
+sys.path.insert(0, os.path.join(SOURCE, "drivers/python"))
+from gravier import namelist  # noqa: E402
 PROGRAMS = os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin")))
 GRAVIER = os.path.join(PROGRAMS, "gravier")
 MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
@@ -85,26 +88,6 @@ def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
         # a rank that crashed, or the launcher itself: Open MPI 4.1 sometimes does when several ranks leave with an error
         status = max((int(text) for text in said.get("status", []) if text), default=status)
     return Run(directory, status, stdout.decode(errors="replace"), stderr, launcher.decode(errors="replace"))
-
-
-def value_text(value):
-    """A value as a namelist has it."""
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, str):
-        return "'" + value.replace("'", "''") + "'"
-    if isinstance(value, (list, tuple)):
-        return ", ".join(value_text(one) for one in value)
-    return repr(value)
-
-
-def namelist(groups):
-    """Text of an input file from {group: {key: value}}; of a group that stands several times, {group: [{key: value}, ...]}."""
-    text = ""
-    for group, several in groups.items():
-        for keys in several if isinstance(several, list) else [several]:
-            text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
-    return text
 
 
 def merged(*parts):

@@ -16,14 +16,14 @@ INERTIA = {2: 1 / 2, 3: 2 / 5}
 
 
 class Grain:
-    """A grain: place and velocity along the axes, spins (one in 2D), the group that glues it to others."""
+    """A grain: place and velocity along the axes, spins (one in 2D), the group that glues it to others, its material."""
 
-    def __init__(self, place, velocity=None, spin=None, radius=0.05, mass=0.7, group=0):
+    def __init__(self, place, velocity=None, spin=None, radius=0.05, mass=0.7, group=0, material=1):
         dimension = len(place)
         self.place = [float(x) for x in place]
         self.velocity = [0.0] * dimension if velocity is None else [float(v) for v in velocity]
         self.spin = [0.0] * (2 * dimension - 3) if spin is None else [float(w) for w in np.atleast_1d(spin)]
-        self.radius, self.mass, self.group = float(radius), float(mass), group
+        self.radius, self.mass, self.group, self.material = float(radius), float(mass), group, material
 
 
 def bodies_csv(grains):
@@ -31,9 +31,9 @@ def bodies_csv(grains):
     dimension = len(grains[0].place)
     axes = "xyz"[:dimension]
     spins = ["omega"] if dimension == 2 else ["wx", "wy", "wz"]
-    rows = [",".join(["id", "radius", "mass", "group", *axes, *("v" + axis for axis in axes), *spins])]
+    rows = [",".join(["id", "radius", "mass", "group", "material", *axes, *("v" + axis for axis in axes), *spins])]
     for number, grain in enumerate(grains, 1):
-        cells = [grain.radius, grain.mass, grain.group, *grain.place, *grain.velocity, *grain.spin]
+        cells = [grain.radius, grain.mass, grain.group, grain.material, *grain.place, *grain.velocity, *grain.spin]
         rows.append(",".join([str(number), *(repr(cell) for cell in cells)]))
     return "\n".join(rows) + "\n"
 

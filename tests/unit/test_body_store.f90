@@ -35,6 +35,7 @@ contains
       bodies%mass(b) = number(bodies%id(b), 2)
       bodies%inertia(b) = number(bodies%id(b), 3)
       bodies%glued(b) = image_of(bodies%id(b), 1)
+      bodies%material(b) = 3 + image_of(bodies%id(b), 1)
       do d = 1, sizes(1)
         bodies%position(d, b) = number(bodies%id(b), 3 + d)
       end do
@@ -80,6 +81,7 @@ contains
       is_grain = is_grain .and. same(bodies%velocity(d, b), number(int(id, i8), 6 + d))
     end do
     is_grain = is_grain .and. bodies%glued(b) == image_of(int(id, i8), 1)
+    is_grain = is_grain .and. bodies%material(b) == 3 + image_of(int(id, i8), 1)
     do d = 1, bodies%ni
       is_grain = is_grain .and. bodies%image(d, b) == image_of(int(id, i8), 1 + d)
     end do
@@ -117,7 +119,7 @@ contains
     integer :: b
 
     call fill(bodies, sizes, 7, 1)
-    call check_equal(bodies%record_words(), 5 + sum(sizes), "words of a record")
+    call check_equal(bodies%record_words(), 6 + sum(sizes), "words of a record")
     allocate (records(bodies%record_words(), 7))
     do b = 1, 7
       call bodies%get_record(b, records(:, b))

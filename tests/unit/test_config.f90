@@ -52,6 +52,8 @@ program test_config
   call test_rules_of_boundary()
   call test_rules_of_free_boundary()
   call test_planar_boundaries()
+  call test_materials()
+  call test_laws()
   call test_sample()
   call test_keys_of_sample()
   call test_rules_of_sample()
@@ -170,7 +172,7 @@ contains
       // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
       // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, fclib_step = 3, stress = .true." // newline &
       // "  energy = .true." // newline &
-      // "  structure = .true., boundary_forces = .true. /" // newline
+      // "  structure = .true., boundary_forces = .true., vtk = .true. /" // newline
   end function whole_file
 
   subroutine check_whole_methods(config)
@@ -208,6 +210,7 @@ contains
     call check(config%output%energy, "energy")
     call check(config%output%stress, "stress")
     call check(config%output%structure, "structure")
+    call check(config%output%vtk, "vtk")
     call check(config%output%boundary_forces, "boundary_forces")
   end subroutine check_whole_methods
 
@@ -290,6 +293,7 @@ contains
     call check(.not. config%output%energy, "default energy")
     call check(.not. config%output%stress, "default stress")
     call check(.not. config%output%structure, "default structure")
+    call check(.not. config%output%vtk, "default vtk")
     call check(.not. config%output%boundary_forces, "default boundary_forces")
   end subroutine check_default_methods
 
@@ -530,7 +534,7 @@ contains
   subroutine test_refused_names()
     call refuse(column // "&solvr /", "unknown group &solvr; did you mean &solver?")
     call refuse(column // "&physics /", &
-      "unknown group &physics: expected one of &scene &boundary &sample &time &solver &decomposition " &
+      "unknown group &physics: expected one of &scene &boundary &sample &material &law &time &solver &decomposition " &
       // "&enriched &output")
     call refuse(column // "&solver methd = 'nlgs' /", "unknown key 'methd' in &solver; did you mean 'method'?")
     call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
@@ -1246,6 +1250,74 @@ contains
     call check_written(text, config)
   end subroutine test_active_options
 
+  subroutine test_materials()
+    type(config_t) :: config
+    character(len=*), parameter :: two = "&scene bodies = 'file' bodies_file = 'b.csv' /" &
+      // time // "&material name = 'a' density = 1000 / &material name = 'b' / "
+
+    call accept(two // "&boundary" // plane_keys // "material = 'b' / &boundary" // plane_keys // "/", "two materials", config)
+    call check_close(config%materials(1)%density, 1000.0_dp, 0.0_dp, "density that is given")
+    call check_close(config%materials(2)%density, config%scene%density, 0.0_dp, "density of the scene")
+    call check_equal(trim(config%boundaries(1)%material), "b", "material of a boundary")
+    call check_equal(trim(config%boundaries(2)%material), "", "no material")
+    call refuse(two // "&material name = 'a' /", &
+      "&material (the 3rd, 'a') name = 'a': expected a name of its own, but the 1st has it too")
+    call refuse(two // "&material name = 'c' density = 0 /", &
+      "&material (the 3rd, 'c') density = 0: expected a finite real number > 0 (kg/m^3, kg/m^2 in 2D)")
+    call refuse(two // "&material density = 1 /", "&material (the 3rd) name is missing: expected a text in quotes, not empty, " &
+      // "at most 4096 characters")
+    call refuse(two // "&boundary" // plane_keys // "material = 'c' /", &
+      "&boundary (the 1st) material = 'c': expected 'a' or 'b'")
+    call refuse(column // "&boundary" // plane_keys // "material = 'c' /", &
+      "&boundary (the 1st) material = 'c': expected the name of a &material, and there is none")
+    call refuse(scene("bodies = 'column' wall_material = 'c'"), &
+      "&scene wall_material = 'c': expected the name of a &material, and there is none")
+    call refuse(column // "&material name = 'a' density = 1 /", &
+      "&material (the 1st, 'a') density = 1: expected none where bodies = 'column': mass is the mass of each body")
+  end subroutine test_materials
+
+  subroutine test_laws()
+    type(config_t) :: config
+    character(len=*), parameter :: two = column // "&material name = 'a' / &material name = 'b' / "
+    character(len=*), parameter :: coulomb = "&law materials = 'a', 'b' kind = 'coulomb' friction = 0.3 / "
+    character(len=*), parameter :: wet = "&law materials = 'a' kind = 'adhesive' adhesion = 1 adhesion_range = 0.1 / "
+    character(len=:), allocatable :: text
+
+    call accept(two // coulomb // wet, "two laws", config)
+    call check_equal(trim(config%laws(1)%materials(2)), "b", "second material of a law")
+    call check_equal(trim(config%laws(2)%materials(2)), "", "a law of one material")
+    call write_active(text, config)
+    call check_line(text, "  materials = 'a', 'b'")
+    call check_line(text, "  materials = 'a'")
+    call check_line(text, "  adhesion_range = 0.1")
+    call check_written(text, config)
+    call refuse(two // "&law materials = 'a', 'c' kind = 'coulomb' /", "&law (the 1st) materials = 'a', 'c': expected 'a' or 'b'")
+    call refuse(two // "&law materials = a kind = 'coulomb' /", &
+      "&law (the 1st) materials = a: expected at most 2 texts in quotes, at most 4096 characters")
+    call refuse(two // "&law materials = 'a', 'b', 'a' kind = 'coulomb' /", &
+      "&law (the 1st) materials = 'a', 'b', 'a': expected at most 2 texts in quotes, at most 4096 characters")
+    call refuse(two // "&law kind = 'coulomb' /", &
+      "&law (the 1st) materials is missing: expected at most 2 texts in quotes, at most 4096 characters")
+    call refuse(two // "&law materials = 'a' /", &
+      "&law (the 1st) kind is missing: expected 'coulomb', 'frictionless', 'velocity', 'adhesive', 'capillary' or 'bonded'")
+    call refuse(two // coulomb // "&law materials = 'b', 'a' kind = 'frictionless' /", &
+      "&law (the 2nd) materials = 'b', 'a': expected a pair of its own, but the 1st has it too")
+    call refuse(two // "&law materials = 'a' kind = 'coulomb' adhesion = 1 /", &
+      "&law (the 1st) adhesion = 1: adhesion belongs to kind = 'adhesive', expected without it where kind = 'coulomb'")
+    call refuse(two // "&law materials = 'a' kind = 'adhesive' adhesion = 1 /", &
+      "&law (the 1st) adhesion_range is missing: expected a finite real number > 0 (m), required by kind = 'adhesive'")
+    call refuse(two // "&law materials = 'a' kind = 'coulomb' restitution = 2 /", &
+      "&law (the 1st) restitution = 2: expected a finite real number in [0, 1]")
+    call refuse(two // "&law materials = 'a' kind = 'coulomb' friction = -1 /", &
+      "&law (the 1st) friction = -1: expected a finite real number >= 0")
+    call refuse(two // "&law materials = 'a' kind = 'adhesive' adhesion = 1 adhesion_range = 0 /", &
+      "&law (the 1st) adhesion_range = 0: expected a finite real number > 0 (m)")
+    call refuse(scene("bodies = 'column' alert_distance = 0.05") // "&material name = 'a' / " // wet, &
+      "&scene alert_distance = 0.05: expected at least 1.000E-001 m, the largest range of a &law")
+    call refuse(column // "&solver criterion = 'error' / &material name = 'a' / " // wet, &
+      "&solver criterion = 'error': expected 'residual' where there is a &law: the exact solution is that of the scene's law")
+  end subroutine test_laws
+
   !> Each boundary with what is given or matters for its shape; the sample where there is one.
   subroutine test_active_groups()
     type(config_t) :: config
@@ -1264,6 +1336,7 @@ contains
       // "  ! tangential_restitution = the value of `wall_tangential_restitution` of `&scene`" // newline &
       // "  ! rolling_friction = the value of `wall_rolling_friction` of `&scene`" // newline &
       // "  ! pivoting_friction = the value of `wall_pivoting_friction` of `&scene`" // newline &
+      // "  ! material = the value of `wall_material` of `&scene`" // newline &
       // "  ! remove_at = never" // newline // "/" // newline // "&boundary" // newline &
       // "  name = 'boundary 2'" // newline // "  shape = 'plane'" // newline // "  point = 0.0, 0.0, 0.0" // newline &
       // "  normal = 0.0, 1.0, 0.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline &
@@ -1275,6 +1348,7 @@ contains
       // "  ! tangential_restitution = the value of `wall_tangential_restitution` of `&scene`" // newline &
       // "  ! rolling_friction = the value of `wall_rolling_friction` of `&scene`" // newline &
       // "  ! pivoting_friction = the value of `wall_pivoting_friction` of `&scene`" // newline &
+      // "  ! material = the value of `wall_material` of `&scene`" // newline &
       // "  ! remove_at = never" // newline // "/" // newline, "boundaries written back")
     call accept(sample("count = 10 radius = 0.5 box = 4"), "a sample to write back", config)
     call write_active(text, config)

@@ -46,6 +46,7 @@ program test_columns
     call check_impulses(table(k), 2)
     call check_impulses(table(k), 3)
   end do
+  call check_newton()
   call check_rates()
   call comm%free()
   call finish_checks()
@@ -54,20 +55,25 @@ program test_columns
 contains
 
   !> Solve one step of a column of unit disks, m = g = h = 1.
-  subroutine solve_column(disks, subdomains, dimension, options, simulation, figures)
+  subroutine solve_column(disks, subdomains, dimension, options, simulation, figures, acceleration)
     integer, intent(in) :: disks, subdomains, dimension
     !> keys of &solver, then whole groups
     character(len=*), intent(in) :: options
     type(simulation_t), intent(inout) :: simulation
     type(step_figures_t), intent(out) :: figures
+    !> none unless given
+    character(len=*), intent(in), optional :: acceleration
     type(config_t) :: config
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: text, word
 
+    word = "none"
+    if (present(acceleration)) word = acceleration
     text = "&scene dimension = "//to_text(dimension)//", bodies = 'column', column_count = "//to_text(disks)// &
       & trim(merge(", gravity = 0, -1 /   ", ", gravity = 0, 0, -1 /", dimension == 2))//newline// &
       & "&time step = 1.0, steps = 1 /"//newline// &
-      & "&decomposition subdomains = "//to_text(subdomains)//" /"//newline//"&solver acceleration = 'none', "//options//newline
+      & "&decomposition subdomains = "//to_text(subdomains)//" /"//newline//"&solver acceleration = '"//word// &
+      & "', "//options//newline
     call parse_config("column", text, config, error)
     if (.not. allocated(error)) call simulation%init(comm, config, error)
     if (.not. allocated(error)) call simulation%advance(figures, error)
@@ -146,6 +152,30 @@ contains
       call simulation%free()
     end do
   end subroutine check_impulses
+
+  !> Where sweeps do well, Newton's method is NSCDD with momentum, iteration by iteration; its impulses are the exact ones.
+  subroutine check_newton()
+    type(row_t), parameter :: row = row_t("newton", 0.0_dp)
+    type(simulation_t) :: simulation
+    type(step_figures_t) :: figures
+    character(len=:), allocatable :: options
+    integer :: problem, k, iterations
+
+    do problem = 1, 2
+      do k = 1, 3
+        options = "sweeps = "//to_text(n_gs(k))//", criterion = 'error', check_every = 1, tolerance = 1e-6, "// &
+          & "max_iterations = 10000 /"
+        call solve_column(problem + 2, problem + 1, 2, "method = 'newton', "//options, simulation, figures)
+        iterations = figures%solve%iterations
+        call simulation%free()
+        call solve_column(problem + 2, problem + 1, 2, "method = 'nscdd', "//options, simulation, figures, "momentum")
+        call check_equal(iterations, figures%solve%iterations, "newton, problem "//to_text(problem)//", n_GS = "//to_text(n_gs(k)))
+        call simulation%free()
+      end do
+    end do
+    call check_impulses(row, 2)
+    call check_impulses(row, 3)
+  end subroutine check_newton
 
   !> The error of NLGS on a column of N shrinks by cos^2(pi/2N) a sweep. It is measured between two checks 10 sweeps
   !> apart where the error is about 1e-8: far above rounding (1e-16) and after all faster modes have died out.

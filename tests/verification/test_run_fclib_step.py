@@ -78,6 +78,11 @@ class FclibStep(RunTestCase):
         self.assertLess(np.abs(velocity - dump.v)[: len(dump.v)].max(), 1e-3 * np.abs(dump.v).max())
         return dump
 
+    def test_attraction(self):
+        """Attractions are loads of the problem; its impulses are those of Coulomb's law."""
+        law = {"materials": ["grain"], "kind": "adhesive", "friction": 0.3, "adhesion": 20.0, "adhesion_range": 5e-4}
+        self.check(merged(DISKS, {"material": [{"name": "grain"}], "law": [law]}), "attraction")
+
     def test_disks(self):
         dump = self.check(DISKS, "disks")
         # restitution and the moving plane are in w

@@ -2,6 +2,7 @@
 lattice with far more contacts than freedoms, and an honest end where it does not get there."""
 import csv
 import math
+import re
 import unittest
 
 import h5py
@@ -82,6 +83,18 @@ class Newton(RunTestCase):
             self.assert_status(run, 0)
             self.assertLessEqual(run.trace()["residual"][-1], TIGHT)
 
+    def test_memory(self):
+        """--check counts the arrays of the method: in 2D with friction a contact has 2 components."""
+        memory = {}
+        for method in ("nlgs", "newton"):
+            run = run_case(merged(self.disks, {"solver": {"method": method}}), directory=self.here("memory " + method),
+                           options=("--check",))
+            self.assert_status(run, 0)
+            memory[method] = dict((name, int(size)) for size, name in re.findall(r"  (\d+) a (contact|body in contact)", run.stdout))
+        # four impulses, a velocity; centre, F and c of 2 numbers, a block of 4 numbers, 5 numbers and a state
+        self.assertEqual(memory["newton"]["contact"] - memory["nlgs"]["contact"], 8 * (4 * 2 + 2 + 3 * 2 + 4 + 5) + 4)
+        self.assertEqual(memory["newton"]["body in contact"] - memory["nlgs"]["body in contact"], 8 * (3 + 3))
+
     def test_honest_end(self):
         run = run_case(merged(self.disks, {"solver": {"max_iterations": 320}}), directory=self.here("short"))
         self.assert_status(run, 3)
@@ -90,6 +103,9 @@ class Newton(RunTestCase):
         with open(run.path("results", "history.csv"), encoding="utf-8") as file:
             row = list(csv.DictReader(file))[-1]
         self.assertLessEqual(float(row["residual"]), min(run.trace()["residual"]))
+        # and the log says so, to three digits
+        said = float(re.search(r"accuracy    residual at most (\S+) at the end of a solve", run.stdout)[1])
+        self.assertAlmostEqual(said / float(row["residual"]), 1.0, delta=6e-3)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,12 @@
+"""Results of Gravier as arrays, and runs of it from Python.
+
+    import gravier
+    run = gravier.Run("out/packing")
+    position = run.bodies().position
+
+needs numpy and h5py; `Table.frame()` needs pandas too.
+"""
+from .case import CaseError, namelist, parse_namelist, run, study, value_text
+from .results import ResultsError, Run, Table, read_table
+
+__all__ = ["CaseError", "ResultsError", "Run", "Table", "namelist", "parse_namelist", "read_table", "run", "study", "value_text"]

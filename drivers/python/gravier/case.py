@@ -1,0 +1,129 @@
+"""Cases as dictionaries: input files written and read, runs of the program, studies of parameters."""
+import itertools
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+
+class CaseError(Exception):
+    """A case that cannot be read, or a run that failed: one line."""
+
+
+def value_text(value):
+    """A value as a namelist has it."""
+    if isinstance(value, (bool, np.bool_)):
+        return ".true." if value else ".false."
+    if isinstance(value, (str, Path)):
+        return "'" + str(value).replace("'", "''") + "'"
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return ", ".join(value_text(one) for one in value)
+    return repr(value.item() if isinstance(value, np.generic) else value)
+
+
+def namelist(groups):
+    """Text of an input file from {group: {key: value}}; of a group that stands several times, {group: [{key: value}, ...]}."""
+    text = ""
+    for group, several in groups.items():
+        for keys in several if isinstance(several, list) else [several]:
+            text += f"&{group}\n" + "".join(f"  {key} = {value_text(value)}\n" for key, value in keys.items()) + "/\n"
+    return text
+
+
+TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>'(?:[^']|'')*'|"(?:[^"]|"")*")|(?P<mark>[&/=,])|(?P<word>[^\s&/=,!'"]+))""")
+
+
+def parse_namelist(text):
+    """{group: [{key: value}, ...]} of an input file; a value is a bool, an int, a float, a text, or a list of these."""
+    tokens = [match for line in text.splitlines() for match in TOKEN.finditer(line) if match.lastgroup]
+    groups, keys, key, place = {}, None, None, 0
+    while place < len(tokens):
+        token = tokens[place]
+        following = tokens[place + 1]["mark"] if place + 1 < len(tokens) else None
+        if token["mark"] == "&" and place + 1 < len(tokens):
+            keys, key = {}, None
+            groups.setdefault(tokens[place + 1][0].strip().lower(), []).append(keys)
+            place += 1
+        elif token["mark"] == "/":
+            keys = key = None
+        elif keys is not None and token["word"] and following == "=":
+            key = token["word"].lower()
+            keys[key] = []
+            place += 1
+        elif key is not None and token["mark"] is None:
+            keys[key] += _values(token)
+        place += 1
+    return {group: [{key: value[0] if len(value) == 1 else value for key, value in keys.items()} for keys in several]
+            for group, several in groups.items()}
+
+
+def _values(token):
+    """What one token stands for: several values where it repeats one, as 3*0.0."""
+    if token["text"]:
+        quote = token["text"][0]
+        return [token["text"][1:-1].replace(2 * quote, quote)]
+    count, _, word = token["word"].rpartition("*")
+    if re.fullmatch(r"\.?[tT](rue|RUE)?\.?", word) or re.fullmatch(r"\.?[fF](alse|ALSE)?\.?", word):
+        value = word.strip(".")[0] in "tT"
+    else:
+        try:
+            value = int(word)
+        except ValueError:
+            try:
+                value = float(re.sub("[dD]", "e", word))
+            except ValueError:
+                value = word
+    return [value] * (int(count) if count.isdigit() else 1)
+
+
+def find_program(name="gravier"):
+    """Path of a program: in $GRAVIER_BIN_DIR, in bin of the installation, in build/release/bin of the source tree, or its
+    name alone, for PATH to find it."""
+    here = Path(__file__).resolve()
+    folders = [os.environ["GRAVIER_BIN_DIR"]] if "GRAVIER_BIN_DIR" in os.environ else []
+    # share/gravier/python/gravier/case.py of an installation, drivers/python/gravier/case.py of a source tree
+    folders += [here.parents[4] / "bin", here.parents[3] / "build/release/bin"]
+    for folder in folders:
+        if (Path(folder) / name).is_file():
+            return str((Path(folder) / name).resolve())
+    return name
+
+
+#: of Open MPI, for one machine
+ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
+               "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OPENBLAS_NUM_THREADS": "1"}
+
+
+def run(groups, directory, ranks=1, program=None):
+    """Write `groups` as case.nml into `directory` (made if need be) and run it there, with what it says in terminal.log. Paths
+    in a case are relative to that directory. Returns the exit status: 0, or 3 where a solve missed its tolerance."""
+    directory = Path(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / "case.nml").write_text(namelist(groups), encoding="utf-8")
+    launcher = os.environ.get("MPIEXEC", "mpiexec")
+    with open(directory / "terminal.log", "w", encoding="utf-8") as log:
+        done = subprocess.run([launcher, "-n", str(ranks), str(program or find_program()), "case.nml"], cwd=directory,
+                              env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                              check=False)
+    if done.returncode not in (0, 3):
+        said = (directory / "terminal.log").read_text(encoding="utf-8", errors="replace")
+        lines = re.findall(r"^gravier: error: .*$", said, re.M) or said.strip().splitlines()[-1:]
+        raise CaseError(f"{directory}: gravier ended with status {done.returncode}: {' '.join(lines)}")
+    return done.returncode
+
+
+def study(base, changes, directory, ranks=1):
+    """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
+    `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). Groups that stand
+    several times cannot be changed."""
+    for number, values in enumerate(itertools.product(*changes.values()), 1):
+        point = dict(zip(changes, values))
+        groups = {group: keys if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
+        for (group, key), value in point.items():
+            if isinstance(groups.setdefault(group, {}), list):
+                raise CaseError(f"&{group} {key}: stands several times; expected a group that stands once")
+            groups[group][key] = value
+        place = Path(directory) / f"run_{number}"
+        yield point, place, run(groups, place, ranks)

@@ -1,0 +1,197 @@
+"""What a run left in its directory, as numpy arrays."""
+import csv
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from .case import parse_namelist
+
+
+class ResultsError(Exception):
+    """One line: what was found and what was expected."""
+
+
+class Table(dict):
+    """Columns by name, as keys and as attributes: arrays (rows) or (rows, components)."""
+
+    def __getattr__(self, name):
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"no column {name}; expected one of {', '.join(self) or 'none'}") from None
+
+    def __len__(self):
+        return len(next(iter(self.values()))) if self.keys() else 0
+
+    def frame(self):
+        """A pandas DataFrame; component k of a column becomes NAME_k."""
+        import pandas
+
+        columns = {}
+        for name, values in self.items():
+            if values.ndim == 1:
+                columns[name] = values
+            else:
+                columns.update({f"{name}_{'xyz'[k]}": values[:, k] for k in range(values.shape[1])})
+        return pandas.DataFrame(columns)
+
+
+def read_table(path):
+    """A CSV file with one row of names: numbers by column."""
+    try:
+        with open(path, newline="", encoding="ascii") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+    except OSError as reason:
+        raise ResultsError(f"{path}: {reason.strerror}; expected a table that a run wrote") from None
+    # the last row of a run that is under way or was killed may be cut off
+    rows = [row for row in rows if len(row) == len(header)]
+    try:
+        values = np.array(rows, dtype=float).reshape(len(rows), len(header))
+    except ValueError as reason:
+        raise ResultsError(f"{path}: {reason}; expected numbers under a row of names") from None
+    return Table({name: values[:, k] for k, name in enumerate(header)})
+
+
+class Run:
+    """The output directory of a run, finished or under way. Files are opened when something is read, and closed again.
+
+    dimension, version, command, input_text: as in /run of results.h5; case: the input by groups; steps, times: what is written.
+    """
+
+    def __init__(self, directory):
+        self.directory = Path(directory)
+        self.path = self.directory / "results.h5"
+        with self._open() as file:
+            what = file["run"].attrs
+            self.dimension = int(what["dimension"])
+            self.version, self.command, self.input_text = (_text(what[name]) for name in ("version", "command", "input_text"))
+            self.steps = np.array(sorted(int(name) for name in file["steps"]), dtype=int)
+            self.times = np.array([file[f"steps/{step}"].attrs["time"] for step in self.steps], dtype=float)
+        self.case = parse_namelist(self.input_text)
+
+    def _open(self):
+        try:
+            file = h5py.File(self.path, "r")
+        except OSError:
+            raise ResultsError(f"{self.path}: cannot read this file; expected the results of a run") from None
+        if "run" not in file or "steps" not in file:
+            file.close()
+            raise ResultsError(f"{self.path}: no groups /run and /steps; expected the results of a run")
+        return file
+
+    def find_step(self, step=None):
+        """A step that is written: the last one unless told."""
+        if step is None and len(self.steps) > 0:
+            return int(self.steps[-1])
+        if step is None or step not in self.steps:
+            held = ", ".join(map(str, self.steps)) or "none, the file has no step"
+            raise ResultsError(f"{self.path}: no step {step}; expected one of {held}")
+        return int(step)
+
+    def _group(self, step, name):
+        step = self.find_step(step)
+        with self._open() as file:
+            group = file[f"steps/{step}"]
+            return Table({key: node[()] for key, node in group[name].items()}) if name in group else None
+
+    def time(self, step=None):
+        """Time of a step [s]."""
+        return float(self.times[self.steps == self.find_step(step)][0])
+
+    def bodies(self, step=None):
+        """id, position (n, d), velocity (n, d), spin (n, 1 or 3), radius, and image (n, d) in periodic scenes."""
+        return self._split(self._group(step, "bodies"))
+
+    def boundaries(self, step=None):
+        """id, name, shape, position, normal, velocity, spin, force."""
+        rows = self._split(self._group(step, "boundaries"))
+        with self._open() as file:
+            for key in ("name", "shape"):
+                rows[key] = np.array([_text(value) for value in file[f"boundaries/{key}"][()]])
+        return rows
+
+    def contacts(self, step=None):
+        """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s]; None where none are written."""
+        return self._group(step, "contacts")
+
+    def diagnostics(self, step=None):
+        """Figures of the step by name, as `&output` asked for; empty where none are written."""
+        with self._open() as file:
+            place = f"steps/{self.find_step(step)}/diagnostics"
+            return {name: float(value) for name, value in file[place].attrs.items()} if place in file else {}
+
+    def history(self):
+        """history.csv: a row a step."""
+        return read_table(self.directory / "history.csv")
+
+    def trace(self):
+        """trace.csv: a row a check of a solve; written with `trace = .true.`."""
+        return read_table(self.directory / "trace.csv")
+
+    def _split(self, rows):
+        if "velocity" in rows:
+            rows["spin"] = rows["velocity"][:, self.dimension:]
+            rows["velocity"] = rows["velocity"][:, :self.dimension]
+        return rows
+
+    # ---- derived
+
+    def time_step(self):
+        """Of the run [s], from the input."""
+        return float(self.case["time"][0]["step"])
+
+    def chains(self, step=None):
+        """Contacts as segments (n, 2, d), from the centre of the candidate to that of the antagonist's nearest image, or to
+        the boundary, and their normal forces [N] (n)."""
+        bodies, contacts = self.bodies(step), self._contacts_or_error(step)
+        row, other = self._rows(bodies, contacts)
+        reach = bodies.radius[row] + contacts.gap + np.where(other >= 0, bodies.radius[other], 0.0)
+        start = bodies.position[row]
+        segments = np.stack([start, start - reach[:, None] * contacts.normal], axis=1)
+        return segments, contacts.impulse[:, 0] / self.time_step()
+
+    def pressure(self, step=None):
+        """Mean pressure in each body [Pa, N/m in 2D] (n): R sum(normal forces)/(d V), with V its own volume or area."""
+        bodies, contacts = self.bodies(step), self._contacts_or_error(step)
+        row, other = self._rows(bodies, contacts)
+        force = contacts.impulse[:, 0] / self.time_step()
+        total = np.bincount(row, force, len(bodies))
+        total += np.bincount(other[other >= 0], force[other >= 0], len(bodies))
+        volume = np.pi * bodies.radius**2 if self.dimension == 2 else 4.0 / 3.0 * np.pi * bodies.radius**3
+        return bodies.radius * total / (self.dimension * volume)
+
+    def subdomain(self, step=None):
+        """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""
+        step = self.find_step(step)
+        path = self.directory / "bodies.vtkhdf"
+        try:
+            file = h5py.File(path, "r")
+        except OSError:
+            raise ResultsError(f"{path}: cannot read this file; expected that of a run with &output vtk = .true.") from None
+        with file:
+            steps = file["VTKHDF/Steps"]
+            count = int(steps.attrs["NSteps"])
+            place = np.flatnonzero(file["step"][:count] == step)
+            if len(place) == 0:
+                raise ResultsError(f"{path}: no step {step}")
+            first = int(steps["PointOffsets"][place[0]])
+            number = int(file["VTKHDF/NumberOfPoints"][place[0]])
+            return file["VTKHDF/PointData/subdomain"][first:first + number].astype(int)
+
+    def _contacts_or_error(self, step):
+        contacts = self.contacts(step)
+        if contacts is None:
+            raise ResultsError(f"{self.path}: no contacts in step {self.find_step(step)}; &output contacts = .true. writes them")
+        return contacts
+
+    @staticmethod
+    def _rows(bodies, contacts):
+        """Rows of candidates and antagonists in `bodies`, whose ids ascend; -1 for boundaries."""
+        row = np.searchsorted(bodies.id, contacts.candidate)
+        other = np.minimum(np.searchsorted(bodies.id, contacts.antagonist), len(bodies) - 1)
+        return row, np.where(bodies.id[other] == contacts.antagonist, other, -1)
+
+
+def _text(value):
+    return value.decode() if isinstance(value, bytes) else str(value)

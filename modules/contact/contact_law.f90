@@ -1,0 +1,146 @@
+!> What a law of contact is: keys of its own in the input, and what it makes of a pair of bodies at the start of a step.
+!>
+!> The solver knows one law, that of Signorini and Coulomb with the terms of contact_terms_t, constant over a step. An attraction
+!> F [N] costs it nothing: with r~_n = r_n + h F the law of the pair is Coulomb's in r~, and the pair force -h F n is a load.
+module gravier_contact_law
+  use gravier_kinds, only: dp
+  implicit none
+  private
+  public :: contact_law_t, contact_pair_t, contact_terms_t, law_key_t, add_resistance_keys, slides
+
+  !> a contact slides whose friction is used but for this part
+  real(dp), parameter :: unused = 1.0e-6_dp
+
+  !> A key of &law. All values are real numbers.
+  type :: law_key_t
+    character(len=24) :: name
+    !> as it would be typed after the equal sign; blank: each group must give it
+    character(len=16) :: default
+    !> one of "", "> 0", ">= 0", "in [0, 1]"
+    character(len=16) :: allowed
+    character(len=24) :: unit
+    character(len=200) :: meaning
+  end type law_key_t
+
+  !> keys of all laws with friction
+  type(law_key_t), parameter :: resistance_keys(2) = &
+    & [law_key_t("rolling_friction", "0.0", ">= 0", "", "rolling friction coefficient: the largest moment over `R* r_n`"), &
+    &  law_key_t("pivoting_friction", "0.0", ">= 0", "", "pivoting friction coefficient, the same about the normal; 0 in 2D")]
+
+  !> What holds at a contact over a step.
+  type :: contact_terms_t
+    real(dp) :: friction = 0.0_dp
+    !> of the normal velocity: where it is not 0 the contact acts from touching on
+    real(dp) :: restitution = 0.0_dp
+    !> of the tangential velocity, likewise; 0 without friction, which alone can send it back
+    real(dp) :: tangential_restitution = 0.0_dp
+    !> the largest moments over R* r_n: rolling and, of spheres, pivoting
+    real(dp) :: rolling = 0.0_dp, pivoting = 0.0_dp
+    !> [N]
+    real(dp) :: attraction = 0.0_dp
+    !> gap that the bodies may close in the step [m]
+    real(dp) :: play = 0.0_dp
+  end type contact_terms_t
+
+  !> A pair of bodies under its law.
+  type :: contact_pair_t
+    !> it is the first step of a run
+    logical :: first = .false.
+    !> at q_m [m]
+    real(dp) :: gap = 0.0_dp
+    !> geometric mean of the radii of two grains, the radius of a grain at a boundary [m]
+    real(dp) :: radius = 0.0_dp
+    !> relative velocity at the start of the step: along the normal, > 0 where the bodies part, and size of the tangential one [m/s]
+    real(dp) :: normal_velocity = 0.0_dp, slip = 0.0_dp
+    !> what the pair remembers from step to step under a law with memory, 0 at first
+    integer :: state = 0
+    !> made by `evaluate`, from an ordinary contact without friction: its play is the gap where that is open
+    type(contact_terms_t) :: terms
+    !> once the step is solved: r~_n and |r_t| [N s]
+    real(dp) :: normal = 0.0_dp, tangential = 0.0_dp
+  end type contact_pair_t
+
+  type, abstract :: contact_law_t
+    !> some pair may have an attraction; pairs have states
+    logical :: attracts = .false., remembers = .false.
+    !> the largest coefficients of friction and of restitution that it hands over
+    real(dp) :: largest_friction = 0.0_dp, largest_restitution = 0.0_dp, largest_tangential_restitution = 0.0_dp
+    !> coefficients of rolling and pivoting friction of its pairs
+    real(dp) :: rolling = 0.0_dp, pivoting = 0.0_dp
+    !> gap up to which bodies that have not been nearer act on each other [m]
+    real(dp) :: range = 0.0_dp
+  contains
+    procedure(law_kind), deferred, nopass :: kind
+    procedure(law_keys), deferred, nopass :: keys
+    procedure(law_set), deferred :: set
+    procedure(law_evaluate), deferred :: evaluate
+    procedure :: conclude => contact_law_conclude
+    procedure :: set_resistance => contact_law_set_resistance
+  end type contact_law_t
+
+  abstract interface
+    !> Its word in the input.
+    pure function law_kind() result(kind)
+      implicit none
+      character(len=16) :: kind
+    end function law_kind
+    !> Its keys. A key that several laws have is the same in all of them: default, rule, unit and meaning.
+    pure subroutine law_keys(keys)
+      import :: law_key_t
+      implicit none
+      type(law_key_t), allocatable, intent(out) :: keys(:)
+    end subroutine law_keys
+    !> Take the values of the keys, in their order.
+    pure subroutine law_set(self, values)
+      import :: contact_law_t, dp
+      implicit none
+      class(contact_law_t), intent(inout) :: self
+      real(dp), intent(in) :: values(:)
+    end subroutine law_set
+    !> The terms of a pair over a step and, with a memory, its state: once a step and pair.
+    pure subroutine law_evaluate(self, pair)
+      import :: contact_law_t, contact_pair_t
+      implicit none
+      class(contact_law_t), intent(in) :: self
+      type(contact_pair_t), intent(inout) :: pair
+    end subroutine law_evaluate
+  end interface
+
+contains
+
+  !> The state of a pair whose step is solved: a pair that parts or slides forgets, unless its law says otherwise.
+  pure subroutine contact_law_conclude(self, pair)
+    class(contact_law_t), intent(in) :: self
+    type(contact_pair_t), intent(inout) :: pair
+
+    if (slides(pair) .or. .not. self%remembers) pair%state = 0
+  end subroutine contact_law_conclude
+
+  !> The keys of a law with friction: its own, then those of the resistance to rolling and pivoting, which set_resistance takes.
+  pure subroutine add_resistance_keys(own, keys)
+    type(law_key_t), intent(in) :: own(:)
+    type(law_key_t), allocatable, intent(out) :: keys(:)
+
+    allocate (keys(size(own) + 2))
+    keys(1:size(own)) = own
+    keys(size(own) + 1:) = resistance_keys
+  end subroutine add_resistance_keys
+
+  !> Take the values of the keys that add_resistance_keys adds.
+  pure subroutine contact_law_set_resistance(self, rolling, pivoting)
+    class(contact_law_t), intent(inout) :: self
+    real(dp), intent(in) :: rolling, pivoting
+
+    self%rolling = rolling
+    self%pivoting = pivoting
+  end subroutine contact_law_set_resistance
+
+  !> Whether a contact carries nothing or uses all its friction.
+  pure logical function slides(pair)
+    type(contact_pair_t), intent(in) :: pair
+
+    slides = .not. pair%normal > 0.0_dp
+    if (.not. slides) slides = pair%tangential >= (1.0_dp - unused)*pair%terms%friction*pair%normal
+  end function slides
+
+end module gravier_contact_law

@@ -1,0 +1,73 @@
+!> Bonds of Mohr's type: pairs that are near at the start of a run are bonded. An intact bond holds the bodies at the distance that
+!> they have, with tensions up to its strength F and shear |r_t| <= mu_b (r_n + h F); one that opens or slides in a step is broken
+!> for good, and the law is Coulomb's from the next step on.
+module gravier_bonded_law
+  use gravier_kinds, only: dp
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  implicit none
+  private
+  public :: bonded_law_t
+
+  !> state of a pair with an intact bond; a bond that opens or slides leaves 0 (contact_law_t%conclude)
+  integer, parameter :: intact = 1
+
+  type, extends(contact_law_t) :: bonded_law_t
+    real(dp) :: friction = 0.0_dp
+    !> [N]
+    real(dp) :: bond_strength = 0.0_dp
+    real(dp) :: bond_friction = 0.0_dp
+    !> [m]
+    real(dp) :: bond_distance = 0.0_dp
+  contains
+    procedure, nopass :: kind => bonded_kind
+    procedure, nopass :: keys => bonded_keys
+    procedure :: set => bonded_set
+    procedure :: evaluate => bonded_evaluate
+  end type bonded_law_t
+
+  type(law_key_t), parameter :: law_keys(*) = &
+    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  law_key_t("bond_strength", "", ">= 0", "N", "tension that an intact bond withstands"), &
+    &  law_key_t("bond_friction", "", "> 0", "", "friction coefficient of an intact bond, of r_n + h `bond_strength`"), &
+    &  law_key_t("bond_distance", "", "> 0", "m", "gap up to which pairs are bonded at the start of a run")]
+
+contains
+
+  pure function bonded_kind() result(kind)
+    character(len=16) :: kind
+    kind = "bonded"
+  end function bonded_kind
+
+  pure subroutine bonded_keys(keys)
+    type(law_key_t), allocatable, intent(out) :: keys(:)
+    call add_resistance_keys(law_keys, keys)
+  end subroutine bonded_keys
+
+  pure subroutine bonded_set(self, values)
+    class(bonded_law_t), intent(inout) :: self
+    real(dp), intent(in) :: values(:)
+
+    self%friction = values(1)
+    self%bond_strength = values(2)
+    self%bond_friction = values(3)
+    self%bond_distance = values(4)
+    self%range = self%bond_distance
+    self%attracts = .true.
+    self%remembers = .true.
+    self%largest_friction = max(self%friction, self%bond_friction)
+    call self%set_resistance(values(5), values(6))
+  end subroutine bonded_set
+
+  pure subroutine bonded_evaluate(self, pair)
+    class(bonded_law_t), intent(in) :: self
+    type(contact_pair_t), intent(inout) :: pair
+
+    pair%terms%friction = self%friction
+    if (pair%first .and. pair%gap <= self%bond_distance) pair%state = intact
+    if (pair%state /= intact) return
+    pair%terms%friction = self%bond_friction
+    pair%terms%attraction = self%bond_strength
+    pair%terms%play = 0.0_dp
+  end subroutine bonded_evaluate
+
+end module gravier_bonded_law

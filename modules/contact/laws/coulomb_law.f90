@@ -1,0 +1,57 @@
+!> Coulomb friction with Newton restitution (Moreau 1988).
+module gravier_coulomb_law
+  use gravier_kinds, only: dp
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  implicit none
+  private
+  public :: coulomb_law_t
+
+  type, extends(contact_law_t) :: coulomb_law_t
+    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp, tangential_restitution = 0.0_dp
+  contains
+    procedure, nopass :: kind => coulomb_kind
+    procedure, nopass :: keys => coulomb_keys
+    procedure :: set => coulomb_set
+    procedure :: evaluate => coulomb_evaluate
+  end type coulomb_law_t
+
+  type(law_key_t), parameter :: law_keys(*) = &
+    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  law_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient"), &
+    &  law_key_t("tangential_restitution", "0.0", "in [0, 1]", "", "tangential restitution coefficient, where there is friction")]
+
+contains
+
+  pure function coulomb_kind() result(kind)
+    character(len=16) :: kind
+    kind = "coulomb"
+  end function coulomb_kind
+
+  pure subroutine coulomb_keys(keys)
+    type(law_key_t), allocatable, intent(out) :: keys(:)
+    call add_resistance_keys(law_keys, keys)
+  end subroutine coulomb_keys
+
+  pure subroutine coulomb_set(self, values)
+    class(coulomb_law_t), intent(inout) :: self
+    real(dp), intent(in) :: values(:)
+
+    self%friction = values(1)
+    self%restitution = values(2)
+    self%tangential_restitution = values(3)
+    self%largest_friction = self%friction
+    self%largest_restitution = self%restitution
+    self%largest_tangential_restitution = self%tangential_restitution
+    call self%set_resistance(values(4), values(5))
+  end subroutine coulomb_set
+
+  pure subroutine coulomb_evaluate(self, pair)
+    class(coulomb_law_t), intent(in) :: self
+    type(contact_pair_t), intent(inout) :: pair
+
+    pair%terms%friction = self%friction
+    pair%terms%restitution = self%restitution
+    if (pair%terms%friction > 0.0_dp) pair%terms%tangential_restitution = self%tangential_restitution
+  end subroutine coulomb_evaluate
+
+end module gravier_coulomb_law

@@ -1,0 +1,199 @@
+!> What every run can say of its energies at next to no cost: the kinetic energy of its grains, and how far it is from the works of
+!> loads and of contacts on them. The works are taken body by body, from the impulses that the last evaluation of a solve has
+!> summed up: no pass over contacts. Of the contacts it knows the work on grains alone, that of boundaries included; what it
+!> dissipates, and where, is for gravier_energy_balance.
+module gravier_grain_balance
+  use gravier_kinds, only: dp
+  use gravier_motion, only: grain_volume
+  use gravier_body_store, only: body_set_t
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_problem_builder, only: physics_t
+  implicit none
+  private
+  public :: grain_balance_t
+
+  !> Of the free grains since `begin`; the same on every rank [J].
+  type :: grain_balance_t
+    !> now, and at the start
+    real(dp) :: kinetic = 0.0_dp, start = 0.0_dp
+    !> done on them by gravity and body force, and by the contacts
+    real(dp) :: load_work = 0.0_dp, contact_work = 0.0_dp
+    !> kinetic energy of grains that were taken out of the scene
+    real(dp) :: carried_away = 0.0_dp
+    !> sums of m v [kg m/s] and, with a body force, of V v [m^4/s] now
+    real(dp), private :: momentum(3) = 0.0_dp, flux(3) = 0.0_dp
+  contains
+    procedure :: begin => grain_balance_begin
+    procedure :: take_step => grain_balance_take_step
+    procedure :: error => grain_balance_error
+    procedure :: turnover => grain_balance_turnover
+  end type grain_balance_t
+
+  !> places among the sums of a step; behind `in_momentum` and `in_flux` come three
+  integer, parameter :: in_kinetic = 1, in_momentum = 1, in_flux = 4, in_contacts = 8, n_sums = 8
+
+contains
+
+  !> Begin with the grains as they are. Collective.
+  subroutine grain_balance_begin(self, decomposition, physics)
+    class(grain_balance_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    real(dp) :: parts(n_sums, size(decomposition%home)), sums(n_sums)
+
+    call add_home(decomposition, physics, parts)
+    call decomposition%comm%sum_parts(parts, sums)
+    call keep_motion(self, sums)
+    self%start = self%kinetic
+    self%load_work = 0.0_dp
+    self%contact_work = 0.0_dp
+    self%carried_away = 0.0_dp
+  end subroutine grain_balance_begin
+
+  !> Take the works of a step into account. Grains have the velocities of its end, the views still those of its start, and the
+  !> problem the impulses on its bodies as `evaluate` sums them. Collective.
+  subroutine grain_balance_take_step(self, decomposition, neighbourhoods, physics, problem, some_left)
+    class(grain_balance_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(physics_t), intent(in) :: physics
+    type(contact_problem_t), intent(in) :: problem
+    !> grains were taken out of the scene in this step
+    logical, intent(in) :: some_left
+    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums), kinetic, momentum(3), flux(3)
+    integer :: s, nd
+
+    nd = decomposition%nd
+    if (some_left) then
+      kinetic = self%kinetic
+      call add_views(neighbourhoods, physics, parts)
+      call decomposition%comm%sum_parts(parts, sums)
+      call keep_motion(self, sums)
+      self%carried_away = self%carried_away + (kinetic - self%kinetic)
+    end if
+    momentum(:) = self%momentum
+    flux(:) = self%flux
+    call add_home(decomposition, physics, parts)
+    do s = 1, size(problem%sub)
+      call add_contact_work(problem%sub(s), physics, nd, problem%kernels%nv, parts(in_contacts, s))
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    call keep_motion(self, sums)
+    ! h F . (v_i + v_{i+1})/2, summed over the grains
+    self%load_work = self%load_work + 0.5_dp*physics%h*(dot_product(physics%gravity(1:nd), momentum(1:nd) + self%momentum(1:nd)) + &
+      & dot_product(physics%body_force(1:nd), flux(1:nd) + self%flux(1:nd)))
+    self%contact_work = self%contact_work + sums(in_contacts)
+  end subroutine grain_balance_take_step
+
+  pure subroutine keep_motion(self, sums)
+    class(grain_balance_t), intent(inout) :: self
+    real(dp), intent(in) :: sums(n_sums)
+
+    self%kinetic = sums(in_kinetic)
+    self%momentum(:) = sums(in_momentum + 1:in_momentum + 3)
+    self%flux(:) = sums(in_flux + 1:in_flux + 3)
+  end subroutine keep_motion
+
+  !> Sums over the free grains at home.
+  pure subroutine add_home(decomposition, physics, parts)
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    !> (n_sums, subdomains)
+    real(dp), intent(out), contiguous :: parts(:, :)
+    integer :: s, k
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(parts, 2)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) call add_grain(home, k, physics, parts(:, s))
+        end do
+      end associate
+    end do
+  end subroutine add_home
+
+  !> The same as the views have them, with the velocities of the start of the step.
+  pure subroutine add_views(neighbourhoods, physics, parts)
+    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(physics_t), intent(in) :: physics
+    !> (n_sums, subdomains)
+    real(dp), intent(out), contiguous :: parts(:, :)
+    integer :: s, k
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(parts, 2)
+      associate (view => neighbourhoods%view(s))
+        do k = 1, view%bodies%n
+          if (view%origin(k) > 0 .and. view%bodies%glued(k) == 0) call add_grain(view%bodies, k, physics, parts(:, s))
+        end do
+      end associate
+    end do
+  end subroutine add_views
+
+  !> Add kinetic energy and momentum of grain `k`.
+  pure subroutine add_grain(bodies, k, physics, part)
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    type(physics_t), intent(in) :: physics
+    real(dp), intent(inout) :: part(n_sums)
+    real(dp) :: volume
+    integer :: d, nd
+
+    nd = bodies%nd
+    part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*sum(bodies%velocity(1:nd, k)**2) + &
+      & 0.5_dp*bodies%inertia(k)*sum(bodies%velocity(nd + 1:, k)**2)
+    do d = 1, nd
+      part(in_momentum + d) = part(in_momentum + d) + bodies%mass(k)*bodies%velocity(d, k)
+    end do
+    if (.not. any(abs(physics%body_force) > 0.0_dp)) return
+    volume = grain_volume(nd, bodies%radius(k))
+    do d = 1, nd
+      part(in_flux + d) = part(in_flux + d) + volume*bodies%velocity(d, k)
+    end do
+  end subroutine add_grain
+
+  !> Add (H r) . (v_i + v_{i+1})/2 over the grains in contact of a subdomain; copies share it. With the free velocity v_f and its
+  !> part h F/m by the loads, v_i = v_f - h F/m.
+  pure subroutine add_contact_work(sub, physics, nd, nv, work)
+    type(subproblem_t), intent(in) :: sub
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: nd, nv
+    real(dp), intent(inout) :: work
+    real(dp) :: twice, volume
+    integer :: b, d
+    logical :: has_body_force
+
+    has_body_force = any(abs(physics%body_force) > 0.0_dp)
+    do b = 1, sub%n_grains
+      twice = 0.0_dp
+      do d = 1, nd
+        twice = twice + sub%reaction(d, b)*((sub%v_free(d, b) + sub%v_global(d, b)) - physics%h*physics%gravity(d))
+      end do
+      if (has_body_force) then
+        volume = grain_volume(nd, sub%radius(b))
+        do d = 1, nd
+          twice = twice - sub%reaction(d, b)*(physics%h*physics%body_force(d)*volume*sub%inverse_mass(d, b))
+        end do
+      end if
+      do d = nd + 1, nv
+        twice = twice + sub%reaction(d, b)*(sub%v_free(d, b) + sub%v_global(d, b))
+      end do
+      work = work + 0.5_dp*twice/sub%multiplicity(b)
+    end do
+  end subroutine add_contact_work
+
+  !> What the balance lacks since the start [J]: rounding, whatever the tolerance.
+  pure real(dp) function grain_balance_error(self) result(error)
+    class(grain_balance_t), intent(in) :: self
+    error = (self%kinetic - self%start) - self%load_work - self%contact_work + self%carried_away
+  end function grain_balance_error
+
+  !> Energy that the terms of the balance stand for: sum of their sizes [J].
+  pure real(dp) function grain_balance_turnover(self) result(turnover)
+    class(grain_balance_t), intent(in) :: self
+    turnover = self%kinetic + self%start + abs(self%load_work) + abs(self%contact_work) + abs(self%carried_away)
+  end function grain_balance_turnover
+
+end module gravier_grain_balance

@@ -1,0 +1,169 @@
+!> Contacts that leave the sweeps while their bodies are at rest, and return when these are disturbed.
+!>
+!> A body is at rest where the momentum left to it, and the change of the impulses on it, are small: m (|v| + R |w|) <= limit and
+!> sum |r_n - r_n of the step before| <= settled limit, limit being the lesser of `speed` times the root mean square of all
+!> impulses, which the residual is relative to, and of a `share` of the normal impulses on the body, so that no grain hangs in
+!> the air whatever lies next to it. Each contact counts the steps for which both of its bodies have been at rest; a contact that
+!> comes, goes or changes lets them start anew, and so does a boundary that moves. A grain all of whose contacts have counted
+!> half of `after` stands still: what the impulses of solves do not balance would else add up, step by step, and sweeps now find
+!> impulses that hold a grain without motion. A contact that has counted them all sleeps: no sweep takes it, its impulse stays,
+!> and its reaction is part of the velocities from the start of a solve. A solve that misses its tolerance for contacts that
+!> sleep wakes them; what moves then moves by the laws of all contacts, and nothing is stopped.
+module gravier_sleeping
+  use gravier_kinds, only: dp
+  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_boundary, only: boundary_t
+  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbourhood, only: neighbourhoods_t
+  implicit none
+  private
+  public :: sleeping_rule_t, count_rest, wake_all
+
+  !> change of the impulses on a body at rest over what momentum it may have; either over the impulses on it at most
+  real(dp), parameter :: settled = 10.0_dp, share = 0.1_dp
+
+  type :: sleeping_rule_t
+    !> steps at rest after which a contact sleeps; 0: none does
+    integer :: after = 0
+    !> momentum of a body at rest over the root mean square of the impulses
+    real(dp) :: speed = 0.0_dp
+  end type sleeping_rule_t
+
+contains
+
+  !> Count the steps at rest of the contacts of a solved problem, before its impulses are kept. Collective.
+  subroutine count_rest(rule, boundaries, woken, neighbourhoods, problem)
+    type(sleeping_rule_t), intent(in) :: rule
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> contacts that slept were woken: nothing is stopped. Else grains at rest stand still: their v_global becomes zero
+    logical, intent(in) :: woken
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    !> v_global is evaluated
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s, b
+
+    do s = 1, size(problem%sub)
+      call sum_impulses(boundaries, neighbourhoods%view(s)%list, problem%sub(s))
+    end do
+    call sum_over_copies(problem)
+    do s = 1, size(problem%sub)
+      call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s))
+    end do
+    if (woken) return
+    call sum_over_copies(problem)
+    do s = 1, size(problem%sub)
+      do b = 1, problem%sub(s)%n_grains
+        if (.not. problem%sub(s)%reaction(1, b) > 0.0_dp) problem%sub(s)%v_global(:, b) = 0.0_dp
+      end do
+    end do
+  end subroutine count_rest
+
+  !> No contact is at rest any more.
+  pure subroutine wake_all(neighbourhoods)
+    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    integer :: s
+
+    if (.not. allocated(neighbourhoods%view)) return
+    do s = 1, size(neighbourhoods%view)
+      associate (list => neighbourhoods%view(s)%list)
+        list%impulse(size(list%impulse, 1), :) = 0.0_dp
+      end associate
+    end do
+  end subroutine wake_all
+
+  !> Sum what `reaction` holds over the copies of each body. Collective.
+  subroutine sum_over_copies(problem)
+    type(contact_problem_t), intent(inout) :: problem
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      call problem%shared%load(s, problem%sub(s)%reaction)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(problem%sub)
+      call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
+    end do
+  end subroutine sum_over_copies
+
+  !> Into the first two rows of `reaction`: normal impulses on each body, and by how much they have changed since the step before.
+  !> Under a boundary that moves they count as changed.
+  subroutine sum_impulses(boundaries, list, sub)
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(neighbour_list_t), intent(in) :: list
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: r, change
+    integer :: c, k
+
+    sub%reaction(:, :) = 0.0_dp
+    do c = 1, sub%n_contacts
+      r = sub%impulse(lane_of(c), 1, block_of(c))
+      change = abs(r - list%impulse(1, sub%source(c)))
+      if (is_moved(boundaries, sub, sub%pair(1, c)) .or. is_moved(boundaries, sub, sub%pair(2, c))) change = r
+      do k = 1, 2
+        sub%reaction(1, sub%pair(k, c)) = sub%reaction(1, sub%pair(k, c)) + r
+        sub%reaction(2, sub%pair(k, c)) = sub%reaction(2, sub%pair(k, c)) + change
+      end do
+    end do
+  end subroutine sum_impulses
+
+  !> Whether column `b` is a boundary that moves as prescribed.
+  pure logical function is_moved(boundaries, sub, b)
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: b
+
+    is_moved = .false.
+    if (b > sub%n_grains) is_moved = boundaries(sub%boundary(b))%is_moved()
+  end function is_moved
+
+  !> Count the steps at rest, and put the number of the contacts of each body that have not counted half of `after` into the
+  !> first row of `reaction`, which comes with the sums of sum_impulses.
+  subroutine count_steps(after, limit, boundaries, list, sub)
+    integer, intent(in) :: after
+    !> momentum of a body at rest [N s]
+    real(dp), intent(in) :: limit
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(neighbour_list_t), intent(inout) :: list
+    type(subproblem_t), intent(inout) :: sub
+    logical, allocatable :: rests(:)
+    integer, allocatable :: steps(:)
+    integer :: c, b, last, nd
+
+    nd = size(sub%position, 1)
+    last = size(list%impulse, 1)
+    allocate (rests(sub%n_columns), steps(sub%n_contacts))
+    do b = 1, sub%n_columns
+      rests(b) = .not. is_moved(boundaries, sub, b)
+      if (b > sub%n_bodies) cycle
+      rests(b) = max(momentum(b), sub%reaction(2, b)/settled) <= min(limit, share*sub%reaction(1, b))
+    end do
+    do c = 1, sub%n_contacts
+      steps(c) = 0
+      if (rests(sub%pair(1, c)) .and. rests(sub%pair(2, c))) steps(c) = min(after, nint(list%impulse(last, sub%source(c))) + 1)
+    end do
+    list%impulse(last, :) = 0.0_dp
+    sub%reaction(:, :) = 0.0_dp
+    do c = 1, sub%n_contacts
+      list%impulse(last, sub%source(c)) = steps(c)
+      if (2*steps(c) >= after) cycle
+      sub%reaction(1, sub%pair(1, c)) = sub%reaction(1, sub%pair(1, c)) + 1.0_dp
+      sub%reaction(1, sub%pair(2, c)) = sub%reaction(1, sub%pair(2, c)) + 1.0_dp
+    end do
+
+  contains
+
+    !> m (|v| + R |w|) of body `b` [N s].
+    pure real(dp) function momentum(b)
+      integer, intent(in) :: b
+      real(dp) :: speed
+
+      speed = norm2(sub%v_global(1:nd, b))
+      if (b <= sub%n_grains) speed = speed + sub%radius(b)*norm2(sub%v_global(nd + 1:, b))
+      momentum = 0.0_dp
+      if (any(sub%inverse_mass(1:nd, b) > 0.0_dp)) momentum = speed/maxval(sub%inverse_mass(1:nd, b))
+    end function momentum
+
+  end subroutine count_steps
+
+end module gravier_sleeping

@@ -1,0 +1,407 @@
+!> Points or lines that change from step to step, in the format VTKHDF of VTK and ParaView (a temporal PolyData).
+!> A step is written behind the others, all its tables first; then its time, and the number that says how many steps there are,
+!> since readers go by one or the other. A file takes its name with its second step, or when it is closed: of a file with one step
+!> VTK reads whatever there is. Whenever the program dies, a reader finds whole steps.
+!> Rows are in the order of their keys: nothing tells how many ranks wrote the file.
+module gravier_vtkhdf_file
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t
+  use gravier_file_system, only: replace_file, remove_file
+  use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
+  use gravier_hdf5_file, only: h5_file_t, table_integer, table_single, table_double
+  implicit none
+  private
+  public :: vtkhdf_file_t, vtk_field_t, vtk_rows_t
+
+  !> A value of each point, or of each line.
+  type :: vtk_field_t
+    character(len=24) :: name
+    !> numbers of it; 1 makes a scalar
+    integer :: components = 1
+    !> kept as integers
+    logical :: whole = .false.
+  end type vtk_field_t
+
+  !> The points or lines of this rank.
+  type :: vtk_rows_t
+    !> (keys, n): the order of the rows, key 1 >= 0
+    integer(i8), allocatable :: key(:, :)
+    !> (3 points of a row, n) [m]: a point, or the two ends of a line
+    real(dp), allocatable :: point(:, :)
+    !> (components of all fields, n)
+    real(dp), allocatable :: value(:, :)
+  end type vtk_rows_t
+
+  !> An open file.
+  type :: vtkhdf_file_t
+    private
+    type(communicator_t) :: comm
+    type(h5_file_t) :: file
+    character(len=:), allocatable :: path
+    type(vtk_field_t), allocatable :: field(:)
+    !> of a row: 1 or 2
+    integer :: n_points = 1
+    !> rows by which the file grows, and what is written
+    integer(i8) :: chunk = 1, steps = 0, rows = 0
+    !> the file has its name
+    logical :: shown = .false.
+  contains
+    procedure :: open => vtkhdf_open
+    procedure :: reopen => vtkhdf_reopen
+    procedure :: write_step => vtkhdf_write_step
+    procedure :: close => vtkhdf_close
+  end type vtkhdf_file_t
+
+  character(len=*), parameter :: root = "/VTKHDF", steps_group = "/VTKHDF/Steps", step_table = "/step"
+  !> kinds of cells of a PolyData, in the order of the columns of CellOffsets
+  character(len=*), parameter :: topologies(4) = [character(len=8) :: "Vertices", "Lines", "Polygons", "Strips"]
+  !> chunks of a table for which the file has room in one block: up to there a program that dies leaves the file whole
+  integer, parameter :: chunks_in_block = 128
+  !> rows of a chunk of short tables, and of the others at least and at most (4 GiB bound a chunk)
+  integer(i8), parameter :: short_chunk = 512, least_chunk = 2048, greatest_chunk = 67108864
+  integer(i8), parameter :: bytes_of_headers = 65536
+
+contains
+
+  !> Create the file, without steps, in place of an older one. Collective.
+  subroutine vtkhdf_open(self, comm, path, n_points, field, expected, error)
+    class(vtkhdf_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    !> of a row: 1 for points, 2 for lines
+    integer, intent(in) :: n_points
+    type(vtk_field_t), intent(in) :: field(:)
+    !> rows of all steps together, about; the same on all ranks
+    integer(i8), intent(in) :: expected
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    call set_up(self, comm, path, n_points, field)
+    self%chunk = min(max(least_chunk, expected/chunks_in_block), greatest_chunk)
+    if (comm%rank == 0) call remove_file(path)
+    call self%file%create(comm, path//".part", error, chunks_in_block)
+    call self%file%make_group(root, error)
+    call self%file%write_attribute(root, "Version", [2_i8, 0_i8], error)
+    call self%file%write_attribute(root, "Type", "PolyData", error)
+    call make_tables(self, error)
+    call self%file%flush(error)
+  end subroutine vtkhdf_open
+
+  subroutine set_up(self, comm, path, n_points, field)
+    type(vtkhdf_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: n_points
+    type(vtk_field_t), intent(in) :: field(:)
+
+    self%comm = comm
+    self%path = path
+    self%n_points = n_points
+    self%field = field
+    self%steps = 0
+    self%rows = 0
+    self%shown = .false.
+  end subroutine set_up
+
+  !> Where the fields are.
+  pure function data_group(self) result(group)
+    type(vtkhdf_file_t), intent(in) :: self
+    character(len=:), allocatable :: group
+    group = "PointData"
+    if (self%n_points > 1) group = "CellData"
+  end function data_group
+
+  subroutine make_tables(self, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    associate (file => self%file)
+      call file%make_table(root//"/NumberOfPoints", 0, table_integer, short_chunk, error)
+      call file%make_table(root//"/Points", 3, table_single, self%n_points*self%chunk, error)
+      do k = 1, size(topologies)
+        associate (group => root//"/"//trim(topologies(k)), drawn => k == self%n_points)
+          call file%make_table(group//"/NumberOfCells", 0, table_integer, short_chunk, error)
+          call file%make_table(group//"/NumberOfConnectivityIds", 0, table_integer, short_chunk, error)
+          call file%make_table(group//"/Connectivity", 0, table_integer, merge(self%n_points*self%chunk, short_chunk, drawn), error)
+          call file%make_table(group//"/Offsets", 0, table_integer, merge(self%chunk, short_chunk, drawn), error)
+        end associate
+      end do
+      call file%make_table(steps_group//"/Values", 0, table_double, short_chunk, error)
+      call file%write_attribute(steps_group, "NSteps", 0_i8, error)
+      call file%make_table(steps_group//"/PartOffsets", 0, table_integer, short_chunk, error)
+      call file%make_table(steps_group//"/NumberOfParts", 0, table_integer, short_chunk, error)
+      call file%make_table(steps_group//"/PointOffsets", 0, table_integer, short_chunk, error)
+      call file%make_table(steps_group//"/CellOffsets", size(topologies), table_integer, short_chunk, error)
+      call file%make_table(steps_group//"/ConnectivityIdOffsets", size(topologies), table_integer, short_chunk, error)
+      do k = 1, size(self%field)
+        associate (field => self%field(k), name => data_group(self)//"/"//trim(self%field(k)%name))
+          call file%make_table(root//"/"//name, merge(0, field%components, field%components == 1), &
+            & merge(table_integer, table_single, field%whole), self%chunk, error)
+          call file%make_table(steps_group//"/"//data_group(self)//"Offsets/"//trim(field%name), 0, table_integer, short_chunk, &
+            & error)
+        end associate
+      end do
+      ! for those who go on with the file: the numbers of the steps
+      call file%make_table(step_table, 0, table_integer, short_chunk, error)
+    end associate
+  end subroutine make_tables
+
+  !> Go on with a file that a run left, with its name or before it has one: steps above `last_step` are forgotten, and written over.
+  !> Without such a file, create it. Failure (status_input): a file that is damaged or has not these fields. Collective.
+  subroutine vtkhdf_reopen(self, comm, path, n_points, field, expected, last_step, error)
+    class(vtkhdf_file_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    !> as for open
+    integer, intent(in) :: n_points
+    type(vtk_field_t), intent(in) :: field(:)
+    integer(i8), intent(in) :: expected
+    integer, intent(in) :: last_step
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: step(:)
+    integer(i8) :: written
+    logical :: named, begun
+    integer :: k
+
+    if (allocated(error)) return
+    named = exists(comm, path)
+    begun = exists(comm, path//".part")
+    if (.not. (named .or. begun)) then
+      call self%open(comm, path, n_points, field, expected, error)
+      return
+    end if
+    call set_up(self, comm, path, n_points, field)
+    if (named .and. comm%rank == 0) call replace_file(path, path//".part", error)
+    call comm%agree(error)
+    call self%file%reopen(comm, path//".part", error)
+    call self%file%read_attribute(steps_group, "NSteps", written, error)
+    do k = 1, size(field)
+      if (allocated(error)) exit
+      if (self%file%exists(root//"/"//data_group(self)//"/"//trim(field(k)%name))) cycle
+      call raise(error, status_input, path//": no field "//trim(field(k)%name)//", but one was expected")
+    end do
+    if (.not. allocated(error)) then
+      allocate (step(written))
+      call self%file%read_rows(step_table, 0_i8, step, error)
+    end if
+    if (allocated(error)) then
+      error%status = status_input
+      call self%file%close(error)
+      return
+    end if
+    self%steps = count(step <= last_step, kind=i8)
+    call find_rows(self, written, error)
+    call self%file%change_attribute(steps_group, "NSteps", self%steps, error)
+    call self%file%flush(error)
+    call cut_steps(self, error)
+    call self%file%flush(error)
+    if (self%steps > 1) call show(self, error)
+  end subroutine vtkhdf_reopen
+
+  !> Whether there is a file, as rank 0 sees it. Collective.
+  logical function exists(comm, path)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+
+    exists = .false.
+    if (comm%rank == 0) inquire (file=path, exist=exists)
+    exists = comm%any_true(exists)
+  end function exists
+
+  !> Cut the tables that tell readers how many steps or parts there are.
+  subroutine cut_steps(self, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    call self%file%cut_rows(steps_group//"/Values", self%steps, error)
+    call self%file%cut_rows(root//"/NumberOfPoints", self%steps, error)
+    do k = 1, size(topologies)
+      call self%file%cut_rows(root//"/"//trim(topologies(k))//"/NumberOfCells", self%steps, error)
+      call self%file%cut_rows(root//"/"//trim(topologies(k))//"/NumberOfConnectivityIds", self%steps, error)
+    end do
+  end subroutine cut_steps
+
+  !> Rows of the steps that stay.
+  subroutine find_rows(self, written, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    integer(i8), intent(in) :: written
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: last(1)
+
+    self%rows = 0
+    if (self%steps == 0 .or. self%steps > written) return
+    call self%file%read_rows(steps_group//"/PointOffsets", self%steps - 1, last, error)
+    self%rows = last(1)
+    call self%file%read_rows(root//"/NumberOfPoints", self%steps - 1, last, error)
+    self%rows = (self%rows + last(1))/self%n_points
+  end subroutine find_rows
+
+  !> Write a step behind the others. The first one has rows: before it, a step without rows is left out (VTK's reader looks for the
+  !> cells of a step that follows only empty ones in the wrong place). Collective; a failure leaves the steps before as they are.
+  subroutine vtkhdf_write_step(self, step, time, rows, error)
+    class(vtkhdf_file_t), intent(inout) :: self
+    integer, intent(in) :: step
+    !> s
+    real(dp), intent(in) :: time
+    type(vtk_rows_t), intent(in) :: rows
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: point(:, :), value(:, :), part(:, :)
+    real(dp) :: now(1, 1)
+    integer(i8) :: total
+    integer :: k, first, width
+
+    if (allocated(error)) return
+    total = self%comm%total(size(rows%key, 2, kind=i8))
+    if (self%rows + total == 0) return
+    call sort_rows(self%comm, rows, point, value)
+    width = 4*size(point, 1) + 8*(2 + self%n_points) + 8*size(value, 1)
+    call self%file%reserve(bytes_of_headers + width*total, error)
+    allocate (part(3, self%n_points*size(point, 2)))
+    do k = 1, size(part, 2)
+      first = 3*mod(k - 1, self%n_points)
+      part(:, k) = point(first + 1:first + 3, (k - 1)/self%n_points + 1)
+    end do
+    call self%file%put_rows(root//"/Points", self%n_points*self%rows, part, error)
+    first = 1
+    do k = 1, size(self%field)
+      associate (last => first + self%field(k)%components - 1)
+        part = value(first:last, :)
+        call self%file%put_rows(root//"/"//data_group(self)//"/"//trim(self%field(k)%name), self%rows, part, error)
+      end associate
+      first = first + self%field(k)%components
+    end do
+    call write_cells(self, size(point, 2), total, error)
+    call write_offsets(self, step, total, error)
+    call self%file%flush(error)
+    now = time
+    call self%file%put_rows(steps_group//"/Values", self%steps, now(:, 1:merge(1, 0, self%comm%rank == 0)), error)
+    call self%file%flush(error)
+    call self%file%change_attribute(steps_group, "NSteps", self%steps + 1, error)
+    call self%file%flush(error)
+    if (allocated(error)) return
+    self%steps = self%steps + 1
+    self%rows = self%rows + total
+    if (.not. self%shown .and. self%steps > 1) call show(self, error)
+  end subroutine vtkhdf_write_step
+
+  !> The rows of all ranks in the order of their keys, cut into nearly equal blocks.
+  subroutine sort_rows(comm, rows, point, value)
+    type(communicator_t), intent(in) :: comm
+    type(vtk_rows_t), intent(in) :: rows
+    real(dp), allocatable, intent(out) :: point(:, :), value(:, :)
+    integer(i8), allocatable :: records(:, :), ordered(:, :)
+    integer :: nk, np, nv
+
+    nk = size(rows%key, 1)
+    np = size(rows%point, 1)
+    nv = size(rows%value, 1)
+    allocate (records(nk + np + nv, size(rows%key, 2)))
+    records(1:nk, :) = rows%key
+    call pack_reals(np, rows%point, nk + 1, records)
+    call pack_reals(nv, rows%value, nk + np + 1, records)
+    call order_rows(comm, nk, records, ordered)
+    call unpack_reals(ordered, nk + 1, np, point)
+    call unpack_reals(ordered, nk + np + 1, nv, value)
+  end subroutine sort_rows
+
+  !> One cell a row, of its points; no cell of the other kinds.
+  subroutine write_cells(self, n, total, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    !> rows of this rank, and of all
+    integer, intent(in) :: n
+    integer(i8), intent(in) :: total
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: connectivity(:, :), offsets(:, :)
+    integer(i8) :: before
+    integer :: i, k, np, first
+
+    np = self%n_points
+    before = self%comm%offset(int(n, i8))
+    ! rank 0 writes the 0 that offsets begin with
+    first = merge(0, 1, self%comm%rank == 0)
+    allocate (connectivity(1, np*n), offsets(1, first:n))
+    do i = 1, np*n
+      connectivity(1, i) = np*before + i - 1
+    end do
+    do i = first, n
+      offsets(1, i) = np*(before + i)
+    end do
+    do k = 1, size(topologies)
+      associate (group => root//"/"//trim(topologies(k)))
+        if (k == np) then
+          call self%file%put_rows(group//"/Connectivity", np*self%rows, connectivity, error)
+          call self%file%put_rows(group//"/Offsets", self%rows + self%steps, offsets, error)
+        else
+          call put_number(self, group//"/Offsets", 0_i8, error)
+        end if
+        call put_number(self, group//"/NumberOfCells", merge(total, 0_i8, k == np), error)
+        call put_number(self, group//"/NumberOfConnectivityIds", merge(np*total, 0_i8, k == np), error)
+      end associate
+    end do
+  end subroutine write_cells
+
+  !> Where the rows of the step begin.
+  subroutine write_offsets(self, step, total, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    integer, intent(in) :: step
+    integer(i8), intent(in) :: total
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: cells(size(topologies), 1), connectivity(size(topologies), 1)
+    integer :: k, n
+
+    n = merge(1, 0, self%comm%rank == 0)
+    cells = 0
+    cells(self%n_points, 1) = self%rows
+    connectivity = self%n_points*cells
+    call put_number(self, root//"/NumberOfPoints", self%n_points*total, error)
+    call put_number(self, steps_group//"/PartOffsets", self%steps, error)
+    call put_number(self, steps_group//"/NumberOfParts", 1_i8, error)
+    call put_number(self, steps_group//"/PointOffsets", self%n_points*self%rows, error)
+    call self%file%put_rows(steps_group//"/CellOffsets", self%steps, cells(:, 1:n), error)
+    call self%file%put_rows(steps_group//"/ConnectivityIdOffsets", self%steps, connectivity(:, 1:n), error)
+    do k = 1, size(self%field)
+      call put_number(self, steps_group//"/"//data_group(self)//"Offsets/"//trim(self%field(k)%name), self%rows, error)
+    end do
+    call put_number(self, step_table, int(step, i8), error)
+  end subroutine write_offsets
+
+  !> The row of this step in a table with one number a step.
+  subroutine put_number(self, path, number, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: number
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: value(1, 1)
+
+    value = number
+    call self%file%put_rows(path, self%steps, value(:, 1:merge(1, 0, self%comm%rank == 0)), error)
+  end subroutine put_number
+
+  !> Give the file its name. Collective.
+  subroutine show(self, error)
+    type(vtkhdf_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    call self%file%close(error)
+    if (self%comm%rank == 0) call replace_file(self%path//".part", self%path, error)
+    call self%comm%agree(error)
+    call self%file%reopen(self%comm, self%path, error)
+    self%shown = .true.
+  end subroutine show
+
+  !> Close; a file without a step is removed. Without effect on a file not open. Collective.
+  subroutine vtkhdf_close(self, error)
+    class(vtkhdf_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. self%file%is_open()) return
+    if (.not. self%shown .and. self%steps > 0) call show(self, error)
+    call self%file%close(error)
+    if (self%steps == 0 .and. self%comm%rank == 0) call remove_file(self%path//".part")
+  end subroutine vtkhdf_close
+
+end module gravier_vtkhdf_file

@@ -1,0 +1,134 @@
+!> Rules of the &material and &law groups, and of the names of materials.
+module gravier_config_check_laws
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_law_set, only: law_set_t
+  use gravier_config_types, only: config_t
+  use gravier_config_table, only: key_t, keys, kind_real
+  use gravier_config_keys, only: choices_text
+  use gravier_config_slots, only: slot_t, slot_of, belongs
+  use gravier_config_report, only: report_t, expect, is_given, ordinal
+  use gravier_config_laws, only: material_number, collect_laws
+  implicit none
+  private
+  public :: check_materials, check_laws
+
+contains
+
+  !> Fails (status_input) with the first rule that a material breaks, and on names of materials that are not there.
+  subroutine check_materials(report, config, error)
+    !> its instance comes back as 1
+    type(report_t), intent(inout) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i, k
+
+    do i = 1, size(config%materials)
+      report%instance = i
+      call expect(report, config%materials(i)%name /= "", "material", "name", error)
+      do k = 1, i - 1
+        call expect(report, config%materials(k)%name /= config%materials(i)%name, "material", "name", error, &
+                    "a name of its own, but the "//ordinal(k)//" has it too")
+      end do
+      call expect(report, config%materials(i)%density > 0.0_dp, "material", "density", error)
+      call expect(report, config%scene%bodies /= "column" .or. .not. config%materials(i)%density_given, "material", "density", &
+                  error, "none where bodies = 'column': mass is the mass of each body")
+    end do
+    report%instance = 1
+    call expect(report, is_known(config, config%scene%wall_material), "scene", "wall_material", error, names_of(config))
+    do i = 1, size(config%boundaries)
+      report%instance = i
+      ! that of &scene is refused there
+      call expect(report, is_known(config, config%boundaries(i)%material) .or. .not. config%boundaries(i)%material_given, &
+                  "boundary", "material", error, names_of(config))
+    end do
+    report%instance = 1
+  end subroutine check_materials
+
+  !> Is it blank or the name of a material?
+  pure logical function is_known(config, name)
+    type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: name
+    is_known = name == ""
+    if (.not. is_known) is_known = material_number(config, name) > 0
+  end function is_known
+
+  !> The names of all materials as one expects them.
+  pure function names_of(config) result(text)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = "the name of a &material, and there is none"
+    do i = 1, size(config%materials)
+      if (i == 1) text = "'"//trim(config%materials(1)%name)//"'"
+      if (i > 1) text = text//merge(" or ", ",   ", i == size(config%materials))//"'"//trim(config%materials(i)%name)//"'"
+    end do
+  end function names_of
+
+  !> Fails (status_input) with the first rule that a law breaks. Keys that do not belong to its kind are not given.
+  subroutine check_laws(report, config, error)
+    !> its instance comes back as 1
+    type(report_t), intent(inout) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    type(law_set_t) :: laws
+    integer :: i, k, pair(2), earlier(2)
+
+    do i = 1, size(config%laws)
+      report%instance = i
+      pair(:) = pair_of(config, i)
+      call expect(report, all(pair > 0), "law", "materials", error, names_of(config))
+      do k = 1, i - 1
+        earlier(:) = pair_of(config, k)
+        call expect(report, any(pair /= earlier) .and. any(pair /= earlier(2:1:-1)), "law", "materials", error, &
+                    "a pair of its own, but the "//ordinal(k)//" has it too")
+      end do
+      call check_values(report, config, error)
+    end do
+    report%instance = 1
+    call expect(report, config%solver%criterion /= "error" .or. size(config%laws) == 0, "solver", "criterion", error, &
+                "'residual' where there is a &law: the exact solution is that of the scene's law")
+    if (allocated(error)) return
+    call collect_laws(config, laws)
+    call expect(report, config%scene%alert_distance >= laws%range .or. .not. config%scene%alert_given, "scene", &
+                "alert_distance", error, "at least "//to_text(laws%range, 4)//" m, the largest range of a &law")
+  end subroutine check_laws
+
+  !> Numbers of the materials of a law, 0 for an unknown one.
+  pure function pair_of(config, i) result(pair)
+    type(config_t), intent(in) :: config
+    integer, intent(in) :: i
+    integer :: pair(2)
+
+    pair(1) = material_number(config, config%laws(i)%materials(1))
+    pair(2) = pair(1)
+    if (config%laws(i)%materials(2) /= "") pair(2) = material_number(config, config%laws(i)%materials(2))
+  end function pair_of
+
+  !> The rules of the keys of the law under check.
+  subroutine check_values(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    !> a copy to point into
+    type(config_t), target :: copy
+    type(slot_t) :: slot
+    integer :: k
+    logical :: holds
+
+    copy = config
+    do k = 1, size(keys)
+      if (keys(k)%group /= "law" .or. keys(k)%kind /= kind_real) cycle
+      if (.not. belongs(copy, keys(k), report%instance)) cycle
+      slot = slot_of(copy, keys(k), report%instance)
+      holds = .true.
+      if (index(keys(k)%allowed, "> 0") == 1) holds = slot%real > 0.0_dp
+      if (index(keys(k)%allowed, ">= 0") == 1) holds = slot%real >= 0.0_dp
+      if (keys(k)%allowed == "in [0, 1]") holds = slot%real >= 0.0_dp .and. slot%real <= 1.0_dp
+      call expect(report, holds, "law", trim(keys(k)%name), error)
+    end do
+  end subroutine check_values
+
+end module gravier_config_check_laws

@@ -1,0 +1,153 @@
+"""Batch jobs through a stand-in for the scheduler: `sbatch`, `srun` and `qsub` of its own put jobs into a queue, which the test works off
+with the variables that the scheduler sets. A run in slices is the run in one piece, bit by bit."""
+import os
+import shutil
+import subprocess
+import time
+
+from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase, gravier, namelist, read_csv, write
+
+JOBS = os.path.join(SOURCE, "drivers", "jobs")
+CASE = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [24, 20], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3},
+    "time": {"step": 1e-3, "steps": 60},
+    "solver": {"method": "nscdd", "tolerance": 1e-4},
+    "decomposition": {"subdomains": 2},
+    "output": {"directory": "part", "every": 100, "checkpoint_every": 1000},
+}
+#: writes its variables and arguments into the queue
+SUBMIT = """#!/bin/sh
+echo "row=${GRAVIER_ROW:-} $*" >> "$QUEUE"
+"""
+
+
+class Jobs(RunTestCase):
+
+    def setUp(self):
+        self.work = os.path.join(self.scratch, self.id().split(".")[-1])
+        self.bin = os.path.join(self.work, "bin")
+        os.makedirs(self.bin)
+        for name in ("sbatch", "qsub"):
+            self.program(name, SUBMIT)
+        self.program("srun", f'#!/bin/sh\nexec "{MPIEXEC}" "$@"\n')
+        self.program("mpirun", f'#!/bin/sh\nexec "{MPIEXEC}" "$@"\n')
+        for name in ("slurm.sh", "pbs.sh", "mpirun.sh"):
+            shutil.copy(os.path.join(JOBS, name), self.work)
+        self.program("gravier_job", f'#!/bin/sh\nexec sh "{os.path.join(JOBS, "gravier_job")}" "$@"\n')
+
+    def program(self, name, text):
+        path = os.path.join(self.bin, name)
+        write(path, text)
+        os.chmod(path, 0o755)
+
+    def sh(self, *command, **variables):
+        environment = {**ENVIRONMENT, **os.environ, "PATH": f"{self.bin}:{PROGRAMS}:{os.environ['PATH']}",
+                       "QUEUE": os.path.join(self.work, "queue"), "GRAVIER_MARGIN": "0", **{k: str(v) for k, v in variables.items()}}
+        return subprocess.run(command, cwd=self.work, env=environment, capture_output=True, text=True, timeout=120, check=False)
+
+    def queue(self):
+        path = os.path.join(self.work, "queue")
+        if not os.path.exists(path):
+            return []
+        with open(path, encoding="utf-8") as file:
+            jobs = file.read().splitlines()
+        os.remove(path)
+        return jobs
+
+    def history(self, directory):
+        with open(os.path.join(self.work, directory, "history.csv"), encoding="ascii") as file:
+            return [row.split(",")[:9] for row in file]
+
+    def work_off(self, script, variables, *seconds):
+        """Run a job of so many seconds, and those that are submitted once more; how many ran. The program keeps back one second, so that
+        a job of one second makes one step."""
+        waiting, count = [""], 0
+        while waiting:
+            self.assertLess(count, len(seconds), "the run does not get on")
+            row, time_given, count = waiting.pop(0), seconds[count], count + 1
+            given = {**variables, "GRAVIER_ROW": row} if row else dict(variables)
+            end = {"SLURM_JOB_END_TIME": int(time.time()) + time_given} if script == "slurm.sh" else {"PBS_WALLTIME": time_given}
+            done = self.sh("sh", script, **given, **end)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            for job in self.queue():
+                self.assertIn(script, job)
+                self.assertIn("afterany:77", job)
+                waiting.append(job.split()[0].removeprefix("row="))
+        return count
+
+    def test_slices_under_slurm_and_pbs_are_the_whole_run(self):
+        write(os.path.join(self.work, "whole.nml"), namelist({**CASE, "output": {**CASE["output"], "directory": "whole"}}))
+        self.assertEqual(gravier("whole.nml", ranks=2, directory=self.work).status, 0)
+        nodes = os.path.join(self.work, "nodes")
+        write(nodes, "here\nhere\n")
+        for script, variables in (("slurm.sh", {"SLURM_JOB_ID": 77, "SLURM_NTASKS": 2}),
+                                  ("pbs.sh", {"PBS_JOBID": 77, "PBS_NODEFILE": nodes, "PBS_O_WORKDIR": self.work})):
+            with self.subTest(script=script):
+                name = script.split(".", maxsplit=1)[0]
+                # a walltime of the case gives way
+                given = {"walltime": 1e5} if name == "pbs" else {}
+                write(os.path.join(self.work, f"{name}.nml"), namelist({**CASE, "output": {**CASE["output"], "directory": name, **given}}))
+                self.assertEqual(self.work_off(script, {**variables, "CASE": f"{name}.nml"}, 1, 1, 60), 3, "jobs of a second do not end")
+                self.assertEqual(self.history(name), self.history("whole"))
+
+    def test_an_array_of_jobs_over_a_list(self):
+        case = namelist({**CASE, "time": {"step": 1e-3, "steps": 3}, "scene": {**CASE["scene"], "friction": "@mu@", "lattice_count": [4, 4]},
+                         "output": {"directory": "@run@", "every": 0}}).replace("'@mu@'", "@mu@")
+        write(os.path.join(self.work, "sweep.nml"), case)
+        write(os.path.join(self.work, "list.csv"), "# friction of each run\nmu\n0.1\n0.3\n0.5\n")
+        self.work_off("slurm.sh", {"SLURM_JOB_ID": 77, "SLURM_NTASKS": 1, "SLURM_ARRAY_TASK_ID": 2, "CASE": "sweep.nml", "LIST": "list.csv"}, 60)
+        self.assertEqual(sorted(d for d in os.listdir(self.work) if os.path.isdir(os.path.join(self.work, d))), ["bin", "sweep_2"])
+        done = self.sh("sh", "mpirun.sh", CASE="sweep.nml", LIST="list.csv")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for k, mu in enumerate(("0.1", "0.3", "0.5"), 1):
+            with open(os.path.join(self.work, f"sweep_{k}.job.nml"), encoding="utf-8") as file:
+                self.assertIn(f"friction = {mu}", file.read())
+            self.assertEqual(len(read_csv(os.path.join(self.work, f"sweep_{k}", "history.csv"))["step"]), 3)
+
+    def test_without_a_scheduler_it_goes_on_by_itself(self):
+        write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 200}}))
+        done = self.sh("sh", "mpirun.sh", RANKS=1, SECONDS_EACH=1.05)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(os.path.join(self.work, "case.out"), encoding="utf-8") as file:
+            self.assertGreater(file.read().count("interrupted ***"), 0)
+        self.assertEqual(len(self.history("part")), 201)
+
+    def test_bad_use_and_failures(self):
+        write(os.path.join(self.work, "case.nml"), namelist({**CASE, "output": {"directory": "part"}}))
+        write(os.path.join(self.work, "bad.nml"), "&scene bodies = 'cubes' /\n&time step = 1, steps = 1 /\n")
+        write(os.path.join(self.work, "plain.nml"), "&scene\n/\n")
+        write(os.path.join(self.work, "template.nml"), "&scene friction = @mu@ /\n&output directory = '@run@' /\n")
+        write(os.path.join(self.work, "mu.csv"), "mu\n0.1\n")
+        write(os.path.join(self.work, "nu.csv"), "nu\n0.1\n")
+        write(os.path.join(self.work, "both.csv"), "mu,nu\n0.1,2\n")
+        write(os.path.join(self.work, "short.csv"), "mu,nu\n0.1\n")
+        write(os.path.join(self.work, "none.csv"), "mu\n")
+        for arguments, words in (
+                ((), "no case"), (("a.nml",), "a.nml: cannot read"), (("list",), "cannot read"), (("--frob", "case.nml"), "unknown option --frob"),
+                (("case.nml", "bad.nml"), "more than one case"), (("mu.csv",), "ends in .nml"), (("--ranks", "0", "case.nml"), "--ranks 0"),
+                (("--seconds", "soon", "case.nml"), "--seconds soon"), (("--seconds",), "expected a value"),
+                (("--list", "x.csv", "template.nml"), "x.csv: cannot read"), (("--list", "mu.csv", "--row", "2", "template.nml"), "no row 2"),
+                (("--list", "mu.csv", "--row", "a", "template.nml"), "--row a"), (("--list", "none.csv", "template.nml"), "no row"),
+                (("--list", "nu.csv", "template.nml"), "@mu@: no such column"), (("--list", "both.csv", "template.nml"), "no @nu@"),
+                (("--list", "short.csv", "template.nml"), "1 columns; expected 2"), (("--list", "mu.csv", "plain.nml"), "no @run@"),
+                (("bad.nml",), "status 2")):
+            with self.subTest(arguments):
+                done = self.sh("gravier_job", *arguments)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertIn(words, done.stderr)
+        # a job that is too short for one step is not submitted for ever; one that is not submitted says so
+        write(os.path.join(self.work, "case.reached"), "1\n")
+        done = self.sh("gravier_job", "--fresh", "--seconds", "0.01", "case.nml")
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("no step since the last job", done.stderr)
+        done = self.sh("gravier_job", "--fresh", "case.nml", SLURM_JOB_ID=1, SLURM_JOB_END_TIME=int(time.time()))
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("GRAVIER_RESUBMIT is not set", done.stderr)
+        done = self.sh("gravier_job", "--seconds", "0.01", "case.nml", GRAVIER_RESUBMIT="false")
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("could not be submitted", done.stderr)
+
+
+if __name__ == "__main__":
+    import unittest
+    unittest.main()

@@ -1,0 +1,266 @@
+"""gravier_import: DATBOX of LMGC90 written here become cases of Gravier that do what formulas say; what has no counterpart is named."""
+import math
+import os
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+
+from gravier_runs import SOURCE, RunTestCase, gravier, namelist, write
+
+IMPORT = os.path.join(SOURCE, "drivers", "gravier_import.py")
+G = 9.81
+
+
+def real(value):
+    """As Fortran writes D14.7."""
+    if value == 0.0:
+        return " 0.0000000D+00"
+    power = math.floor(math.log10(abs(value))) + 1
+    return f"{value / 10.0**power:10.7f}D{power:+03d}"
+
+
+def values(**given):
+    return "  ".join(f"{name}={real(value)}" for name, value in given.items())
+
+
+def vectors(prefix, numbers, form="{}{}"):
+    cells = [f"{form.format(prefix, k + 1)}={real(x)}" for k, x in enumerate(numbers)]
+    return ("\n" + " " * 29).join("  ".join(cells[k:k + 3]) for k in range(0, len(cells), 3))
+
+
+def body(dimension, rank, place, contactors, avrd=0.0):
+    """A body; contactors as (kind, colour, text of its values)."""
+    kind, node, pad = ("RBDY2", "NO3xx", 3) if dimension == 2 else ("RBDY3", "NO6xx", 6)
+    place = [*place, *[0.0] * (pad - len(place))]
+    lines = ["$bdyty", f" {kind}{rank:7d}", "$blmty", f" PLAIN      1  behav  stone  {values(avrd=avrd, gyrd=0.0)}", "$nodty",
+             f" {node}      1                {vectors('coo', place)}", "$tacty"]
+    lines += [f" {shape}{k:7d}  color  {colour}  {text}" for k, (shape, colour, text) in enumerate(contactors, 1)]
+    return "\n".join(lines) + "\n$$$$$$\n"
+
+
+def drive(dimension, rank, rows):
+    kind, node = ("RBDY2", "NO3xx") if dimension == 2 else ("RBDY3", "NO6xx")
+    text = f"$bdyty\n {kind}{rank:7d}\n$nodty\n {node}      1\n"
+    text += "$dofty  numbr [CT......+......AMP..*..cos.(..OMEGA.*.time.+.PHI..)]...*...[RAMPI.....+.....RAMP.*.time]\n"
+    for what, component, *numbers in rows:
+        text += f" {what}{component:7d} " + " ".join(real(x) for x in numbers) + "\n"
+    return text + "$$$$$$\n"
+
+
+def still(dimension, rank):
+    return drive(dimension, rank, [("vlocy", k + 1, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0) for k in range(3 * dimension - 3)])
+
+
+def state(dimension, rank, moved, velocity, frame=None):
+    kind, node, pad = ("RBDY2", "NO3xx", 3) if dimension == 2 else ("RBDY3", "NO6xx", 6)
+    rows = [vectors("X", [*moved, *[0.0] * (pad - len(moved))], "{}({})"), vectors("V", [*velocity, *[0.0] * (pad - len(velocity))], "{}({})")]
+    rows += [vectors(name, axis, "{}({})") for name, axis in zip("abc", frame)] if frame is not None else []
+    return f"$bdyty\n {kind}{rank:7d}\n$nodty\n {node}      1                " + ("\n" + " " * 29).join(rows) + "\n$$$$$$\n"
+
+
+BULK = """! materials
+$gravy
+                   grv1= 0.0000000D+00  grv2={0}  grv3={1}
+
+$behav  lawty
+ stone  RIGID                           Umas= 0.2500000D+04
+"""
+LAW = "$behav  lawty\n iqsc0  IQS_CLB                         fric= 0.3000000D+00\n"
+SEE = "$seety\n cdbdy  cdtac  cdcol  behav  anbdy  antac  ancol\n {0}  {1}  {2}  iqsc0  {0}  {3}  {4}       0.2000000D-02\n"
+
+
+class Import(RunTestCase):
+
+    def box(self, dimension, bodies, laws, drives="", states=None, bulk=None, contacts=None):
+        folder = self.fresh("DATBOX")
+        gravity = (real(-G), real(0.0)) if dimension == 2 else (real(0.0), real(-G))
+        files = {"BODIES.DAT": "! File BODIES\n" + bodies, "BULK_BEHAV.DAT": bulk or BULK.format(*gravity), "TACT_BEHAV.DAT": laws,
+                 "DRV_DOF.DAT": "! DOF\n" + drives, "DOF.INI": states and "! DOF\n\n$steps      0                time= 0.0000000D+00\n" + states,
+                 "Vloc_Rloc.INI": contacts}
+        for name, text in files.items():
+            if text is not None:
+                write(os.path.join(folder, name), text)
+        return folder
+
+    def fresh(self, name):
+        folder = os.path.join(self.scratch, f"{name}{len(os.listdir(self.scratch))}")
+        os.mkdir(folder)
+        return folder
+
+    def convert(self, box, *options, step=1e-3, steps=50, status=0):
+        folder = self.fresh("run")
+        done = subprocess.run([sys.executable, IMPORT, box, "--step", str(step), "--steps", str(steps), "--out", "case", *options],
+                              cwd=folder, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return folder, done.stderr
+
+    def run_case(self, folder):
+        run = gravier("case.nml", directory=folder)
+        self.assertEqual(run.status, 0, run)
+        with h5py.File(os.path.join(folder, "case_results", "results.h5")) as file:
+            steps = [file[f"steps/{k}"] for k in sorted(map(int, file["steps"]))]
+            return [{name: data[:] for name, data in each["bodies"].items()} for each in steps], \
+                   [each["boundaries/force"][:] for each in steps]
+
+    def test_a_settled_packing_stays_settled(self):
+        """300 disks at rest, as LMGC90 would have written them (reference places and displacements, walls that are rectangles with
+        round ends): they stay, and the walls bear the weight."""
+        self.make_packing()
+        with h5py.File(self.here("packing.h5")) as file:
+            place, radius, identifier = (file[f"bodies/{name}"][:] for name in ("position", "radius", "id"))
+        order = np.argsort(identifier)
+        place, radius = place[order], radius[order]
+        n, moved = len(radius), np.array([1e-3, -2e-3])
+        bodies = "".join(body(2, k + 1, x - moved, [("DISKx", "BLUEx", values(byrd=r))]) for k, (x, r) in enumerate(zip(place, radius)))
+        thick, width, height = 0.01, 0.3, 0.4
+        walls = [((0.5 * width, -thick), 0.0, width), ((-thick, 0.5 * height), 0.5 * math.pi, height),
+                 ((width + thick, 0.5 * height), 0.5 * math.pi, height)]
+        for k, (centre, turned, half) in enumerate(walls, n + 1):
+            bodies += body(2, k, [*centre, turned], [("JONCx", "WALLx", values(axe1=half, axe2=thick))])
+        states = "".join(state(2, k + 1, moved, [0.0, 0.0]) for k in range(n))
+        contacts = ("$steps      7                time= 0.0000000D+00\n\n$icdan  DKDKx        1\n"
+                    " cdbdy  numbr  cdtac  numbr  behav  anbdy  numbr  antac  numbr  sttus   iadj\n"
+                    " RBDY2      1  DISKx      1  iqsc0  RBDY2      2  DISKx      1  stick      1\n"
+                    f"{' ' * 29}rlt/H 0.1000000D+00  rln/H 0.2000000D+01  rls/H 0.0000000D+00\n{' ' * 29}gapTT-0.1000000D-05\n"
+                    f"{' ' * 29}n(1)= 0.0000000D+00  n(2)= 0.1000000D+01  n(3)= 0.0000000D+00\n")
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        box = self.box(2, bodies, laws, "".join(still(2, n + 1 + k) for k in range(3)), states, contacts=contacts)
+        folder, _ = self.convert(box)
+        with open(os.path.join(folder, "case_contacts.csv"), encoding="utf-8") as file:
+            self.assertEqual(file.read().splitlines()[1], "1,DISKx,2,DISKx,stick,-1e-06,2.0,0.1,0.0,0.0,1.0,0.0")
+        with h5py.File(os.path.join(folder, "case.h5")) as file:
+            self.assertEqual(len(file["bodies/id"]), n + 6)
+            np.testing.assert_allclose(file["bodies/mass"][:n], 2500.0 * math.pi * radius**2, rtol=1e-6)
+        steps, forces = self.run_case(folder)
+        # 50 steps of fall would be 12 mm; 1e-3 of a radius is what the rest criterion of the sample leaves
+        self.assertLess(np.abs(steps[-1]["position"] - steps[0]["position"])[:n].max(), 0.02 * radius.mean())
+        weight = 2500.0 * math.pi * (radius**2).sum() * G
+        self.assertLess(abs(forces[-1][:, 1].sum() + weight), 0.02 * weight)
+
+    def make_packing(self):
+        write(self.here("sample.nml"), namelist({
+            "scene": {"bodies": "sample", "dimension": 2, "density": 2500.0, "friction": 0.3, "alert_distance": 2e-3},
+            "sample": {"preparation": "settled", "count": 120, "radii": "uniform", "radius_min": 0.008, "radius_max": 0.012, "box": [0.3],
+                       "solid_fraction": 0.5, "file": "packing.h5"},
+            "time": {"step": 1e-3, "steps": 0}, "solver": {"tolerance": 1e-3, "max_iterations": 5000}}))
+        done = gravier("sample.nml", directory=self.scratch, program="gravier_sample")
+        self.assertEqual(done.status, 0, done)
+
+    def test_a_drum_and_a_moving_wall(self):
+        """A disk falls onto the lowest point of a drum, another rides on a plate that rises by the ramp of its drive."""
+        disk = [("DISKx", "BLUEx", values(byrd=0.05))]
+        bodies = body(2, 1, [0.0, -0.94], disk) + body(2, 2, [0.5, 0.06], disk) + \
+            body(2, 3, [0.0, 0.0], [("xKSID", "DRUMx", values(byrd=1.0))]) + \
+            body(2, 4, [0.5, 0.0], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx") \
+            + SEE.format("RBDY2", "DISKx", "BLUEx", "xKSID", "DRUMx")
+        rise = drive(2, 4, [("vlocy", 1, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), ("vlocy", 2, 0.2, 0.0, 0.0, 0.0, 0.0, 10.0),
+                            ("vlocy", 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)])
+        folder, _ = self.convert(self.box(2, bodies, laws, still(2, 3) + rise), steps=200)
+        steps, _ = self.run_case(folder)
+        last = steps[-1]["position"]
+        np.testing.assert_allclose(last[0], [0.0, -0.95], atol=1e-3)
+        # velocity 0.2 min(1, 10 t): 0.01 m in the first 0.1 s and 0.02 m in the other
+        np.testing.assert_allclose(last[1], [0.5, 0.06 + 0.03], atol=1e-3)
+
+    def test_spheres_on_a_plate_in_a_cylinder(self):
+        """A sphere on an inclined plate (localframe) at rest by friction; one that spins in a frame of its own; a hollow cylinder."""
+        slope = 0.2
+        alp, bet, gam = [math.cos(slope), 0.0, math.sin(slope)], [0.0, 1.0, 0.0], [-math.sin(slope), 0.0, math.cos(slope)]
+        frame = "".join("\n" + " " * 29 + vectors(name, axis) for name, axis in (("alp", alp), ("bet", bet), ("gam", gam)))
+        ball = [("SPHER", "BLUEx", values(byrd=0.05))]
+        bodies = body(3, 1, list(0.06 * np.array(gam)), ball) + body(3, 2, [0.0, 0.0, 0.5], ball) + \
+            body(3, 3, [0.0] * 3, [("PLANx", "WALLx", values(axe1=1.0, axe2=1.0, axe3=0.01) + "\n" + " " * 29 + "localframe" + frame)]) + \
+            body(3, 4, [0.0] * 3, [("DNLYC", "DRUMx", values(High=1.0, byrd=2.0))])
+        laws = LAW + "".join(SEE.format("RBDY3", "SPHER", "BLUEx", other, colour)
+                             for other, colour in (("SPHER", "BLUEx"), ("PLANx", "WALLx"), ("DNLYC", "DRUMx")))
+        turned = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+        states = state(3, 2, [0.1, 0.0, 0.0], [0.0, 0.0, 0.0, 3.0, 0.0, 0.0], turned)
+        folder, notes = self.convert(self.box(3, bodies, laws, still(3, 3) + still(3, 4), states), steps=20)
+        self.assertIn("DNLYC: the cylinder is endless", notes)
+        with h5py.File(os.path.join(folder, "case.h5")) as file:
+            # V(4) is about the first axis of the body, which is y of space
+            np.testing.assert_allclose(file["bodies/velocity"][1], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0], atol=1e-12)
+            np.testing.assert_allclose(file["bodies/position"][1], [0.1, 0.0, 0.5], atol=1e-12)
+        steps, _ = self.run_case(folder)
+        # it rolls, with 5/7 g sin(slope) along the plate
+        moved = steps[-1]["position"][0] - steps[0]["position"][0]
+        self.assertLess(abs(moved @ np.array(gam)), 1e-6)
+        self.assertLess(abs(moved @ np.array(alp) + 0.5 * 5.0 / 7.0 * G * math.sin(slope) * 0.02**2), 0.06 * 1.4e-3 * 0.2)
+        self.assertLess(abs(steps[-1]["position"][1][2] - (0.5 - 0.5 * G * 0.02**2)), 1e-4)
+
+    def test_a_lid_moved_by_a_force(self):
+        """A lid that weighs 2 kg and is pressed down by 30 N on a disk: the ground bears all."""
+        bodies = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
+            body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))]) + \
+            body(2, 3, [0.0, 0.11], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))], avrd=math.sqrt(2.0 / 2500.0 / math.pi))
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        lid = drive(2, 3, [("vlocy", 1, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), ("force", 2, -30.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+                           ("vlocy", 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)])
+        for option in ([], ["--planes"]):
+            folder, _ = self.convert(self.box(2, bodies, laws, still(2, 2) + lid), *option)
+            _, forces = self.run_case(folder)
+            weight = 2500.0 * math.pi * 0.05**2 * G
+            self.assertLess(abs(forces[-1][0, 1] + 30.0 + 2.0 * G + weight), 0.01 * weight)
+
+    def test_laws_by_wall(self):
+        """A wall has its own law: RST_CLB on the ground, IQS_CLB between disks."""
+        disk = body(2, 1, [0.0, 0.06], [("DISKx", "BLUEx", values(byrd=0.05))])
+        # as public files have it
+        disk = disk.replace(values(gyrd=0.0), values(gyrd=0.05 * 0.70706))
+        bodies = disk + body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        bounce = LAW.replace("IQS_CLB", "RST_CLB").replace("iqsc0", "rstc0") + " " * 40 + values(rstn=0.5, rstt=0.25) + "\n"
+        laws = LAW + bounce + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + \
+            SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx").replace("iqsc0", "rstc0")
+        folder, _ = self.convert(self.box(2, bodies, laws, still(2, 2)), "--planes", steps=100)
+        with open(os.path.join(folder, "case.nml"), encoding="utf-8") as file:
+            scene, wall = file.read().split("&boundary", 1)
+        self.assertNotIn("restitution", scene)
+        self.assertIn("  restitution = 0.5\n  tangential_restitution = 0.25\n", wall)
+        steps, _ = self.run_case(folder)
+        # it falls by 1 cm, with 0.443 m/s after 45 ms, and comes up by a quarter of that
+        self.assertLess(abs(max(state["position"][0, 1] for state in steps[6:]) - 0.0525), 4e-4)
+
+    def test_what_has_no_counterpart_is_refused(self):
+        disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
+        wall = body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        polygon = body(2, 1, [0.0, 0.0], [("POLYG", "BLUEx", "nb_vertex=      4    byrd= 0.1000000D+00")])
+        cluster = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05)), ("DISKx", "BLUEx", values(byrd=0.05))])
+        good = {"bodies": disk + wall, "laws": laws, "drives": still(2, 2)}
+        cases = [
+            ({"bodies": disk.replace("RBDY2", "MAILx")}, ("BODIES.DAT: line 3", "MAILx", "rigid bodies")),
+            ({"bodies": polygon + wall}, ("BODIES.DAT: line 9", "POLYG")),
+            ({"bodies": cluster + wall}, ("BODIES.DAT: line 10", "clusters have no counterpart")),
+            ({"bodies": disk.replace("gyrd= 0.0000000D+00", "gyrd= 0.1000000D-01") + wall}, ("gyrd= 0.01", "homogeneous disk")),
+            ({"bodies": disk.replace("stone", "brick") + wall}, ("material brick",)),
+            ({"bodies": wall, "drives": still(2, 1)}, ("no grain moves freely",)),
+            ({"laws": laws.replace("IQS_CLB ", "IQS_MAC_CZM")}, ("TACT_BEHAV.DAT: line 2", "IQS_MAC_CZM", "IQS_CLB, RST_CLB")),
+            ({"laws": laws.replace("IQS_CLB", "RST_CLB")}, ("TACT_BEHAV.DAT: line 2", "rstn= is missing")),
+            ({"laws": LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")}, ("do not see each other",)),
+            ({"laws": laws.replace("0.2000000D-02", "")}, ("alert= is missing",)),
+            ({"laws": LAW}, ("no table of visibility", "$seety")),
+            ({"drives": ""}, ("body 2 (JONCx) turns freely", "vlocy 3")),
+            ({"drives": still(2, 7)}, ("DRV_DOF.DAT: line 3", "body RBDY2 7")),
+            ({"drives": still(2, 2).replace("vlocy      1", "gravy      1")}, ("gravy", "vlocy or force")),
+            ({"bulk": "$behav  lawty\n stone  RIGID      Umas= 1.\n"}, ("no gravity", "$gravy")),
+            ({"contacts": "$icdan  DKDKx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      9  DISKx      1\n"},
+             ("Vloc_Rloc.INI: line 3", "bodies 1 and 9")),
+            ({"bodies": "nothing\n"}, ("no body", "$bdyty")),
+        ]
+        for change, words in cases:
+            with self.subTest(words=words):
+                folder, message = self.convert(self.box(2, **{**good, **change}), status=2)
+                self.assertEqual(message.count("\n"), 1, message)
+                for word in words:
+                    self.assertIn(word, message)
+                self.assertEqual(os.listdir(folder), [])
+        folder, message = self.convert(self.fresh("empty"), status=2)
+        self.assertIn("BODIES.DAT: no such file", message)
+
+
+if __name__ == "__main__":
+    import unittest
+    unittest.main()

@@ -1,0 +1,160 @@
+"""The Python package and gravier_plot on one small run: what they read is what the files hold, pictures are drawn, bad input is refused."""
+import contextlib
+import io
+import math
+import os
+import subprocess
+import sys
+
+import gravier_runs  # noqa: F401  puts the package on the path
+import h5py
+import matplotlib.image
+import numpy as np
+from gravier_runs import SOURCE, RunTestCase
+
+import gravier
+
+sys.path.insert(0, os.path.join(SOURCE, "drivers"))
+import gravier_plot  # noqa: E402
+
+GROUND = {"name": "it's the ground", "shape": "plane", "normal": [0.0, 1.0]}
+
+
+class Package(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.base = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.008, "radius_max": 0.012,
+                              "friction": 0.3},
+                    "time": {"step": 1e-3, "steps": 300},
+                    "solver": {"method": "nscdd", "tolerance": 1e-4},
+                    "decomposition": {"subdomains": 2},
+                    "output": {"directory": "results", "every": 100, "trace": True}}
+        cls.status = gravier.run(cls.base, cls.here(cls, "heap"), ranks=2)
+        cls.run_ = gravier.Run(cls.here(cls, "heap/results"))
+
+    def plot(self, *arguments):
+        """Status and text of gravier_plot, in this process: most of its time would go into the start of another."""
+        said, place = io.StringIO(), os.getcwd()
+        os.chdir(self.scratch)
+        try:
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                gravier_plot.main(arguments)
+            status = 0
+        except SystemExit as end:
+            status = end.code
+        finally:
+            os.chdir(place)
+        return status, said.getvalue()
+
+    def test_command(self):
+        done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/gravier_plot.py"), "--help"], capture_output=True,
+                              text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("convergence", done.stdout)
+
+    def test_tables_are_what_the_file_holds(self):
+        run = self.run_
+        self.assertEqual((self.status, run.dimension, list(run.steps)), (0, 2, [0, 100, 200, 300]))
+        self.assertAlmostEqual(run.times[-1], 0.3, places=12)
+        with h5py.File(run.path) as file:
+            for step in run.steps:
+                self.assertTrue(np.array_equal(run.bodies(step).position, file[f"steps/{step}/bodies/position"]))
+            velocity = file["steps/300/bodies/velocity"][:]
+            self.assertTrue(np.array_equal(np.hstack([run.bodies().velocity, run.bodies().spin]), velocity))
+            self.assertTrue(np.array_equal(run.contacts().impulse, file["steps/300/contacts/impulse"]))
+            self.assertEqual(list(run.boundaries().shape), [value.decode() for value in file["boundaries/shape"]])
+        self.assertEqual(len(run.history()), 300)
+        self.assertEqual(set(run.trace().step), set(range(1, 301)))
+        self.assertEqual(run.case["solver"], [self.base["solver"]])
+        with self.assertRaisesRegex(gravier.ResultsError, "no step 7; expected one of 0, 100, 200, 300"):
+            run.bodies(7)
+        with self.assertRaisesRegex(gravier.ResultsError, "expected the results of a run"):
+            gravier.Run(self.here("nowhere"))
+
+    def test_forces_of_the_chains_carry_the_weight(self):
+        """At rest the normal forces on the ground are the weight of the disks, which touch nothing else that could carry: walls
+        of the box may do so by friction, which is added. Each chain begins at a centre and ends at one, or on a boundary."""
+        run = self.run_
+        bodies, contacts, boundaries = run.bodies(), run.contacts(), run.boundaries()
+        segments, force = run.chains()
+        self.assertTrue(np.array_equal(force, contacts.impulse[:, 0] / 1e-3))
+        between = np.isin(contacts.antagonist, bodies.id)
+        ends = bodies.position[contacts.antagonist[between] - 1]
+        # gap and normal are those of the middle of the step
+        self.assertLess(np.abs(segments[between, 1] - ends).max(), 1e-3 * np.abs(bodies.velocity).max() + 1e-12)
+        ground = contacts.antagonist == boundaries.id[np.flatnonzero(boundaries.normal[:, 1] == 1.0)[0]]
+        self.assertTrue(ground.any() and np.abs(segments[ground, 1, 1]).max() < 1e-5)
+        # sum of f_n R over all ends is that of p d V over all bodies
+        ends = bodies.radius[contacts.candidate - 1] + np.where(between, bodies.radius[np.minimum(contacts.antagonist, 36) - 1], 0.0)
+        self.assertAlmostEqual((run.pressure() * 2.0 * math.pi * bodies.radius**2).sum() / (force * ends).sum(), 1.0, places=12)
+        weight = (2500.0 if "density" not in run.case["scene"][0] else 0.0) * math.pi * (bodies.radius**2).sum() * 9.81
+        self.assertAlmostEqual(-boundaries.force[:, 1].sum() / weight, 1.0, delta=0.05)
+
+    def test_namelists_are_read_as_they_are_written(self):
+        groups = {"scene": [{"title": "it's & a 'title' / ! no comment", "gravity": [0.0, -9.81], "friction": 0.3}],
+                  "boundary": [GROUND, {"name": "gate", "shape": "plane", "free": [True, False], "mass": 1e-3}],
+                  "time": [{"step": 1e-3, "steps": 5}]}
+        self.assertEqual(gravier.parse_namelist(gravier.namelist(groups)), groups)
+        text = "! a & b = 3 /\n&Scene Title='x', gravity = 2*0.0, -1.0d1 ! more\n bodies='file' /\n &output vtk = T /"
+        self.assertEqual(gravier.parse_namelist(text), {"scene": [{"title": "x", "gravity": [0.0, 0.0, -10.0], "bodies": "file"}],
+                                                        "output": [{"vtk": True}]})
+
+    def test_study(self):
+        base = {**self.base, "time": {"step": 1e-3, "steps": 2}, "boundary": [GROUND]}
+        points = list(gravier.study(base, {("scene", "friction"): [0.0, 0.4], ("time", "steps"): [2, 3]}, self.here("study")))
+        self.assertEqual([tuple(point.values()) for point, _, _ in points], [(0.0, 2), (0.0, 3), (0.4, 2), (0.4, 3)])
+        for point, place, status in points:
+            run = gravier.Run(place / "results")
+            self.assertEqual((run.case["scene"][0]["friction"], run.steps[-1], status), (*point.values(), 0))
+        self.assertEqual(base["scene"]["friction"], 0.3)
+        with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
+            list(gravier.study(base, {("scene", "friction"): [-1.0]}, self.here("refused")))
+        with self.assertRaisesRegex(gravier.CaseError, "&boundary name: stands several times"):
+            list(gravier.study(base, {("boundary", "name"): ["x"]}, self.here("refused")))
+
+    def test_pictures(self):
+        drawn = [("packing", "a.png", ("--dpi", "100")), ("packing", "b.svg", ("--colour", "pressure", "--step", "100")),
+                 ("packing", "c.png", ("--colour", "rotation", "--no-chains", "--dpi", "100")), ("history", "d.png", ()), ("convergence", "e.png", ())]
+        for kind, name, options in drawn:
+            status, said = self.plot(kind, "heap/results", "--out", name, *options)
+            self.assertEqual((status, said), (0, name + "\n"))
+        for name in ("a.png", "c.png", "d.png", "e.png"):
+            picture = matplotlib.image.imread(self.here(name))
+            self.assertGreater(min(picture.shape[:2]), 300)
+            self.assertGreater(picture[:, :, :3].std(), 0.05, f"{name} is blank")
+        # force chains are red, and only there where they are asked for
+        red = [np.all(np.abs(matplotlib.image.imread(self.here(name))[:, :, :3] - np.array([0xb2, 0x18, 0x2b]) / 255) < 0.02, axis=2).sum()
+               for name in ("a.png", "c.png")]
+        self.assertGreater(red[0], 200)
+        self.assertEqual(red[1], 0)
+        with open(self.here("b.svg"), encoding="utf-8") as file:
+            self.assertIn("<svg", file.read())
+
+    def test_runs_compared_and_movie(self):
+        status, said = self.plot("history", "heap/results", "heap/results", "--out", "two.png", "--columns", "contacts")
+        self.assertEqual((status, said), (0, "two.png\n"))
+        status, said = self.plot("movie", "heap/results", "--out", "film.gif", "--every", "2")
+        self.assertEqual((status, said), (0, "film.gif\n"))
+        with open(self.here("film.gif"), "rb") as file:
+            self.assertEqual(file.read(3), b"GIF")
+        status, said = self.plot("movie", "heap/results", "--out", "frames", "--every", "3")
+        self.assertEqual((status, sorted(os.listdir(self.here("frames")))), (0, ["frame_00000.png", "frame_00001.png"]))
+        shapes = {matplotlib.image.imread(self.here("frames", name)).shape for name in os.listdir(self.here("frames"))}
+        self.assertEqual(len(shapes), 1)
+
+    def test_refusals(self):
+        for arguments, message in ((("packing", "nowhere"), "results.h5: cannot read this file"),
+                                   (("packing", "heap/results", "--step", "5"), "no step 5; expected one of 0, 100"),
+                                   (("packing", "heap/results", "--out", "x.txt"), "ends in .png or .svg"),
+                                   (("packing", "heap/results", "--colour", "subdomain"), "vtk = .true."),
+                                   (("history", "heap/results", "--columns", "nothing"), "no column nothing"),
+                                   (("convergence", "heap/results", "--step", "999"), "no step 999")):
+            status, said = self.plot(*arguments)
+            self.assertEqual((status, len(said.splitlines())), (2, 1), said)
+            self.assertIn(message, said)
+
+
+if __name__ == "__main__":
+    gravier_runs.unittest.main()

@@ -1,0 +1,143 @@
+"""Sleeping: contacts of bodies at rest leave the sweeps and return where something disturbs them, while the residual over all
+contacts stays below the tolerance. Two heaps of disks stand side by side, a wall between them; a disk falls on the left one."""
+import re
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, each, merged, run_case, write
+from small_scenes import Grain, Record, bodies_csv, plane
+
+TOLERANCE = 1e-4
+COUNT, SPACING, RADIUS = 7, 0.021, 0.01
+HALF = COUNT * SPACING
+#: grains of a heap, one after the other; the disk that falls is the last grain
+HEAP = COUNT**2
+#: it falls for 0.38 s, until both heaps are at rest
+STEPS, IMPACT = 550, 380
+SLEEPING = {"solver": {"sleeping": True}}
+
+
+def heaps():
+    """The grains of both heaps on lattices, then the disk."""
+    rng = np.random.default_rng(3)
+    grains = []
+    for heap in range(2):
+        for k in range(HEAP):
+            radius = rng.uniform(0.8, 1.0) * RADIUS
+            place = [heap * HALF + (k % COUNT + 0.5) * SPACING, (k // COUNT + 0.6) * SPACING]
+            grains.append(Grain(place, radius=radius, mass=2800.0 * np.pi * radius**2))
+    grains.append(Grain([0.5 * HALF, COUNT * SPACING + 0.5 * 9.81 * (1e-3 * IMPACT)**2], radius=RADIUS,
+                        mass=2800.0 * np.pi * RADIUS**2))
+    return grains
+
+
+class Sleeping(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.grains = heaps()
+        bodies = write(f"{cls.scratch}/heaps.csv", bodies_csv(cls.grains))
+        wall = {"shape": "segment", "point": [HALF, 0.0], "end": [HALF, 3.0]}
+        cls.case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": bodies, "friction": 0.3},
+            "boundary": [plane([0, 0], [0, 1]), plane([0, 0], [1, 0]), plane([2 * HALF, 0], [-1, 0]), wall],
+            "time": {"step": 1e-3, "steps": STEPS},
+            "solver": {"method": "nscdd", "tolerance": TOLERANCE, "max_iterations": 5000},
+            "decomposition": {"subdomains": 4, "repartition_every": 200},
+            "output": {"directory": "results", "every": 10, "checkpoint_every": 100},
+        }
+        cls.plain, cls.sleeping = each(lambda name, more: run_case(merged(cls.case, more), 1, f"{cls.scratch}/{name}"),
+                                       [("plain", {}), ("sleeping", SLEEPING)])
+
+    def test_falling_disk(self):
+        """The heap that is hit wakes, the other one sleeps on, and both come to the places that they have without sleep."""
+        self.assert_status(self.sleeping, 0)
+        history, record = self.sleeping.history(), Record(self.sleeping, self.grains, 2)
+        self.assertLessEqual(history["residual"].max(), TOLERANCE)
+        asleep = history["sleeping"] / history["contacts"]
+        left, right, disk = slice(0, HEAP), slice(HEAP, 2 * HEAP), 2 * HEAP
+        speed = np.abs(record.all_velocities).max(axis=2)
+        before = record.step.tolist().index(IMPACT - 20)
+        # whole heaps sleep before the disk arrives, and all grains stand still; it wakes the left one, and all sleep again
+        self.assertGreater(asleep[IMPACT - 20], 0.95)
+        self.assertEqual(speed[before, :disk].max(), 0.0)
+        hit = slice(before, before + 12)
+        self.assertGreater(speed[hit, left].max(), 0.0)
+        self.assertLess(asleep[IMPACT:IMPACT + 100].min(), 0.9)
+        self.assertGreater(asleep[-1], 0.95)
+        self.assertEqual(speed[-1].max(), 0.0)
+        # the right heap knows nothing of it
+        self.assertEqual(speed[before:, right].max(), 0.0)
+        # in solves that wake all contacts, grains at rest may take up what the tolerance leaves: less than 0.01 g h in a step
+        self.assertLess(np.ptp(record.position[before:, right], axis=0).max(), 1e-6 * RADIUS)
+        # measured: 5e-5 of a radius
+        plain = Record(self.plain, self.grains, 2)
+        self.assertLess(np.abs(record.position[-1] - plain.position[-1]).max(), 1e-3 * RADIUS)
+
+    def test_work(self):
+        """Sleep saves relaxations of contacts (measured: two thirds), and the log says how many contacts slept."""
+        relaxed = [int(re.search(r"sweeps, (\d+) contact relaxations", run.stdout).group(1)) for run in (self.plain, self.sleeping)]
+        self.assertLess(2 * relaxed[1], relaxed[0])
+        slept = int(re.search(r"sleeping +(\d+) contacts slept", self.sleeping.stdout).group(1))
+        self.assertEqual(slept, self.sleeping.history()["sleeping"].sum())
+        self.assertNotIn("sleeping", self.plain.history())
+
+    def test_ranks_and_restart(self):
+        """Bit by bit the same on other numbers of ranks, and from a checkpoint between impact and rest."""
+        def stopped_and_resumed(ranks, again):
+            case, where = merged(self.case, SLEEPING), f"{self.scratch}/on {ranks}"
+            self.assert_status(run_case(merged(case, {"time": {"steps": IMPACT + 20}}), ranks, where), 0)
+            return run_case(case, again, where, options=["--restart"])
+
+        for run in each(stopped_and_resumed, [(2, 4), (4, 1)]):
+            self.assert_status(run, 0)
+            # the text of the input tells how many steps were asked for first
+            differing = differences(self.sleeping.results(), run.results())
+            # the state written when the first run ended
+            self.assertEqual([name for name in differing if name != "/run@input_text"], [])
+            for column in ("sleeping", "woken", "iterations", "residual"):
+                self.assertEqual(self.sleeping.history()[column].tolist(), run.history()[column].tolist(), column)
+
+    def test_schwarz_and_nlgs(self):
+        """The same sleep under the other methods; a boundary that begins to move, and gravity that changes, wake it."""
+        gravity = write(f"{self.scratch}/gravity.csv", "time,gx,gy\n0,0,-9.81\n0.30,0,-9.81\n0.301,0.5,-9.81\n")
+        drive = write(f"{self.scratch}/drive.csv", "time,vx\n0,0\n0.30,0\n0.301,-0.05\n")
+        short = merged(self.case, SLEEPING, {"time": {"steps": 310}, "output": {"checkpoint_every": 0}})
+        walls = list(self.case["boundary"])
+        walls[1] = {**walls[1], "table": drive}
+        cases = [("schwarz", {"solver": {"method": "schwarz"}, "boundary": walls}),
+                 ("nlgs", {"solver": {"method": "nlgs"}, "decomposition": {"subdomains": None, "repartition_every": 0},
+                           "scene": {"gravity_table": gravity}})]
+        runs = each(lambda name, more: run_case(merged(short, more), 1, f"{self.scratch}/{name}"), cases)
+        for run in runs:
+            self.assert_status(run, 0)
+            history = run.history()
+            self.assertLessEqual(history["residual"].max(), TOLERANCE)
+            self.assertGreater(history["sleeping"][295] / history["contacts"][295], 0.9)
+        # of the contacts with the wall and their neighbours
+        asleep = runs[0].history()["sleeping"]
+        self.assertGreater(asleep[299], asleep[301])
+        self.assertGreater(asleep[-1], 0)
+        self.assertEqual(runs[1].history()["sleeping"][302:].tolist(), [0] * 8)
+
+    def test_refusals(self):
+        """One line, status 2."""
+        for more, expected in [({"method": "newton"}, "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"),
+                               ({"method": "nscdd_ep"}, "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"),
+                               ({"method": "schwarz_ec"}, "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"),
+                               ({"warm_start": False}, "contacts that sleep keep their impulses"),
+                               ({"sleep_after": 0}, "sleep_after = 0: expected an integer >= 1"),
+                               ({"sleep_speed": 0.0}, "sleep_speed = 0.0: expected a finite real number > 0")]:
+            with self.subTest(more):
+                run = run_case(merged(self.case, SLEEPING, {"solver": more}), 1, self.here("refused"), options=["--check"])
+                self.assert_status(run, 2)
+                self.assertEqual(len(run.stderr.splitlines()), 1, run)
+                self.assertIn(expected, run.stderr)
+        checked = run_case(merged(self.case, SLEEPING), 1, self.here("checked"), options=["--check"])
+        self.assertIn("contacts of bodies at rest for 20 steps leave the sweeps", checked.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
