@@ -14,17 +14,12 @@ module gravier_scheme
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
   real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)
   !> growth of |r - y|^2 between iterations that shortens the memory, and what is left of t then
-  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.75_dp
+  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.7_dp
   !> least 1 - beta: at the start, after an idle phase, ever; its factor after a window that grew, and after one that shrank
   real(dp), parameter :: first_margin = 0.1_dp, wary_margin = 0.3_dp, least_margin = 0.02_dp, widen = 3.0_dp, narrow = 0.7_dp
   !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
   integer, parameter :: window = 10, idle_limit = 20
   real(dp), parameter :: progress_made = 0.8_dp
-  !> ratio of the residual to |r - y|/|r| of the last sweep, on packings 0.55 to 0.65
-  real(dp), parameter :: residual_ratio = 0.62_dp
-  !> plain sweeps may finish a solve from so many times the tolerance; |r - y|^2 goes down by more in each, or momentum goes on;
-  !> what of their gain they are expected to have again
-  real(dp), parameter :: first_finish = 1.6_dp, settling = 0.97_dp, gain_expected = 0.95_dp
 
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
@@ -49,32 +44,19 @@ module gravier_scheme
   !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
   !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 22: growth from one iteration to the next shortens the
   !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
-  !> without progress come as many plain iterations as the solve has had. Near the tolerance a few plain iterations take away
-  !> what momentum has stirred up.
+  !> without progress come as many plain iterations as the solve has had.
   type :: momentum_t
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
     logical :: resting = .false.
-    !> the memory was shortened in this solve
-    logical :: shortened = .false.
-    !> the last change was less than the one before by what plain iterations at the end are asked for
-    logical :: falls = .false.
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
-    !> tolerance of the residual, 0 where it is not what a solve is judged by; times it from which plain iterations finish
-    real(dp) :: tolerance = 0.0_dp, finish_from = first_finish
-    !> where they began: |r - y|^2, and times the tolerance
-    real(dp) :: finish_change = unknown, finish_began = 0.0_dp
-    !> iterations of this solve but the finishing ones, windows since `lowest`, plain iterations to come, iteration
-    !> before which no finishing ones begin
-    integer :: iterations = 0, idle_windows = 0, plain = 0, finish_after = 0
-    !> finishing iterations to come, at most
-    integer :: finishing = 0
+    !> iterations of this solve, windows since `lowest`, plain iterations to come
+    integer :: iterations = 0, idle_windows = 0, plain = 0
     type(momentum_part_t), allocatable :: part(:)
   contains
     procedure :: steer => momentum_steer
-    procedure :: finish => momentum_finish
   end type momentum_t
 
   type, abstract :: scheme_t
@@ -372,7 +354,6 @@ contains
     if (.not. scheme%momentum%on) return
     call problem%sum_progress(sums)
     call scheme%momentum%steer(sums(1))
-    if (sums(2) > 0.0_dp) call scheme%momentum%finish(sqrt(sums(1)/sums(2)))
   end subroutine end_sweeps
 
   !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
@@ -382,18 +363,7 @@ contains
     real(dp), intent(in) :: change
     real(dp) :: t
 
-    if (self%finishing > 0) then
-      self%finishing = self%finishing - 1
-      if (change >= settling*self%change) self%finishing = 0
-      self%change = change
-      if (self%finishing == 0) call go_on(self)
-      return
-    end if
-    if (change > growth_allowed*self%change) then
-      self%t = max(1.0_dp, memory_kept*self%t)
-      self%shortened = .true.
-    end if
-    self%falls = change < settling*self%change
+    if (change > growth_allowed*self%change) self%t = max(1.0_dp, memory_kept*self%t)
     self%change = change
     self%window_change = self%window_change + change
     self%iterations = self%iterations + 1
@@ -405,32 +375,6 @@ contains
     self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
     self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin)
   end subroutine momentum_steer
-
-  !> Near the tolerance: plain iterations, which take away within a few what momentum has stirred up, in a solve in which
-  !> changes have grown; the momentum of the last iteration waits.
-  pure subroutine momentum_finish(self, progress)
-    class(momentum_t), intent(inout) :: self
-    !> |r - y|/|r| of the first sweep
-    real(dp), intent(in) :: progress
-
-    if (self%resting .or. self%falls .or. .not. self%shortened .or. self%iterations < self%finish_after) return
-    if (residual_ratio*progress > self%finish_from*self%tolerance) return
-    self%finishing = window
-    self%resting = .true.
-    self%finish_change = self%change
-    self%finish_began = residual_ratio*progress/self%tolerance
-  end subroutine momentum_finish
-
-  !> Momentum goes on after plain iterations that have not met the tolerance: the next ones begin a window later at the
-  !> earliest, and nearer to it, where those would have met it.
-  pure subroutine go_on(momentum)
-    type(momentum_t), intent(inout) :: momentum
-
-    momentum%resting = .false.
-    momentum%finish_from = gain_expected*min(momentum%finish_began, sqrt(momentum%finish_change/momentum%change))
-    momentum%finish_after = momentum%iterations + window
-    momentum%change = unknown
-  end subroutine go_on
 
   !> The end of a window of iterations: the margin, and whether momentum still pays.
   pure subroutine close_window(momentum)

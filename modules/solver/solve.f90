@@ -105,7 +105,6 @@ contains
     call scheme%start(problem, error)
     call stop_timer(phase_setup)
     if (allocated(error)) return
-    if (.not. present(exact)) scheme%momentum%tolerance = control%tolerance
     report%start_seconds = clock() - began
     call check(done)
     do while (.not. done)

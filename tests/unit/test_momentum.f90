@@ -1,4 +1,4 @@
-!> How momentum chooses its extrapolation from the changes it sees: memory, margin, plain iterations, the finish.
+!> How momentum chooses its extrapolation from the changes it sees: memory, margin, plain iterations.
 program test_momentum
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
@@ -11,7 +11,6 @@ program test_momentum
   call test_growth_between_iterations()
   call test_growth_between_windows()
   call test_idle_windows()
-  call test_finish()
   call finish_checks()
   call MPI_Finalize()
 
@@ -109,46 +108,5 @@ contains
     end do
     call check(momentum%beta > 0.5_dp, "idle: momentum again")
   end subroutine test_idle_windows
-
-  !> Near the tolerance, after some growth, iterations are plain as long as each takes 3 % off the square of the change; then
-  !> beta is what it was, no growth is seen in the first change after them, and the next ones wait for a window.
-  subroutine test_finish()
-    type(momentum_t) :: momentum
-    real(dp) :: beta
-    integer :: k
-
-    momentum%tolerance = 1e-3_dp
-    do k = 1, 12
-      call momentum%steer(1.0_dp)
-      call momentum%finish(1e-3_dp)
-    end do
-    call check(.not. momentum%resting, "finish: not where changes never grew")
-    call momentum%steer(1.1_dp)
-    call momentum%finish(1e-2_dp)
-    call check(.not. momentum%resting, "finish: not far from the tolerance")
-    call momentum%steer(1.0_dp)
-    call momentum%finish(1e-3_dp)
-    call check(.not. momentum%resting, "finish: not while momentum itself gains")
-    call momentum%steer(1.0_dp)
-    call momentum%finish(1e-3_dp)
-    call check(momentum%resting, "finish: near the tolerance, after growth")
-    beta = momentum%beta
-    call momentum%steer(0.95_dp)
-    call momentum%finish(1e-3_dp)
-    call check(momentum%resting, "finish: while it gains")
-    call momentum%steer(0.94_dp)
-    call momentum%finish(1e-3_dp)
-    call check(.not. momentum%resting, "finish: no longer")
-    call check_close(momentum%beta, beta, 1e-15_dp, "finish: momentum goes on as it was")
-    do k = 1, 9
-      call momentum%steer(2.0_dp)
-      call momentum%finish(1e-5_dp)
-      call check(.not. momentum%resting, "finish: not again in the next window")
-      if (k == 1) call check(momentum%beta >= beta, "finish: no growth seen after it")
-    end do
-    call momentum%steer(2.0_dp)
-    call momentum%finish(1e-5_dp)
-    call check(momentum%resting, "finish: again a window later")
-  end subroutine test_finish
 
 end program test_momentum
