@@ -25,8 +25,8 @@ program gravier_fclib
     & "  --warm               start from the impulses in the file, its solution or first guess, where it has some"//nl// &
     & "  --csv FILE           the results as a table"//nl// &
     & "  --profile FILE       performance profile of the methods, as a table"//nl// &
-    & "  --write DIR          each problem, reduced to its contacts, with the impulses found by the method named last and the"//nl// &
-    & "                       multipliers of its bilateral constraints"//nl// &
+    & "  --write DIR          each problem, reduced to its contacts, with the impulses found by the method named last"//nl// &
+    & "                       and the multipliers of its bilateral constraints"//nl// &
     & "  --help"//nl// &
     & "exit status: 0 all solved; 2 bad input or usage; 3 a solve did not reach its tolerance; 4 anything else"
 
