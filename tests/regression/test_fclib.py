@@ -379,8 +379,8 @@ class Fclib(RunTestCase):
             (replace("W/x", np.zeros(144)), "contact 1: normal and mean diagonal of W"),
         ]
         hinge = np.random.default_rng(2).uniform(-1, 1, (12, 2))
-        # two constraints that are one, but for rounding
-        same = np.array([[0.1, 0.3], [0.3, 0.9]])
+        # four constraints of which two follow from the others, but for rounding
+        four = np.random.default_rng(3).uniform(-1, 1, (12, 4))
 
         def constrain(**changes):
             def change(group):
@@ -398,7 +398,7 @@ class Fclib(RunTestCase):
             (constrain(R=np.eye(3)), "/fclib_local/R: a matrix of 3 rows and 3 columns: expected 2 and 2"),
             (constrain(R=np.zeros((2, 2))), "/fclib_local/R: expected a regular one ("),
             (constrain(R=np.ones((2, 2))), "/fclib_local/R: expected a regular one ("),
-            (constrain(R=same), "/fclib_local/R: expected a regular one ("),
+            (constrain(V=four, R=four[:2].T @ four[:2], s=np.zeros(4)), "/fclib_local/R: expected a regular one ("),
         ]
         write_local(self.path("good.h5"), w, q, mu)
         for change, message in cases:
