@@ -4,12 +4,19 @@ module gravier_fclib_study
   use gravier_errors, only: error_t, raise, status_input
   use gravier_communicator, only: communicator_t
   use gravier_fclib_file, only: fclib_local_t, fclib_global_t, read_fclib
-  use gravier_condensation, only: condense
+  use gravier_condensation, only: multipliers_t, condense, eliminate_constraints
   use gravier_delassus, only: delassus_t
   use gravier_friction_solver, only: friction_control_t, friction_report_t, solve_friction
   implicit none
   private
-  public :: read_problem, solve_timed
+  public :: problem_t, read_problem, solve_timed
+
+  !> A problem reduced to its contacts, as in files and packed, and the multipliers of the bilateral constraints that it is rid of.
+  type :: problem_t
+    type(fclib_local_t), allocatable :: local
+    type(delassus_t) :: packed
+    type(multipliers_t) :: multipliers
+  end type problem_t
 
   !> solves shorter than this are repeated for so long, and the median of their times is taken [s]
   real(dp), parameter :: short = 0.02_dp
@@ -17,23 +24,26 @@ module gravier_fclib_study
 
 contains
 
-  !> Read a problem; a global one is reduced to its contacts. Every message begins with the path. Collective.
-  subroutine read_problem(comm, path, local, problem, error)
+  !> Read a problem and reduce it to its contacts. Every message begins with the path. Collective.
+  subroutine read_problem(comm, path, problem, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
-    type(fclib_local_t), allocatable, intent(out) :: local
-    type(delassus_t), intent(inout) :: problem
+    type(problem_t), intent(inout) :: problem
     type(error_t), allocatable, intent(inout) :: error
     type(fclib_global_t), allocatable :: global
     type(error_t), allocatable :: reason
 
-    call read_fclib(comm, path, local, global, error)
+    call read_fclib(comm, path, problem%local, global, error)
     if (allocated(error)) return
     if (allocated(global)) then
-      allocate (local)
-      call condense(global, local, reason)
+      allocate (problem%local)
+      call condense(global, problem%local, problem%multipliers, reason)
+    else
+      call eliminate_constraints(problem%local, problem%multipliers, reason)
     end if
-    call problem%init(local%dimension, local%w, local%q, local%mu, reason)
+    associate (local => problem%local)
+      call problem%packed%init(local%dimension, local%w, local%q, local%mu, reason)
+    end associate
     if (allocated(reason)) call raise(error, status_input, path//": "//reason%message)
   end subroutine read_problem
 

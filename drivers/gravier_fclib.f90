@@ -8,10 +8,9 @@ program gravier_fclib
   use gravier_file_system, only: path_t, add_path, list_files, make_directory
   use gravier_csv_writer, only: csv_writer_t
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
-  use gravier_fclib_file, only: fclib_local_t, write_fclib_local
-  use gravier_delassus, only: delassus_t
+  use gravier_fclib_file, only: write_fclib_local
   use gravier_friction_solver, only: friction_control_t, friction_methods
-  use gravier_fclib_study, only: read_problem, solve_timed
+  use gravier_fclib_study, only: problem_t, read_problem, solve_timed
   use gravier_fclib_report, only: result_t, print_heading, print_result, open_results, add_result, write_profile
   implicit none
 
@@ -27,6 +26,7 @@ program gravier_fclib
     & "  --csv FILE           the results as a table"//nl// &
     & "  --profile FILE       performance profile of the methods, as a table"//nl// &
     & "  --write DIR          each problem, reduced to its contacts, with the impulses found by the method named last"//nl// &
+    & "                       and the multipliers of its bilateral constraints"//nl// &
     & "  --help"//nl// &
     & "exit status: 0 all solved; 2 bad input or usage; 3 a solve did not reach its tolerance; 4 anything else"
 
@@ -198,14 +198,13 @@ contains
     type(path_t), intent(in) :: files(:)
     integer, intent(inout) :: status
     type(error_t), allocatable, intent(inout) :: error
-    type(fclib_local_t), allocatable :: local
-    type(delassus_t) :: problem
+    type(problem_t) :: problem
     type(result_t), allocatable :: results(:, :)
     type(csv_writer_t) :: table
     integer :: p, failed
 
     do p = 1, size(files)
-      call read_problem(comm, files(p)%text, local, problem, error)
+      call read_problem(comm, files(p)%text, problem, error)
     end do
     if (allocated(error)) return
     if (comm%rank == 0) then
@@ -216,9 +215,9 @@ contains
     call comm%agree(error)
     allocate (results(size(options%methods), size(files)))
     do p = 1, size(files)
-      call read_problem(comm, files(p)%text, local, problem, error)
+      call read_problem(comm, files(p)%text, problem, error)
       if (allocated(error)) return
-      call solve_problem(options, files(p)%text, local, problem, results(:, p), table, error)
+      call solve_problem(options, files(p)%text, problem, results(:, p), table, error)
     end do
     failed = count(.not. results%report%converged)
     if (failed > 0) status = status_unconverged
@@ -233,33 +232,33 @@ contains
   end subroutine run_study
 
   !> One problem by every method. Collective.
-  subroutine solve_problem(options, path, local, problem, results, table, error)
+  subroutine solve_problem(options, path, problem, results, table, error)
     type(options_t), intent(in) :: options
     character(len=*), intent(in) :: path
-    type(fclib_local_t), intent(inout) :: local
-    type(delassus_t), intent(in) :: problem
+    type(problem_t), intent(inout) :: problem
     !> (methods)
     type(result_t), intent(inout) :: results(:)
     type(csv_writer_t), intent(inout) :: table
     type(error_t), allocatable, intent(inout) :: error
     type(friction_control_t) :: control
-    real(dp), allocatable :: start(:, :), r(:, :), v(:, :)
+    real(dp), allocatable :: start(:, :), r(:, :), v(:, :), l(:)
     character(len=:), allocatable :: name
     integer :: m
 
     name = path(index(path, "/", back=.true.) + 1:)
     control%tolerance = options%tolerance
     control%max_iterations = options%max_iterations
-    allocate (start(problem%dimension, problem%n_contacts), r(problem%dimension, problem%n_contacts))
+    allocate (start(problem%local%dimension, size(problem%local%mu)))
+    allocate (r, v, mold=start)
     start(:, :) = 0.0_dp
-    if (options%warm .and. allocated(local%r)) start(:, :) = local%r
+    if (options%warm .and. allocated(problem%local%r)) start(:, :) = problem%local%r
     do m = 1, size(options%methods)
       control%method = trim(options%methods(m))
       results(m)%problem = name
       results(m)%method = control%method
-      results(m)%dimension = problem%dimension
-      results(m)%contacts = problem%n_contacts
-      call solve_timed(problem, control, start, r, results(m)%report, results(m)%seconds, error)
+      results(m)%dimension = problem%local%dimension
+      results(m)%contacts = size(problem%local%mu)
+      call solve_timed(problem%packed, control, start, r, results(m)%report, results(m)%seconds, error)
       call comm%agree(error)
       if (allocated(error)) return
       if (comm%rank /= 0) cycle
@@ -268,10 +267,10 @@ contains
     end do
     call comm%agree(error)
     if (options%directory == "" .or. allocated(error)) return
-    allocate (v(problem%dimension, problem%n_contacts))
-    call problem%velocity(r, v)
-    local%r = r
-    call write_fclib_local(comm, written_path(options%directory, path), local, error, velocity=v)
+    call problem%packed%velocity(r, v)
+    call problem%multipliers%evaluate(r, l)
+    problem%local%r = r
+    call write_fclib_local(comm, written_path(options%directory, path), problem%local, error, velocity=v, multipliers=l)
   end subroutine solve_problem
 
 end program gravier_fclib

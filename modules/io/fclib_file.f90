@@ -1,6 +1,6 @@
-!> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + q read and
-!> written, global ones (M, H and G) read, those without G written. What is wrong with a file ends in status_input and one line
-!> that names the dataset.
+!> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + V l + q and global
+!> ones (M, H and G) read, those without the constraints of V or G written. What is wrong with a file ends in status_input and one
+!> line that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
@@ -13,14 +13,16 @@ module gravier_fclib_file
   private
   public :: fclib_local_t, fclib_global_t, fclib_rows_t, read_fclib, write_fclib_local, write_fclib_global
 
-  !> v = W r + q, of each contact (n, t) or (n, t, s).
+  !> v = W r + V l + q, of each contact (n, t) or (n, t, s), and bilateral constraints V^T r + R l + s = 0 with multipliers l.
   type :: fclib_local_t
     !> of space: 2 or 3
     integer :: dimension = 0
     !> (dimension*contacts, dimension*contacts)
     type(sparse_rows_t) :: w
-    !> (dimension*contacts)
-    real(dp), allocatable :: q(:)
+    !> V (dimension*contacts, p) and R (p, p), p = 0 without constraints
+    type(sparse_rows_t) :: coupling, constraint
+    !> (dimension*contacts), (p)
+    real(dp), allocatable :: q(:), s(:)
     !> (contacts)
     real(dp), allocatable :: mu(:)
     !> (dimension, contacts) impulses of the solution, or of the first guess, where the file has one
@@ -99,15 +101,24 @@ contains
     type(source_t), intent(inout) :: source
     type(fclib_local_t), intent(inout) :: local
     type(error_t), allocatable, intent(inout) :: error
-    integer :: n
+    integer :: n, n_constraints
 
     call read_contacts(source, "/fclib_local", local%dimension, local%mu, error)
     if (allocated(error)) return
     n = local%dimension*size(local%mu)
-    if (source%file%exists("/fclib_local/V")) call source%refuse( &
-      & "/fclib_local/V: expected a problem without bilateral constraints", error)
     call read_matrix(source, "/fclib_local/W", n, n, local%w, error)
     call read_vector(source, "/fclib_local/vectors/q", n, local%q, error)
+    if (source%file%exists("/fclib_local/V")) then
+      call read_vector(source, "/fclib_local/vectors/s", -1, local%s, error)
+      if (allocated(error)) return
+      n_constraints = size(local%s)
+      call read_matrix(source, "/fclib_local/V", n, n_constraints, local%coupling, error)
+      call read_matrix(source, "/fclib_local/R", n_constraints, n_constraints, local%constraint, error)
+    else
+      allocate (local%s(0))
+      local%coupling = no_columns(n)
+      local%constraint = no_columns(0)
+    end if
     if (source%file%exists("/fclib_local/solution/r")) then
       call read_impulses(source, "/fclib_local/solution/r", local, error)
     else if (source%file%exists("/fclib_local/guesses/1/r")) then
@@ -324,8 +335,9 @@ contains
     if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
   end subroutine read_entries
 
-  !> Write a local problem, W by compressed rows, and its solution if there is one. Collective, the same on all ranks.
-  subroutine write_fclib_local(comm, path, local, error, velocity)
+  !> Write a local problem without constraints, W by compressed rows, and its solution if there is one. Collective, the same on all
+  !> ranks.
+  subroutine write_fclib_local(comm, path, local, error, velocity, multipliers)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> where `r` is allocated it is written as the solution
@@ -333,6 +345,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> (dimension, contacts) W r + q
     real(dp), intent(in), contiguous, optional :: velocity(:, :)
+    !> of the constraints that the problem was rid of; none is not written (p)
+    real(dp), intent(in), contiguous, optional :: multipliers(:)
     type(h5_file_t) :: file
     logical :: mine
 
@@ -352,6 +366,9 @@ contains
     call write_reals("/fclib_local/vectors/mu", local%mu)
     if (allocated(local%r)) call write_columns("/fclib_local/solution/r", local%r)
     if (present(velocity)) call write_columns("/fclib_local/solution/u", velocity)
+    if (present(multipliers)) then
+      if (size(multipliers) > 0) call write_reals("/fclib_local/solution/l", multipliers)
+    end if
     call file%close(error)
 
   contains

@@ -1,17 +1,25 @@
-!> From the dynamics of bodies to the problem of their contacts: M V = H r + G l + f, G^T V + b = 0 and v = H^T V + w become
-!> v = W r + q, with W = H^T M^-1 H and q = H^T M^-1 f + w where there are no constraints G.
+!> From the matrices of a problem of FCLIB to the problem of its contacts alone, v = W r + q: bodies and bilateral constraints are
+!> eliminated by the factors of their own matrix.
 module gravier_condensation
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, transposed
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, transposed, no_columns
   use gravier_fclib_file, only: fclib_local_t, fclib_global_t
   use gravier_sparse_direct, only: sparse_factor_t
   implicit none
   private
-  public :: condense
+  public :: multipliers_t, condense, eliminate_constraints
 
-  !> right-hand sides solved together
-  integer, parameter :: batch = 64
+  !> Multipliers of the bilateral constraints of a problem, given by the impulses of its contacts: l = L r + l_0.
+  type :: multipliers_t
+    private
+    !> L (p, dimension*contacts)
+    type(sparse_rows_t) :: of_impulses
+    !> l_0 (p)
+    real(dp), allocatable :: without_impulses(:)
+  contains
+    procedure :: evaluate => multipliers_evaluate
+  end type multipliers_t
 
   !> entries found so far, by columns
   type :: entries_t
@@ -20,126 +28,214 @@ module gravier_condensation
     real(dp), allocatable :: value(:)
   end type entries_t
 
+  !> Unknowns x to eliminate from v = W r + sign B^T x + q: K x = B r + c.
+  type :: unknowns_t
+    !> of K, for messages
+    character(len=:), allocatable :: name
+    type(entries_t) :: k
+    !> (order of K)
+    real(dp), allocatable :: c(:)
+    !> (order of K or less: the rows below are 0, dimension*contacts)
+    type(sparse_rows_t) :: b
+    real(dp) :: sign = 1.0_dp
+    !> unknowns before the multipliers
+    integer :: before = 0
+  end type unknowns_t
+
+  !> right-hand sides solved together
+  integer, parameter :: batch = 64
+  !> a pivot below this part of the scaled matrix is rounding
+  real(dp), parameter :: smallest_pivot = 1.0e-13_dp
+
 contains
 
-  !> Eliminate the bodies. A singular matrix of masses and constraints raises an error.
-  subroutine condense(global, local, error)
+  !> Eliminate the bodies from M V = H r + G l + f, G^T V + b = 0, v = H^T V + w: K = (M -G; G^T 0), B = (H; 0), c = (f; -b). A
+  !> singular K raises an error.
+  subroutine condense(global, local, multipliers, error)
     type(fclib_global_t), intent(in) :: global
     type(fclib_local_t), intent(out) :: local
+    type(multipliers_t), intent(out) :: multipliers
+    type(error_t), allocatable, intent(inout) :: error
+    type(unknowns_t) :: unknowns
+    type(entries_t) :: nothing
+    integer :: e, i, n
+
+    if (allocated(error)) return
+    n = size(global%f)
+    do i = 1, n
+      do e = global%m%start(i), global%m%start(i + 1) - 1
+        call append(unknowns%k, i, global%m%column(e), global%m%value(e))
+      end do
+      do e = global%g%start(i), global%g%start(i + 1) - 1
+        call append(unknowns%k, i, n + global%g%column(e), -global%g%value(e))
+        call append(unknowns%k, n + global%g%column(e), i, global%g%value(e))
+      end do
+    end do
+    unknowns%name = "the matrix of masses and constraints"
+    allocate (unknowns%c(n + size(global%b)))
+    unknowns%c(1:n) = global%f
+    unknowns%c(n + 1:) = -global%b
+    unknowns%b = global%h
+    unknowns%before = n
+    local%dimension = global%dimension
+    local%mu = global%mu
+    local%q = global%w
+    local%w = matrix_of(nothing, size(local%q), size(local%q))
+    call eliminate(unknowns, local, multipliers, error)
+  end subroutine condense
+
+  !> Eliminate the constraints from v = W r + V l + q, V^T r + R l + s = 0: K = R, B = -V^T, c = -s. A problem without any stays as
+  !> it is; a singular R raises an error.
+  subroutine eliminate_constraints(local, multipliers, error)
+    type(fclib_local_t), intent(inout) :: local
+    type(multipliers_t), intent(out) :: multipliers
+    type(error_t), allocatable, intent(inout) :: error
+    type(unknowns_t) :: unknowns
+    integer :: e, i
+
+    if (allocated(error)) return
+    if (size(local%s) == 0) then
+      multipliers%of_impulses = no_columns(0)
+      allocate (multipliers%without_impulses(0))
+      return
+    end if
+    do i = 1, size(local%s)
+      do e = local%constraint%start(i), local%constraint%start(i + 1) - 1
+        call append(unknowns%k, i, local%constraint%column(e), local%constraint%value(e))
+      end do
+    end do
+    unknowns%name = "/fclib_local/R"
+    unknowns%c = -local%s
+    unknowns%b = transposed(local%coupling)
+    unknowns%b%value(:) = -unknowns%b%value
+    unknowns%sign = -1.0_dp
+    call eliminate(unknowns, local, multipliers, error)
+  end subroutine eliminate_constraints
+
+  !> Add to W and q what the unknowns do.
+  subroutine eliminate(unknowns, local, multipliers, error)
+    type(unknowns_t), intent(in) :: unknowns
+    type(fclib_local_t), intent(inout) :: local
+    type(multipliers_t), intent(inout) :: multipliers
     type(error_t), allocatable, intent(inout) :: error
     type(sparse_factor_t) :: factor
     type(error_t), allocatable :: reason
-    type(sparse_rows_t) :: columns
-    type(entries_t) :: w
+    type(sparse_rows_t) :: columns_b, columns_w
+    type(entries_t) :: w, l
     real(dp), allocatable :: x(:, :)
-    integer :: first, last, n_contact
+    integer :: first, n
 
-    if (allocated(error)) return
-    call factorise_bodies(global, factor, reason)
-    if (allocated(reason)) call raise(error, status_input, "the matrix of masses and constraints: expected a regular one ("// &
-      & reason%message//")")
-    if (.not. allocated(error)) then
-      n_contact = global%h%n_columns
-      local%dimension = global%dimension
-      local%mu = global%mu
-      allocate (local%q(n_contact), x(factor%n, 1), w%row(0), w%column(0), w%value(0))
-      x(1:size(global%f), 1) = global%f
-      x(size(global%f) + 1:, 1) = -global%b
+    associate (k => unknowns%k)
+      call factor%init_local(reason, general=.true., smallest_pivot=smallest_pivot)
+      call factor%factorise(size(unknowns%c), k%row(1:k%n), k%column(1:k%n), k%value(1:k%n), reason)
+    end associate
+    if (allocated(reason)) then
+      call raise(error, status_input, unknowns%name//": expected a regular one ("//reason%message//")")
+    else
+      n = size(local%q)
+      allocate (x(factor%n, 1))
+      x(:, 1) = unknowns%c
       call factor%solve(x, error)
-      call add_transposed(global%h, x(:, 1), global%w, local%q)
-      columns = transposed(global%h)
-      do first = 1, n_contact, batch
-        last = min(first + batch - 1, n_contact)
-        call solve_columns(global%h, columns, factor, first, last, w, error)
+      call add_transposed(unknowns%b, unknowns%sign, x(:, 1), local%q)
+      multipliers%without_impulses = x(unknowns%before + 1:, 1)
+      columns_b = transposed(unknowns%b)
+      columns_w = transposed(local%w)
+      do first = 1, n, batch
+        call solve_columns(first, min(first + batch - 1, n))
       end do
-      if (.not. allocated(error)) local%w = compressed_rows(n_contact, n_contact, w%row(1:w%n), w%column(1:w%n), w%value(1:w%n))
+      local%w = matrix_of(w, n, n)
+      multipliers%of_impulses = matrix_of(l, factor%n - unknowns%before, n)
     end if
     call factor%free()
-  end subroutine condense
-
-  !> Factors of M, or of (M -G; G^T 0).
-  subroutine factorise_bodies(global, factor, error)
-    type(fclib_global_t), intent(in) :: global
-    type(sparse_factor_t), intent(inout) :: factor
-    type(error_t), allocatable, intent(inout) :: error
-    integer, allocatable :: row(:), column(:)
-    real(dp), allocatable :: value(:)
-    integer :: i, k, m, n
-
-    n = global%m%n_rows
-    m = size(global%m%value)
-    allocate (row(m + 2*size(global%g%value)), column(m + 2*size(global%g%value)), value(m + 2*size(global%g%value)))
-    m = 0
-    do i = 1, n
-      do k = global%m%start(i), global%m%start(i + 1) - 1
-        call put(i, global%m%column(k), global%m%value(k))
-      end do
-      do k = global%g%start(i), global%g%start(i + 1) - 1
-        call put(i, n + global%g%column(k), -global%g%value(k))
-        call put(n + global%g%column(k), i, global%g%value(k))
-      end do
-    end do
-    call factor%init_local(error, general=.true.)
-    call factor%factorise(n + global%g%n_columns, row, column, value, error)
 
   contains
 
-    subroutine put(at_row, at_column, entry)
-      integer, intent(in) :: at_row, at_column
-      real(dp), intent(in) :: entry
-      m = m + 1
-      row(m) = at_row
-      column(m) = at_column
-      value(m) = entry
-    end subroutine put
+    !> Columns first to last of W and L; entries that are exactly 0 are left out.
+    subroutine solve_columns(first, last)
+      integer, intent(in) :: first, last
+      real(dp), allocatable :: columns(:, :), column(:)
+      integer :: i, j
 
-  end subroutine factorise_bodies
-
-  !> Columns first to last of W; entries that are exactly 0 are left out.
-  subroutine solve_columns(h, columns, factor, first, last, w, error)
-    !> H, and its transpose
-    type(sparse_rows_t), intent(in) :: h, columns
-    type(sparse_factor_t), intent(inout) :: factor
-    integer, intent(in) :: first, last
-    type(entries_t), intent(inout) :: w
-    type(error_t), allocatable, intent(inout) :: error
-    real(dp), allocatable :: x(:, :), column(:), none(:)
-    integer :: i, j, k
-
-    if (allocated(error)) return
-    allocate (x(factor%n, last - first + 1), column(h%n_columns), none(h%n_columns))
-    x(:, :) = 0.0_dp
-    none(:) = 0.0_dp
-    do j = first, last
-      do k = columns%start(j), columns%start(j + 1) - 1
-        i = columns%column(k)
-        x(i, j - first + 1) = x(i, j - first + 1) + columns%value(k)
+      allocate (columns(factor%n, last - first + 1), column(n))
+      columns(:, :) = 0.0_dp
+      do j = first, last
+        call add_row(columns_b, j, columns(:, j - first + 1))
       end do
-    end do
-    call factor%solve(x, error)
-    do j = first, last
-      call add_transposed(h, x(:, j - first + 1), none, column)
-      do i = 1, size(column)
-        if (abs(column(i)) > 0.0_dp) call append(w, i, j, column(i))
+      call factor%solve(columns, error)
+      do j = first, last
+        column(:) = 0.0_dp
+        call add_row(columns_w, j, column)
+        call add_transposed(unknowns%b, unknowns%sign, columns(:, j - first + 1), column)
+        do i = 1, n
+          if (abs(column(i)) > 0.0_dp) call append(w, i, j, column(i))
+        end do
+        do i = unknowns%before + 1, factor%n
+          if (abs(columns(i, j - first + 1)) > 0.0_dp) call append(l, i - unknowns%before, j, columns(i, j - first + 1))
+        end do
       end do
-    end do
-  end subroutine solve_columns
+    end subroutine solve_columns
 
-  !> y = H^T x + w.
-  pure subroutine add_transposed(h, x, w, y)
-    type(sparse_rows_t), intent(in) :: h
+  end subroutine eliminate
+
+  !> y = y + row i of A.
+  pure subroutine add_row(a, i, y)
+    type(sparse_rows_t), intent(in) :: a
+    integer, intent(in) :: i
+    !> (n_columns or more)
+    real(dp), intent(inout), contiguous :: y(:)
+    integer :: k
+
+    do k = a%start(i), a%start(i + 1) - 1
+      y(a%column(k)) = y(a%column(k)) + a%value(k)
+    end do
+  end subroutine add_row
+
+  !> y = y + sign B^T x.
+  pure subroutine add_transposed(b, sign, x, y)
+    type(sparse_rows_t), intent(in) :: b
+    real(dp), intent(in) :: sign
     !> (n_rows or more), (n_columns)
-    real(dp), intent(in), contiguous :: x(:), w(:)
-    real(dp), intent(out), contiguous :: y(:)
+    real(dp), intent(in), contiguous :: x(:)
+    real(dp), intent(inout), contiguous :: y(:)
     integer :: i, k
 
-    y(:) = w
-    do i = 1, h%n_rows
-      do k = h%start(i), h%start(i + 1) - 1
-        y(h%column(k)) = y(h%column(k)) + h%value(k)*x(i)
+    do i = 1, b%n_rows
+      do k = b%start(i), b%start(i + 1) - 1
+        y(b%column(k)) = y(b%column(k)) + sign*b%value(k)*x(i)
       end do
     end do
   end subroutine add_transposed
+
+  !> Multipliers of a solution.
+  pure subroutine multipliers_evaluate(self, r, l)
+    class(multipliers_t), intent(in) :: self
+    !> impulses (dimension, contacts)
+    real(dp), intent(in), contiguous :: r(:, :)
+    !> (p)
+    real(dp), allocatable, intent(out) :: l(:)
+    integer :: a, i, k
+
+    l = self%without_impulses
+    do i = 1, size(l)
+      do k = self%of_impulses%start(i), self%of_impulses%start(i + 1) - 1
+        a = (self%of_impulses%column(k) - 1)/size(r, 1)
+        l(i) = l(i) + self%of_impulses%value(k)*r(self%of_impulses%column(k) - a*size(r, 1), a + 1)
+      end do
+    end do
+  end subroutine multipliers_evaluate
+
+  pure function matrix_of(entries, n_rows, n_columns) result(matrix)
+    type(entries_t), intent(in) :: entries
+    integer, intent(in) :: n_rows, n_columns
+    type(sparse_rows_t) :: matrix
+
+    if (allocated(entries%row)) then
+      matrix = compressed_rows(n_rows, n_columns, entries%row(1:entries%n), entries%column(1:entries%n), entries%value(1:entries%n))
+    else
+      matrix = no_columns(n_rows)
+      matrix%n_columns = n_columns
+    end if
+  end function matrix_of
 
   !> One more entry; the room doubles when it is full.
   pure subroutine append(entries, row, column, value)
@@ -150,6 +246,7 @@ contains
     integer :: n
 
     n = entries%n
+    if (.not. allocated(entries%row)) allocate (entries%row(0), entries%column(0), entries%value(0))
     if (n == size(entries%row)) then
       allocate (larger%row(max(1024, 2*n)), larger%column(max(1024, 2*n)), larger%value(max(1024, 2*n)))
       larger%row(1:n) = entries%row

@@ -49,11 +49,13 @@ module gravier_sparse_direct
 contains
 
   !> A matrix that lives on this rank alone.
-  subroutine sparse_factor_init_local(self, error, general)
+  subroutine sparse_factor_init_local(self, error, general, smallest_pivot)
     class(sparse_factor_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
     !> the matrix is not symmetric, or not definite, and given by all of its entries; default: false
     logical, intent(in), optional :: general
+    !> a pivot of less than this part of the scaled matrix is an error; default: only one of 0 is
+    real(dp), intent(in), optional :: smallest_pivot
 
     call self%free()
     allocate (self%id)
@@ -61,6 +63,10 @@ contains
     self%id%sym = 1
     if (present(general)) self%id%sym = merge(0, 1, general)
     call start(self, error)
+    if (.not. present(smallest_pivot) .or. allocated(error)) return
+    ! pivots that are too small are counted and passed over
+    self%id%icntl(24) = 1
+    self%id%cntl(3) = smallest_pivot
   end subroutine sparse_factor_init_local
 
   !> A matrix whose entries and rows are spread over the ranks. Collective.
@@ -137,6 +143,8 @@ contains
     call run(self, job_factorise, "factorisation", error)
     self%factorisations = self%factorisations + 1
     self%n = n
+    if (self%id%icntl(24) == 1 .and. self%id%infog(28) > 0) call raise(error, status_failure, "sparse direct solver (MUMPS): "// &
+      & to_text(self%id%infog(28))//" of "//to_text(n)//" pivots are 0 up to rounding")
     if (allocated(error)) self%n = 0
   end subroutine sparse_factor_factorise
 

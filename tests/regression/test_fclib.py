@@ -1,5 +1,6 @@
 """gravier_fclib: problems in every storage form, local and global, judged again here; statuses, tables and bad input."""
 import csv
+import itertools
 import os
 import tempfile
 import unittest
@@ -63,18 +64,23 @@ def write_matrix(group, matrix, form="rows"):
     group["i"], group["x"] = j.astype("i4"), x
 
 
-def write_local(path, w, q, mu, form="rows", dimension=3):
+def write_local(path, w, q, mu, form="rows", dimension=3, constraints=None):
+    """v = W r + V l + q; the constraints V^T r + R l + s = 0 are (V, R, s)."""
     with h5py.File(path, "w") as file:
         local = file.create_group("fclib_local")
         local["spacedim"] = np.array([dimension], "i4")
         write_matrix(local.create_group("W"), w, form)
         local["vectors/q"], local["vectors/mu"] = q, mu
+        if constraints:
+            write_matrix(local.create_group("V"), constraints[0], form)
+            write_matrix(local.create_group("R"), constraints[1], form)
+            local["vectors/s"] = constraints[2]
 
 
-def write_global(path, m, h, f, mu, g=None, b=None, w=None):
+def write_global(path, m, h, f, mu, g=None, b=None, w=None, dimension=3):
     with h5py.File(path, "w") as file:
         group = file.create_group("fclib_global")
-        group["spacedim"] = np.array([3], "i4")
+        group["spacedim"] = np.array([dimension], "i4")
         write_matrix(group.create_group("M"), m, "columns")
         write_matrix(group.create_group("H"), h, "triplets")
         if g is not None:
@@ -82,6 +88,46 @@ def write_global(path, m, h, f, mu, g=None, b=None, w=None):
             group["vectors/b"] = b
         group["vectors/f"], group["vectors/mu"] = f, mu
         group["vectors/w"] = np.zeros(h.shape[1]) if w is None else w
+
+
+def hinged_rods(seed=4):
+    """Two rods in a plane, hinged, with a contact each: W, q, mu and (V, R, s) of the hinge, made from random M, H, G, f and b."""
+    random = np.random.default_rng(seed)
+    m, h, g = np.diag(random.uniform(1, 2, 6)), random.uniform(-1, 1, (6, 4)), random.uniform(-1, 1, (6, 2))
+    f, b, w = random.uniform(-1, 1, 6), random.uniform(-1, 1, 2), random.uniform(-1, 0, 4)
+    inverse = np.linalg.inv(m)
+    return (h.T @ inverse @ h, h.T @ inverse @ f + w, np.array([0.2, 0.6]),
+            (h.T @ inverse @ g, g.T @ inverse @ g, g.T @ inverse @ f + b)), (m, h, g, f, b, w)
+
+
+def solutions_in_plane(w, q, mu, constraints):
+    """All (r, v, l) of contacts in a plane that are open, stick, or slip one way, found by trying every combination: v, r and l
+    solve linear equations then."""
+    v_matrix, r_matrix, s = constraints
+    n, p = v_matrix.shape
+    found = []
+    for states in itertools.product(("open", "stick", 1, -1), repeat=len(mu)):
+        # unknowns r, v, l
+        a = np.zeros((2 * n + p, 2 * n + p))
+        a[:n] = np.hstack([-w, np.eye(n), -v_matrix])
+        a[n:n + p] = np.hstack([v_matrix.T, np.zeros((p, n)), r_matrix])
+        for c, state in enumerate(states):
+            rows, normal, tangent = slice(n + p + 2 * c, n + p + 2 * c + 2), 2 * c, 2 * c + 1
+            if state == "open":
+                a[rows, normal:normal + 2] = np.eye(2)
+            elif state == "stick":
+                a[rows, n + normal:n + normal + 2] = np.eye(2)
+            else:
+                a[rows, n + normal] = 1, 0
+                a[rows, tangent] = 0, 1
+                a[rows, normal] = 0, state * mu[c]
+        x = np.linalg.solve(a, np.concatenate([q, -s, np.zeros(n)]))
+        r, v = x[:n].reshape(-1, 2), x[n:2 * n].reshape(-1, 2)
+        if all(v[c, 0] >= 0 if state == "open" else r[c, 0] >= 0 and (
+                abs(r[c, 1]) <= mu[c] * r[c, 0] if state == "stick" else state * v[c, 1] >= 0)
+               for c, state in enumerate(states)):
+            found.append((x[:n], x[n:2 * n], x[2 * n:], states))
+    return found
 
 
 def measures(w, q, mu, r):
@@ -129,6 +175,10 @@ class Fclib(RunTestCase):
     def impulses(self, name):
         with h5py.File(self.path(name)) as file:
             return file["fclib_local/solution/r"][()], file["fclib_local/solution/u"][()]
+
+    def multipliers(self, name):
+        with h5py.File(self.path(name)) as file:
+            return file["fclib_local/solution/l"][()]
 
     def test_storage_forms_are_one_problem(self):
         w, q, mu = random_problem(3, 12)
@@ -207,8 +257,55 @@ class Fclib(RunTestCase):
             r, u = self.impulses(f"out/{name}.h5")
             np.testing.assert_allclose(u, w @ r + q, atol=1e-12)
             self.assertLess(measures(w, q, mu, r)[1], 1.01e-8)
-        # u of the rail: the velocity that b prescribes, whatever the impulses
+        # u of the rail: the velocity that b prescribes, whatever the impulses, by the force of the rail
         np.testing.assert_allclose(u[1:12:3].mean(), 0.02, atol=1e-12)
+        np.testing.assert_allclose(self.multipliers("out/rail.h5"), [m[0, 0] * 0.02 - h[0] @ r - f[0]], atol=1e-12)
+
+    def test_bilateral_constraints(self):
+        states = set()
+        for seed, form in enumerate(("rows", "columns", "triplets", "rows", "rows", "rows")):
+            w, q, mu, constraints = hinged_rods(seed)[0]
+            write_local(self.path("a.h5"), w, q, mu, form, 2, constraints)
+            self.solve("a.h5", "--write", "out", "--tolerance", "1e-12")
+            (r, v, multipliers, state), = solutions_in_plane(w, q, mu, constraints)
+            for found, exact in zip((*self.impulses("out/a.h5"), self.multipliers("out/a.h5")), (r, v, multipliers)):
+                np.testing.assert_allclose(found, exact, atol=1e-10)
+            states.update(state)
+        self.assertEqual(states, {"open", "stick", 1, -1})
+        # the written problem is one of contacts alone
+        self.solve("out/a.h5", "--warm", "--write", "again", "--csv", "warm.csv", "--tolerance", "1e-12")
+        np.testing.assert_array_equal(self.impulses("again/a.h5"), self.impulses("out/a.h5"))
+        self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"])
+        with h5py.File(self.path("again/a.h5")) as file:
+            self.assertNotIn("l", file["fclib_local/solution"])
+
+    def test_constraints_of_bodies_and_of_contacts(self):
+        # one problem by M, H and G, and by W, V and R
+        (w, q, mu, constraints), (m, h, g, f, b, shift) = hinged_rods(7)
+        write_global(self.path("bodies.h5"), m, h, f, mu, g, b, shift, dimension=2)
+        write_local(self.path("contacts.h5"), w, q, mu, dimension=2, constraints=constraints)
+        self.solve("bodies.h5", "contacts.h5", "--write", "out", "--tolerance", "1e-12")
+        for name in ("bodies", "contacts"):
+            r, u = self.impulses(f"out/{name}.h5")
+            multipliers = self.multipliers(f"out/{name}.h5")
+            velocity = np.linalg.solve(m, h @ r + g @ multipliers + f)
+            np.testing.assert_allclose(g.T @ velocity, -b, atol=1e-12)
+            np.testing.assert_allclose(h.T @ velocity + shift, u, atol=1e-12)
+            np.testing.assert_allclose(r, self.impulses("out/bodies.h5")[0], atol=1e-10)
+
+    def test_many_constraints(self):
+        # cubes that may not turn, each by three constraints on its velocities: they slide as points do
+        m, h, f, mu = box_stack(boxes=30)
+        turns = np.eye(len(f))[:, np.arange(len(f)) % 6 > 2]
+        inverse = np.linalg.inv(m)
+        v, r, s = h.T @ inverse @ turns, turns.T @ inverse @ turns, turns.T @ inverse @ f
+        write_local(self.path("a.h5"), h.T @ inverse @ h, h.T @ inverse @ f, mu, constraints=(v, r, s))
+        self.solve("a.h5", "--write", "out")
+        found = self.impulses("out/a.h5")[0]
+        np.testing.assert_allclose(self.multipliers("out/a.h5"), -np.linalg.solve(r, v.T @ found + s), atol=1e-12)
+        straight = np.delete(np.eye(len(f)), np.flatnonzero(turns.any(axis=1)), axis=1)
+        w = h.T @ straight @ np.linalg.inv(straight.T @ m @ straight) @ straight.T @ h
+        self.assertLess(measures(w, h.T @ inverse @ f, mu, found)[1], 1.01e-8)
 
     def test_ranks_do_not_matter(self):
         w, q, mu = local_problem()
@@ -280,7 +377,28 @@ class Fclib(RunTestCase):
             (replace("W/p", np.arange(13)[::-1]), "/fclib_local/W/p: expected numbers that rise from 0"),
             (replace("W/p", np.arange(5)), "/fclib_local/W/p: 5 numbers: expected 13"),
             (replace("W/x", np.zeros(144)), "contact 1: normal and mean diagonal of W"),
-            (lambda group: group.create_dataset("V/m", data=[1]), "/fclib_local/V: expected a problem without bilateral constraints"),
+        ]
+        hinge = np.random.default_rng(2).uniform(-1, 1, (12, 2))
+        # four constraints of which two follow from the others, but for rounding
+        four = np.random.default_rng(3).uniform(-1, 1, (12, 4))
+
+        def constrain(**changes):
+            def change(group):
+                for name, value in {"V": hinge, "R": np.eye(2), "s": [0.1, 0.2], **changes}.items():
+                    if name == "s":
+                        group["vectors/s"] = np.array(value)
+                    elif value is not None:
+                        write_matrix(group.create_group(name), value)
+            return change
+
+        cases += [
+            (constrain(R=None), "/fclib_local/R/m: missing"),
+            (constrain(s=[0.1]), "/fclib_local/V: a matrix of 12 rows and 2 columns: expected 12 and 1"),
+            (constrain(V=hinge[:11]), "/fclib_local/V: a matrix of 11 rows and 2 columns: expected 12 and 2"),
+            (constrain(R=np.eye(3)), "/fclib_local/R: a matrix of 3 rows and 3 columns: expected 2 and 2"),
+            (constrain(R=np.zeros((2, 2))), "/fclib_local/R: expected a regular one ("),
+            (constrain(R=np.ones((2, 2))), "/fclib_local/R: expected a regular one ("),
+            (constrain(V=four, R=four[:2].T @ four[:2], s=np.zeros(4)), "/fclib_local/R: expected a regular one ("),
         ]
         write_local(self.path("good.h5"), w, q, mu)
         for change, message in cases:
@@ -297,6 +415,14 @@ class Fclib(RunTestCase):
         m, h, f, mu = box_stack()
         m[0, 0] = 0
         write_global(self.path("a.h5"), m, h, f, mu)
+        run = self.solve("a.h5", status=2)
+        self.assertIn("a.h5: the matrix of masses and constraints: expected a regular one", run.stderr)
+        # three constraints of which one follows from the others, but for rounding
+        m, h, f, mu = box_stack()
+        g = np.zeros((len(f), 3))
+        g[:2, :2] = [[0.1, 0.7], [0.3, 0.2]]
+        g[:, 2] = 0.3 * g[:, 0] + 0.7 * g[:, 1]
+        write_global(self.path("a.h5"), m, h, f, mu, g, np.zeros(3))
         run = self.solve("a.h5", status=2)
         self.assertIn("a.h5: the matrix of masses and constraints: expected a regular one", run.stderr)
 

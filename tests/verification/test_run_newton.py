@@ -43,14 +43,16 @@ class Newton(RunTestCase):
             return file["steps/1/bodies/velocity"][:]
 
     def test_tolerance_that_sweeps_do_not_reach(self):
-        newton = run_case(self.disks, directory=self.here("newton"))
+        # 156 disks: Newton's method takes 350 to 560 iterations, where the 600 of the other tests take thousands
+        disks = merged(self.disks, {"scene": {"bodies_file": settled_disks(self.here("few"), count=(12, 13))}})
+        newton = run_case(disks, directory=self.here("newton"))
         self.assert_status(newton, 0)
         residual = newton.trace()["residual"]
         self.assertLessEqual(residual[-1], TIGHT)
-        sweeps = run_case(merged(self.disks, {"solver": {"method": "nlgs", "acceleration": "momentum"}}),
+        sweeps = run_case(merged(disks, {"solver": {"method": "nlgs", "acceleration": "momentum"}}),
                           directory=self.here("sweeps"))
         self.assert_status(sweeps, 3)
-        # sweeps stagnate near 7e-7, in as many iterations
+        # sweeps stagnate at 2e-7 to 1e-5, in as many iterations
         self.assertGreater(sweeps.trace()["residual"][-1], 1e3 * TIGHT)
 
     def test_column_against_exact_impulses(self):
