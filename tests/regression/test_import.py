@@ -326,6 +326,14 @@ class Import(RunTestCase):
                 folder, message = self.convert(self.box(2, bodies, law + self.see("cohes")), status=2)
                 self.assertIn("TACT_BEHAV.DAT: line 2: " + words, message)
                 self.assertEqual(os.listdir(folder), [])
+        drum = SEE.format("RBDY2", "DISKx", "BLUEx", "xKSID", "DRUMx").replace("iqsc0", "cohes")
+        bodies = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.0, 0.0], [("xKSID", "DRUMx", values(byrd=1.0))])
+        laws = self.law("cohes", "IQS_MOHR_DS_CLB", cohesion, one) + LAW + self.see("iqsc0") + drum
+        _, message = self.convert(self.box(2, bodies, laws, still(2, 2)), status=2)
+        self.assertIn("law IQS_MOHR_DS_CLB of grains in a drum: expected grains, JONCx and PLANx", message)
+        glued = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [1.0, 0.0], [("DISKx", "REDxx", values(byrd=0.05))])
+        _, message = self.convert(self.box(2, glued, LAW + self.see("iqsc0"), still(2, 2)), status=2)
+        self.assertIn("no grain sees a contactor of body 2", message)
 
     def test_what_has_no_counterpart_is_refused(self):
         disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
