@@ -83,6 +83,7 @@ contains
     type(scan_t) :: found
     integer :: i
 
+    call fill_keys()
     study%title = ""
     study%case = ""
     study%directory = "accuracy"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make a case of Gravier from a DATBOX of LMGC90.
 
-    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX [LY]] [--planes]
+    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V]
 
 Reads BODIES.DAT, BULK_BEHAV.DAT and TACT_BEHAV.DAT and, where they are there, DRV_DOF.DAT, DOF.INI and Vloc_Rloc.INI; writes NAME.nml,
 NAME.h5 (bodies), NAME_drive_K.csv (drives that change in time) and NAME_contacts.csv (the contacts of Vloc_Rloc.INI).
@@ -19,11 +19,9 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
-#: a law of LMGC90: keys here, and the names of its parameters that they take
-LAWS = {
-    "IQS_CLB": {"friction": "fric"},
-    "RST_CLB": {"friction": "fric", "restitution": "rstn", "tangential_restitution": "rstt"},
-}
+LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
+#: names of parameters of laws as LMGC90 itself writes them, and as its pre-processor does
+OLDER = {"dfric": "dyfr", "sfric": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "restn": "rstn", "restt": "rstt"}
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
 #: `name= number`; forces and gaps of contacts stand without the sign
@@ -52,7 +50,7 @@ class Entry:
     def add(self, text):
         # ax1 is the older name of axe1
         for name, bare, value in VALUE.findall(text):
-            self.values[re.sub(r"^ax(?=\d$)", "axe", name or bare)] = number(value)
+            self.values[OLDER.get(name, re.sub(r"^ax(?=\d$)", "axe", name or bare))] = number(value)
 
     def get(self, name, default=None):
         if name in self.values:
@@ -279,52 +277,97 @@ def read_contacts(path, bodies):
 
 
 class Case:
-    """The case that is made: grains, boundaries, laws, remarks for the user."""
+    """The case that is made: grains, boundaries, materials (one for each contactor and colour), laws (one for each line of the table of
+    visibility that grains have part in), remarks for the user. `slip` is the scale [m/s] of laws with static and dynamic friction."""
 
-    def __init__(self, bodies, density, gravity, laws, sees, planes):
+    def __init__(self, bodies, density, gravity, laws, sees, planes, slip):
         self.bodies, self.density, self.gravity, self.laws, self.sees, self.planes = bodies, density, gravity, laws, sees, planes
-        self.dimension = bodies[0].dimension
-        self.grains, self.boundaries, self.remarks, self.used = [], [], [], []
+        self.dimension, self.slip = bodies[0].dimension, slip
+        self.grains, self.boundaries, self.remarks, self.used, self.materials, self.met = [], [], [], [], [], {}
         self.free = [body for body in bodies if not body.drives and body.contactors[0].words[0] in GRAINS]
         if not self.free:
             bodies[0].start.refuse("no grain moves freely", "a body with one contactor DISKx or SPHER that DRV_DOF.DAT does not drive")
-        self.colours = {(self.kind(body.contactors[0]), self.colour(body.contactors[0])) for body in self.free}
+        self.colours = {self.thing(body.contactors[0]) for body in self.free}
+        #: radii by contactor and colour: none of flat walls
+        self.radii = {}
+        for contactor in (contactor for body in bodies for contactor in body.contactors):
+            self.radii.setdefault(self.thing(contactor), set()).update([contactor.get("byrd")] if contactor.words[0] in GRAINS else [])
         self.centres = np.array([body.place() for body in self.free])
 
     @staticmethod
-    def kind(contactor):
-        return {"DISKb": "DISKx", "SPHEb": "SPHER"}.get(contactor.words[0], contactor.words[0])
+    def thing(contactor):
+        """Contactor and colour, by which the table of visibility names it."""
+        return {"DISKb": "DISKx", "SPHEb": "SPHER"}.get(contactor.words[0], contactor.words[0]), contactor.words[3]
 
-    @staticmethod
-    def colour(contactor):
-        return contactor.words[3]
+    def material(self, thing):
+        """Name of its material: the colour, where no other contactor has it."""
+        name = thing[1] if sum(other[1] == thing[1] for other in self.radii) == 1 else " ".join(thing)
+        if name not in self.materials:
+            self.materials.append(name)
+        return name
 
-    def law(self, thing, entry):
-        """The law between the free grains and a contactor (kind, colour) as keys; None where they do not see it."""
-        found = {}
-        for grain in sorted(self.colours):
-            pairs = [(law, alert, see) for pair, law, alert, see in self.sees if pair == {grain, thing}]
-            found[grain] = pairs[-1] if pairs else None
-        if not any(found.values()):
-            return None
-        blind = [grain for grain in found if found[grain] is None]
-        if blind:
-            entry.refuse(f"{blind[0][0]} of colour {blind[0][1]} does not see {thing[0]} of colour {thing[1]}, others do",
+    def meet(self, thing, entry):
+        """Take over the laws between the free grains and a contactor of a colour; False where no grain sees it."""
+        lines = {grain: see for grain in sorted(self.colours) for see in self.sees if see[0] == {grain, thing}}
+        for grain in sorted(self.colours - lines.keys() if lines else ()):
+            entry.refuse(f"{grain[0]} of colour {grain[1]} does not see {thing[0]} of colour {thing[1]}, others do",
                          "a contact law for all grains: $seety of TACT_BEHAV.DAT")
-        keys = [self.keys_of(law, see) for law, _, see in found.values()]
-        if any(other != keys[0] for other in keys):
-            entry.refuse(f"grains of several colours meet {thing[0]} of colour {thing[1]} by several laws", "one law")
-        self.used += [alert for _, alert, _ in found.values()]
-        return keys[0]
+        for pair, law, alert, see in lines.values():
+            names = sorted(self.material(each) for each in pair)
+            self.met[tuple(names)] = self.keys_of(law, alert, see, pair)
+            self.used.append(alert)
+        return bool(lines)
 
-    def keys_of(self, nickname, see):
+    def keys_of(self, nickname, alert, see, pair):
+        """Keys of the &law that a line of the table of visibility becomes."""
         if nickname not in self.laws:
             see.refuse(f"law {nickname}", "a law of this file")
         entry = self.laws[nickname]
         name = entry.words[1]
         if name not in LAWS:
             entry.refuse(f"law {name}", f"one of {', '.join(LAWS)}")
-        return {key: entry.get(theirs) for key, theirs in LAWS[name].items()}
+        keys = self.friction_of(entry, name)
+        if name.startswith("RST"):
+            keys.update(restitution=entry.get("rstn"), tangential_restitution=entry.get("rstt"))
+        if name == "IQS_WET_DS_CLB":
+            return {"kind": "adhesive", **keys, "adhesion": entry.get("cohn"), "adhesion_range": min(entry.get("Wthk"), alert)}
+        if name == "IQS_MOHR_DS_CLB":
+            return {"kind": "bonded", **keys, **self.bond_of(entry, alert, pair)}
+        return {"kind": "velocity" if "slip_scale" in keys else "coulomb", **keys}
+
+    def friction_of(self, entry, name):
+        """Keys of friction: one coefficient, or a static and a dynamic one where the law here has both."""
+        if name in ("IQS_CLB", "RST_CLB"):
+            return {"friction": entry.get("fric")}
+        static, dynamic = entry.get("stfr"), entry.get("dyfr")
+        if static == dynamic:
+            return {"friction": static}
+        if name in ("IQS_WET_DS_CLB", "IQS_MOHR_DS_CLB"):
+            entry.refuse(f"law {name} with stfr= {static:g} and dyfr= {dynamic:g}", "equal ones: this law has one coefficient here")
+        if self.slip is None:
+            entry.refuse(f"law {name} with stfr= {static:g} and dyfr= {dynamic:g}",
+                         "--slip V, the slip [m/s] over which friction falls from the one to the other")
+        return {"static_friction": static, "dynamic_friction": dynamic, "slip_scale": self.slip}
+
+    def bond_of(self, entry, alert, pair):
+        """Keys of a bond. Cohesion is a stress in LMGC90, of a contact as large as R* = R_i R_j/(R_i + R_j) in 2D, pi R*^2 in 3D, with the
+        radius of the grain against a flat wall."""
+        if not {thing[0] for thing in pair} <= {"DISKx", "SPHER", "JONCx", "PLANx"}:
+            entry.refuse("law IQS_MOHR_DS_CLB of grains in a drum", "grains, JONCx and PLANx")
+        cohesion, shear = entry.get("cohn"), entry.get("coht")
+        if not (cohesion > 0.0 and shear > 0.0):
+            entry.refuse(f"law IQS_MOHR_DS_CLB with cohn= {cohesion:g} and coht= {shear:g}", "both > 0")
+        first, last = min(pair), max(pair)
+        sizes = []
+        for choose in (min, max):
+            one, other = (choose(self.radii[thing], default=math.inf) for thing in (first, last))
+            reduced = 1.0 / (1.0 / one + 1.0 / other)
+            sizes.append(reduced if self.dimension == 2 else math.pi * reduced**2)
+        if sizes[1] - sizes[0] > ROUND * sizes[1]:
+            entry.refuse(f"law IQS_MOHR_DS_CLB between several radii, with bonds of {cohesion * sizes[0]:g} to {cohesion * sizes[1]:g} N",
+                         "one radius: the bonds of a law are of one strength here")
+        self.remarks.append(f"law {entry.words[0]} IQS_MOHR_DS_CLB: bodies bonded across a gap keep it, LMGC90 draws them together")
+        return {"bond_strength": cohesion * sizes[1], "bond_friction": shear / cohesion, "bond_distance": alert}
 
     def mass(self, body, volume):
         name = body.bulk.words[3] if len(body.bulk.words) > 3 else ""
@@ -344,7 +387,8 @@ class Case:
         radius = contactor.get("byrd")
         identifier = body.rank if contactor is body.contactors[0] else None
         velocity = body.velocity() if group == 0 else None
-        self.grains.append([identifier, place, radius, self.mass(body, self.ball(radius)), velocity, group])
+        self.grains.append([identifier, place, radius, self.mass(body, self.ball(radius)), velocity, group,
+                            self.material(self.thing(contactor))])
 
     def check_free(self, body):
         contactor = body.contactors[0]
@@ -458,44 +502,40 @@ class Case:
 
     def add_wall(self, body):
         for number_of, contactor in enumerate(body.contactors, 1):
-            law = self.law((self.kind(contactor), self.colour(contactor)), contactor)
-            if law is None:
+            if not self.meet(self.thing(contactor), contactor):
                 self.remarks.append(f"body {body.rank} {contactor.words[0]}: no grain sees it, left out")
                 continue
+            material = self.material(self.thing(contactor))
             found, ends = self.pieces(body, contactor)
             keys, columns = self.motion(body, len(found) == 1 and not ends and len(body.contactors) == 1)
             name = f"body {body.rank}" + (f" contactor {number_of}" if len(body.contactors) > 1 else "")
             for label, shape in found:
-                self.boundaries.append(({"name": name + label, **shape, **keys, **law}, columns))
+                self.boundaries.append(({"name": name + label, **shape, **keys, "material": material}, columns))
             if ends:
                 group = self.new_group()
                 for place, radius in ends:
-                    self.grains.append([None, place, radius, self.ball(radius), None, group])
-                self.boundaries.append(({"name": name + " ends", "shape": "grains", "group": group, **keys, **law}, columns))
+                    self.grains.append([None, place, radius, self.ball(radius), None, group, material])
+                self.boundaries.append(({"name": name + " ends", "shape": "grains", "group": group, **keys}, columns))
 
     def new_group(self):
         return 1 + max([grain[5] for grain in self.grains], default=0)
 
     def add_glued(self, body):
-        """A driven body of disks or spheres: grains glued to each other."""
-        laws = [self.law((self.kind(contactor), self.colour(contactor)), contactor) for contactor in body.contactors]
-        if laws[0] is None or any(law != laws[0] for law in laws):
-            body.start.refuse(f"the contactors of body {body.rank} have several laws, or grains do not see them", "one law")
+        """A driven body of disks or spheres: grains glued to each other, each of its own material."""
+        for contactor in body.contactors:
+            if not self.meet(self.thing(contactor), contactor):
+                contactor.refuse(f"no grain sees a contactor of body {body.rank}", "a contact law: $seety of TACT_BEHAV.DAT")
         group = self.new_group()
         for contactor in body.contactors:
             self.add_grain(body, contactor, self.axes_of(body, contactor)[0], group)
         keys, columns = self.motion(body, True)
-        self.boundaries.append(({"name": f"body {body.rank}", "shape": "grains", "group": group, **keys, **laws[0]}, columns))
+        self.boundaries.append(({"name": f"body {body.rank}", "shape": "grains", "group": group, **keys}, columns))
 
     def build(self):
         first = self.free[0].contactors[0]
-        self.grain_law = {}
-        for colour in sorted(self.colours):
-            law = self.law(colour, first)
-            if law is None or self.grain_law not in ({}, law):
-                first.refuse(f"pairs of grains of colours {', '.join(sorted(c for _, c in self.colours))} meet by several laws, or do not "
-                             "see each other", "one law for all pairs of grains: $seety of TACT_BEHAV.DAT")
-            self.grain_law = law
+        for thing in sorted(self.colours):
+            if not self.meet(thing, first):
+                first.refuse(f"grains of colour {thing[1]} do not see each other", "a contact law: $seety of TACT_BEHAV.DAT")
         for body in self.bodies:
             kinds = {contactor.words[0] in GRAINS for contactor in body.contactors}
             if len(kinds) > 1:
@@ -542,13 +582,15 @@ def write_files(case, stem, options, contacts):
         file["bodies/radius"] = np.array([grain[2] for grain in case.grains])
         file["bodies/mass"] = np.array([grain[3] for grain in case.grains])
         file["bodies/velocity"] = np.array([np.zeros(spins) if grain[4] is None else grain[4] for grain in case.grains])
+        file["bodies/material"] = np.array([1 + case.materials.index(grain[6]) for grain in case.grains], dtype=np.int64)
         if any(grain[5] for grain in case.grains):
             file["bodies/group"] = np.array([grain[5] for grain in case.grains], dtype=np.int64)
     scene = {"title": f"imported from {options.datbox}", "dimension": d, "gravity": list(case.gravity[:d]), "bodies": "file",
-             "bodies_file": stem + ".h5", "alert_distance": max(case.used), **case.grain_law}
+             "bodies_file": stem + ".h5", "alert_distance": max(case.used)}
     if options.period:
         scene["period"] = options.period
-    parts = [group_text("scene", scene)]
+    parts = [group_text("scene", scene), *(group_text("material", {"name": name}) for name in case.materials),
+             *(group_text("law", {"materials": names, **keys}) for names, keys in case.met.items())]
     tables = {}
     for keys, columns in case.boundaries:
         if columns:
@@ -582,9 +624,13 @@ def parse():
     parser.add_argument("--out", default="imported", metavar="NAME", help="the files are NAME.nml, NAME.h5 and so on (imported)")
     parser.add_argument("--period", type=float, nargs="+", metavar="L", help="lengths of the periodic cell, which the command script has")
     parser.add_argument("--planes", action="store_true", help="walls with all grains on one side become endless planes")
+    parser.add_argument("--slip", type=float, metavar="V",
+                        help="slip [m/s] over which friction falls from static to dynamic, for IQS_DS_CLB and RST_DS_CLB")
     options = parser.parse_args()
     if not (math.isfinite(options.step) and options.step > 0.0) or options.steps < 0:
         parser.error("--step: expected a finite number > 0, and --steps at least 0")
+    if options.slip is not None and not (math.isfinite(options.slip) and options.slip > 0.0):
+        parser.error("--slip: expected a finite number > 0")
     return options
 
 
@@ -604,7 +650,7 @@ def main():
         contacts = read_contacts(box / "Vloc_Rloc.INI", bodies) if (box / "Vloc_Rloc.INI").is_file() else None
         if options.period and len(options.period) != bodies[0].dimension:
             raise Refused(f"--period: {len(options.period)} numbers: expected {bodies[0].dimension}, 0 along an axis that is not periodic")
-        case = Case(bodies, density, gravity, laws, sees, options.planes)
+        case = Case(bodies, density, gravity, laws, sees, options.planes, options.slip)
         case.build()
         made = write_files(case, options.out, options, contacts)
     except Refused as refused:

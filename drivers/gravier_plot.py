@@ -191,11 +191,22 @@ def draw_chains(axes, run, step, view, force):
         return
     axes.add_collection(LineCollection(view.place(segments[loaded]), linewidths=WIDEST * normal[loaded] / top, colors=CHAINS,
                                        capstyle="round", zorder=2))
-    axes.plot([], [], color=CHAINS, linewidth=WIDEST, label=f"normal force {top:.2g} N")
+    axes.plot([], [], color=CHAINS, linewidth=WIDEST, label=f"normal force {float(f'{top:.2g}'):g} N")
     axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8)
 
 
 # ---- curves
+
+def names_of(runs):
+    """What tells the directories of runs apart: their paths without what all begin and end with."""
+    parts = [run.directory.resolve().parts for run in runs]
+    if len(set(parts)) < len(parts):
+        return [str(run.directory) for run in runs]
+    shortest = min(len(path) for path in parts)
+    first = next((k for k in range(shortest) if len({path[k] for path in parts}) > 1), shortest - 1)
+    last = next((k for k in range(1, shortest - first) if len({path[-k] for path in parts}) > 1), shortest - first)
+    return ["/".join(path[first:len(path) - last + 1]) for path in parts]
+
 
 def draw_history(runs, columns):
     """A figure with a panel for each column of history.csv against time, a line a run."""
@@ -208,8 +219,8 @@ def draw_history(runs, columns):
                 refuse(f"{run.directory}/history.csv: no column {name}; expected one of {', '.join(history)}")
     figure, panels = plt.subplots(len(columns), 1, figsize=(6.2, 0.4 + 1.75 * len(columns)), sharex=True, squeeze=False)
     for axes, name in zip(panels[:, 0], columns):
-        for k, (run, history) in enumerate(zip(runs, histories)):
-            axes.plot(history.time, history[name], color=LINES[k % len(LINES)], linewidth=1.2, label=run.directory.name,
+        for k, (label, history) in enumerate(zip(names_of(runs), histories)):
+            axes.plot(history.time, history[name], color=LINES[k % len(LINES)], linewidth=1.2, label=label,
                       marker="o" if len(history) <= 50 else None, markersize=3)
         axes.set_ylabel(LABELS.get(name, name.replace("_", " ")))
         axes.grid(True, color="0.9", linewidth=0.6)
@@ -230,20 +241,24 @@ def draw_history(runs, columns):
 def draw_convergence(runs, step):
     """A figure of residual and jump against iterations, a line a run: of one step, that of most iterations unless told."""
     figure, axes = plt.subplots(figsize=(6.2, 4.0))
-    for k, run in enumerate(runs):
+    for k, (run, label) in enumerate(zip(runs, names_of(runs))):
         trace = run.trace()
         held = numpy.unique(trace.step).astype(int) if len(trace) > 0 else []
         if len(held) == 0 or (step is not None and step not in held):
             refuse(f"{run.directory}/trace.csv: no step {step}; expected one of {', '.join(map(str, held)) or 'none, it has no row'}")
-        chosen = trace.step == (trace.step[numpy.argmax(trace.iteration)] if step is None else step)
+        drawn = trace.step[numpy.argmax(trace.iteration)] if step is None else step
+        chosen = trace.step == drawn
+        begin = "" if len(runs) == 1 else f"{label}, step {drawn:.0f}, "
         for name, style in (("error", "-"), ("residual", "-" if "error" not in trace else "--"), ("jump", ":")):
             if name not in trace or not (trace[name][chosen] > 0.0).any():
                 continue
             axes.plot(trace.iteration[chosen], numpy.where(trace[name][chosen] > 0.0, trace[name][chosen], numpy.nan), style,
-                      color=LINES[k % len(LINES)], linewidth=1.2, label=f"{run.directory.name}, {name}")
+                      color=LINES[k % len(LINES)], linewidth=1.2, label=begin + name)
         tolerance = run.case.get("solver", [{}])[0].get("tolerance")
         if tolerance is not None:
-            axes.axhline(tolerance, color=LINES[k % len(LINES)], linewidth=0.6)
+            axes.axhline(tolerance, color=LINES[k % len(LINES)], linewidth=0.6, label=begin + "tolerance")
+    if len(runs) == 1:
+        axes.set_title(f"step {drawn:.0f}", fontsize=9, loc="left")
     axes.set(xlabel="iteration", ylabel="residual, jump", yscale="log")
     axes.grid(True, color="0.9", linewidth=0.6)
     if axes.get_legend_handles_labels()[0]:

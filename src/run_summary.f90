@@ -84,8 +84,9 @@ contains
     associate (effort => simulation%effort, config => simulation%config)
       lost = real(effort%iterations - effort%reached(at_tolerance), dp)/real(max(effort%iterations, 1_i8), dp)
       if (simulation%comm%size > simulation%decomposition%n_subdomains) then
-        text = to_text(simulation%comm%size)//" ranks wait for those that own a subdomain: as many &decomposition "// &
-          & "subdomains, now "//to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
+        text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
+          & to_text(simulation%comm%size)//" ranks own no subdomain and wait: as many &decomposition subdomains, now "// &
+          & to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
       else if (phases(phase_output) > half) then
         text = "output takes most of it: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then

@@ -215,13 +215,125 @@ class Import(RunTestCase):
         laws = LAW + bounce + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + \
             SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx").replace("iqsc0", "rstc0")
         folder, _ = self.convert(self.box(2, bodies, laws, still(2, 2)), "--planes", steps=100)
-        with open(os.path.join(folder, "case.nml"), encoding="utf-8") as file:
-            scene, wall = file.read().split("&boundary", 1)
-        self.assertNotIn("restitution", scene)
-        self.assertIn("  restitution = 0.5\n  tangential_restitution = 0.25\n", wall)
+        self.assertIn("&law\n  materials = 'BLUEx', 'WALLx'\n  kind = 'coulomb'\n  friction = 0.3\n  restitution = 0.5\n"
+                      "  tangential_restitution = 0.25\n/\n", self.case_of(folder))
+        self.assertIn("&law\n  materials = 'BLUEx'\n  kind = 'coulomb'\n  friction = 0.3\n/\n", self.case_of(folder))
         steps, _ = self.run_case(folder)
         # it falls by 1 cm, with 0.443 m/s after 45 ms, and comes up by a quarter of that
         self.assertLess(abs(max(state["position"][0, 1] for state in steps[6:]) - 0.0525), 4e-4)
+
+    def case_of(self, folder):
+        with open(os.path.join(folder, "case.nml"), encoding="utf-8") as file:
+            return file.read()
+
+    def on_ground(self, laws, disks):
+        """Disks of radius 5 cm, each (place, colour), above a ground that each colour meets by the law `iqsc0`, as planes."""
+        shapes = [body(2, k, place, [("DISKx", colour, values(byrd=0.05))]) for k, (place, colour) in enumerate(disks, 1)]
+        shapes.append(body(2, len(disks) + 1, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=2.0, axe2=0.01))]))
+        walls = "".join(SEE.format("RBDY2", "DISKx", colour, "JONCx", "WALLx") for colour in sorted({colour for _, colour in disks}))
+        box = self.box(2, "".join(shapes), LAW + laws + walls, still(2, len(disks) + 1))
+        return self.convert(box, "--planes")
+
+    def see(self, name, one="BLUEx", other="BLUEx"):
+        return SEE.format("RBDY2", "DISKx", one, "DISKx", other).replace("iqsc0", name)
+
+    def law(self, name, kind, *lines):
+        return f"$behav  lawty\n {name}  {kind:30s}  " + ("\n" + " " * 40).join(values(**line) for line in lines) + "\n"
+
+    def test_materials_of_colours(self):
+        """Two colours, laws by pairs: each slides by the friction of its pair on a driven body of both colours."""
+        laws = self.law("iqsc1", "IQS_CLB", {"fric": 0.1}) + self.see("iqsc0") + self.see("iqsc1", "REDxx", "REDxx") + \
+            self.see("iqsc1", "REDxx", "BLUEx")
+        folder, _ = self.on_ground(laws, [([0.0, 0.05], "BLUEx"), ([0.5, 0.05], "REDxx")])
+        case = self.case_of(folder)
+        self.assertEqual([case.count(f"&{group}\n") for group in ("material", "law", "boundary")], [3, 5, 1])
+        self.assertIn("  materials = 'BLUEx', 'REDxx'\n  kind = 'coulomb'\n  friction = 0.1\n", case)
+        with h5py.File(os.path.join(folder, "case.h5")) as file:
+            self.assertEqual(list(file["bodies/material"]), [1, 2])
+        # each on its like, which goes faster than friction, 0.3 and 0.1 of a weight in a step, can carry along; in half a step the normal
+        # turns by 0.02 m/s 0.5 ms/0.1 m = 1e-4, as much of the weight, 1e-3 of the friction
+        slab = [("DISKx", "BLUEx", values(byrd=0.05) + "  " + values(coo1=-0.5, coo2=0.0)),
+                ("DISKx", "REDxx", values(byrd=0.05) + "  " + values(coo1=0.5, coo2=0.0))]
+        bodies = body(2, 1, [-0.5, 0.1], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
+            body(2, 2, [0.5, 0.1], [("DISKx", "REDxx", values(byrd=0.05))]) + body(2, 3, [0.0, 0.0], slab)
+        moving = drive(2, 3, [("vlocy", 1, 0.02, 0.0, 0.0, 0.0, 1.0, 0.0)] + [("vlocy", k, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0) for k in (2, 3)])
+        folder, _ = self.convert(self.box(2, bodies, LAW + laws, moving), steps=1)
+        steps, _ = self.run_case(folder)
+        np.testing.assert_allclose(steps[-1]["velocity"][:2, 0], [0.3 * G * 1e-3, 0.1 * G * 1e-3], rtol=3e-3)
+
+    def test_static_and_dynamic_friction(self):
+        """IQS_DS_CLB: one coefficient is Coulomb's; two want the slip over which friction falls, and a fast disk is under the dynamic one."""
+        ground = LAW.replace("IQS_CLB ", "IQS_DS_CLB").replace("fric= 0.3000000D+00", values(dyfr=0.2, stfr=0.5)) + self.see("iqsc0")
+        slides = state(2, 1, [0.0, 0.0], [1.0, 0.0])
+        box = self.box(2, body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
+                       + body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=2.0, axe2=0.01))]),
+                       ground + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx"), still(2, 2), slides)
+        _, message = self.convert(box, status=2)
+        self.assertIn("TACT_BEHAV.DAT: line 2: law IQS_DS_CLB with stfr= 0.5 and dyfr= 0.2: expected --slip V", message)
+        folder, _ = self.convert(box, "--planes", "--slip", "1e-3", steps=20)
+        self.assertIn("  kind = 'velocity'\n  static_friction = 0.5\n  dynamic_friction = 0.2\n  slip_scale = 0.001\n", self.case_of(folder))
+        steps, _ = self.run_case(folder)
+        self.assertLess(abs(steps[-1]["velocity"][0, 0] - (1.0 - 0.2 * G * 0.02)), 1e-4)
+        # names as LMGC90 itself writes them
+        equal = self.law("dsclb", "RST_DS_CLB", {"restn": 0.4, "restt": 0.0}, {"dfric": 0.2, "sfric": 0.2})
+        folder, _ = self.on_ground(equal + self.see("dsclb"), [([0.0, 0.05], "BLUEx")])
+        self.assertIn("  kind = 'coulomb'\n  friction = 0.2\n  restitution = 0.4\n", self.case_of(folder))
+
+    def hanging(self, law, weights):
+        """A disk under a driven one, with a force of so many weights between them at most; how far it falls in 50 steps of 1 ms."""
+        weight = 2500.0 * math.pi * 0.05**2 * G
+        top, low = (body(2, k, [0.0, y], [("DISKx", "BLUEx", values(byrd=0.05))]) for k, y in ((2, 0.0), (1, -0.1)))
+        folder, notes = self.convert(self.box(2, low + top, law(weights * weight) + self.see("cohes"), still(2, 2)))
+        steps, _ = self.run_case(folder)
+        return steps[0]["position"][0, 1] - steps[-1]["position"][0, 1], self.case_of(folder), notes
+
+    def test_adhesion(self):
+        """IQS_WET_DS_CLB holds what is lighter than cohn, within Wthk."""
+        def law(force):
+            return self.law("cohes", "IQS_WET_DS_CLB", {"cohn": force, "coht": 0.0}, {"Wthk": 1e-3}, {"dyfr": 0.3, "stfr": 0.3})
+        held, case, _ = self.hanging(law, 1.1)
+        self.assertIn("  kind = 'adhesive'\n  friction = 0.3\n", case)
+        self.assertIn("  adhesion_range = 0.001\n", case)
+        self.assertLess(abs(held), 1e-6)
+        self.assertGreater(self.hanging(law, 0.9)[0], 1e-4)
+
+    def test_bonds(self):
+        """IQS_MOHR_DS_CLB: cohn times R* = 25 mm is the strength, coht/cohn the friction of the bond."""
+        def law(force):
+            stress = force / 0.025
+            return self.law("cohes", "IQS_MOHR_DS_CLB", {"cohn": stress, "coht": 0.5 * stress}, {"dyfr": 0.3, "stfr": 0.3})
+        held, case, notes = self.hanging(law, 1.1)
+        self.assertIn("  kind = 'bonded'\n  friction = 0.3\n", case)
+        self.assertIn("  bond_friction = 0.5\n  bond_distance = 0.002\n", case)
+        self.assertIn("note: law cohes IQS_MOHR_DS_CLB: bodies bonded across a gap keep it", notes)
+        self.assertLess(abs(held), 1e-6)
+        self.assertGreater(self.hanging(law, 0.9)[0], 5e-3)
+
+    def test_laws_that_mean_another_thing_are_refused(self):
+        two, one = {"dyfr": 0.2, "stfr": 0.5}, {"dyfr": 0.3, "stfr": 0.3}
+        cohesion = {"cohn": 10.0, "coht": 5.0}
+        cases = [
+            (self.law("cohes", "IQS_WET_DS_CLB", cohesion, {"Wthk": 1e-3}, two), 0.05, "law IQS_WET_DS_CLB with stfr= 0.5 and dyfr= 0.2"),
+            (self.law("cohes", "IQS_MOHR_DS_CLB", cohesion, two), 0.05, "law IQS_MOHR_DS_CLB with stfr= 0.5 and dyfr= 0.2"),
+            (self.law("cohes", "IQS_MOHR_DS_CLB", {"cohn": 0.0, "coht": 5.0}, one), 0.05, "law IQS_MOHR_DS_CLB with cohn= 0 and coht= 5"),
+            (self.law("cohes", "IQS_MOHR_DS_CLB", cohesion, one), 0.06, "law IQS_MOHR_DS_CLB between several radii"),
+            (self.law("cohes", "xQS_WET_DS_CLB", cohesion, {"Wthk": 1e-3}, one), 0.05, "law xQS_WET_DS_CLB: expected one of IQS_CLB"),
+        ]
+        for law, radius, words in cases:
+            with self.subTest(words=words):
+                bodies = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
+                    body(2, 2, [1.0, 0.0], [("DISKx", "BLUEx", values(byrd=radius))])
+                folder, message = self.convert(self.box(2, bodies, law + self.see("cohes")), status=2)
+                self.assertIn("TACT_BEHAV.DAT: line 2: " + words, message)
+                self.assertEqual(os.listdir(folder), [])
+        drum = SEE.format("RBDY2", "DISKx", "BLUEx", "xKSID", "DRUMx").replace("iqsc0", "cohes")
+        bodies = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.0, 0.0], [("xKSID", "DRUMx", values(byrd=1.0))])
+        laws = self.law("cohes", "IQS_MOHR_DS_CLB", cohesion, one) + LAW + self.see("iqsc0") + drum
+        _, message = self.convert(self.box(2, bodies, laws, still(2, 2)), status=2)
+        self.assertIn("law IQS_MOHR_DS_CLB of grains in a drum: expected grains, JONCx and PLANx", message)
+        glued = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [1.0, 0.0], [("DISKx", "REDxx", values(byrd=0.05))])
+        _, message = self.convert(self.box(2, glued, LAW + self.see("iqsc0"), still(2, 2)), status=2)
+        self.assertIn("no grain sees a contactor of body 2", message)
 
     def test_what_has_no_counterpart_is_refused(self):
         disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
@@ -237,7 +349,7 @@ class Import(RunTestCase):
             ({"bodies": disk.replace("gyrd= 0.0000000D+00", "gyrd= 0.1000000D-01") + wall}, ("gyrd= 0.01", "homogeneous disk")),
             ({"bodies": disk.replace("stone", "brick") + wall}, ("material brick",)),
             ({"bodies": wall, "drives": still(2, 1)}, ("no grain moves freely",)),
-            ({"laws": laws.replace("IQS_CLB ", "IQS_MAC_CZM")}, ("TACT_BEHAV.DAT: line 2", "IQS_MAC_CZM", "IQS_CLB, RST_CLB")),
+            ({"laws": laws.replace("IQS_CLB ", "IQS_MAC_CZM")}, ("TACT_BEHAV.DAT: line 2", "IQS_MAC_CZM", "IQS_WET_DS_CLB, RST_CLB")),
             ({"laws": laws.replace("IQS_CLB", "RST_CLB")}, ("TACT_BEHAV.DAT: line 2", "rstn= is missing")),
             ({"laws": LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")}, ("do not see each other",)),
             ({"laws": laws.replace("0.2000000D-02", "")}, ("alert= is missing",)),

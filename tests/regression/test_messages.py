@@ -37,6 +37,8 @@ UNPROVOKED = {
     "not a finite number; expected speeds": "as the motion of boundaries",
     "cannot read this dataset": "within HDF5",
     "cannot remove this group": "within HDF5",
+    "cannot cut this table": "within HDF5",
+    "cannot write rows of this table: is the disk full?": "within HDF5; a full disk is met by test_run_full_disk at other places",
 }
 
 CALL = re.compile(r"\bcall\s+(?:\w+%)*(raise|refuse|expect|fail|complain)\s*\(", re.I)
@@ -115,6 +117,8 @@ class Messages(RunTestCase):
                     "&scene period: expected more than", "two diameters of the largest grain")
         self.refuse(bad({"scene": {"lattice_count": [100000, 100000]}}), "expected at most 2147483647 bodies")
         self.refuse(bad({"scene": {"friction": -1.0}}), "&scene friction = -1.0: expected a finite real number >= 0")
+        self.refuse(bad({"material": {"name": "glass"}, "law": {"materials": "glass", "kind": "coulomb", "friction": -1.0}}),
+                    "&law", "friction = -1.0: expected a finite real number >= 0")
         self.refuse(bad({"scene": {"bodies": "sample", "lattice_count": None, "radius_min": None, "radius_max": None},
                          "sample": {"count": 10, "radius": 0.01, "box": [0.01, 0.0]}}), "&sample box", "the largest grain has a diameter")
         self.refuse(bad({"boundary": {**PLANE, "free": [False, True], "mass": 0.0}}), "mass = 0.0", "expected a finite real number > 0")
@@ -153,6 +157,12 @@ class Messages(RunTestCase):
             rows = file.read().splitlines()
         write(self.here("results", "history.csv"), "\n".join([rows[0], "x" + rows[1], rows[2]]) + "\n")
         self.assertIn("history.csv: line 2", self.run_program("--restart", "case.nml"))
+        write(self.here("case.nml"), namelist(merged(CASE, {"output": {"vtk": True}})))
+        self.run_program("case.nml", status=0)
+        with h5py.File(self.here("results", "bodies.vtkhdf"), "r+") as file:
+            del file["VTKHDF/PointData/radius"]
+        self.assertIn("bodies.vtkhdf: no field radius, but one was expected", self.run_program("--restart", "case.nml"))
+        write(self.here("case.nml"), namelist(CASE))
 
     def provoke_studies(self):
         for text, words in (
@@ -202,9 +212,12 @@ class Messages(RunTestCase):
         unknown, used = [], set()
         for place, procedure, text in found:
             reasons = [fragment for fragment in UNPROVOKED if fragment in text]
-            if self.is_said(text, procedure, everything) or self.is_expected(text, expected, every_literal):
+            if self.is_said(text, procedure, everything):
                 continue
+            # a word that another test expects of something else may stand in a message that nothing brings about
             used.update(reasons)
+            if self.is_expected(text, expected, every_literal):
+                continue
             if procedure == "expect" and KEY.search(text):
                 self.provoke_key(*KEY.search(text).groups())
             elif not reasons:

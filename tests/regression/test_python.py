@@ -3,8 +3,10 @@ import contextlib
 import io
 import math
 import os
+import pathlib
 import subprocess
 import sys
+import types
 
 import gravier_runs  # noqa: F401  puts the package on the path
 import h5py
@@ -131,6 +133,12 @@ class Package(RunTestCase):
         self.assertEqual(red[1], 0)
         with open(self.here("b.svg"), encoding="utf-8") as file:
             self.assertIn("<svg", file.read())
+
+    def test_names_of_runs(self):
+        """What tells directories apart is kept of them."""
+        for paths, names in ((["/a/run_1/results", "/a/run_2/results"], ["run_1", "run_2"]), (["/a/b", "/a/b/c"], ["b", "b/c"]),
+                             (["/a/x/y/r", "/a/z/r"], ["x/y", "z"]), (["/a/b"], ["b"])):
+            self.assertEqual(gravier_plot.names_of([types.SimpleNamespace(directory=pathlib.Path(path)) for path in paths]), names)
 
     def test_runs_compared_and_movie(self):
         status, said = self.plot("history", "heap/results", "heap/results", "--out", "two.png", "--columns", "contacts")

@@ -125,7 +125,7 @@ class Progress(RunTestCase):
         idle = run_case(self.case, 2, self.here("idle"))
         self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-004; [\d.]+ iterations a solve\n")
         self.assertRegex(idle.stdout, r"\ntime        [\d.]+ s, [\d.]+ m?s a step: [a-z]+.* \d+ %")
-        self.assertIn("\nto halve it 2 ranks wait for those that own a subdomain", idle.stdout)
+        self.assertIn("\nto halve it 1 of 2 ranks own no subdomain and wait: as many &decomposition subdomains, now 1, or fewer ranks", idle.stdout)
         lost = run_case(merged(self.case, {"time": {"steps": 5}, "solver": {"tolerance": 1e-16, "max_iterations": 3000},
                                            "output": {"every": 0}}), 1, self.here("lost"))
         self.assertIn("\nconverged   NO: 5 of 5 solves did not reach the tolerance 1.00E-016; at worst", lost.stdout)
