@@ -148,6 +148,21 @@ class Adhesion(SmallScene):
         self.assertGreater(gap[-1], 2 * self.reach)
         self.verify(case, "acceleration above the adhesion [m/s^2]", gain, wanted, 1e-7)
 
+    def test_sleeping_pair_falls(self):
+        """Two grains that hold each other a thousand times their weight fall as without `sleeping`: what they press each other with holds
+        neither up. On the ground they come to rest."""
+        def check(dimension):
+            up, across = unit(dimension, -1), unit(dimension, 0)
+            adhesive = law("a", "adhesive", adhesion=1000 * MASS * G, adhesion_range=1e-3, friction=0.5)
+            pairs = [Grain(height * up + (side * RADIUS + place) * across, material=1)
+                     for place, height in ((0.0, 1.0), (0.5, RADIUS)) for side in (-1, 1)]
+            record = self.play(f"clinging {dimension}", pairs, [plane(0 * up, up)], -G * up, 60, material=named("a"), law=[adhesive],
+                               solver={"tolerance": 1e-4, "sleeping": True, "sleep_after": 6, "warm_start": True})
+            fall = -G * record.time
+            self.verify(f"{dimension}D grains that cling and fall", "speed [m/s]", record.velocity[:, :2] @ up, fall[:, None], 0.02)
+            self.verify(f"{dimension}D grains that cling on the ground", "speed [m/s]", record.velocity[-1, 2:], 0.0, 1e-12)
+        self.both(check)
+
     def test_friction_of_adhesive_grains(self):
         """Without weight a grain on a plate that attracts it slides under a force above mu F: one of two masses does."""
         masses, pull, bound = np.array([0.99, 1.01]) * MASS, 0.3 * self.force / MASS, 0.3 * self.force
