@@ -37,7 +37,7 @@ module gravier_contact_problem
     real(dp), allocatable :: position(:, :), radius(:)
     !> velocity without contacts, M^-1 R^d, in a solve with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
-    !> largest of the terms whose sum is R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
+    !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
     real(dp) :: largest_term = 0.0_dp
     !> velocity under the scheme's present loads (nv, n_columns)
     real(dp), allocatable :: velocity(:, :)
