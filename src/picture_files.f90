@@ -4,7 +4,7 @@ module gravier_picture_files
   use gravier_errors, only: error_t
   use gravier_vtkhdf_file, only: vtkhdf_file_t, vtk_field_t, vtk_rows_t
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_contact_structure, only: unused
+  use gravier_contact_law, only: unused
   use gravier_simulation, only: simulation_t
   implicit none
   private

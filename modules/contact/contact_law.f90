@@ -6,7 +6,7 @@ module gravier_contact_law
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: contact_law_t, contact_pair_t, contact_terms_t, law_key_t, add_resistance_keys, slides
+  public :: contact_law_t, contact_pair_t, contact_terms_t, law_key_t, add_resistance_keys, unused
 
   !> a contact slides whose friction is used but for this part
   real(dp), parameter :: unused = 1.0e-6_dp
@@ -24,7 +24,8 @@ module gravier_contact_law
 
   !> keys of all laws with friction
   type(law_key_t), parameter :: resistance_keys(2) = &
-    & [law_key_t("rolling_friction", "0.0", ">= 0", "", "rolling friction coefficient: the largest moment over `R* r_n`"), &
+    & [law_key_t("rolling_friction", "0.0", ">= 0", "", &
+    &              "rolling friction coefficient: the largest moment over `R* r_n`, over `R* (r_n + h F)` under an attraction F"), &
     &  law_key_t("pivoting_friction", "0.0", ">= 0", "", "pivoting friction coefficient, the same about the normal; 0 in 2D")]
 
   !> What holds at a contact over a step.
@@ -34,7 +35,7 @@ module gravier_contact_law
     real(dp) :: restitution = 0.0_dp
     !> of the tangential velocity, likewise; 0 without friction, which alone can send it back
     real(dp) :: tangential_restitution = 0.0_dp
-    !> the largest moments over R* r_n: rolling and, of spheres, pivoting
+    !> the largest moments over R* r~_n: rolling and, of spheres, pivoting
     real(dp) :: rolling = 0.0_dp, pivoting = 0.0_dp
     !> [N]
     real(dp) :: attraction = 0.0_dp

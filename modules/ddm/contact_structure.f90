@@ -1,17 +1,16 @@
 !> How grains hold each other: coordination, fabric, sliding, distribution of forces, overlaps.
 module gravier_contact_structure
   use gravier_kinds, only: dp, i8
+  use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: contact_structure_t, n_bins, bin_width, unused
+  public :: contact_structure_t, n_bins, bin_width
 
   !> bins of the histogram of normal forces over their mean; one more counts what lies beyond
   integer, parameter :: n_bins = 100
   real(dp), parameter :: bin_width = 0.1_dp
-  !> a contact slides whose friction is used but for this part
-  real(dp), parameter :: unused = 1.0e-6_dp
 
   !> The same on every rank. A contact carries where its bodies touch: where the normal impulse of its solve is not zero.
   type :: contact_structure_t

@@ -306,7 +306,7 @@ contains
     self%potential = decomposition%comm%sum_real(part)
   end subroutine energy_take_places
 
-  !> What the balance lacks since the start [J]: rounding.
+  !> What the balance lacks since the start [J]: rounding, and what was taken from grains that stand still (gravier_sleeping).
   pure real(dp) function energy_error(self) result(error)
     class(energy_balance_t), intent(in) :: self
     error = ((self%translation + self%rotation + self%boundaries) - self%start) - self%load_work - self%boundary_work + &

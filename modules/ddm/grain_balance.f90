@@ -184,7 +184,7 @@ contains
     end do
   end subroutine add_contact_work
 
-  !> What the balance lacks since the start [J]: rounding, whatever the tolerance.
+  !> What the balance lacks since the start [J]: rounding, whatever the tolerance, and what was taken from grains that stand still.
   pure real(dp) function grain_balance_error(self) result(error)
     class(grain_balance_t), intent(in) :: self
     error = (self%kinetic - self%start) - self%load_work - self%contact_work + self%carried_away

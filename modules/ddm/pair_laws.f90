@@ -143,9 +143,9 @@ contains
           pair%state = view%list%state(p)
           pair%gap = sub%gap(c)
           pair%normal = sub%impulse(q, 1, g)
-          pair%tangential = norm2(sub%impulse(q, 2:, g))
+          pair%tangential = norm2(sub%impulse(q, 2:problem%kernels%nf, g))
           pair%terms%friction = 0.0_dp
-          if (problem%kernels%nc > 1) pair%terms%friction = sub%hot(q, problem%kernels%nd + 6, g)
+          if (problem%kernels%nf > 1) pair%terms%friction = sub%hot(q, problem%kernels%friction_row, g)
           call laws%of(l)%law%conclude(pair)
           view%list%state(p) = pair%state
         end do

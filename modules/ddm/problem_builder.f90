@@ -404,6 +404,9 @@ contains
       sub%radius(b) = view%bodies%radius(k)
       sub%v_free(:, b) = view%bodies%velocity(1:kernels%nv, k)
       call physics%accelerate(view%bodies, k, sub%v_free(:, b))
+      associate (before => view%bodies%velocity(1:kernels%nd, k), after => sub%v_free(1:kernels%nd, b))
+        sub%largest_term = max(sub%largest_term, view%bodies%mass(k)*max(norm2(before), norm2(after - before)))
+      end associate
       sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/view%bodies%mass(k)
       if (kernels%nw > kernels%nd .and. physics%rotation) sub%inverse_mass(kernels%nw, b) = 1.0_dp/view%bodies%inertia(k)
     end do
@@ -424,7 +427,10 @@ contains
     if (column > sub%n_bodies) return
     sub%home(column) = mod(b - 1, n_subdomains) + 1
     do d = 1, kernels%nd
-      if (boundary%free(d)) sub%inverse_mass(d, column) = 1.0_dp/boundary%mass
+      if (.not. boundary%free(d)) cycle
+      sub%inverse_mass(d, column) = 1.0_dp/boundary%mass
+      sub%largest_term = max(sub%largest_term, boundary%mass*abs(boundary%last_velocity(d)), &
+        & boundary%mass*abs(boundary%velocity(d) - boundary%last_velocity(d)))
     end do
   end subroutine pack_boundary
 
@@ -953,11 +959,12 @@ contains
     problem%n_asleep = counts(n_multiplicities + 6)
   end subroutine count_figures
 
-  !> Scales of the residual and of the jump: largest |R^d|, over the components that can move, and largest free speed of a
-  !> body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may strike. Collective.
+  !> Scales of the residual, of the jump and of roundings: largest |R^d|, over the components that can move, largest free speed,
+  !> and largest term of R^d of a body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may
+  !> strike. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(2), moving(problem%kernels%nd), speed, lightest
+    real(dp) :: scales(3), moving(problem%kernels%nd), speed, lightest
     integer :: s, b, d, nd
 
     nd = problem%kernels%nd
@@ -981,11 +988,14 @@ contains
           scales(1) = max(scales(1), speed/lightest)
           scales(2) = max(scales(2), speed)
         end do
+        scales(3) = max(scales(3), sub%largest_term)
+        if (allocated(sub%attraction)) scales(3) = max(scales(3), maxval(sub%attraction))
       end associate
     end do
     call problem%comm%highest_of(scales)
     problem%force_scale = scales(1)
     problem%velocity_scale = scales(2)
+    problem%rounded_scale = max(scales(1), scales(3))
   end subroutine find_scales
 
   !> Velocities at the end of the step: those of the solved problem (v_global) for grains in contact, free ones for

@@ -3,7 +3,9 @@
 !> A body is at rest where the momentum left to it, and the change of the impulses on it, are small: m (|v| + R |w|) <= limit and
 !> sum |r_n - r_n of the step before| <= settled limit, limit being the lesser of `speed` times the root mean square of all
 !> impulses, which the residual is relative to, and of a `share` of the normal impulses on the body, so that no grain hangs in
-!> the air whatever lies next to it. Each contact counts the steps for which both of its bodies have been at rest; a contact that
+!> the air whatever lies next to it; where some law attracts, the momentum is at most that share of the sum H r of the contacts'
+!> impulses on it too, which is all that holds a body up: those that cling to each other press each other with more. Each contact
+!> counts the steps for which both of its bodies have been at rest; a contact that
 !> comes, goes or changes lets them start anew, and so does a boundary that moves. A grain all of whose contacts have counted
 !> half of `after` stands still: what the impulses of solves do not balance would else add up, step by step, and sweeps now find
 !> impulses that hold a grain without motion. A contact that has counted them all sleeps: no sweep takes it, its impulse stays,
@@ -44,7 +46,7 @@ contains
     !> contacts that slept were woken: nothing is stopped. Else grains at rest stand still: their v_global becomes zero
     logical, intent(in) :: woken
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
-    !> v_global is evaluated
+    !> v_global is evaluated, and `reaction` what it is evaluated with
     type(contact_problem_t), intent(inout) :: problem
     type(sums_t) :: sums(size(problem%sub))
     integer :: s, b
@@ -149,6 +151,8 @@ contains
       rests(b) = .not. is_moved(boundaries, sub, b)
       if (b > sub%n_bodies) cycle
       rests(b) = max(momentum(b), sums%of(2, b)/settled) <= min(limit, share*sums%of(1, b))
+      ! H r is H r~ and the pull of the attractions
+      if (allocated(sub%pull)) rests(b) = rests(b) .and. momentum(b) <= share*norm2(sub%reaction(1:nd, b) + sub%pull(1:nd, b))
     end do
     do c = 1, sub%n_contacts
       steps(c) = 0

@@ -10,7 +10,7 @@ module gravier_contact_problem
   private
   public :: subproblem_t, contact_problem_t
 
-  !> a defect of so many roundings of the largest momentum, a contact, is none
+  !> a defect of so many roundings of the largest term of R^d, a contact, is none
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
 
   !> The contacts of one subdomain and the bodies they touch, packed in sweep order. Bodies 1 to n_grains are free
@@ -37,6 +37,8 @@ module gravier_contact_problem
     real(dp), allocatable :: position(:, :), radius(:)
     !> velocity without contacts, M^-1 R^d, in a solve with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
+    !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
+    real(dp) :: largest_term = 0.0_dp
     !> velocity under the scheme's present loads (nv, n_columns)
     real(dp), allocatable :: velocity(:, :)
     !> velocity of the undivided bodies under all impulses (nv, n_columns), made by `evaluate`
@@ -89,6 +91,8 @@ module gravier_contact_problem
     real(dp) :: asleep_share = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
+    !> largest term of a sum R^d [N s], whose roundings no solve gets below: where loads take a momentum away, R^d has nothing else
+    real(dp) :: rounded_scale = 0.0_dp
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
@@ -308,7 +312,7 @@ contains
     if (self%n_asleep > 0) self%asleep_share = all_sums(3)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
     self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
-    if (defect <= rounding*self%force_scale*sqrt(real(self%n_contacts, dp))) then
+    if (defect <= rounding*self%rounded_scale*sqrt(real(self%n_contacts, dp))) then
       ! velocities are not known better; where impulses vanish, as in a group that flies on after a shock, no iteration
       ! would bring the defect below a part of them
       residual = 0.0_dp

@@ -51,6 +51,7 @@ contains
     call problem%shared%init(over, part, n_subdomains, problem%kernels%nv)
     problem%n_contacts = 4*n_columns - 2
     problem%force_scale = 1.0_dp
+    problem%rounded_scale = 1.0_dp
     problem%velocity_scale = 1.0_dp
   end subroutine make
 

@@ -182,6 +182,25 @@ class TangentialRestitution(SmallScene):
         self.both(check)
 
 
+class Restitution(SmallScene):
+
+    def test_weight_ends_a_rebound(self):
+        """Balls fall for five steps and spring back with e = 1/5, at the speed that their weight takes away in the next step: free,
+        they come to rest but for rounding, of either sign, which no solve gets below, and no contact asks for more."""
+        def check(dimension):
+            up, along = np.eye(dimension)[-1], np.eye(dimension)[0]
+            balls = [Grain((0.05 + 13.0 * G * self.step**2) * up + 0.2 * k * along, mass=0.3 + 0.17 * k) for k in range(9)]
+            record = self.play(f"end of a rebound {dimension}", balls, [plane(0 * up, up)], -G * up,
+                               steps=10, scene={"restitution": 0.2},
+                               solver={"tolerance": 1e-6, "check_every": 10, "warm_start": True, "max_iterations": 100, "acceleration": "none"})
+            weight = G * self.step
+            rounded = 40 * EPS * weight
+            self.verify(f"{dimension}D ball", "speed after the rebound [m/s]", record.velocity[6] @ up, weight, rounded)
+            self.verify(f"{dimension}D ball", "speed once the weight has taken it away [m/s]", record.velocity[7] @ up, 0.0, rounded)
+            self.assertLessEqual(record.run.history()["residual"].max(), 1e-6)
+        self.both(check)
+
+
 class Neutral(SmallScene):
     """An effect with a value too small to count: 1e-300 chooses its kernels, and every trajectory keeps its bits. What stands for
     round-off is the 1e-300 themselves."""

@@ -148,6 +148,21 @@ class Adhesion(SmallScene):
         self.assertGreater(gap[-1], 2 * self.reach)
         self.verify(case, "acceleration above the adhesion [m/s^2]", gain, wanted, 1e-7)
 
+    def test_sleeping_pair_falls(self):
+        """Two grains that hold each other a thousand times their weight fall as without `sleeping`: what they press each other with holds
+        neither up. On the ground they come to rest."""
+        def check(dimension):
+            up, across = unit(dimension, -1), unit(dimension, 0)
+            adhesive = law("a", "adhesive", adhesion=1000 * MASS * G, adhesion_range=1e-3, friction=0.5)
+            pairs = [Grain(height * up + (side * RADIUS + place) * across, material=1)
+                     for place, height in ((0.0, 1.0), (0.5, RADIUS)) for side in (-1, 1)]
+            record = self.play(f"clinging {dimension}", pairs, [plane(0 * up, up)], -G * up, 60, material=named("a"), law=[adhesive],
+                               solver={"tolerance": 1e-4, "sleeping": True, "sleep_after": 6, "warm_start": True})
+            fall = -G * record.time
+            self.verify(f"{dimension}D grains that cling and fall", "speed [m/s]", record.velocity[:, :2] @ up, fall[:, None], 0.02)
+            self.verify(f"{dimension}D grains that cling on the ground", "speed [m/s]", record.velocity[-1, 2:], 0.0, 1e-12)
+        self.both(check)
+
     def test_friction_of_adhesive_grains(self):
         """Without weight a grain on a plate that attracts it slides under a force above mu F: one of two masses does."""
         masses, pull, bound = np.array([0.99, 1.01]) * MASS, 0.3 * self.force / MASS, 0.3 * self.force
@@ -250,6 +265,32 @@ class Bonds(SmallScene):
         self.verify("a sheared bond", "acceleration below mu_b F [m/s^2]", gain[:, 0], 0.0, 1e-9)
         self.verify("a sheared bond", "acceleration as it breaks [m/s^2]", gain[0, 1], 4.0 - 4.0 / 1.01, 1e-9)
         self.verify("a sheared bond", "acceleration once broken [m/s^2]", gain[1:, 1], 4.0, 1e-9)
+
+    def test_moment(self):
+        """A bond to a wall carries the weight of a grain by shear, of which it withstands mu_b F, and by a moment, of which it withstands
+        mu_r R F: either alone, whatever the other. The grain whose bond bears less shear falls, the one whose bond bears less moment rolls."""
+        weight = MASS * G
+
+        def check(dimension):
+            up, across = unit(dimension, -1), unit(dimension, 0)
+            bond = {"bond_strength": weight, "bond_distance": 1e-6}
+            record = self.play(f"held sideways {dimension}", [Grain(RADIUS * across + k * up, material=k + 1) for k in range(3)],
+                               [plane(0 * up, across, material="wall")], -G * up, 40, material=named("a", "b", "c", "wall"),
+                               solver={"acceleration": "none"}, output={"every": 1, "contacts": True},
+                               law=[law((name, "wall"), "bonded", bond_friction=friction, rolling_friction=rolling, **bond)
+                                    for name, friction, rolling in (("a", 1.2, 1.2), ("b", 0.8, 1.2), ("c", 1.2, 0.8))])
+            case = f"{dimension}D grains bonded to a wall"
+            self.verify(case, "speed of the one whose bond holds [m/s]", record.all_velocities[:, 0], 0.0, 1e-10)
+            ends = record.contacts[-1]
+            first = np.flatnonzero(ends["candidate"] == 1)[0]
+            self.verify(case, "shear over the weight", np.linalg.norm(ends["impulse"][first, 1:]) / (weight * self.step), 1.0, 1e-9)
+            moment = np.linalg.norm(ends["moment"][first])
+            self.verify(case, "moment over that of the weight", moment / (weight * RADIUS * self.step), 1.0, 1e-9)
+            self.assertLess(record.velocity[-1, 1] @ up, -0.5)
+            # it rolls down: a force r_t at the wall with m a = m g - r_t, I w' = (r_t - 0.8 m g) R, a = R w'
+            rolls = G * 0.2 / (1.0 + INERTIA[dimension])
+            self.verify(case, "acceleration of the one that rolls [m/s^2]", -np.diff(record.velocity[:, 2] @ up)[:20] / self.step, rolls, 1e-8)
+        self.both(check)
 
 
 def block():
