@@ -3,7 +3,8 @@
 
     python3 drivers/study_hard.py --out DIR [--cases REGEX] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
 
-leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page of the table. --short leaves out the long runs."""
+leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page of the table. --short leaves out the long runs. With
+--cases the rows of other cases that DIR/hard_cases.csv has already stay."""
 import argparse
 import csv
 import re
@@ -58,6 +59,15 @@ def study(options, case):
     return rows
 
 
+def joined(path, chosen, rows):
+    """New rows and those of the file of cases that were not chosen, in the order of the cases."""
+    if path.exists():
+        with open(path, encoding="ascii", newline="") as file:
+            rows = rows + [r for r in csv.DictReader(file) if r["case"] not in {case.name for case in chosen}]
+    order = list(cases())
+    return sorted((r for r in rows if r["case"] in order), key=lambda r: order.index(r["case"]))
+
+
 def page(rows):
     """The table as Markdown: a line a case and method, ranks that agree in one line."""
     text = ""
@@ -92,14 +102,17 @@ def main():
     options.failed = 0
     options.out.mkdir(parents=True, exist_ok=True)
     chosen = [case for name, case in cases().items() if re.search(options.cases, name)]
-    rows = [r for several in gravier_runs.each(study, [(options, case) for case in chosen], options.workers) for r in several]
+    found = gravier_runs.each(study, [(options, case) for case in chosen], options.workers)
+    rows = joined(options.out / "hard_cases.csv", chosen, [r for several in found for r in several])
     with open(options.out / "hard_cases.csv", "w", encoding="ascii", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
     head = (SOURCE / "doc" / "hard_cases.md").read_text(encoding="utf-8").split(MARK)[0] + MARK
     (options.out / "hard_cases.md").write_text(head + "\n" + page(rows), encoding="utf-8")
-    print(f"{len(rows)} runs of {len(chosen)} cases, {options.failed} failures that are not known")
+    converged = sum(r["status"] == "converged" for r in rows)
+    print(f"{len(rows)} runs of {len({r['case'] for r in rows})} cases, {converged} that converged; "
+          f"{options.failed} failures of this time that are not known")
     return 1 if options.failed else 0
 
 

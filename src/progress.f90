@@ -7,13 +7,15 @@ module gravier_progress
   implicit none
   private
   public :: progress_t, duration_text
-  public :: warn_unconverged, warn_fast, warn_lowered, warn_partition, note_balance
+  public :: warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, warn_partition, note_balance
 
-  integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_partition = 4, note_balance = 5
-  integer, parameter :: n_kinds = 5
+  integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_momentum = 4, warn_relaxation = 5, &
+    & warn_partition = 6, note_balance = 7
+  integer, parameter :: n_kinds = 7
   !> what the closing line calls them; a note is not counted there
-  character(len=*), parameter :: kind_names(4) = [character(len=44) :: "solves above the tolerance", &
-    & "grains too fast for the step", "search directions lowered", "partitions refused"]
+  character(len=*), parameter :: kind_names(6) = [character(len=44) :: "solves above the tolerance", &
+    & "grains too fast for the step", "search directions lowered", "momentum put off", "relaxation factors lowered", &
+    & "partitions refused"]
   !> said in full, of each kind
   integer(i8), parameter :: first_ones = 5
   !> lines of steps that are always written

@@ -16,7 +16,8 @@ module gravier_run_log
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
-  use gravier_progress, only: progress_t, warn_unconverged, warn_fast, warn_lowered, warn_partition, note_balance
+  use gravier_progress, only: progress_t, warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, &
+    & warn_partition, note_balance
   use gravier_run_summary, only: converged_text, time_text, halving_text
   implicit none
   private
@@ -38,8 +39,8 @@ module gravier_run_log
     type(progress_t) :: progress
     !> rank 0 writes to a terminal; a live line stands there
     logical :: live = .false., line_stands = .false.
-    !> of search directions, in the last step
-    integer(i8) :: lowered = 0
+    !> up to the last step
+    type(work_t) :: told
   contains
     procedure :: init => run_log_init
     procedure :: open => run_log_open
@@ -326,6 +327,7 @@ contains
 
     call self%progress%note_step(seconds)
     if (figures%solve%status == solve_diverged) then
+      call write_recoveries(self, simulation, simulation%step + 1, error)
       call self%line("  *** "//failure_text(simulation, figures), error)
       return
     end if
@@ -381,7 +383,6 @@ contains
     type(simulation_t), intent(in) :: simulation
     type(step_figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: lowered
 
     if (figures%divided) call warn(self, note_balance, 1_i8, "balance     "// &
       & balance_text(figures%rank_balance, figures%subdomain_balance)//" of the mean until this partition", error)
@@ -389,14 +390,34 @@ contains
       & "subdomains: the old partition stays", error)
     if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "//to_text(figures%fast)// &
       & " grains move by more than their radius in step "//to_text(simulation%step), error)
-    lowered = int(simulation%scheme%work%lowered, i8) - self%lowered
-    self%lowered = self%lowered + lowered
-    if (lowered > 0) call warn(self, warn_lowered, lowered, &
-      & "warning     changes grew or went round in circles under l: lowered "//to_text(lowered)//" times in step "// &
-      & to_text(simulation%step), error)
+    call write_recoveries(self, simulation, simulation%step, error)
     if (figures%solve%status /= solve_converged) call warn(self, warn_unconverged, 1_i8, "  *** "// &
       & failure_text(simulation, figures)//" in step "//to_text(simulation%step), error)
   end subroutine write_warnings
+
+  !> By what means a solve got over growth or standstill: l lowered, momentum put off, relaxation lowered.
+  subroutine write_recoveries(self, simulation, step, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: step
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: lowered, put_off, relaxed
+
+    associate (work => simulation%scheme%work)
+      lowered = work%lowered - self%told%lowered
+      put_off = work%put_off - self%told%put_off
+      relaxed = work%relaxed - self%told%relaxed
+      self%told = work
+    end associate
+    if (lowered > 0) call warn(self, warn_lowered, lowered, &
+      & "warning     changes grew or went round in circles under l: lowered "//to_text(lowered)//" times in step "// &
+      & to_text(step), error)
+    if (put_off > 0) call warn(self, warn_momentum, put_off, "warning     no progress with momentum: put off "// &
+      & to_text(put_off)//" times in step "//to_text(step), error)
+    if (relaxed > 0) call warn(self, warn_relaxation, relaxed, &
+      & "warning     changes of the neighbours' loads alternate and grow: relaxation lowered "//to_text(relaxed)// &
+      & " times in step "//to_text(step), error)
+  end subroutine write_recoveries
 
   !> How unevenly sweeps took time.
   function balance_text(ranks, subdomains) result(text)
@@ -499,6 +520,10 @@ contains
       & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance", error)
     if (simulation%scheme%direction_text /= "") call self%line("direction   "//simulation%scheme%direction_text//"; lowered "// &
       & to_text(work%lowered)//" times", error)
+    if (work%shortened + work%put_off > 0) call self%line("momentum    memory shortened "//to_text(work%shortened)// &
+      & " times, put off "//to_text(work%put_off)//" times", error)
+    if (work%relaxed > 0) call self%line("relaxation  lowered "//to_text(work%relaxed)//" times, to "// &
+      & to_text(work%least_factor, 3)//" at least", error)
     if (simulation%decomposition%n_subdomains > 1) then
       call simulation%scheme%measure_balance(self%comm, simulation%decomposition%n_subdomains, ranks, subdomains)
       call self%line("balance     "//balance_text(ranks, subdomains)//" of the mean since the last partition", error)

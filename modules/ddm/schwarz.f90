@@ -4,7 +4,7 @@ module gravier_schwarz
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, momentum_t, start_sweeps, sweep_all, extrapolate
+  use gravier_scheme, only: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
   implicit none
   private
   public :: schwarz_t, neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
@@ -58,6 +58,7 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
+    self%adapts = self%relaxation%automatic
     call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
   end subroutine schwarz_start
@@ -80,7 +81,7 @@ contains
       call shared_reactions(problem, s, self%load(s))
       call problem%shared%load(s, problem%sub(s)%reaction)
     end do
-    call take_neighbour_loads(problem, self%relaxation, self%load)
+    call take_neighbour_loads(problem, self%relaxation, self%load, self%work)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
   end subroutine schwarz_iterate
@@ -166,11 +167,13 @@ contains
 
   !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* /= E of B_E B_E*^T R_E*, and change the velocities by
   !> what the loads have changed. With under-relaxation, only a share of the change is taken over. Collective.
-  subroutine take_neighbour_loads(problem, relaxation, load)
+  subroutine take_neighbour_loads(problem, relaxation, load, work)
     type(contact_problem_t), intent(inout) :: problem
     type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), intent(inout) :: load(:)
-    real(dp) :: change(problem%kernels%nv), parts(2, size(load)), sums(2)
+    !> counts how often the factor is lowered
+    type(work_t), intent(inout) :: work
+    real(dp) :: change(problem%kernels%nv), parts(2, size(load)), sums(2), factor
     integer :: s, k, b, nd, nw
 
     nd = problem%kernels%nd
@@ -192,7 +195,10 @@ contains
     end do
     if (relaxation%automatic) then
       call problem%comm%sum_parts(parts, sums)
+      factor = relaxation%factor
       call relaxation%adapt(sums(1), sums(2))
+      if (relaxation%factor < factor) work%relaxed = work%relaxed + 1
+      work%least_factor = min(work%least_factor, relaxation%factor)
     end if
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), sub => problem%sub(s), load => load(s))

@@ -34,6 +34,7 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
+    self%adapts = self%relaxation%automatic
     call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
     call self%matrix%set_share(1.0_dp)
@@ -71,7 +72,7 @@ contains
     call stop_timer(phase_interface_solve)
     call problem%comm%agree(error)
     call start_timer(phase_exchange)
-    call take_neighbour_loads(problem, self%relaxation, self%load)
+    call take_neighbour_loads(problem, self%relaxation, self%load, self%work)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
     if (.not. is_enriched(self)) return

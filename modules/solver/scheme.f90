@@ -30,6 +30,11 @@ module gravier_scheme
     integer(i8) :: analyses = 0, factorisations = 0
     !> times that the safeguard of an enriched method has lowered its search direction
     integer(i8) :: lowered = 0
+    !> times that the memory of momentum was shortened, and that momentum gave way to plain iterations
+    integer(i8) :: shortened = 0, put_off = 0
+    !> times that the automatic relaxation factor of a Schwarz method was lowered, and how far at most
+    integer(i8) :: relaxed = 0
+    real(dp) :: least_factor = 1.0_dp
   end type work_t
 
   !> What extrapolation keeps of the last iteration, for one subdomain.
@@ -49,6 +54,8 @@ module gravier_scheme
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
     logical :: resting = .false.
+    !> times that the memory was shortened in this solve
+    integer :: shortened = 0
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
@@ -64,6 +71,8 @@ module gravier_scheme
     logical :: guarded = .false.
     !> what the log says of the search direction, empty without one
     character(len=:), allocatable :: direction_text
+    !> the method lowers a factor of its own where changes grow
+    logical :: adapts = .false.
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
     type(momentum_t) :: momentum
@@ -78,6 +87,7 @@ module gravier_scheme
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
     procedure :: conclude => scheme_conclude
+    procedure :: mends_growth => scheme_mends_growth
     procedure :: free => scheme_free
     procedure :: work_done => scheme_work_done
     procedure :: measure_balance => scheme_measure_balance
@@ -119,6 +129,13 @@ contains
     self%check_next = .false.
     call problem%evaluate()
   end subroutine scheme_conclude
+
+  !> Whether something in the method works against growth: a safeguard, momentum that gives way, a factor that is lowered, or
+  !> impulses kept from before.
+  pure logical function scheme_mends_growth(self) result(mends)
+    class(scheme_t), intent(in) :: self
+    mends = self%guarded .or. self%adapts .or. self%keeps_best .or. self%momentum%on
+  end function scheme_mends_growth
 
   !> Give back what the method holds; methods that hold something override it.
   subroutine scheme_free(self)
@@ -347,13 +364,18 @@ contains
     class(scheme_t), intent(inout) :: scheme
     type(contact_problem_t), intent(inout) :: problem
     real(dp) :: sums(2)
+    integer :: shortened, plain
 
     scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
     scheme%work%iterations = scheme%work%iterations + 1
     call stop_timer(phase_sweep)
     if (.not. scheme%momentum%on) return
     call problem%sum_progress(sums)
+    shortened = scheme%momentum%shortened
+    plain = scheme%momentum%plain
     call scheme%momentum%steer(sums(1))
+    scheme%work%shortened = scheme%work%shortened + scheme%momentum%shortened - shortened
+    if (scheme%momentum%plain > plain) scheme%work%put_off = scheme%work%put_off + 1
   end subroutine end_sweeps
 
   !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
@@ -363,7 +385,10 @@ contains
     real(dp), intent(in) :: change
     real(dp) :: t
 
-    if (change > growth_allowed*self%change) self%t = max(1.0_dp, memory_kept*self%t)
+    if (change > growth_allowed*self%change) then
+      self%t = max(1.0_dp, memory_kept*self%t)
+      self%shortened = self%shortened + 1
+    end if
     self%change = change
     self%window_change = self%window_change + change
     self%iterations = self%iterations + 1

@@ -16,6 +16,9 @@ module gravier_solve
 
   !> growth of the defect, relative to that at the start or to the largest |R^d| of a body, taken for divergence
   real(dp), parameter :: growth_limit = 1.0e4_dp
+  !> the same for methods that cannot mend it themselves, whose defect has stayed above the reference for so many iterations
+  real(dp), parameter :: unmended_limit = 4.0_dp
+  integer, parameter :: unmended_iterations = 10
   !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
@@ -91,7 +94,7 @@ contains
     !> criterion 'error'
     class(exact_solution_t), intent(in), optional :: exact
     real(dp) :: reference, progress, ratio, began, checking, ignored
-    integer :: skips
+    integer :: skips, exceeded_at
     logical :: measure, done
 
     began = clock()
@@ -101,6 +104,7 @@ contains
     progress = 0.0_dp
     ratio = 0.0_dp
     skips = 0
+    exceeded_at = -1
     call start_timer(phase_setup)
     call scheme%start(problem, error)
     call stop_timer(phase_setup)
@@ -150,7 +154,7 @@ contains
           enough = 1.0_dp
         end if
         if (expected > 0.0_dp) is_worth = expected <= enough*control%tolerance .or. &
-          & (regular .and. (skips >= most_skips .or. sqrt(sums(1)) > growth_limit*reference))
+          & (regular .and. (skips >= most_skips .or. sqrt(sums(1)) > watched_growth()*reference))
       end if
       if (is_worth) then
         skips = 0
@@ -159,6 +163,26 @@ contains
         call report%descent%note(report%iterations, expected, control%tolerance)
       end if
     end function is_worth_a_check
+
+    !> Growth of the changes that is worth a check: methods that lower what makes them grow are left to do so.
+    real(dp) function watched_growth() result(growth)
+      growth = merge(growth_limit, 1.0_dp, scheme%mends_growth())
+    end function watched_growth
+
+    !> Whether the defect has been above the reference for 10 iterations and is 4 times it, where the method has no means
+    !> against it.
+    logical function grows(defect)
+      real(dp), intent(in) :: defect
+
+      grows = .false.
+      if (scheme%mends_growth() .or. .not. defect > reference) then
+        exceeded_at = -1
+      else if (exceeded_at < 0) then
+        exceeded_at = report%iterations
+      else
+        grows = report%iterations >= exceeded_at + unmended_iterations .and. defect > unmended_limit*reference
+      end if
+    end function grows
 
     subroutine check(finished)
       logical, intent(out) :: finished
@@ -217,6 +241,8 @@ contains
       if (report%figure <= control%tolerance .and. .not. report%closing > 0.0_dp) then
         report%status = solve_converged
       else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
+        report%status = solve_diverged
+      else if (grows(defect)) then
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted

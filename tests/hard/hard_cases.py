@@ -12,12 +12,14 @@ import numpy as np
 
 from gravier_runs import merged, run_case, write
 from scene_laws import Figures, Scene, check_numbers, check_states
-from small_scenes import G, Grain, Record, bodies_csv, plane
+from small_scenes import G, Grain, Record, bodies_csv, floats, plane
 
 STEP = 1.0 / 512
 #: of a solve; a tenth of it, and 100 steps at most, for the enriched methods, whose iterations cost a hundred times as much
-#: here. That is not enough everywhere: they may always end with exit status 3, and so may Schwarz, which oscillates on some scenes
+#: here, a fifth of it and 100 steps for `newton`. That is not enough everywhere: the enriched ones may always end with exit
+#: status 3, and so may Schwarz, which oscillates on some scenes
 ITERATIONS = 1000
+DEAR = {"nscdd_ep": ITERATIONS // 10, "schwarz_ec": ITERATIONS // 10, "newton": ITERATIONS // 5}
 TOLERANCE = 1e-8
 
 #: title: input groups; a method that is 'nlgs' has one domain
@@ -35,6 +37,11 @@ METHODS = {
     "schwarz_ec": {"solver": {"method": "schwarz_ec"}},
     "newton": {"solver": {"method": "newton"}},
 }
+
+
+#: methods that serve moments and sleeping contacts, and words of the others' refusals
+PLAIN = ("nlgs", "nscdd", "schwarz")
+MOMENTS, SLEEPING = "with rolling or pivoting friction", "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"
 
 
 def is_enriched(method):
@@ -74,6 +81,8 @@ class Case:
     may_fail: tuple = ()
     #: exit statuses and words of a run that is refused or stopped
     ends: tuple = ()
+    #: words by which methods other than those of PLAIN refuse the case
+    refuses: str = ""
     #: velocities are unique, and those of two methods agree to this part of the largest speed (falls of a step included)
     agree: float = 0.0
     #: the last state for which this holds; None for all
@@ -88,15 +97,15 @@ class Case:
 
     def input_groups(self, method, long=False):
         several = method["solver"]["method"] != "nlgs"
-        enriched = is_enriched(method["solver"]["method"])
+        word = method["solver"]["method"]
         steps = self.long if long and self.long else self.steps
-        steps = min(steps, 100) if enriched else steps
+        steps = min(steps, 100) if word in DEAR else steps
         return merged({
             "scene": {"dimension": self.dimension, "bodies": "file", "bodies_file": "bodies.csv",
                       "gravity": [0.0, -G, 0.0] if self.dimension == 2 else [0.0, 0.0, -G]},
             "boundary": [dict(keys) for keys in self.boundaries],
             "time": {"step": STEP, "steps": steps},
-            "solver": {"tolerance": TOLERANCE, "max_iterations": ITERATIONS // 10 if enriched else ITERATIONS},
+            "solver": {"tolerance": TOLERANCE, "max_iterations": DEAR.get(word, ITERATIONS)},
             "decomposition": {"subdomains": self.subdomains if several else 1},
             "output": {"directory": "results", "energy": True, "every": steps // 2 if self.halves else 1},
         }, method, self.groups, {} if several else {"decomposition": {"subdomains": 1, "grid": None}})
@@ -126,8 +135,11 @@ class Played:
         """All that is wrong with the run; empty if nothing is."""
         case, run = self.case, self.run
         said = run.stdout + run.stderr
-        if case.ends:
-            status, words = case.ends
+        ends = case.ends
+        if case.refuses and self.groups["solver"]["method"] not in PLAIN:
+            ends = (2,), case.refuses
+        if ends:
+            status, words = ends
             wrong = [] if run.status in status and words in said else [f"ended with status {run.status}, without '{words}'"]
             return wrong + (check_numbers(run) if self.wrote else [])
         if run.status not in (0, 3) or not self.wrote:
@@ -286,6 +298,14 @@ def keeps_energy(part):
     return holds
 
 
+def gains_nothing(part):
+    """Kinetic energy never exceeds that of the start by more than a part of it."""
+    def holds(played):
+        most = played.figures.history["kinetic_energy"].max() / played.figures.start_kinetic - 1.0
+        return [] if most <= part else [f"kinetic energy grew by {most:.1e}, allowed are {part:.1e}"]
+    return holds
+
+
 def bounded_energy(most):
     """Kinetic energy never exceeds `most` [J]."""
     def holds(played):
@@ -413,6 +433,65 @@ def laws():
              {"scene": {"restitution": 0.3}, "time": {"step": 1.0 / 128}}, steps=150, holds=comes_to_rest),
         Case("bouncing heap", "e = 1 without friction: shocks of many contacts at once", heap(), heap_box(),
              {"scene": {"restitution": 1.0}}, steps=100),
+    ]
+
+
+def resistances():
+    """Rolling and pivoting resistance, tangential restitution, attractions, sleep."""
+    free = {"scene": {"gravity": [0.0, 0.0, 0.0]}}
+    tan = 0.2 * (1.0 - 1e-6)
+    slope = G * np.array([tan, -1.0]) / np.hypot(tan, 1.0)
+    incline = {"scene": {"gravity": floats([*slope, 0.0]), "friction": 0.5, "rolling_friction": 0.2}}
+    spinning = [Grain([0.1 * k, 0.0], [1.0 if k == 0 else 0.0, 0.0], spin=20.0 * (-1) ** k) for k in range(6)]
+    chain = [Grain([0.0, -0.1 * k], group=int(k == 0)) for k in range(11)]
+    held = [{"shape": "grains", "group": 1}]
+    weight = 10 * 0.7 * G
+
+    def bonds(strength):
+        return {"material": [{"name": "rock"}],
+                "law": [{"materials": "rock", "kind": "bonded", "friction": 0.3, "bond_strength": float(strength),
+                         "bond_friction": 1.0, "bond_distance": 1e-3}]}
+
+    def sticky(force, **more):
+        return {"scene": {"wall_material": "wet"}, "material": [{"name": "wet"}],
+                "law": [{"materials": "wet", "kind": "adhesive", "friction": 0.3, "adhesion": float(force), "adhesion_range": 2e-3,
+                         **more}]}
+
+    asleep = {"scene": {"friction": 0.3}, "solver": {"tolerance": 1e-4, "max_iterations": 500, "sleeping": True, "sleep_after": 10}}
+    struck = square(4) + [Grain([0.21, 0.62], [0.3, -3.0])]
+    return [
+        Case("on the edge of rolling", "disks on an incline a millionth less steep than their rolling friction",
+             [Grain([0.15 * k, 0.05], radius=0.05, mass=10.0 ** (k - 2)) for k in range(5)], [floor()], incline,
+             holds=at_rest(1e-5), refuses=MOMENTS),
+        Case("rolling friction 10", "twelve disks that cannot roll are thrown into a box", heap(), heap_box(),
+             {"scene": {"friction": 0.5, "rolling_friction": 10.0}}, may_fail=("nscdd",), holds=overlaps_below(0.02, 0.5),
+             refuses=MOMENTS),
+        Case("rolling friction without friction", "moments alone turn the disks", heap(), heap_box(),
+             {"scene": {"rolling_friction": 0.3}}, holds=overlaps_below(0.02, 0.5), refuses=MOMENTS),
+        Case("rolling and pivoting friction 1e6, spheres", "eight spheres that only slide are thrown into a box",
+             heap(dimension=3, count=8), heap_box(3), {"scene": {"friction": 0.3, "rolling_friction": 1e6, "pivoting_friction": 1e6}},
+             dimension=3, holds=overlaps_below(0.02, 0.5), refuses=MOMENTS),
+        Case("superballs", "e = e_t = 1 in a row of disks that spin: no shock may give energy", spinning, [],
+             merged(free, {"scene": {"friction": 1e6, "restitution": 1.0, "tangential_restitution": 1.0}}), steps=50,
+             holds=gains_nothing(1e-7)),
+        Case("heap of superballs", "e = e_t = 1 between walls, shocks of many contacts at once", heap(), heap_box(),
+             merged(free, {"scene": {"friction": 10.0, "restitution": 1.0, "tangential_restitution": 1.0}}), steps=50,
+             holds=gains_nothing(1e-5)),
+        Case("hanging chain", "ten disks hang in bonds a tenth stronger than their weight", chain, held,
+             bonds(1.1 * weight), may_fail=("nscdd",), holds=at_rest(1e-4)),
+        Case("hanging chain, strong bonds", "the same in bonds 10^3 times as strong: tensions are what is left of large numbers",
+             chain, held, bonds(1e3 * weight), may_fail=ALL, holds=at_rest(1e-2)),
+        Case("hanging chain, bonds beyond the tolerance", "the same in bonds 10^9 times as strong: a residual of 1e-8 is ten times the "
+             "weight", chain, held, bonds(1e9 * weight), steps=1, may_fail=ALL, holds=at_rest(1e-2), known="not at rest"),
+        Case("sticky heap", "twelve disks that attract each other with 100 times their weight are thrown into a box", heap(),
+             heap_box(), sticky(100 * 0.7 * G), holds=overlaps_below(0.02, 0.5)),
+        Case("sticky heap that rolls badly", "the same with rolling friction 0.3 of the law", heap(), heap_box(),
+             sticky(100 * 0.7 * G, rolling_friction=0.3), may_fail=("nscdd",), holds=overlaps_below(0.02, 0.5),
+             refuses=MOMENTS),
+        Case("sleeping lattice", "disks fall asleep under a tolerance of 1e-4", square(4), box(8 * 0.05), asleep, steps=60,
+             holds=together(at_rest(1e-2), overlaps_below(1e-3)), refuses=SLEEPING),
+        Case("sleepers that are struck", "a disk falls among disks at rest", struck, box(8 * 0.05), asleep, steps=100, may_fail=ALL,
+             holds=overlaps_below(0.02), refuses=SLEEPING),
     ]
 
 
@@ -566,5 +645,5 @@ def comes_to_rest(played):
 
 def cases():
     """All cases, by name."""
-    found = towers() + packings() + laws() + places() + units() + next_to_nothing() + extremes() + enrichments()
+    found = towers() + packings() + laws() + resistances() + places() + units() + next_to_nothing() + extremes() + enrichments()
     return {case.name: case for case in found}

@@ -1,13 +1,14 @@
 """Small nasty scenes made at random, each from its number alone."""
 import numpy as np
 
-from hard_cases import METHODS, Case
+from gravier_runs import merged
+from hard_cases import METHODS, MOMENTS, Case
 from small_scenes import G, Grain, plane
 
 
 def scene(number):
     """A Case of a few grains whose masses span up to 6 decades and radii up to 2, which overlap, turn and fly, with any friction
-    and restitution, step, walls and subdomains."""
+    and restitution, step, walls and subdomains; with rolling friction, tangential restitution as the normal one, or adhesion."""
     rng = np.random.default_rng(number)
     dimension = int(rng.choice([2, 3]))
     count = int(rng.integers(2, 16))
@@ -42,10 +43,35 @@ def scene(number):
     groups = {"scene": {"gravity": [float(g) for g in gravity], "friction": friction, "restitution": restitution},
               "time": {"step": step}, "decomposition": {"kind": str(rng.choice(["dual", "primal"]))},
               "solver": {"max_iterations": 500, "check_every": int(rng.choice([1, 10]))}}
+    more = effects(rng, dimension, masses, radii, friction, restitution)
+    if "law" in more:
+        friction = max(more["law"][0]["friction"], friction)
+    groups = merged(groups, more)
     return Case(f"random scene {number}", "made at random", grains, boundaries, groups, steps=6, dimension=dimension,
+                refuses=MOMENTS if any("rolling_friction" in keys for keys in (more.get("scene", {}), *more.get("law", []))) else "",
                 subdomains=int(min(cells, rng.integers(1, 7))), may_fail=("all",),
                 # without friction the velocities of a step are unique; what follows may part
                 agree=1e-4 if friction == 0.0 else 0.0, agree_until=1)
+
+
+def effects(rng, dimension, masses, radii, friction, restitution):
+    """Groups of what a scene has beyond friction and restitution: in half of the scenes nothing."""
+    kind = rng.choice(["none", "none", "none", "rolling", "tangential", "adhesion"])
+    rolling = {"rolling_friction": float(rng.choice([0.01, 0.3, 10.0]))}
+    if dimension == 3:
+        rolling["pivoting_friction"] = float(rng.choice([0.0, 0.1, 10.0]))
+    if kind == "rolling":
+        return {"scene": rolling}
+    if kind == "tangential":
+        return {"scene": {"tangential_restitution": restitution}}
+    if kind == "adhesion":
+        law = {"materials": "sticky", "kind": "adhesive", "friction": friction,
+               "adhesion": float(np.median(masses) * G * rng.choice([0.1, 10.0, 1e4])),
+               "adhesion_range": float(radii.min() * rng.choice([1e-3, 0.2]))}
+        law.update(rolling if rng.random() < 0.3 else {})
+        # restitution of pairs without the law stays
+        return {"material": [{"name": "sticky"}], "law": [law], **({"scene": {"wall_material": "sticky"}} if rng.random() < 0.5 else {})}
+    return {}
 
 
 def methods(number, count=2):

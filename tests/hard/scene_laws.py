@@ -1,7 +1,8 @@
 """What every run must obey, whatever its method: checked from what it wrote, with formulas of its own.
 
-From two states that follow each other: finite numbers, Coulomb's cone, action and reaction (the velocities written are those of the
-impulses written), the laws of contact to the residual that the run reports, and no energy from nowhere."""
+From two states that follow each other: finite numbers, the cones of friction and of moments, action and reaction (the velocities
+written are those of the impulses written), the laws of contact to the residual that the run reports, and no energy from nowhere. Laws
+are those of &scene and, of pairs of materials, one adhesive law, or a bonded one whose bonds hold."""
 import array
 
 import numpy as np
@@ -13,28 +14,47 @@ from small_scenes import EPS, INERTIA
 ROUNDING = 1e3 * EPS
 #: momenta whose squares are below the smallest numbers: residuals are 0 then, and contacts as they come [kg m/s]
 SMALLEST = 1e-140
+COEFFICIENTS = ["friction", "restitution", "tangential_restitution", "rolling_friction", "pivoting_friction"]
 
 
 class Scene:
-    """Masses and loads of a scene of small_scenes.Grain, as the checks need them."""
+    """Masses and loads of a scene of small_scenes.Grain, as the checks need them. All grains are of one material."""
 
     def __init__(self, grains, groups, boundaries):
         self.grains = grains
         self.dimension = len(grains[0].place) if grains else groups["scene"]["dimension"]
         scene = groups["scene"]
-        self.friction, self.restitution = scene.get("friction", 0.0), scene.get("restitution", 0.0)
-        self.wall_friction = scene.get("wall_friction", self.friction)
-        self.wall_restitution = scene.get("wall_restitution", self.restitution)
+        #: coefficients of each kind between grains, at walls and glued grains, and of the law of the material
+        self.law = groups["law"][0] if "law" in groups else None
+        law = self.law or {}
+        self.coefficients = {name: (scene.get(name, 0.0), scene.get(f"wall_{name}", scene.get(name, 0.0)), law.get(name, 0.0))
+                             for name in COEFFICIENTS}
+        if "bond_friction" in law:
+            self.coefficients["friction"] = (*self.coefficients["friction"][:2], law["bond_friction"])
+        #: it counts at boundaries where these have the material too, at glued grains in any case
+        self.law_at_walls = "wall_material" in scene
         self.gravity = np.array(scene["gravity"][:self.dimension], float)
         self.step = groups["time"]["step"]
         self.tolerance = groups["solver"]["tolerance"]
-        self.turns = self.with_friction(boundaries) and scene.get("rotation", True)
+        #: momentum over the root mean square of impulses below which a grain may be made to stand still
+        self.sleep_speed = groups["solver"].get("sleep_speed", 100.0 * self.tolerance) if groups["solver"].get("sleeping") else 0.0
+        rotation = scene.get("rotation", True)
+        self.rolls = rotation and any(max(self.coefficients[name]) > 0.0 for name in ("rolling_friction", "pivoting_friction"))
+        self.turns = (self.with_friction(boundaries) or self.rolls) and rotation
         #: no boundary does work; some boundary is moved by forces, and takes part in its contacts with a mass
         self.still = not any(np.any(b.get(key, False)) for b in boundaries for key in ("velocity", "rotation"))
         self.pressed = any(np.any(b.get("free", False)) for b in boundaries)
 
     def with_friction(self, boundaries):
-        return max([self.friction, self.wall_friction] + [b.get("friction", 0.0) for b in boundaries]) > 0.0
+        return max([*self.coefficients["friction"]] + [b.get("friction", 0.0) for b in boundaries]) > 0.0
+
+    def attraction(self, by_law, gap):
+        """Of contacts, under the law or not, with these gaps [N]."""
+        if self.law is None:
+            return np.zeros(len(gap))
+        force, reach = ((self.law["bond_strength"], np.inf) if self.law["kind"] == "bonded" else
+                        (self.law["adhesion"], self.law["adhesion_range"]))
+        return np.where((gap <= reach) & by_law, force, 0.0)
 
 
 def tangents(normal):
@@ -76,11 +96,28 @@ class Contacts:
             impulse = table("impulse")
             self.impulse[:, :impulse.shape[1]] = impulse
         wall = ~(free[self.side[0]] & free[self.side[1]])
-        self.mu = np.where(wall, scene.wall_friction, scene.friction)
-        self.e = np.where(wall, scene.wall_restitution, scene.restitution)
+        by_law = np.full(self.n, scene.law is not None)
+        if not scene.law_at_walls:
+            by_law &= np.maximum(*self.side) < len(grains)
+        self.mu, self.e, self.e_t, self.rolling, self.pivoting = (
+            np.choose(np.where(by_law, 2, wall.astype(int)), scene.coefficients[name]).astype(float) for name in COEFFICIENTS)
+        self.e_t[self.mu == 0.0] = 0.0
+        #: impulse of the attraction, and the normal impulse without it, which is what laws are about
+        self.pull = scene.step * scene.attraction(by_law, self.gap)
+        self.pressing = self.impulse[:, 0] + self.pull
+        self.bonded = by_law & (scene.law is not None and scene.law["kind"] == "bonded")
         one, two = self.side
         self.w_n = self.inverse[one] + self.inverse[two]
         self.w_t = self.w_n + self.radius[one] ** 2 * self.inverse_inertia[one] + self.radius[two] ** 2 * self.inverse_inertia[two]
+        lever = np.where(free, self.radius, 0.0)
+        #: radius R* of moments, and moments over it about the normal and the tangents (of disks about z), (c, 2 d - 3)
+        self.reach = np.where(np.minimum(lever[one], lever[two]) > 0.0, lever[one] * lever[two] / np.maximum(
+            lever[one] + lever[two], 1e-300), np.maximum(lever[one], lever[two]))
+        self.moment = np.zeros((self.n, (2 * d - 3) * scene.rolls))
+        if scene.rolls and self.n > 0:
+            self.moment = table("moment").reshape(self.n, 2 * d - 3) / np.maximum(self.reach, 1e-300)[:, None]
+        self.w_r = self.reach ** 2 * (self.inverse_inertia[one] + self.inverse_inertia[two])
+        self.d = d
 
     def velocities(self, results, step):
         """Of all bodies (grains, walls): (n, nv)."""
@@ -90,8 +127,15 @@ class Contacts:
         walls = results.get(f"/steps/{step}/boundaries/velocity", np.zeros((len(self.walls), rows.shape[1])))
         return np.vstack([rows, walls])
 
+    def axes(self):
+        """Axes of the moments (c, 2 d - 3, 2 d - 3): normal, then tangents; of disks z."""
+        if self.d == 2:
+            return np.ones((self.n, 1, 1))
+        return np.concatenate([self.normal[:, None], self.tangent], 1)
+
     def relative(self, velocity):
-        """(c, d): normal, then tangential, of the candidate against the antagonist."""
+        """(c, d), with moments (c, 3 d - 3): normal, tangential, then of the spins times R*, of the candidate against the
+        antagonist."""
         one, two = self.side
         d = self.normal.shape[1]
         apart = velocity[one, :d] - velocity[two, :d]
@@ -102,7 +146,14 @@ class Contacts:
         else:
             found.append((self.tangent[:, 0] * apart).sum(1) - (self.tangent[:, 1] * turn).sum(1))
             found.append((self.tangent[:, 1] * apart).sum(1) + (self.tangent[:, 0] * turn).sum(1))
+        if self.moment.shape[1] > 0:
+            spin = (velocity[one, d:] - velocity[two, d:]) * self.reach[:, None]
+            found += list(np.einsum("cmk,ck->mc", self.axes(), spin))
         return np.stack(found, -1)
+
+    def all_impulses(self):
+        """(c, d), with moments over R* (c, 3 d - 3), the normal ones without attraction: what laws are about."""
+        return np.hstack([self.pressing[:, None], self.impulse[:, 1:], self.moment])
 
     def pushed(self):
         """What the impulses add to the velocities of the bodies, and the sizes that were added up, both (n, nv)."""
@@ -112,30 +163,65 @@ class Contacts:
         moment = -self.impulse[:, 1:]
         if d == 3:
             moment = -(self.impulse[:, 1:2] * self.tangent[:, 1] - self.impulse[:, 2:3] * self.tangent[:, 0])
+        roll = np.zeros_like(moment)
+        if self.moment.shape[1] > 0:
+            roll = np.einsum("cm,cmk->ck", self.moment, self.axes()) * self.reach[:, None]
         change, size = np.zeros((len(self.mass), nv)), np.zeros((len(self.mass), nv))
         for sign, side in ((1.0, self.side[0]), (-1.0, self.side[1])):
-            parts = np.hstack([sign * force * self.inverse[side, None],
-                               moment * (self.radius[side] * self.inverse_inertia[side])[:, None]])
+            turn = moment * self.radius[side, None]
+            parts = np.hstack([sign * force * self.inverse[side, None], (turn + sign * roll) * self.inverse_inertia[side, None]])
             np.add.at(change, side, parts)
-            np.add.at(size, side, np.abs(parts))
+            # the force without its attraction and the attraction are two terms
+            terms = np.abs(force) + np.abs(self.pull[:, None] * self.normal)
+            np.add.at(size, side, np.hstack([terms * self.inverse[side, None],
+                                             (np.abs(turn) + np.abs(roll)) * self.inverse_inertia[side, None]]))
         return change, size
 
+    def pulled(self, velocity):
+        """Velocities with the attractions as loads (n, nv)."""
+        found, d = velocity.copy(), self.normal.shape[1]
+        for sign, side in ((-1.0, self.side[0]), (1.0, self.side[1])):
+            np.add.at(found[:, :d], side, sign * self.pull[:, None] * self.normal * self.inverse[side, None])
+        return found
+
     def defect(self, relative, before, loaded, step):
-        """How far each impulse is from its own local solve under all others (c, d), and the shifted velocities."""
-        shift = np.maximum(self.gap, 0.0) / step
+        """How far each impulse is from its own local solve under all others, and the shifted velocities, (c, d) or, with moments,
+        (c, 3 d - 3)."""
+        shift = np.where(self.bonded, 0.0, np.maximum(self.gap, 0.0) / step)
         bounces = self.e > 0.0
         held = (before[:, 0] > 0.0) & (loaded[:, 0] < 0.0)
+        # rounding decides where the loads of the step are all that was needed to close a contact
+        tie = np.abs(loaded[:, 0]) <= ROUNDING * before[:, 0]
+        held = np.where(tie, np.abs(relative[:, 0]) < np.abs(relative[:, 0] + self.e * before[:, 0]), held)
         shift[bounces] = (self.e * np.where(held, 0.0, before[:, 0]))[bounces]
         shifted = relative.copy()
         shifted[:, 0] += shift
-        wanted = np.zeros_like(self.impulse)
-        wanted[:, 0] = np.maximum(0.0, self.impulse[:, 0] - shifted[:, 0] / self.w_n)
-        trial = self.impulse[:, 1:] - relative[:, 1:] / self.w_t[:, None]
-        size = np.linalg.norm(trial, axis=1)
-        limit = self.mu * wanted[:, 0]
-        wanted[:, 1:] = trial * np.where(size > limit, limit / np.maximum(size, 1e-300), 1.0)[:, None]
-        wanted[self.mu == 0.0, 1:] = 0.0
-        return self.impulse - wanted, shifted
+        d = self.d
+        shifted[:, 1:d] += self.e_t[:, None] * before[:, 1:d]
+        impulse = self.all_impulses()
+        wanted = np.zeros_like(impulse)
+        wanted[:, 0] = np.maximum(0.0, impulse[:, 0] - shifted[:, 0] / self.w_n)
+        limits = [(slice(1, d), self.mu, self.w_t)]
+        if self.moment.shape[1] > 0:
+            limits += [(slice(d, None), self.rolling, self.w_r)] if d == 2 else [
+                (slice(d, d + 1), self.pivoting, self.w_r), (slice(d + 1, None), self.rolling, self.w_r)]
+        for part, coefficient, w in limits:
+            trial = impulse[:, part] - shifted[:, part] / np.maximum(w, 1e-300)[:, None]
+            size = np.linalg.norm(trial, axis=1)
+            limit = coefficient * wanted[:, 0]
+            wanted[:, part] = trial * np.where(size > limit, limit / np.maximum(size, 1e-300), 1.0)[:, None]
+            wanted[coefficient == 0.0, part] = 0.0
+        return impulse - wanted, shifted
+
+    def outside_cones(self):
+        """Whether some impulse is outside the cone of its law, beyond rounding."""
+        slack = ROUNDING * (np.abs(self.impulse[:, 0]) + self.pull)
+        discs = [(self.mu, self.impulse[:, 1:])]
+        if self.moment.shape[1] > 0:
+            discs += [(self.rolling, self.moment)] if self.d == 2 else [
+                (self.pivoting, self.moment[:, :1]), (self.rolling, self.moment[:, 1:])]
+        return np.any(self.pressing < np.where(self.pull > 0.0, -slack, 0.0)) or any(np.any(
+            np.linalg.norm(part, axis=1) > coefficient * (self.pressing + slack)) for coefficient, part in discs)
 
 
 def kinetic(contacts, scene, velocity):
@@ -169,9 +255,8 @@ def check_states(run, scene, history):
     steps = steps_of(results)
     for last, step in zip(steps, steps[1:]):
         contacts = Contacts(scene, results, step)
-        if np.any(contacts.impulse[:, 0] < 0.0) or np.any(
-                np.linalg.norm(contacts.impulse[:, 1:], axis=1) > contacts.mu * contacts.impulse[:, 0] * (1.0 + ROUNDING)):
-            wrong.append(f"step {step}: an impulse is outside Coulomb's cone")
+        if contacts.outside_cones():
+            wrong.append(f"step {step}: an impulse is outside the cone of its law")
         if step != last + 1 or not np.array_equal(contacts.identifiers, results[f"/steps/{last}/bodies/id"]):
             continue
         found = check_step(contacts, scene, results, (last, step), history["residual"][rows[step]])
@@ -188,6 +273,15 @@ def check_step(contacts, scene, results, steps, residual):
         loaded = old.copy()
         loaded[contacts.free, :d] += scene.step * scene.gravity
         change, size = contacts.pushed()
+        if scene.sleep_speed > 0.0:
+            # grains that stand still: the laws are those of the velocities that they would have
+            standing = contacts.free & np.all(new == 0.0, axis=1)
+            new = np.where(standing[:, None], loaded + change, new)
+            momenta = np.where(contacts.free, contacts.mass, 0.0) * (
+                np.linalg.norm(new[:, :d], axis=1) + contacts.radius * np.linalg.norm(new[:, d:], axis=1))
+            usual = np.sqrt((contacts.all_impulses() ** 2).sum() / max(contacts.n, 1))
+            if np.any(momenta[standing] > (scene.sleep_speed + ROUNDING) * usual):
+                wrong.append("a grain stands still that moves by its impulses")
         off = np.abs(new - loaded - change)[contacts.free]
         size = (size + np.abs(loaded) + np.abs(old))[contacts.free]
         # each component to the size of the terms of the whole vector: normals and tangents are rounded
@@ -199,6 +293,7 @@ def check_step(contacts, scene, results, steps, residual):
         if contacts.n == 0 or scene.pressed:
             return wrong
         # the laws, to the residual that was reported
+        loaded = contacts.pulled(loaded)
         relative, before = contacts.relative(new), contacts.relative(old)
         under_loads = contacts.relative(loaded)
         defect, shifted = contacts.defect(relative, before, under_loads, scene.step)
@@ -206,25 +301,28 @@ def check_step(contacts, scene, results, steps, residual):
         if contacts.mass[contacts.free].min(initial=1.0) * speed < SMALLEST:
             return wrong
         mass = contacts.mass[contacts.free].max() if contacts.free.any() else 0.0
-        missed, size = np.linalg.norm(defect), np.linalg.norm(contacts.impulse)
+        missed, size = np.linalg.norm(defect), np.linalg.norm(contacts.all_impulses())
         rounding = ROUNDING * (mass * speed + size) * np.sqrt(contacts.n)
         if missed > 1.001 * residual * (size if size > 0.0 else mass * speed) + rounding:
             wrong.append(f"contacts miss their laws by {missed / size if size > 0.0 else missed:.1e}, reported was {residual:.1e}")
-        slack = 2.0 * (missed + rounding) * (contacts.w_t.max() * size + np.linalg.norm(shifted) + np.linalg.norm(relative))
+        slack = 2.0 * (missed + rounding) * (max(contacts.w_t.max(), contacts.w_r.max()) * size + np.linalg.norm(shifted) +
+                                             np.linalg.norm(relative))
         first, free, last = (kinetic(contacts, scene, velocity) for velocity in (old, loaded, new))
         slack += ROUNDING * max(first, free, last)
         if not scene.still:
             return wrong
-        if np.all(contacts.e == 0.0):
-            # inelastic contacts take energy from what moves freely
+        if np.all(contacts.e == 0.0) and np.all(contacts.e_t == 0.0):
+            # inelastic contacts take energy from what moves freely, under attractions too
             if last > free + slack:
                 wrong.append(f"energy from nowhere: {last:.6e} J after {free:.6e} J without contacts, allowed {slack:.1e} J")
-        elif np.all(contacts.mu == 0.0) and len(set(contacts.e)) == 1:
-            # without friction, and with one restitution, contacts do no work in the mean of the velocities before and after, but
-            # against the loads of the step: of 0 <= r W r = r (v - v_loaded) and v = -e v_before, or 0 where a contact is held
+        elif np.all((contacts.mu == 0.0) | (contacts.e_t == contacts.e)) and len(set(contacts.e)) == 1 and not scene.rolls:
+            # with one restitution for both directions, or without friction, contacts do no work in the mean of the velocities
+            # before and after, but against the loads of the step: of 0 <= r W r = r (v - v_loaded) and r (v + e v_before) <= 0,
+            # or e r_n v_n,before where a contact is held
             pushed = work_of(contacts, before - under_loads)
-            held = work_of(contacts, np.where((before > 0.0) & (under_loads < 0.0), before, 0.0))
-            slack += 0.5 * max(pushed, 0.0) + held
+            held = np.zeros_like(before)
+            held[:, 0] = np.where((before[:, 0] > 0.0) & (under_loads[:, 0] <= ROUNDING * before[:, 0]), before[:, 0], 0.0)
+            slack += 0.5 * max(pushed, 0.0) + work_of(contacts, held)
             work = 0.5 * work_of(contacts, relative + before)
             if work > slack:
                 wrong.append(f"energy from nowhere: contacts do a work of {work:.1e} J on {first:.6e} J, allowed {slack:.1e} J")
@@ -232,8 +330,8 @@ def check_step(contacts, scene, results, steps, residual):
 
 
 def work_of(contacts, relative):
-    """Work of the normal impulses at a relative velocity (c, d) [J]."""
-    return (contacts.impulse[:, 0] * relative[:, 0]).sum()
+    """Work of the impulses at a relative velocity, as `relative` gives it [J]."""
+    return (contacts.all_impulses() * relative).sum()
 
 
 def read_history(run):

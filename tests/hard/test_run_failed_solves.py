@@ -1,5 +1,6 @@
 """Solves that diverge or give up: noticed, said aloud, exit status 3, and nothing in the results that is not a result."""
 import os
+import re
 import unittest
 
 import numpy as np
@@ -65,6 +66,42 @@ class FailedSolves(RunTestCase):
                 # the start, and nothing of the step that diverged
                 self.assertEqual(steps_of(self.assert_clean(run)), [0])
                 self.assertEqual(len(run.history()["step"]), 0)
+
+    def test_divergence_is_noticed_soon(self):
+        """At most 20 iterations from the first check at which the residual is above that of the start to the stop, with checks at
+        each iteration and at each tenth."""
+        for every in (1, 10):
+            for title in ("schwarz", "schwarz, many sweeps"):
+                with self.subTest(title, check_every=every):
+                    case = merged(self.case, DIVERGING[title], {"solver": {"check_every": every}, "time": {"steps": 1}})
+                    run = run_case(case, 1, self.here(f"soon {title} {every}"))
+                    self.assert_loud(run, "DIVERGED")
+                    end = int(re.search(r"DIVERGED: step 1 after (\d+) iterations", run.stdout).group(1))
+                    # the way there, of which a step that diverged leaves nothing
+                    run = run_case(merged(case, {"solver": {"max_iterations": end - every}}), 1, self.here(f"way {title} {every}"))
+                    trace = run.trace()
+                    onset = trace["iteration"][trace["residual"] > trace["residual"][0]][0]
+                    self.assertLessEqual(end - onset, 20)
+
+    def test_recoveries_are_said(self):
+        """Where relaxation is lowered, or momentum put off, the log says so in the step, counts it and sums it up at the end."""
+        alone = {"time": {"steps": 1}}
+        run = run_case(merged(self.case, DIVERGING["schwarz"], alone, {"solver": {"relaxation": None, "max_iterations": 60}}), 2,
+                       self.here("relaxation"))
+        self.assertNotIn("DIVERGED", run.stdout)
+        self.assertRegex(run.stdout, r"warning +changes of the neighbours' loads alternate and grow: relaxation lowered [1-9]\d* times "
+                                     r"in step 1")
+        times, least = re.search(r"\nrelaxation +lowered (\d+) times, to (\S+) at least", run.stdout).groups()
+        self.assertAlmostEqual(float(least), max(0.8 ** int(times), 0.25), places=2)
+        self.assertIn(f"relaxation factors lowered {times}", run.stdout)
+        # a body of 10^6 times the mass on a light one
+        write(self.here("heavy.csv"), "id,x,y,radius,mass\n1,0,1,1,1\n2,0,3,1,1e6\n")
+        run = run_case(merged(self.case, alone, {
+            "scene": {"bodies_file": self.here("heavy.csv")}, "boundary": {"shape": "plane", "normal": [0.0, 1.0]},
+            "solver": {"method": "nlgs", "max_iterations": 1000}}), 1, self.here("momentum"))
+        self.assertRegex(run.stdout, r"warning +no progress with momentum: put off 2 times in step 1")
+        self.assertRegex(run.stdout, r"\nmomentum +memory shortened \d+ times, put off 2 times")
+        self.assertRegex(run.stdout, r"\nwarnings .*momentum put off 2")
 
     def test_divergence_after_good_steps(self):
         """A method that diverges only when the grains have met the ground: the steps before stay, whole and right."""
