@@ -330,6 +330,7 @@ contains
     if (.not. on_terminal .or. length == 0) return
     process = int(c_getpid())
     mine = output_of(process)
+    place = mine
     do level = 1, highest_ancestor
       process = parent_of(process)
       place = output_of(process)

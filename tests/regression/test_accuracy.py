@@ -27,7 +27,7 @@ COLUMN_CASE = {
 }
 DISKS = {
     "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [8, 8], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3,
-              "alert_distance": 0.003},
+              "alert_distance": 0.003, "seed": 2},  # of seed 1 one step of the reference ends in a cycle above 1e-6
     "time": {"step": 1e-3, "steps": 120},
     "solver": {"tolerance": 1e-4, "max_iterations": 20000},
 }

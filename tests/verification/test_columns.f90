@@ -158,17 +158,17 @@ contains
     type(row_t), parameter :: row = row_t("newton", 0.0_dp)
     type(simulation_t) :: simulation
     type(step_figures_t) :: figures
-    character(len=:), allocatable :: options
+    character(len=120) :: options
     integer :: problem, k, iterations
 
     do problem = 1, 2
       do k = 1, 3
         options = "sweeps = "//to_text(n_gs(k))//", criterion = 'error', check_every = 1, tolerance = 1e-6, "// &
           & "max_iterations = 10000 /"
-        call solve_column(problem + 2, problem + 1, 2, "method = 'newton', "//options, simulation, figures)
+        call solve_column(problem + 2, problem + 1, 2, "method = 'newton', "//trim(options), simulation, figures)
         iterations = figures%solve%iterations
         call simulation%free()
-        call solve_column(problem + 2, problem + 1, 2, "method = 'nscdd', "//options, simulation, figures, "momentum")
+        call solve_column(problem + 2, problem + 1, 2, "method = 'nscdd', "//trim(options), simulation, figures, "momentum")
         call check_equal(iterations, figures%solve%iterations, "newton, problem "//to_text(problem)//", n_GS = "// &
           & to_text(n_gs(k)))
         call simulation%free()
