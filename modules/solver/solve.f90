@@ -154,7 +154,7 @@ contains
           enough = 1.0_dp
         end if
         if (expected > 0.0_dp) is_worth = expected <= enough*control%tolerance .or. &
-          & (regular .and. (skips >= most_skips .or. sqrt(sums(1)) > watched_growth()*reference))
+          & (regular .and. (.not. ratio > 0.0_dp .or. skips >= most_skips .or. sqrt(sums(1)) > watched_growth()*reference))
       end if
       if (is_worth) then
         skips = 0
