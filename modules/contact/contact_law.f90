@@ -64,8 +64,10 @@ module gravier_contact_law
   type, abstract :: contact_law_t
     !> some pair may have an attraction; pairs have states
     logical :: attracts = .false., remembers = .false.
-    !> the largest coefficients of friction and of restitution that it hands over
-    real(dp) :: largest_friction = 0.0_dp, largest_restitution = 0.0_dp, largest_tangential_restitution = 0.0_dp
+    !> the largest coefficient of friction that it hands over
+    real(dp) :: largest_friction = 0.0_dp
+    !> coefficients of normal and tangential restitution of its pairs
+    real(dp) :: restitution = 0.0_dp, tangential_restitution = 0.0_dp
     !> coefficients of rolling and pivoting friction of its pairs
     real(dp) :: rolling = 0.0_dp, pivoting = 0.0_dp
     !> gap up to which bodies that have not been nearer act on each other [m]

@@ -70,8 +70,8 @@ contains
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
       self%largest_friction = max(self%largest_friction, law%largest_friction)
-      self%largest_restitution = max(self%largest_restitution, law%largest_restitution)
-      self%largest_tangential_restitution = max(self%largest_tangential_restitution, law%largest_tangential_restitution)
+      self%largest_restitution = max(self%largest_restitution, law%restitution)
+      self%largest_tangential_restitution = max(self%largest_tangential_restitution, law%tangential_restitution)
       self%largest_rolling = max(self%largest_rolling, law%rolling)
       self%largest_pivoting = max(self%largest_pivoting, law%pivoting)
       self%range = max(self%range, law%range)

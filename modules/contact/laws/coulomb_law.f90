@@ -7,7 +7,7 @@ module gravier_coulomb_law
   public :: coulomb_law_t
 
   type, extends(contact_law_t) :: coulomb_law_t
-    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp, tangential_restitution = 0.0_dp
+    real(dp) :: friction = 0.0_dp
   contains
     procedure, nopass :: kind => coulomb_kind
     procedure, nopass :: keys => coulomb_keys
@@ -40,8 +40,6 @@ contains
     self%restitution = values(2)
     self%tangential_restitution = values(3)
     self%largest_friction = self%friction
-    self%largest_restitution = self%restitution
-    self%largest_tangential_restitution = self%tangential_restitution
     call self%set_resistance(values(4), values(5))
   end subroutine coulomb_set
 

@@ -7,7 +7,6 @@ module gravier_frictionless_law
   public :: frictionless_law_t
 
   type, extends(contact_law_t) :: frictionless_law_t
-    real(dp) :: restitution = 0.0_dp
   contains
     procedure, nopass :: kind => frictionless_kind
     procedure, nopass :: keys => frictionless_keys
@@ -34,7 +33,6 @@ contains
     class(frictionless_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
     self%restitution = values(1)
-    self%largest_restitution = self%restitution
   end subroutine frictionless_set
 
   pure subroutine frictionless_evaluate(self, pair)

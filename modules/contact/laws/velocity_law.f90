@@ -11,7 +11,6 @@ module gravier_velocity_law
     real(dp) :: static_friction = 0.0_dp, dynamic_friction = 0.0_dp
     !> [m/s]
     real(dp) :: slip_scale = 1.0_dp
-    real(dp) :: restitution = 0.0_dp, tangential_restitution = 0.0_dp
   contains
     procedure, nopass :: kind => velocity_kind
     procedure, nopass :: keys => velocity_keys
@@ -49,8 +48,6 @@ contains
     self%restitution = values(4)
     self%tangential_restitution = values(5)
     self%largest_friction = max(self%static_friction, self%dynamic_friction)
-    self%largest_restitution = self%restitution
-    self%largest_tangential_restitution = self%tangential_restitution
     call self%set_resistance(values(6), values(7))
   end subroutine velocity_set
 
