@@ -12,7 +12,7 @@ module gravier_run_log
   use gravier_scheme, only: work_t
   use gravier_descent, only: effort_t, tenfold
   use gravier_solve, only: solve_converged, solve_diverged
-  use gravier_problem_builder, only: interface_figures_t, n_multiplicities
+  use gravier_interface, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory

@@ -22,7 +22,10 @@ module gravier_simulation
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
-  use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
+  use gravier_physics, only: physics_t
+  use gravier_interface, only: interface_figures_t
+  use gravier_problem_builder, only: build_problem
+  use gravier_velocity_return, only: take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
   use gravier_overlap_projection, only: project_overlaps
   use gravier_diagnostics, only: diagnostics_t

@@ -1,7 +1,7 @@
 !> Who owns which grain.
 module gravier_decomposition
   use gravier_kinds, only: dp, i8
-  use gravier_sorting, only: argsort
+  use gravier_sorting, only: argsort, find_sorted
   use gravier_periodic, only: period_t
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
@@ -33,6 +33,7 @@ module gravier_decomposition
     procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
     procedure :: subdomain_of => decomposition_subdomain_of
+    procedure :: find_home => decomposition_find_home
   end type decomposition_t
 
 contains
@@ -67,6 +68,17 @@ contains
     integer, intent(in) :: s
     subdomain = self%first + s - 1
   end function decomposition_subdomain_of
+
+  !> Subdomain of this rank and place in its home of a grain.
+  pure subroutine decomposition_find_home(self, key, h, place)
+    class(decomposition_t), intent(in) :: self
+    !> owner and identifier
+    integer(i8), intent(in) :: key(2)
+    integer, intent(out) :: h, place
+
+    h = int(key(1)) - self%first + 1
+    place = find_sorted(self%home(h)%id, key(2))
+  end subroutine decomposition_find_home
 
   !> Corners of the box that holds all grains, radii included [m], and along periodic axes just the period; an empty
   !> scene has the unit box. Collective.

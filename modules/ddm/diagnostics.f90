@@ -5,7 +5,7 @@ module gravier_diagnostics
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
-  use gravier_problem_builder, only: physics_t
+  use gravier_physics, only: physics_t
   use gravier_energy_balance, only: energy_balance_t
   use gravier_mean_stress, only: mean_stress_t
   use gravier_contact_structure, only: contact_structure_t

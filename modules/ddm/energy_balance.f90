@@ -9,7 +9,7 @@ module gravier_energy_balance
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
-  use gravier_problem_builder, only: physics_t
+  use gravier_physics, only: physics_t
   implicit none
   private
   public :: energy_balance_t, energy_words

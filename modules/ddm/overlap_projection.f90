@@ -8,7 +8,7 @@ module gravier_overlap_projection
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
-  use gravier_problem_builder, only: take_displacements
+  use gravier_velocity_return, only: take_displacements
   use gravier_boundary_loads, only: take_boundary_displacements
   implicit none
   private

@@ -13,14 +13,16 @@
 !> sleep wakes them; what moves then moves by the laws of all contacts, and nothing is stopped.
 module gravier_sleeping
   use gravier_kinds, only: dp
-  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_pair_laws, only: boundary_of
+  use gravier_narrow_phase, only: found_t
   implicit none
   private
-  public :: sleeping_rule_t, count_rest, wake_all
+  public :: sleeping_rule_t, count_rest, put_sleepers_last, wake_all
 
   !> change of the impulses on a body at rest over what momentum it may have; either over the impulses on it at most
   real(dp), parameter :: settled = 10.0_dp, share = 0.1_dp
@@ -67,6 +69,46 @@ contains
       end do
     end do
   end subroutine count_rest
+
+  !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
+  !> whole blocks. A contact with a boundary that moves as prescribed does not sleep.
+  subroutine put_sleepers_last(view, boundaries, after, found)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: after
+    type(found_t), intent(inout) :: found
+    type(found_t) :: old
+    logical, allocatable :: asleep(:)
+    integer :: c, b, n, round
+
+    allocate (asleep(found%n))
+    do c = 1, found%n
+      asleep(c) = view%list%impulse(size(view%list%impulse, 1), found%source(c)) >= after
+      b = boundary_of(view, found%source(c))
+      if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
+    end do
+    found%n_awake = min(found%n, lanes*n_blocks(count(.not. asleep)))
+    n = found%n_awake - count(.not. asleep)
+    do c = 1, found%n
+      if (n == 0) exit
+      if (.not. asleep(c)) cycle
+      asleep(c) = .false.
+      n = n - 1
+    end do
+    if (found%n_awake == found%n) return
+    old = found
+    n = 0
+    do round = 1, 2
+      do c = 1, found%n
+        if (asleep(c) .neqv. round == 2) cycle
+        n = n + 1
+        found%source(n) = old%source(c)
+        found%gap(n) = old%gap(c)
+        found%normal(:, n) = old%normal(:, c)
+        if (size(old%terms) > 0) found%terms(n) = old%terms(c)
+      end do
+    end do
+  end subroutine put_sleepers_last
 
   !> No contact is at rest any more.
   pure subroutine wake_all(neighbourhoods)

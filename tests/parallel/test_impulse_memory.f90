@@ -13,7 +13,10 @@ program test_impulse_memory
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
-  use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities
+  use gravier_physics, only: physics_t
+  use gravier_interface, only: interface_figures_t
+  use gravier_problem_builder, only: build_problem
+  use gravier_velocity_return, only: take_velocities
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t

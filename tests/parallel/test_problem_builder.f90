@@ -14,7 +14,10 @@ program test_problem_builder
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
-  use gravier_problem_builder, only: physics_t, interface_figures_t, build_problem, take_velocities, n_multiplicities
+  use gravier_physics, only: physics_t
+  use gravier_interface, only: interface_figures_t, n_multiplicities
+  use gravier_problem_builder, only: build_problem
+  use gravier_velocity_return, only: take_velocities
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw_number => draw, plane, make_decomposition
   use gravier_test_contact_columns, only: contact_column
   use gravier_check, only: check, check_close, check_equal, finish_checks

@@ -1,0 +1,150 @@
+!> The contacts of a subdomain: those of its near pairs that are within the alert distance, with gaps, normals and the terms of
+!> their laws.
+module gravier_narrow_phase
+  use gravier_kinds, only: dp
+  use gravier_periodic, only: period_t, shift_of_code
+  use gravier_boundary, only: boundary_t
+  use gravier_contact_law, only: contact_pair_t, contact_terms_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbourhood, only: neighbourhood_t
+  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
+  use gravier_physics, only: physics_t
+  implicit none
+  private
+  public :: found_t, find_contacts, scene_terms
+
+  !> Gaps and normals of the pairs of a list that are contacts.
+  type :: found_t
+    integer :: n = 0
+    !> those that do not sleep: the first ones, in whole blocks where others follow
+    integer :: n_awake = 0
+    !> place in the list (n)
+    integer, allocatable :: source(:)
+    !> (n) [m], (nd, n)
+    real(dp), allocatable :: gap(:), normal(:, :)
+    !> where a law is given (n)
+    type(contact_terms_t), allocatable :: terms(:)
+  end type found_t
+
+contains
+
+  !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
+  !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
+  subroutine find_contacts(view, decomposition, physics, found)
+    type(neighbourhood_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(found_t), intent(inout) :: found
+    integer :: p, i, j, nd
+    real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
+    type(contact_terms_t) :: terms
+
+    nd = decomposition%nd
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms)
+    allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
+    allocate (found%terms(merge(view%list%n, 0, physics%laws%n > 0)))
+    found%n = 0
+    alert = decomposition%rule%alert_distance
+    do p = 1, view%list%n
+      i = view%list%candidate(p)
+      j = view%list%antagonist(p)
+      if (j > 0) then
+        branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
+        if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
+        distance = norm2(branch)
+        gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
+        if (is_far()) cycle
+        if (distance > 0.0_dp) then
+          normal(:) = branch/distance
+        else
+          ! coincident centres have no normal: take the vertical, so that the law can part them
+          normal(:) = 0.0_dp
+          normal(nd) = 1.0_dp
+        end if
+      else
+        if (.not. decomposition%boundaries(-j)%present) cycle
+        call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
+        gap = distance - view%bodies%radius(i)
+        if (is_far()) cycle
+      end if
+      call find_terms()
+      if (is_far()) cycle
+      if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) cycle
+      found%n = found%n + 1
+      found%source(found%n) = p
+      found%gap(found%n) = gap
+      found%normal(:, found%n) = normal
+      if (size(found%terms) > 0) found%terms(found%n) = terms
+    end do
+    found%n_awake = found%n
+
+  contains
+
+    !> Whether the pair is no contact: beyond the alert distance, and with nothing to remember.
+    logical function is_far()
+      is_far = gap > alert
+      if (is_far .and. size(view%list%state) > 0) is_far = view%list%state(p) == 0
+    end function is_far
+
+    subroutine find_terms()
+      type(contact_pair_t) :: pair
+      integer :: l
+
+      l = law_of(view, decomposition%boundaries, physics%laws, p)
+      if (l == 0) then
+        terms = scene_terms(view, decomposition%boundaries, physics, p, gap)
+        return
+      end if
+      pair%first = physics%first
+      pair%gap = gap
+      if (size(view%list%state) > 0) pair%state = view%list%state(p)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, normal, pair)
+      if (size(view%list%state) > 0) view%list%state(p) = pair%state
+      terms = pair%terms
+    end subroutine find_terms
+
+  end subroutine find_contacts
+
+  !> Take the shift of the antagonist into account in the way from it to the candidate.
+  pure subroutine shift_back(period, code, branch)
+    type(period_t), intent(in) :: period
+    integer, intent(in) :: code
+    !> (nd) [m]
+    real(dp), intent(inout) :: branch(:)
+    integer :: shift(3), d
+
+    shift(:) = shift_of_code(code)
+    do d = 1, size(branch)
+      branch(d) = branch(d) - shift(d)*period%length(d)
+    end do
+  end subroutine shift_back
+
+  !> The terms of pair `p` where no law is given: the scene's values, or those of the boundary that takes part.
+  pure type(contact_terms_t) function scene_terms(view, boundaries, physics, p, gap) result(terms)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap
+    integer :: b
+
+    b = boundary_of(view, p)
+    terms%play = max(gap, 0.0_dp)
+    terms%friction = physics%friction
+    terms%restitution = physics%restitution
+    terms%tangential_restitution = physics%tangential_restitution
+    terms%rolling = physics%rolling_friction
+    terms%pivoting = physics%pivoting_friction
+    if (b > 0) then
+      terms%friction = boundaries(b)%friction
+      terms%restitution = boundaries(b)%restitution
+      terms%tangential_restitution = boundaries(b)%tangential_restitution
+      terms%rolling = boundaries(b)%rolling_friction
+      terms%pivoting = boundaries(b)%pivoting_friction
+    end if
+    ! friction alone can send a tangential velocity back
+    if (.not. terms%friction > 0.0_dp) terms%tangential_restitution = 0.0_dp
+  end function scene_terms
+
+end module gravier_narrow_phase

@@ -1,0 +1,56 @@
+!> What acts on the grains of a scene.
+module gravier_physics
+  use gravier_kinds, only: dp
+  use gravier_body_store, only: body_set_t
+  use gravier_motion, only: grain_volume
+  use gravier_law_set, only: law_set_t
+  implicit none
+  private
+  public :: physics_t
+
+  !> What acts on the grains of a scene.
+  type :: physics_t
+    !> at the present time [m/s^2], the first nd are used
+    real(dp) :: gravity(3) = 0.0_dp
+    !> on the volume of grains [N/m^3, N/m^2 in 2D]
+    real(dp) :: body_force(3) = 0.0_dp
+    !> friction and normal restitution between grains; boundaries have their own
+    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
+    !> tangential restitution, rolling and pivoting friction, likewise
+    real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
+    !> laws of pairs of materials, which take their place
+    type(law_set_t) :: laws
+    !> the step is the first of the run
+    logical :: first = .false.
+    !> grains turn
+    logical :: rotation = .true.
+    !> step [s]
+    real(dp) :: h = 1.0_dp
+    !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
+    integer :: sleep_after = 0
+  contains
+    procedure :: accelerate => physics_accelerate
+  end type physics_t
+
+contains
+
+  !> Turn the velocity of grain `k` at the start of a step into that without contacts, M^-1 R^d = V_i + h M^-1 F
+  !> (paper, (1)); no force here turns a grain.
+  pure subroutine physics_accelerate(self, bodies, k, v)
+    class(physics_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (nv)
+    real(dp), intent(inout) :: v(:)
+    integer :: d
+
+    do d = 1, bodies%nd
+      v(d) = v(d) + self%h*self%gravity(d)
+    end do
+    if (.not. any(abs(self%body_force) > 0.0_dp)) return
+    do d = 1, bodies%nd
+      v(d) = v(d) + self%h*self%body_force(d)*grain_volume(bodies%nd, bodies%radius(k))/bodies%mass(k)
+    end do
+  end subroutine physics_accelerate
+
+end module gravier_physics

@@ -1,0 +1,129 @@
+!> From the solved problem of a step back to the grains: velocities, and displacements of projections, where they are at home.
+module gravier_velocity_return
+  use gravier_kinds, only: dp, i8
+  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
+  implicit none
+  private
+  public :: take_velocities, take_displacements
+
+contains
+
+  !> Velocities at the end of the step: those of the solved problem (v_global) for grains in contact, free ones for
+  !> the others. A shared grain whose owner has no contact on it gets its velocity from its first sharer. Grains glued to
+  !> a boundary are left. Collective.
+  subroutine take_velocities(decomposition, physics, problem)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(contact_problem_t), intent(in) :: problem
+    integer :: s, k
+
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) call physics%accelerate(home, k, home%velocity(:, k))
+        end do
+      end associate
+    end do
+    call bring_home(decomposition, problem, displace=.false.)
+  end subroutine take_velocities
+
+  !> Move the grains in contact by what v_global holds in the place of velocities [m]. Collective.
+  subroutine take_displacements(decomposition, problem)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    call bring_home(decomposition, problem, displace=.true.)
+  end subroutine take_displacements
+
+  !> Bring v_global of the grains in contact to where they are at home: in this subdomain by their places, in others by
+  !> records (owner, grain, velocity). Collective.
+  subroutine bring_home(decomposition, problem, displace)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    !> they are displacements, not velocities
+    logical, intent(in) :: displace
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer, allocatable :: destination(:)
+    real(dp) :: v(problem%kernels%nv)
+    integer :: s, b, k, d, h, place
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = 1, sub%n_grains
+          if (sub%place(b) > 0) call put(s, sub%place(b), sub%v_global(:, b))
+        end do
+      end associate
+    end do
+    call list_returns(decomposition, problem, records, destination)
+    call sparse_exchange(decomposition%comm, records, destination, received)
+    do k = 1, size(received, 2)
+      call decomposition%find_home(received(1:2, k), h, place)
+      do d = 1, size(v)
+        v(d) = transfer(received(2 + d, k), 0.0_dp)
+      end do
+      call put(h, place, v)
+    end do
+
+  contains
+
+    subroutine put(h, place, v)
+      !> subdomain of this rank, and place there
+      integer, intent(in) :: h, place
+      !> (nv)
+      real(dp), intent(in) :: v(:)
+
+      associate (home => decomposition%home(h))
+        if (displace) then
+          home%position(:, place) = home%position(:, place) + v(1:decomposition%nd)
+        else
+          home%velocity(1:size(v), place) = v
+        end if
+      end associate
+    end subroutine put
+
+  end subroutine bring_home
+
+  !> Records (owner, grain, velocity) of the grains in contact that are at home in none of their sharers, from the first of
+  !> them.
+  subroutine list_returns(decomposition, problem, records, destination)
+    type(decomposition_t), intent(in) :: decomposition
+    type(contact_problem_t), intent(in) :: problem
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    integer, allocatable, intent(out) :: destination(:)
+    logical, allocatable :: sends(:)
+    integer :: s, b, k, d, n, round
+
+    do round = 1, 2
+      n = 0
+      do s = 1, size(problem%sub)
+        associate (sub => problem%sub(s), part => problem%shared%part(s))
+          allocate (sends(sub%n_bodies), source=.false.)
+          do b = 1, sub%n_grains
+            sends(b) = sub%place(b) == 0
+          end do
+          do k = 1, part%n_shared
+            b = part%body(k)
+            if (b > sub%n_grains) cycle
+            sends(b) = part%rung(k) == 1 .and. .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%home(b))
+          end do
+          do b = 1, sub%n_grains
+            if (.not. sends(b)) cycle
+            n = n + 1
+            if (round == 1) cycle
+            destination(n) = decomposition%comm%rank_of(sub%home(b), decomposition%n_subdomains)
+            records(1, n) = sub%home(b)
+            records(2, n) = sub%id(b)
+            do d = 1, problem%kernels%nv
+              records(2 + d, n) = transfer(sub%v_global(d, b), 0_i8)
+            end do
+          end do
+          deallocate (sends)
+        end associate
+      end do
+      if (round == 1) allocate (records(2 + problem%kernels%nv, n), destination(n))
+    end do
+  end subroutine list_returns
+
+end module gravier_velocity_return
