@@ -1,0 +1,390 @@
+!> Datasets of an HDF5 file by rows: a Fortran array (k, n) is an (N, k) dataset in C, Python and h5dump, and each rank holds n of
+!> the N rows.
+module gravier_hdf5_rows
+  use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_null_char
+  use hdf5, only: H5T_FLOAT_F, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_INTEGER_F, H5T_STD_I64LE, h5dclose_f, h5dopen_f, &
+    & h5dset_extent_f, h5tclose_f, hid_t, hsize_t
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_hdf5_properties, only: text_type, is_ascii
+  use gravier_hdf5_tree, only: h5_tree_t
+  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, class_of
+  implicit none
+  private
+  public :: h5_rows_t
+  public :: table_integer, table_single, table_double
+
+  type, extends(h5_tree_t) :: h5_rows_t
+  contains
+    procedure :: columns => h5_columns
+    procedure :: row_count => h5_row_count
+
+    !> write_rows(path, values, error): make a dataset of the rows of all ranks, in the order of the ranks
+    generic :: write_rows => write_integers, write_integer_columns, write_reals, write_real_columns, write_texts
+    procedure, private :: write_integers => h5_write_integers
+    procedure, private :: write_integer_columns => h5_write_integer_columns
+    procedure, private :: write_texts => h5_write_texts
+    procedure, private :: write_reals => h5_write_reals
+    procedure, private :: write_real_columns => h5_write_real_columns
+
+    !> put_rows(path, first_row, values, error): write the rows of all ranks into a table, in the order of the ranks, from row
+    !> first_row (from 0) on; the table grows
+    procedure :: make_table => h5_make_table
+    procedure :: cut_rows => h5_cut_rows
+    generic :: put_rows => put_integer_rows, put_real_rows
+    procedure, private :: put_integer_rows => h5_put_integer_rows
+    procedure, private :: put_real_rows => h5_put_real_rows
+
+    !> read_rows(path, first_row, values, error): fill `values` with rows first_row (from 0) and following; each rank
+    !> asks for its own block, empty if it likes
+    generic :: read_rows => read_integers, read_integer_columns, read_reals, read_real_columns
+    procedure, private :: read_integers => h5_read_integers
+    procedure, private :: read_integer_columns => h5_read_integer_columns
+    procedure, private :: read_reals => h5_read_reals
+    procedure, private :: read_real_columns => h5_read_real_columns
+  end type h5_rows_t
+
+  !> what a table holds
+  integer, parameter :: table_integer = 1, table_single = 2, table_double = 3
+
+contains
+
+  !> k of an (N, k) dataset, 0 of a vector of N numbers, -1 of anything else. Not collective.
+  integer function h5_columns(self, path) result(columns)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(hsize_t) :: extent(2)
+    integer :: n_dims
+
+    columns = -1
+    if (.not. self%exists(path)) return
+    call get_extent(self, path, n_dims, extent)
+    if (n_dims == 1) columns = 0
+    if (n_dims == 2) columns = int(extent(1))
+  end function h5_columns
+
+  !> N of an (N, k) dataset or of a vector of N numbers.
+  subroutine h5_row_count(self, path, n, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(out) :: n
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hsize_t) :: extent(2)
+    integer :: n_dims
+
+    n = 0
+    if (allocated(error)) return
+    if (.not. self%exists(path)) then
+      call self%fail(path, "missing", error)
+    else
+      call get_extent(self, path, n_dims, extent)
+      select case (n_dims)
+      case (1, 2)
+        n = int(extent(n_dims), i8)
+      case default
+        call self%fail(path, "a dataset of one or two dimensions was expected", error)
+      end select
+    end if
+    call self%comm%agree(error)
+  end subroutine h5_row_count
+
+  subroutine h5_write_integers(self, path, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (rows of this rank)
+    integer(i8), intent(in), contiguous, target :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    call write_block(self, path, rows_of(values), error)
+  end subroutine h5_write_integers
+
+  subroutine h5_write_integer_columns(self, path, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (columns, rows of this rank); the number of columns is the same on all ranks
+    integer(i8), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    call write_block(self, path, rows_of(values), error)
+  end subroutine h5_write_integer_columns
+
+  subroutine h5_write_reals(self, path, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (rows of this rank)
+    real(dp), intent(in), contiguous, target :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    call write_block(self, path, rows_of(values), error)
+  end subroutine h5_write_reals
+
+  subroutine h5_write_real_columns(self, path, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (columns, rows of this rank); the number of columns is the same on all ranks
+    real(dp), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    call write_block(self, path, rows_of(values), error)
+  end subroutine h5_write_real_columns
+
+  !> Texts without their trailing blanks, as strings of one fixed length.
+  subroutine h5_write_texts(self, path, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> (rows of this rank)
+    character(len=*), intent(in), contiguous :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    character(kind=c_char, len=:), allocatable, target :: letters
+    integer(hid_t) :: type
+    integer :: i, length, stat
+    logical :: ascii
+
+    if (allocated(error)) return
+    length = 1
+    if (size(values) > 0) length = max(1, maxval(len_trim(values)))
+    length = nint(self%comm%highest(real(length, dp)))
+    letters = repeat(c_null_char, length*max(1, size(values)))
+    do i = 1, size(values)
+      letters(length*(i - 1) + 1:length*(i - 1) + len_trim(values(i))) = trim(values(i))
+    end do
+    ascii = .not. self%comm%any_true(.not. is_ascii(letters))
+    type = text_type(length, ascii)
+    call write_block(self, path, rows_t(0, size(values), type, type, c_loc(letters)), error)
+    call h5tclose_f(type, stat)
+  end subroutine h5_write_texts
+
+  subroutine h5_put_integer_rows(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, or 1, rows of this rank)
+    integer(i8), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    call put_block(self, path, first_row, rows_of(values), error)
+  end subroutine h5_put_integer_rows
+
+  !> Reals; a table of integers takes them too, rounded towards zero.
+  subroutine h5_put_real_rows(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, or 1, rows of this rank)
+    real(dp), intent(in), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    call put_block(self, path, first_row, rows_of(values), error)
+  end subroutine h5_put_real_rows
+
+  subroutine h5_read_integers(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (rows this rank wants)
+    integer(i8), intent(inout), contiguous, target :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    call read_block(self, path, first_row, rows_of(values), error)
+  end subroutine h5_read_integers
+
+  subroutine h5_read_integer_columns(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, rows this rank wants)
+    integer(i8), intent(inout), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    call read_block(self, path, first_row, rows_of(values), error)
+  end subroutine h5_read_integer_columns
+
+  subroutine h5_read_reals(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (rows this rank wants)
+    real(dp), intent(inout), contiguous, target :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    call read_block(self, path, first_row, rows_of(values), error)
+  end subroutine h5_read_reals
+
+  subroutine h5_read_real_columns(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    !> (columns, rows this rank wants)
+    real(dp), intent(inout), contiguous, target :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    call read_block(self, path, first_row, rows_of(values), error)
+  end subroutine h5_read_real_columns
+
+  !> Make a table without rows, which put_rows lengthens: (N) with n_columns = 0, (N, n_columns) otherwise.
+  subroutine h5_make_table(self, path, n_columns, kind, rows_a_chunk, error)
+    class(h5_rows_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: n_columns
+    !> table_integer (64 bits), table_single or table_double
+    integer, intent(in) :: kind
+    !> the file grows by so many rows at a time; the same on all ranks
+    integer(i8), intent(in) :: rows_a_chunk
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: dataset, type
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    type = H5T_STD_I64LE
+    if (kind == table_single) type = H5T_IEEE_F32LE
+    if (kind == table_double) type = H5T_IEEE_F64LE
+    call create_dataset(self, path, type, n_columns, 0_i8, dataset, stat, rows_a_chunk)
+    if (stat < 0) then
+      call self%fail(path, "cannot make this dataset", error)
+    else
+      call h5dclose_f(dataset, ignored)
+    end if
+    call self%comm%agree(error)
+  end subroutine h5_make_table
+
+  !> Leave the first rows of a table alone.
+  subroutine h5_cut_rows(self, path, n_rows, error)
+    class(h5_rows_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: n_rows
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place, dataset
+    integer(hsize_t) :: extent(2)
+    character(len=:), allocatable :: name
+    integer :: n_dims, stat, ignored
+
+    if (allocated(error)) return
+    call self%locate(path, place, name)
+    call get_shape(max(self%columns(path), 0), n_rows, n_dims, extent)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat == 0) then
+      call h5dset_extent_f(dataset, extent(1:n_dims), stat)
+      call h5dclose_f(dataset, ignored)
+    end if
+    if (stat < 0) call self%fail(path, "cannot cut this table", error)
+    call self%comm%agree(error)
+  end subroutine h5_cut_rows
+
+  !> Make a dataset and write the rows of all ranks.
+  subroutine write_block(self, path, rows, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    type(rows_t), intent(in) :: rows
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: dataset
+    integer(i8) :: first, total
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    total = self%comm%total(int(rows%n, i8))
+    first = self%comm%offset(int(rows%n, i8))
+    if (self%comm%any_true(rows%n_columns /= nint(self%comm%highest(real(rows%n_columns, dp))))) then
+      call self%fail(path, "the number of columns differs between ranks", error)
+      return
+    end if
+    call create_dataset(self, path, rows%file_type, rows%n_columns, total, dataset, stat)
+    if (stat < 0) call self%fail(path, "cannot make this dataset", error)
+    call self%comm%agree(error)
+    if (allocated(error)) return
+    if (total > 0) then
+      call transfer_rows(dataset, rows, first, .true., stat)
+      if (stat < 0) call self%fail(path, "cannot write this dataset: is the disk full?", error)
+    end if
+    call h5dclose_f(dataset, ignored)
+    call self%comm%agree(error)
+  end subroutine write_block
+
+  !> Lengthen a table where need be and write the rows of all ranks into it.
+  subroutine put_block(self, path, first_row, values, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first_row
+    type(rows_t), intent(in) :: values
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place, dataset
+    integer(hsize_t) :: extent(2)
+    integer(i8) :: first, total, length
+    character(len=:), allocatable :: name
+    type(rows_t) :: rows
+    integer :: n_dims, stat, ignored
+
+    call self%row_count(path, length, error)
+    if (allocated(error)) return
+    rows = values
+    rows%n_columns = self%columns(path)
+    total = self%comm%total(int(rows%n, i8))
+    first = first_row + self%comm%offset(int(rows%n, i8))
+    call self%locate(path, place, name)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat == 0) then
+      if (first_row + total > length) then
+        call get_shape(rows%n_columns, first_row + total, n_dims, extent)
+        call h5dset_extent_f(dataset, extent(1:n_dims), stat)
+      end if
+      if (stat == 0 .and. total > 0) call transfer_rows(dataset, rows, first, .true., stat)
+      call h5dclose_f(dataset, ignored)
+    end if
+    if (stat < 0) call self%fail(path, "cannot write rows of this table: is the disk full?", error)
+    call self%comm%agree(error)
+  end subroutine put_block
+
+  !> Read rows [first, first + n) of a dataset of the same numbers and columns into memory.
+  subroutine read_block(self, path, first, rows, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first
+    type(rows_t), intent(in) :: rows
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place, dataset
+    character(len=:), allocatable :: name
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    call check_shape(self, path, first, rows, error)
+    if (allocated(error)) return
+    if (self%comm%total(int(rows%n, i8)) == 0) return
+    call self%locate(path, place, name)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat < 0) call self%fail(path, "cannot open this dataset", error)
+    call self%comm%agree(error)
+    if (allocated(error)) return
+    call transfer_rows(dataset, rows, first, .false., stat)
+    if (stat < 0) call self%fail(path, "cannot read this dataset", error)
+    call h5dclose_f(dataset, ignored)
+    call self%comm%agree(error)
+  end subroutine read_block
+
+  !> Check that a dataset is there, of the kind and shape expected, and long enough.
+  subroutine check_shape(self, path, first, rows, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first
+    type(rows_t), intent(in) :: rows
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: total
+    integer :: found, kind_found
+
+    call self%row_count(path, total, error)
+    if (allocated(error)) return
+    found = self%columns(path)
+    kind_found = class_of(self, path)
+    if (found /= rows%n_columns) then
+      call self%fail(path, columns_text(found)//", but "//columns_text(rows%n_columns)//" was expected", error)
+    else if (rows%file_type == H5T_STD_I64LE .and. kind_found /= H5T_INTEGER_F) then
+      call self%fail(path, "not made of integers", error)
+    else if (kind_found /= H5T_INTEGER_F .and. kind_found /= H5T_FLOAT_F) then
+      call self%fail(path, "not made of numbers", error)
+    else if (rows%n > 0 .and. (first < 0 .or. first + rows%n > total)) then
+      call self%fail(path, "rows "//to_text(first)//" to "//to_text(first + rows%n - 1)//" were asked for, but it has "// &
+        & to_text(total), error)
+    end if
+    call self%comm%agree(error)
+  end subroutine check_shape
+
+  pure function columns_text(n_columns) result(text)
+    integer, intent(in) :: n_columns
+    character(len=:), allocatable :: text
+    if (n_columns == 0) then
+      text = "a dataset of shape (N)"
+    else
+      text = "a dataset of shape (N, "//to_text(n_columns)//")"
+    end if
+  end function columns_text
+
+end module gravier_hdf5_rows

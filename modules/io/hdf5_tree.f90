@@ -1,0 +1,404 @@
+!> An HDF5 file as a tree of groups: opened and closed, kept readable whatever becomes of the program, and groups that appear when
+!> they are complete.
+module gravier_hdf5_tree
+  use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, &
+    & H5_INDEX_NAME_F, H5_ITER_INC_F, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, &
+    & h5gclose_f, h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, &
+    & h5odecr_refcount_f, h5oincr_refcount_f, h5olink_f, h5pclose_f, h5pcreate_f, h5pset_istore_k_f, hid_t, hsize_t
+  use gravier_kinds, only: i8
+  use gravier_errors, only: error_t, raise, status_input, status_failure
+  use gravier_communicator, only: communicator_t
+  use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, extend_file
+  use gravier_hdf5_properties, only: start_library, parallel_access, with_groups_above, ask_for_one_block
+  implicit none
+  private
+  public :: h5_tree_t
+
+  !> An open HDF5 file. Paths start at the root: "/steps/12/bodies/id".
+  type :: h5_tree_t
+    private
+    !> the ranks that hold it open
+    type(communicator_t), public :: comm
+    character(len=:), allocatable :: path
+    integer(hid_t) :: id = -1
+    logical :: writable = .false.
+    !> on rank 0: length of the file when it was flushed last
+    integer(i8) :: flushed = 0
+    !> the group that begin_group started, not yet seen by readers
+    integer(hid_t) :: hidden = -1
+    character(len=:), allocatable :: hidden_path
+  contains
+    procedure :: create => h5_create
+    procedure :: open => h5_open
+    procedure :: reopen => h5_reopen
+    procedure :: close => h5_close
+    procedure :: flush => h5_flush
+    procedure :: reserve => h5_reserve
+    procedure :: is_open => h5_is_open
+
+    procedure :: make_group => h5_make_group
+    procedure :: begin_group => h5_begin_group
+    procedure :: commit_group => h5_commit_group
+    procedure :: abandon_group => h5_abandon_group
+    procedure :: remove_group => h5_remove_group
+
+    procedure :: exists => h5_exists
+    procedure :: member_count => h5_member_count
+    procedure :: member => h5_member
+
+    !> for the types that extend this one
+    procedure :: locate => h5_locate
+    procedure :: fail => h5_fail
+  end type h5_tree_t
+
+  !> reserved for an empty file, and for the link of a hidden group or other headers
+  integer(i8), parameter :: bytes_of_file = 65536, bytes_of_link = 16384
+  !> groups at the root that find room in its first block
+  integer, parameter :: members_of_root = 8
+
+contains
+
+  !> Create a file, replacing an older one.
+  subroutine h5_create(self, comm, path, error, chunks)
+    class(h5_tree_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    !> keep room for so many chunks of each table in one block: to add one more of them is then a single write
+    integer, intent(in), optional :: chunks
+    integer(hid_t) :: access, creation
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    call prepare(self, comm, path, error)
+    ! HDF5 cannot even close a file that it cannot write to: find out beforehand
+    if (comm%rank == 0) then
+      call check_creatable(path, error)
+      call reserve_space(path, bytes_of_file, error)
+    end if
+    call comm%agree(error)
+    if (allocated(error)) return
+    access = parallel_access(comm)
+    call h5pcreate_f(H5P_FILE_CREATE_F, creation, ignored)
+    call ask_for_one_block(creation, members_of_root)
+    if (present(chunks)) call h5pset_istore_k_f(creation, (chunks + 1)/2, ignored)
+    call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, stat, creation_prp=creation, access_prp=access)
+    call h5pclose_f(creation, ignored)
+    call h5pclose_f(access, ignored)
+    if (stat < 0) call raise(error, status_failure, path//": cannot create this HDF5 file")
+    self%writable = .true.
+    call comm%agree(error)
+    call self%reserve(bytes_of_file, error)
+  end subroutine h5_create
+
+  !> Open an existing file for reading.
+  subroutine h5_open(self, comm, path, error)
+    class(h5_tree_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    call open_existing(self, comm, path, .false., error)
+  end subroutine h5_open
+
+  !> Open an existing file for reading and for writing more into it.
+  subroutine h5_reopen(self, comm, path, error)
+    class(h5_tree_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    call open_existing(self, comm, path, .true., error)
+  end subroutine h5_reopen
+
+  subroutine open_existing(self, comm, path, writable, error)
+    type(h5_tree_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: writable
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: access
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    call prepare(self, comm, path, error)
+    ! one rank alone looks first: a file that HDF5 cannot make sense of is never opened by all together
+    if (comm%rank == 0) then
+      call check_format(path, error)
+      if (writable) call reserve_space(path, bytes_of_file, error)
+    end if
+    call comm%agree(error)
+    if (allocated(error)) return
+    access = parallel_access(comm)
+    call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable), self%id, stat, access_prp=access)
+    call h5pclose_f(access, ignored)
+    if (stat < 0) call raise(error, status_input, path//": truncated or damaged HDF5 file")
+    self%writable = writable
+    call comm%agree(error)
+  end subroutine open_existing
+
+  !> Check that `path` can be read and begins like an HDF5 file.
+  subroutine check_format(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: is_hdf5
+    integer :: stat
+
+    call check_readable(path, error)
+    if (allocated(error)) return
+    call h5fis_hdf5_f(path, is_hdf5, stat)
+    if (stat < 0 .or. .not. is_hdf5) call raise(error, status_input, path//": not an HDF5 file")
+  end subroutine check_format
+
+  !> Start the library, close what was open and remember where to find the file.
+  subroutine prepare(self, comm, path, error)
+    type(h5_tree_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    call self%close(error)
+    call start_library(error)
+    self%comm = comm
+    self%path = path
+    self%flushed = 0
+  end subroutine prepare
+
+  !> Close, whatever happened before; without effect on a file not open. A hidden group is lost.
+  subroutine h5_close(self, error)
+    class(h5_tree_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: stat
+
+    if (self%id < 0) return
+    call self%abandon_group()
+    call h5fclose_f(self%id, stat)
+    self%id = -1
+    if (stat < 0) call raise(error, merge(status_failure, status_input, self%writable), self%path//": cannot close this file")
+    call self%comm%agree(error)
+  end subroutine h5_close
+
+  !> Bring everything written so far to the disk: the file stays readable whatever becomes of the program afterwards.
+  subroutine h5_flush(self, error)
+    class(h5_tree_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hsize_t) :: length
+    integer :: stat
+
+    if (allocated(error)) return
+    ! a file that the program dies over must not be shorter than its headers say
+    if (self%comm%rank == 0) then
+      call h5fget_filesize_f(self%id, length, stat)
+      if (stat == 0) call extend_file(self%path, int(length, i8), error)
+    end if
+    ! HDF5 waits for ever when one rank cannot write its share of the headers: give them their place first
+    if (self%comm%rank == 0) call reserve_space(self%path, bytes_of_link, error, start=self%flushed)
+    call self%comm%agree(error)
+    if (allocated(error)) return
+    call h5fflush_f(self%id, H5F_SCOPE_GLOBAL_F, stat)
+    if (stat < 0) call raise(error, status_failure, self%path//": cannot write to this file: is the disk full?")
+    call self%comm%agree(error)
+    if (self%comm%rank == 0) self%flushed = file_length(self%path)
+  end subroutine h5_flush
+
+  !> Make sure of `bytes` of disk space for what will be written next, its headers included (allow 64 KiB for those of
+  !> a few groups). On failure nothing has been written and the file is as the last flush left it. Where the file
+  !> system knows no reservation, the space that is free now is all that can be asked for.
+  subroutine h5_reserve(self, bytes, error)
+    class(h5_tree_t), intent(in) :: self
+    !> on rank 0: of all ranks together
+    integer(i8), intent(in) :: bytes
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    if (self%comm%rank == 0) call reserve_space(self%path, bytes, error)
+    call self%comm%agree(error)
+  end subroutine h5_reserve
+
+  pure logical function h5_is_open(self) result(is_open)
+    class(h5_tree_t), intent(in) :: self
+    is_open = self%id >= 0
+  end function h5_is_open
+
+  !> Raise an error that names the file and the object in it.
+  subroutine h5_fail(self, path, what, error)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path, what
+    type(error_t), allocatable, intent(inout) :: error
+    call raise(error, merge(status_failure, status_input, self%writable), self%path//": "//path//": "//what)
+  end subroutine h5_fail
+
+  ! ------------------------------------------------------------------------------------------------ groups
+
+  !> Make a group, and those above it that are missing.
+  subroutine h5_make_group(self, path, error, members)
+    class(h5_tree_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    !> keep room for so many members, 1500 at most, in one block: to show one more of them is then a single write
+    integer, intent(in), optional :: members
+    integer(hid_t) :: place, group, links, creation
+    character(len=:), allocatable :: name
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    call self%locate(path, place, name)
+    links = with_groups_above()
+    call h5pcreate_f(H5P_GROUP_CREATE_F, creation, ignored)
+    if (present(members)) call ask_for_one_block(creation, members)
+    call h5gcreate_f(place, name, group, stat, lcpl_id=links, gcpl_id=creation)
+    call h5pclose_f(creation, ignored)
+    call h5pclose_f(links, ignored)
+    if (stat < 0) then
+      call self%fail(path, "cannot make this group", error)
+    else
+      call h5gclose_f(group, ignored)
+    end if
+    call self%comm%agree(error)
+  end subroutine h5_make_group
+
+  !> Start a group that appears in the file only with commit_group; until then every path at or below `path` leads
+  !> into it. Should the program die meanwhile, the file is what it was before.
+  subroutine h5_begin_group(self, path, error)
+    class(h5_tree_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: stat
+
+    if (allocated(error)) return
+    call self%abandon_group()
+    if (self%exists(path)) call self%fail(path, "is in the file already", error)
+    if (.not. allocated(error)) then
+      call h5gcreate_anon_f(self%id, self%hidden, stat)
+      if (stat < 0) then
+        self%hidden = -1
+        call self%fail(path, "cannot make this group", error)
+      else
+        self%hidden_path = path
+      end if
+    end if
+    call self%comm%agree(error)
+  end subroutine h5_begin_group
+
+  !> Show the group that begin_group started: first its content is brought to the disk, then its name, which is one write
+  !> where the group above has room for it in one block. Whenever the program dies, a reader finds the group whole or not.
+  subroutine h5_commit_group(self, error)
+    class(h5_tree_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: links
+    integer :: stat, ignored
+
+    ! counted as if it had its name, so that the name changes nothing in it
+    if (.not. allocated(error)) call h5oincr_refcount_f(self%hidden, ignored)
+    call self%flush(error)
+    call self%reserve(bytes_of_link, error)
+    if (allocated(error)) then
+      if (self%hidden >= 0) call h5odecr_refcount_f(self%hidden, ignored)
+      call self%abandon_group()
+      return
+    end if
+    links = with_groups_above()
+    call h5olink_f(self%hidden, self%id, self%hidden_path, stat, lcpl_id=links)
+    call h5pclose_f(links, ignored)
+    if (stat < 0) call self%fail(self%hidden_path, "cannot make this group", error)
+    call h5odecr_refcount_f(self%hidden, ignored)
+    call self%comm%agree(error)
+    call self%abandon_group()
+    call self%flush(error)
+  end subroutine h5_commit_group
+
+  !> Let go of the group that begin_group started; HDF5 drops its content if it has no name yet. Collective.
+  subroutine h5_abandon_group(self)
+    class(h5_tree_t), intent(inout) :: self
+    integer :: ignored
+
+    if (self%hidden < 0) return
+    call h5gclose_f(self%hidden, ignored)
+    self%hidden = -1
+    deallocate (self%hidden_path)
+  end subroutine h5_abandon_group
+
+  !> Remove a group and all that is in it; the file can use its room again.
+  subroutine h5_remove_group(self, path, error)
+    class(h5_tree_t), intent(inout) :: self
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: place
+    character(len=:), allocatable :: name
+    integer :: stat
+
+    if (allocated(error)) return
+    call self%locate(path, place, name)
+    call h5ldelete_f(place, name, stat)
+    if (stat < 0) call self%fail(path, "cannot remove this group", error)
+    call self%comm%agree(error)
+  end subroutine h5_remove_group
+
+  !> Where HDF5 finds `path`: a place and a name relative to it.
+  subroutine h5_locate(self, path, place, name)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(hid_t), intent(out) :: place
+    character(len=:), allocatable, intent(out) :: name
+
+    place = self%id
+    name = path
+    if (self%hidden < 0) return
+    if (path == self%hidden_path) then
+      place = self%hidden
+      name = "."
+    else if (index(path, self%hidden_path//"/") == 1) then
+      place = self%hidden
+      name = path(len(self%hidden_path) + 2:)
+    end if
+  end subroutine h5_locate
+
+  !> True when the file has a group or dataset at `path`. Not collective.
+  logical function h5_exists(self, path) result(exists)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(hid_t) :: place
+    character(len=:), allocatable :: name
+    integer :: i, stat
+
+    call self%locate(path, place, name)
+    exists = .true.
+    ! every link on the way must exist before the next one may be asked for
+    do i = 2, len(name)
+      if (i < len(name) .and. name(min(i + 1, len(name)):min(i + 1, len(name))) /= "/") cycle
+      call h5lexists_f(place, name(1:i), exists, stat)
+      if (stat < 0) exists = .false.
+      if (.not. exists) return
+    end do
+    if (len(name) == 1 .and. name /= "/" .and. name /= ".") call h5lexists_f(place, name, exists, stat)
+  end function h5_exists
+
+  !> Number of groups and datasets in a group. Not collective.
+  integer function h5_member_count(self, path) result(n)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(hid_t) :: place
+    character(len=:), allocatable :: name
+    integer :: stat
+
+    call self%locate(path, place, name)
+    call h5gn_members_f(place, name, n, stat)
+    if (stat < 0) n = 0
+  end function h5_member_count
+
+  !> Name of the i-th group or dataset in a group, in alphabetic order. Not collective.
+  function h5_member(self, path, i) result(member)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: i
+    character(len=:), allocatable :: member
+    integer(hid_t) :: place
+    character(len=:), allocatable :: name
+    character(len=255) :: buffer
+    integer :: stat
+
+    call self%locate(path, place, name)
+    call h5lget_name_by_idx_f(place, name, H5_INDEX_NAME_F, H5_ITER_INC_F, int(i - 1, hsize_t), buffer, stat)
+    if (stat < 0) buffer = ""
+    member = trim(buffer)
+  end function h5_member
+
+end module gravier_hdf5_tree
