@@ -7,7 +7,6 @@ module gravier_bench_scene
   use gravier_timers, only: reset_timers, gather_timers, n_phases, phase_bodies, phase_neighbourhood, phase_detection, &
     & phase_interface, phase_setup, phase_sweep, phase_exchange, phase_interface_solve, phase_factorise, phase_check, &
     & phase_reduction
-  use gravier_impulse_memory, only: impulse_entries
   use gravier_nscdd, only: average_copies
   use gravier_scheme, only: work_t
   use gravier_solve, only: solve_report_t, solve_contacts
@@ -72,7 +71,7 @@ contains
       call reset_grains(self%packing, simulation, middle=.true.)
       call simulation%comm%barrier()
       start = MPI_Wtime()
-      call simulation%neighbourhoods%build(simulation%decomposition, impulse_entries(simulation%problem%kernels))
+      call simulation%neighbourhoods%build(simulation%decomposition)
       call simulation%comm%barrier()
     end associate
     seconds = MPI_Wtime() - start

@@ -8,7 +8,8 @@ module gravier_checkpoint
   use gravier_time_table, only: time_table_t
   use gravier_body_store, only: place_word
   use gravier_boundary, only: boundary_t, boundary_words
-  use gravier_impulse_memory, only: impulse_entries, list_impulses, match_impulses
+  use gravier_neighbour_list, only: pair_memory_t
+  use gravier_impulse_memory, only: list_impulses, match_impulses
   use gravier_energy_balance, only: energy_words
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
@@ -48,6 +49,11 @@ contains
     call file%write_scalar("fast", simulation%fast, error)
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
     call file%write_scalar("lists_made", simulation%neighbourhoods%builds, error)
+    associate (memory => simulation%neighbourhoods%memory)
+      call file%write_scalar("impulse_entries", int(memory%n_impulse, i8), error)
+      call file%write_scalar("law_row", int(memory%law_row, i8), error)
+      call file%write_scalar("rest_row", int(memory%rest_row, i8), error)
+    end associate
     call file%write_scalar("imbalance", simulation%imbalance, error)
     call file%write_scalar("reached_imbalance", simulation%reached_imbalance, error)
     call pack_boundaries(simulation%decomposition%boundaries, words)
@@ -289,7 +295,7 @@ contains
     type(checkpoint_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), own(:, :), counts(:), map(:)
-    integer :: s, n, k, n_words, n_subdomains
+    integer :: s, n, k, n_subdomains
 
     n_subdomains = simulation%decomposition%n_subdomains
     associate (home => simulation%decomposition%home)
@@ -297,13 +303,11 @@ contains
       call pack_grains(simulation, records, counts)
       call file%write_table("grains", n_subdomains, records, counts, error)
       if (simulation%neighbourhoods%builds > 0) then
-        n_words = 2 + impulse_entries(simulation%problem%kernels, simulation%sleeping%after > 0) + &
-          & merge(1, 0, simulation%decomposition%rule%remembers)
         do s = 1, size(home)
           counts(s) = simulation%neighbourhoods%view(s)%list%n_kept()
         end do
         deallocate (records)
-        allocate (records(n_words, sum(counts)))
+        allocate (records(2 + simulation%neighbourhoods%memory%words(), sum(counts)))
         n = 0
         do s = 1, size(home)
           call list_impulses(simulation%neighbourhoods%view(s), 0, own)
@@ -339,7 +343,7 @@ contains
     integer :: s, k, n, d, words, nd
 
     nd = simulation%decomposition%nd
-    words = place_word - 1 + nd + simulation%decomposition%nv + simulation%decomposition%ni
+    words = simulation%decomposition%grain_words()
     associate (home => simulation%decomposition%home)
       do s = 1, size(home)
         counts(s) = home(s)%n
@@ -387,7 +391,7 @@ contains
 
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
-      n_words = place_word - 1 + nd + decomposition%nv + decomposition%ni
+      n_words = decomposition%grain_words()
       call file%read_table("grains", decomposition%n_subdomains, records, counts, error)
       if (builds > 0) call file%read_array("boundaries_when_listed", words, error)
       call file%read_array("boundaries", now, error)
@@ -403,8 +407,7 @@ contains
       if (builds > 0) then
         call unpack_boundaries(words, decomposition%boundaries, simulation%config%file, error)
         if (allocated(error)) return
-        call simulation%neighbourhoods%build(decomposition, impulse_entries(simulation%problem%kernels, &
-          & simulation%sleeping%after > 0))
+        call simulation%neighbourhoods%build(decomposition)
         simulation%neighbourhoods%builds = builds
         call load_impulses(simulation, file, error)
       end if
@@ -426,13 +429,19 @@ contains
     type(checkpoint_file_t), intent(in) :: file
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:)
+    integer(i8) :: n_impulse, law_row, rest_row
+    type(pair_memory_t) :: kept
     integer :: s, n
 
+    call file%read_scalar("impulse_entries", n_impulse, error)
+    call file%read_scalar("law_row", law_row, error)
+    call file%read_scalar("rest_row", rest_row, error)
     call file%read_table("impulses", simulation%decomposition%n_subdomains, records, counts, error)
     if (allocated(error)) return
+    kept = pair_memory_t(int(n_impulse), int(law_row), int(rest_row))
     n = 0
     do s = 1, size(simulation%neighbourhoods%view)
-      call match_impulses(records(:, n + 1:n + int(counts(s))), simulation%neighbourhoods%view(s))
+      call match_impulses(records(:, n + 1:n + int(counts(s))), kept, simulation%neighbourhoods%view(s))
       n = n + int(counts(s))
     end do
   end subroutine load_impulses

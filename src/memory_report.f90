@@ -3,7 +3,6 @@ module gravier_memory_report
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_impulse_memory, only: impulse_entries
   use gravier_newton, only: newton_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -94,14 +93,13 @@ contains
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
       call items(2)%add("shift", 4, merge(1, 0, ni > 0))
-      call items(2)%add("impulse", 8, impulse_entries(kernels, simulation%sleeping%after > 0))
-      if (simulation%decomposition%rule%remembers) call items(2)%add("state", 4, 1)
+      call items(2)%add("impulse", 8, simulation%neighbourhoods%memory%n_impulse)
+      call items(2)%add("state", 4, simulation%neighbourhoods%memory%n_states())
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
       call items(3)%add("home", 4, 1)
       call items(3)%add("place", 4, 1)
       call items(3)%add("multiplicity", 4, 1)
-      call items(3)%add("position", 8, nd)
       call items(3)%add("radius", 8, 1)
       call items(3)%add("v_free", 8, nv)
       if (simulation%physics%laws%attracts) call items(3)%add("pull", 8, nv)
@@ -134,7 +132,7 @@ contains
       call item%add("velocity", 8, nv)
       call item%add("radius", 8, 1)
       call item%add("mass", 8, 1)
-      call item%add("inertia", 8, 1)
+      call item%add("inertia", 8, merge(1, 0, simulation%decomposition%nv > nd))
       call item%add("glued", 4, 1)
       call item%add("material", 4, 1)
       call item%add("image", 4, ni)

@@ -313,7 +313,7 @@ contains
       else
         scene%grains%mass(k) = grain_mass(nd, data%radius(k), density_of(config, data%material(k)))
       end if
-      scene%grains%inertia(k) = grain_inertia(nd, data%radius(k), scene%grains%mass(k))
+      if (nv > nd) scene%grains%inertia(k) = grain_inertia(nd, data%radius(k), scene%grains%mass(k))
     end do
     scene%n_grains = data%total
     if (data%n > 0) scene%largest_radius = maxval(data%radius)

@@ -32,7 +32,7 @@ module gravier_simulation
   use gravier_grain_balance, only: grain_balance_t
   use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
   use gravier_pair_laws, only: conclude_pairs
-  use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
+  use gravier_impulse_memory, only: memory_of, keep_impulses, recall_impulses, gather_impulses, spread_impulses
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
@@ -244,11 +244,12 @@ contains
       self%physics%sleep_after = self%sleeping%after
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)
+      self%neighbourhoods%memory = memory_of(self%problem%kernels, self%config%solver%warm_start, scene%laws%remembers, &
+        & self%sleeping%after > 0)
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
       rule%alert_distance = max(rule%alert_distance, scene%laws%range)
-      rule%remembers = scene%laws%remembers
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
@@ -612,12 +613,12 @@ contains
 
     if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
     if (.not. figures%listed) return
-    remembered = (self%config%solver%warm_start .or. self%physics%laws%remembers) .and. self%neighbourhoods%builds > 0
+    remembered = self%neighbourhoods%memory%words() > 0 .and. self%neighbourhoods%builds > 0
     if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
     call let_grains_out(self, figures)
     if (figures%divided) call divide_again(self, figures%refused)
     call self%decomposition%settle()
-    call self%neighbourhoods%build(self%decomposition, impulse_entries(self%problem%kernels, self%sleeping%after > 0))
+    call self%neighbourhoods%build(self%decomposition)
     if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)
   end subroutine list_neighbours
 

@@ -6,7 +6,7 @@ module gravier_body_store
   public :: body_set_t, append_bodies, place_word
 
   !> first of the words of a record that hold the grain's place
-  integer, parameter :: place_word = 7
+  integer, parameter :: place_word = 6
 
   !> Grains of one subdomain, or of any batch. Velocities hold the translation first, then the spin where the
   !> scene has one: (vx, vy[, omega]) in 2D, (vx, vy, vz[, wx, wy, wz]) in 3D, all in global axes.
@@ -28,7 +28,7 @@ module gravier_body_store
     real(dp), allocatable :: radius(:)
     !> (n) [kg]
     real(dp), allocatable :: mass(:)
-    !> about any axis through the centre, (n) [kg m^2]
+    !> about any axis through the centre, of no size where grains do not turn (n or 0) [kg m^2]
     real(dp), allocatable :: inertia(:)
     !> number of the boundary that a grain is glued to, 0 for a free one (n)
     integer, allocatable :: glued(:)
@@ -58,15 +58,15 @@ contains
     self%ni = ni
     if (allocated(self%id)) deallocate (self%id, self%position, self%velocity, self%radius, self%mass, self%inertia, self%glued, &
       & self%material, self%image)
-    allocate (self%id(n), self%position(nd, n), self%velocity(nv, n), self%radius(n), self%mass(n), self%inertia(n), &
-      & self%glued(n), self%image(ni, n))
+    allocate (self%id(n), self%position(nd, n), self%velocity(nv, n), self%radius(n), self%mass(n), &
+      & self%inertia(merge(n, 0, nv > nd)), self%glued(n), self%image(ni, n))
     allocate (self%material(n), source=1)
   end subroutine body_set_init
 
   !> Words of one grain when it travels between subdomains.
   pure integer function body_set_record_words(self) result(words)
     class(body_set_t), intent(in) :: self
-    words = place_word - 1 + self%nd + self%nv + self%ni
+    words = place_word - 1 + self%nd + self%nv + self%ni + merge(1, 0, self%nv > self%nd)
   end function body_set_record_words
 
   !> Write grain `k` into `record` (record_words).
@@ -79,9 +79,8 @@ contains
     record(1) = self%id(k)
     record(2) = transfer(self%radius(k), 0_i8)
     record(3) = transfer(self%mass(k), 0_i8)
-    record(4) = transfer(self%inertia(k), 0_i8)
-    record(5) = self%glued(k)
-    record(6) = self%material(k)
+    record(4) = self%glued(k)
+    record(5) = self%material(k)
     do d = 1, self%nd
       record(place_word - 1 + d) = transfer(self%position(d, k), 0_i8)
     end do
@@ -91,6 +90,7 @@ contains
     do d = 1, self%ni
       record(place_word - 1 + self%nd + self%nv + d) = self%image(d, k)
     end do
+    if (self%nv > self%nd) record(self%record_words()) = transfer(self%inertia(k), 0_i8)
   end subroutine body_set_get_record
 
   !> Read grain `k` from `record` (record_words).
@@ -103,9 +103,8 @@ contains
     self%id(k) = record(1)
     self%radius(k) = transfer(record(2), 0.0_dp)
     self%mass(k) = transfer(record(3), 0.0_dp)
-    self%inertia(k) = transfer(record(4), 0.0_dp)
-    self%glued(k) = int(record(5))
-    self%material(k) = int(record(6))
+    self%glued(k) = int(record(4))
+    self%material(k) = int(record(5))
     do d = 1, self%nd
       self%position(d, k) = transfer(record(place_word - 1 + d), 0.0_dp)
     end do
@@ -115,6 +114,7 @@ contains
     do d = 1, self%ni
       self%image(d, k) = int(record(place_word - 1 + self%nd + self%nv + d))
     end do
+    if (self%nv > self%nd) self%inertia(k) = transfer(record(self%record_words()), 0.0_dp)
   end subroutine body_set_set_record
 
   !> Keep the grains order(1), order(2), ... in this order; `order` may leave some out.
@@ -132,7 +132,7 @@ contains
       self%velocity(:, k) = old%velocity(:, order(k))
       self%radius(k) = old%radius(order(k))
       self%mass(k) = old%mass(order(k))
-      self%inertia(k) = old%inertia(order(k))
+      if (self%nv > self%nd) self%inertia(k) = old%inertia(order(k))
       self%glued(k) = old%glued(order(k))
       self%material(k) = old%material(order(k))
       self%image(:, k) = old%image(:, order(k))
@@ -174,7 +174,7 @@ contains
       bodies%velocity(:, 1:n) = old%velocity
       bodies%radius(1:n) = old%radius
       bodies%mass(1:n) = old%mass
-      bodies%inertia(1:n) = old%inertia
+      if (bodies%nv > bodies%nd) bodies%inertia(1:n) = old%inertia
       bodies%glued(1:n) = old%glued
       bodies%material(1:n) = old%material
       bodies%image(:, 1:n) = old%image
@@ -184,7 +184,7 @@ contains
     bodies%velocity(:, n + 1:) = more%velocity
     bodies%radius(n + 1:) = more%radius
     bodies%mass(n + 1:) = more%mass
-    bodies%inertia(n + 1:) = more%inertia
+    if (bodies%nv > bodies%nd) bodies%inertia(n + 1:) = more%inertia
     bodies%glued(n + 1:) = more%glued
     bodies%material(n + 1:) = more%material
     bodies%image(:, n + 1:) = more%image

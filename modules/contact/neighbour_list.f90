@@ -3,15 +3,25 @@ module gravier_neighbour_list
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: neighbour_list_t
+  public :: neighbour_list_t, pair_memory_t
 
-  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. The impulses of
-  !> the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
+  !> What pairs keep from one step to the next.
+  type :: pair_memory_t
+    !> entries of an impulse, 0 where solves do not start from those of the last step
+    integer :: n_impulse = 0
+    !> rows of the states that laws with a memory give pairs, and of the steps at rest, where contacts may sleep; 0 for none
+    integer :: law_row = 0, rest_row = 0
+  contains
+    procedure :: n_states => pair_memory_n_states
+    procedure :: words => pair_memory_words
+  end type pair_memory_t
+
+  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier.
+  !> The impulses of the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
   !> global axes.
   type :: neighbour_list_t
     integer :: n = 0
-    !> pairs have states
-    logical :: remembers = .false.
+    type(pair_memory_t) :: memory
     !> place of the candidate among the bodies searched (n)
     integer, allocatable :: candidate(:)
     !> place of the antagonist among the bodies searched, or minus the number of a boundary (n)
@@ -19,10 +29,10 @@ module gravier_neighbour_list
     !> periods by which the antagonist's place is shifted to meet the candidate, see shift_code; without periods of no
     !> size (n or 0)
     integer, allocatable :: shift(:)
-    !> (entries of an impulse, n) [N s]; the last entry is the number of steps at rest where contacts may sleep
+    !> (entries of an impulse, n) [N s]
     real(dp), allocatable :: impulse(:, :)
-    !> what pairs remember under laws with a memory, 0 at first; without such laws of no size (n or 0)
-    integer, allocatable :: state(:)
+    !> numbers that pairs keep, 0 at first (memory%n_states, n)
+    integer, allocatable :: state(:, :)
   contains
     procedure :: init => neighbour_list_init
     procedure :: add => neighbour_list_add
@@ -33,13 +43,23 @@ module gravier_neighbour_list
 
 contains
 
-  !> Whether pair `p` keeps something from the last step: an impulse, steps at rest or a state.
+  pure integer function pair_memory_n_states(self) result(n)
+    class(pair_memory_t), intent(in) :: self
+    n = max(self%law_row, self%rest_row)
+  end function pair_memory_n_states
+
+  !> Words of what is kept with a pair.
+  pure integer function pair_memory_words(self) result(n)
+    class(pair_memory_t), intent(in) :: self
+    n = self%n_impulse + self%n_states()
+  end function pair_memory_words
+
+  !> Whether pair `p` keeps something from the last step.
   pure logical function neighbour_list_keeps(self, p) result(keeps)
     class(neighbour_list_t), intent(in) :: self
     integer, intent(in) :: p
 
-    keeps = any(abs(self%impulse(:, p)) > 0.0_dp)
-    if (size(self%state) > 0) keeps = keeps .or. self%state(p) /= 0
+    keeps = any(abs(self%impulse(:, p)) > 0.0_dp) .or. any(self%state(:, p) /= 0)
   end function neighbour_list_keeps
 
   !> Pairs that keep something from the last step.
@@ -92,21 +112,18 @@ contains
   end subroutine lengthen
 
   !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses and states to zero.
-  subroutine neighbour_list_finish(self, order, n_impulse, remembers)
+  subroutine neighbour_list_finish(self, order, memory)
     class(neighbour_list_t), intent(inout) :: self
     !> (n) a permutation
     integer, intent(in), contiguous :: order(:)
-    !> entries of an impulse
-    integer, intent(in) :: n_impulse
-    !> pairs have states
-    logical, intent(in) :: remembers
+    type(pair_memory_t), intent(in) :: memory
 
     call permute(self%candidate, order)
     call permute(self%antagonist, order)
     if (size(self%shift) > 0) call permute(self%shift, order)
-    allocate (self%impulse(n_impulse, self%n), source=0.0_dp)
-    self%remembers = remembers
-    allocate (self%state(merge(self%n, 0, remembers)), source=0)
+    self%memory = memory
+    allocate (self%impulse(memory%n_impulse, self%n), source=0.0_dp)
+    allocate (self%state(memory%n_states(), self%n), source=0)
   end subroutine neighbour_list_finish
 
   subroutine permute(list, order)

@@ -7,7 +7,7 @@ module gravier_neighbour_search
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
-  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_region, only: region_t
   implicit none
   private
@@ -27,8 +27,6 @@ module gravier_neighbour_search
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
     !> rule_dual or rule_primal
     integer :: kind = rule_dual
-    !> pairs have states
-    logical :: remembers = .false.
   contains
     procedure :: range => rule_range
     procedure :: reach => rule_reach
@@ -130,8 +128,8 @@ contains
     end do
   end function place_of
 
-  !> List the near pairs that belong to a subdomain, in sweep order, without impulses.
-  subroutine find_neighbours(bodies, home, boundaries, period, region, subdomain, rule, n_impulse, list)
+  !> List the near pairs that belong to a subdomain, in sweep order, with nothing kept.
+  subroutine find_neighbours(bodies, home, boundaries, period, region, subdomain, rule, memory, list)
     !> the grains that the subdomain sees, wrapped into the period
     type(body_set_t), intent(in) :: bodies
     !> (n) subdomain that holds each grain's centre
@@ -141,8 +139,7 @@ contains
     class(region_t), intent(in) :: region
     integer, intent(in) :: subdomain
     type(neighbour_rule_t), intent(in) :: rule
-    !> entries of an impulse in the list
-    integer, intent(in) :: n_impulse
+    type(pair_memory_t), intent(in) :: memory
     type(neighbour_list_t), intent(inout) :: list
     type(entries_t) :: entries
     type(cell_hash_t) :: hash
@@ -317,7 +314,7 @@ contains
       end do
       if (list%n > 0) lower(:) = minval(point, dim=2)
       call sweep_order(point, lower, rule%sweep_edge(), id, order)
-      call list%finish(order, n_impulse, rule%remembers)
+      call list%finish(order, memory)
     end subroutine sort_list
 
   end subroutine find_neighbours

@@ -33,6 +33,7 @@ module gravier_decomposition
     procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
     procedure :: subdomain_of => decomposition_subdomain_of
+    procedure :: grain_words => decomposition_grain_words
     procedure :: find_home => decomposition_find_home
   end type decomposition_t
 
@@ -68,6 +69,17 @@ contains
     integer, intent(in) :: s
     subdomain = self%first + s - 1
   end function decomposition_subdomain_of
+
+  !> Words of the record of a grain.
+  pure integer function decomposition_grain_words(self) result(words)
+    class(decomposition_t), intent(in) :: self
+    type(body_set_t) :: grains
+
+    grains%nd = self%nd
+    grains%nv = self%nv
+    grains%ni = self%ni
+    words = grains%record_words()
+  end function decomposition_grain_words
 
   !> Subdomain of this rank and place in its home of a grain.
   pure subroutine decomposition_find_home(self, key, h, place)

@@ -86,7 +86,7 @@ contains
     real(dp), intent(inout) :: translation, rotation
 
     translation = translation + 0.5_dp*bodies%mass(k)*sum(velocity(1:bodies%nd)**2)
-    rotation = rotation + 0.5_dp*bodies%inertia(k)*sum(velocity(bodies%nd + 1:)**2)
+    if (bodies%nv > bodies%nd) rotation = rotation + 0.5_dp*bodies%inertia(k)*sum(velocity(bodies%nd + 1:)**2)
   end subroutine add_kinetic
 
   !> Kinetic energy of the free components of a boundary; 0 once it is removed.

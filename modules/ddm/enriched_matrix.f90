@@ -157,7 +157,7 @@ contains
       g = block_of(c)
       direction(q, :, g) = share*rule%value
       if (rule%relative) then
-        call sub%local_operator(c, sub%inverse_mass, w)
+        call sub%local_operator(kernels, c, sub%inverse_mass, w)
         direction(q, 1, g) = share*rule%value/w(1)
         direction(q, 2:, g) = share*rule%value/w(2)
       end if

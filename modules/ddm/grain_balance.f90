@@ -142,8 +142,8 @@ contains
     integer :: d, nd
 
     nd = bodies%nd
-    part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*sum(bodies%velocity(1:nd, k)**2) + &
-      & 0.5_dp*bodies%inertia(k)*sum(bodies%velocity(nd + 1:, k)**2)
+    part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*sum(bodies%velocity(1:nd, k)**2)
+    if (bodies%nv > nd) part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%inertia(k)*sum(bodies%velocity(nd + 1:, k)**2)
     do d = 1, nd
       part(in_momentum + d) = part(in_momentum + d) + bodies%mass(k)*bodies%velocity(d, k)
     end do

@@ -1,6 +1,5 @@
 !> Impulses kept from one step to the next, so that a solve starts from those of contacts that persist. They stay with the
-!> pairs of the neighbour lists, and move with them when the lists are made anew; so do the states of pairs under laws with a
-!> memory.
+!> pairs of the neighbour lists, and move with them when the lists are made anew; so do the states of pairs.
 module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort_rows
@@ -8,47 +7,49 @@ module gravier_impulse_memory
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_list, only: pair_memory_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
   implicit none
   private
-  public :: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses, list_impulses, match_impulses
+  public :: memory_of, impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses, list_impulses, &
+    & match_impulses
 
 contains
 
+  !> What pairs have to keep.
+  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest) result(memory)
+    type(kernels_t), intent(in) :: kernels
+    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted
+    logical, intent(in) :: warm_start, remembers, counts_rest
+
+    memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
+    memory%law_row = merge(1, 0, remembers)
+    if (counts_rest) memory%rest_row = memory%law_row + 1
+  end function memory_of
+
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
   !> over R*, or its vector.
-  pure integer function impulse_entries(kernels, counts_rest) result(n)
+  pure integer function impulse_entries(kernels) result(n)
     type(kernels_t), intent(in) :: kernels
-    !> one more entry for the steps at rest
-    logical, intent(in), optional :: counts_rest
 
     n = kernels%nc
     if (kernels%nf == 3) n = merge(7, 4, kernels%rolling_row > 0)
-    if (present(counts_rest)) n = n + merge(1, 0, counts_rest)
   end function impulse_entries
 
-  !> Words of what a list keeps with a pair: the entries of an impulse and, where pairs have one, the state.
-  pure integer function kept_entries(list) result(n)
-    type(neighbour_list_t), intent(in) :: list
-    n = size(list%impulse, 1) + merge(1, 0, list%remembers)
-  end function kept_entries
-
-  !> Keep the impulses of a solved problem with the pairs of the lists.
+  !> Keep the impulses of a solved problem with the pairs of the lists, whose memory has them.
   subroutine keep_impulses(problem, neighbourhoods)
     type(contact_problem_t), intent(in) :: problem
     type(neighbourhoods_t), intent(inout) :: neighbourhoods
-    integer :: s, c, q, g, n
+    integer :: s, c, q, g
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
-    n = impulse_entries(problem%kernels)
     rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
-        list%impulse(1:n, :) = 0.0_dp
+        list%impulse(:, :) = 0.0_dp
         do g = 1, n_blocks(sub%n_contacts)
           if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
           if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
@@ -58,7 +59,7 @@ contains
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
             if (problem%kernels%nf < 3) then
-              list%impulse(1:n, sub%source(c)) = sub%impulse(q, :, g)
+              list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
               list%impulse(2:4, sub%source(c)) = vector(q, :)
@@ -75,11 +76,10 @@ contains
   subroutine recall_impulses(neighbourhoods, problem)
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s, c, q, g, n
+    integer :: s, c, q, g
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
-    n = impulse_entries(problem%kernels)
     rolls = problem%kernels%rolling_row > 0
     vector(:, :) = 0.0_dp
     moment(:, :) = 0.0_dp
@@ -89,7 +89,7 @@ contains
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
             if (problem%kernels%nf < 3) then
-              sub%impulse(q, :, g) = list%impulse(1:n, sub%source(c))
+              sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
             else
               sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
               vector(q, :) = list%impulse(2:4, sub%source(c))
@@ -105,18 +105,18 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist, the impulse and, where pairs have one, the state, for the pairs of a list that carry
-  !> an impulse or a state; the antagonist of a boundary is minus its number.
+  !> Identifiers of candidate and antagonist, the impulse and the states, for the pairs of a list that keep something; the
+  !> antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, records)
     type(neighbourhood_t), intent(in) :: view
     !> words left free before those of a record
     integer, intent(in) :: lead
-    !> (lead + 2 + kept_entries, pairs that keep something)
+    !> (lead + 2 + words of the memory, pairs that keep something)
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer :: p, e, n
 
     associate (list => view%list)
-      allocate (records(lead + 2 + kept_entries(list), list%n_kept()), source=0_i8)
+      allocate (records(lead + 2 + list%memory%words(), list%n_kept()))
       n = 0
       do p = 1, list%n
         if (.not. list%keeps(p)) cycle
@@ -126,7 +126,7 @@ contains
         do e = 1, size(list%impulse, 1)
           records(lead + 2 + e, n) = transfer(list%impulse(e, p), 0_i8)
         end do
-        if (size(list%state) > 0) records(size(records, 1), n) = list%state(p)
+        records(lead + 3 + size(list%impulse, 1):, n) = list%state(:, p)
       end do
     end associate
   end subroutine list_impulses
@@ -144,12 +144,12 @@ contains
   subroutine gather_impulses(decomposition, neighbourhoods, records)
     type(decomposition_t), intent(in) :: decomposition
     type(neighbourhoods_t), intent(in) :: neighbourhoods
-    !> (1 + nd + 2 + kept_entries, n): subdomain (to be set), point, candidate, antagonist, impulse, state
+    !> (1 + nd + 2 + words of the memory, n): subdomain (to be set), point, candidate, antagonist, impulse, states
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer(i8), allocatable :: own(:, :)
     integer :: s, n, words
 
-    words = 3 + decomposition%nd + neighbourhoods%n_impulse + merge(1, 0, decomposition%rule%remembers)
+    words = 3 + decomposition%nd + neighbourhoods%memory%words()
     n = 0
     do s = 1, size(neighbourhoods%view)
       n = n + neighbourhoods%view(s)%list%n_kept()
@@ -221,34 +221,43 @@ contains
         if (received(1, order(k)) /= decomposition%subdomain_of(s)) exit
         k = k + 1
       end do
-      call match_impulses(mine(:, first:k - 1), neighbourhoods%view(s))
+      call match_impulses(mine(:, first:k - 1), neighbourhoods%memory, neighbourhoods%view(s))
     end do
   end subroutine spread_impulses
 
-  !> Give impulses and states to the pairs of a list that have the same bodies; of a checkpoint without steps at rest, these are
-  !> none.
-  subroutine match_impulses(records, view)
-    !> (2 + kept_entries, n): candidate, antagonist, impulse, state
+  !> Give impulses and states to the pairs of a list that have the same bodies; what the records do not have stays.
+  subroutine match_impulses(records, kept, view)
+    !> (2 + words of `kept`, n): candidate, antagonist, impulse, states
     integer(i8), intent(in), contiguous :: records(:, :)
+    type(pair_memory_t), intent(in) :: kept
     type(neighbourhood_t), intent(inout) :: view
     integer(i8), allocatable :: keys(:, :)
     integer, allocatable :: order(:)
-    integer :: p, k, e, n_states
+    integer :: p, k, e
 
     allocate (keys(2, size(records, 2)), order(size(records, 2)))
     keys(:, :) = records(1:2, :)
     call argsort_rows(keys, order)
     associate (list => view%list)
-      n_states = merge(1, 0, size(list%state) > 0)
       do p = 1, list%n
         k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p))
         if (k == 0) cycle
-        do e = 1, min(size(list%impulse, 1), size(records, 1) - 2 - n_states)
+        do e = 1, min(list%memory%n_impulse, kept%n_impulse)
           list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
         end do
-        if (n_states > 0) list%state(p) = int(records(size(records, 1), k))
+        call take_state(list%memory%law_row, kept%law_row)
+        call take_state(list%memory%rest_row, kept%rest_row)
       end do
     end associate
+
+  contains
+
+    subroutine take_state(row, row_kept)
+      integer, intent(in) :: row, row_kept
+
+      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = int(records(2 + kept%n_impulse + row_kept, k))
+    end subroutine take_state
+
   end subroutine match_impulses
 
   !> Place of a pair among keys that `order` sorts, or 0.

@@ -35,7 +35,7 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(found_t), intent(inout) :: found
-    integer :: p, i, j, nd
+    integer :: p, i, j, nd, row
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
     type(contact_terms_t) :: terms
 
@@ -44,6 +44,7 @@ contains
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
     allocate (found%terms(merge(view%list%n, 0, physics%laws%n > 0)))
     found%n = 0
+    row = view%list%memory%law_row
     alert = decomposition%rule%alert_distance
     do p = 1, view%list%n
       i = view%list%candidate(p)
@@ -83,7 +84,7 @@ contains
     !> Whether the pair is no contact: beyond the alert distance, and with nothing to remember.
     logical function is_far()
       is_far = gap > alert
-      if (is_far .and. size(view%list%state) > 0) is_far = view%list%state(p) == 0
+      if (is_far .and. row > 0) is_far = view%list%state(row, p) == 0
     end function is_far
 
     subroutine find_terms()
@@ -97,9 +98,9 @@ contains
       end if
       pair%first = physics%first
       pair%gap = gap
-      if (size(view%list%state) > 0) pair%state = view%list%state(p)
+      if (row > 0) pair%state = view%list%state(row, p)
       call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, normal, pair)
-      if (size(view%list%state) > 0) view%list%state(p) = pair%state
+      if (row > 0) view%list%state(row, p) = pair%state
       terms = pair%terms
     end subroutine find_terms
 

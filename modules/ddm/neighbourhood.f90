@@ -5,7 +5,7 @@ module gravier_neighbourhood
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_set_t, append_bodies
   use gravier_boundary, only: boundary_t, shape_plane, shape_grains, shape_outlet
-  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_search, only: find_neighbours, sweep_order
   use gravier_decomposition, only: decomposition_t
   implicit none
@@ -35,8 +35,8 @@ module gravier_neighbourhood
     integer, allocatable :: sent(:, :), seer(:), destination(:)
     !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
     integer, allocatable :: arrival(:, :)
-    !> entries of an impulse kept with a pair
-    integer :: n_impulse = 0
+    !> to be set before the first list
+    type(pair_memory_t) :: memory
     !> lists made so far
     integer(i8) :: builds = 0
   contains
@@ -48,11 +48,9 @@ module gravier_neighbourhood
 contains
 
   !> Make views and lists of the grains as they have settled. Collective.
-  subroutine neighbourhoods_build(self, decomposition, n_impulse)
+  subroutine neighbourhoods_build(self, decomposition)
     class(neighbourhoods_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
-    !> entries of an impulse kept with a pair
-    integer, intent(in) :: n_impulse
     type(body_set_t), allocatable :: ghosts(:)
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer :: s
@@ -68,10 +66,9 @@ contains
     do s = 1, size(self%view)
       self%reference(s)%position = decomposition%home(s)%position
       call find_neighbours(self%view(s)%bodies, self%view(s)%home, decomposition%boundaries, decomposition%period, &
-        & decomposition%partition, decomposition%subdomain_of(s), decomposition%rule, n_impulse, self%view(s)%list)
+        & decomposition%partition, decomposition%subdomain_of(s), decomposition%rule, self%memory, self%view(s)%list)
     end do
     self%reference_boundaries = decomposition%boundaries
-    self%n_impulse = n_impulse
     self%builds = self%builds + 1
   end subroutine neighbourhoods_build
 
@@ -111,11 +108,9 @@ contains
     class(neighbourhoods_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable, intent(out) :: records(:, :)
-    type(body_set_t) :: empty
     integer :: n
 
-    call empty%init(decomposition%nd, decomposition%nv, decomposition%ni, 0)
-    allocate (records(2 + empty%record_words(), size(self%seer)))
+    allocate (records(2 + decomposition%grain_words(), size(self%seer)))
     do n = 1, size(self%seer)
       records(1, n) = self%seer(n)
       records(2, n) = decomposition%subdomain_of(self%sent(1, n))

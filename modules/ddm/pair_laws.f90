@@ -140,14 +140,14 @@ contains
           if (l == 0) cycle
           q = lane_of(c)
           g = block_of(c)
-          pair%state = view%list%state(p)
+          pair%state = view%list%state(view%list%memory%law_row, p)
           pair%gap = sub%gap(c)
           pair%normal = sub%impulse(q, 1, g)
           pair%tangential = norm2(sub%impulse(q, 2:problem%kernels%nf, g))
           pair%terms%friction = 0.0_dp
           if (problem%kernels%nf > 1) pair%terms%friction = sub%hot(q, problem%kernels%friction_row, g)
           call laws%of(l)%law%conclude(pair)
-          view%list%state(p) = pair%state
+          view%list%state(view%list%memory%law_row, p) = pair%state
         end do
       end associate
     end do

@@ -126,8 +126,7 @@ contains
     integer, intent(in) :: n_columns
     type(subproblem_t), intent(inout) :: sub
 
-    allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%place(sub%n_grains))
-    allocate (sub%position(kernels%nd, sub%n_grains), sub%radius(sub%n_grains))
+    allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%place(sub%n_grains), sub%radius(sub%n_grains))
     allocate (sub%v_free(kernels%nv, n_columns), sub%inverse_mass(kernels%nw, n_columns), source=0.0_dp)
     ! what the solve sets before it reads them
     allocate (sub%velocity(kernels%nv, n_columns), sub%v_global(kernels%nv, n_columns), sub%reaction(kernels%nv, n_columns), &
@@ -150,7 +149,6 @@ contains
       sub%id(b) = view%bodies%id(k)
       sub%home(b) = view%home(k)
       sub%place(b) = view%origin(k)
-      sub%position(:, b) = view%bodies%position(:, k)
       sub%radius(b) = view%bodies%radius(k)
       sub%v_free(:, b) = view%bodies%velocity(1:kernels%nv, k)
       call physics%accelerate(view%bodies, k, sub%v_free(:, b))

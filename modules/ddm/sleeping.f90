@@ -59,7 +59,7 @@ contains
     call sum_over_copies(problem, sums)
     do s = 1, size(problem%sub)
       call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s), &
-        & sums(s))
+        & problem%kernels%nd, sums(s))
     end do
     if (woken) return
     call sum_over_copies(problem, sums)
@@ -83,7 +83,7 @@ contains
 
     allocate (asleep(found%n))
     do c = 1, found%n
-      asleep(c) = view%list%impulse(size(view%list%impulse, 1), found%source(c)) >= after
+      asleep(c) = view%list%state(view%list%memory%rest_row, found%source(c)) >= after
       b = boundary_of(view, found%source(c))
       if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
     end do
@@ -118,7 +118,7 @@ contains
     if (.not. allocated(neighbourhoods%view)) return
     do s = 1, size(neighbourhoods%view)
       associate (list => neighbourhoods%view(s)%list)
-        list%impulse(size(list%impulse, 1), :) = 0.0_dp
+        list%state(list%memory%rest_row, :) = 0
       end associate
     end do
   end subroutine wake_all
@@ -174,20 +174,20 @@ contains
 
   !> Count the steps at rest, and put the number of the contacts of each body that have not counted half of `after` into the
   !> first row of the sums, which comes as sum_impulses and sum_over_copies leave it.
-  subroutine count_steps(after, limit, boundaries, list, sub, sums)
+  subroutine count_steps(after, limit, boundaries, list, sub, nd, sums)
     integer, intent(in) :: after
     !> momentum of a body at rest [N s]
     real(dp), intent(in) :: limit
     type(boundary_t), intent(in) :: boundaries(:)
     type(neighbour_list_t), intent(inout) :: list
     type(subproblem_t), intent(in) :: sub
+    !> space dimension
+    integer, intent(in) :: nd
     type(sums_t), intent(inout) :: sums
     logical, allocatable :: rests(:)
     integer, allocatable :: steps(:)
-    integer :: c, b, last, nd
+    integer :: c, b, row
 
-    nd = size(sub%position, 1)
-    last = size(list%impulse, 1)
     allocate (rests(sub%n_columns), steps(sub%n_contacts))
     do b = 1, sub%n_columns
       rests(b) = .not. is_moved(boundaries, sub, b)
@@ -196,14 +196,15 @@ contains
       ! H r is H r~ and the pull of the attractions
       if (allocated(sub%pull)) rests(b) = rests(b) .and. momentum(b) <= share*norm2(sub%reaction(1:nd, b) + sub%pull(1:nd, b))
     end do
+    row = list%memory%rest_row
     do c = 1, sub%n_contacts
       steps(c) = 0
-      if (rests(sub%pair(1, c)) .and. rests(sub%pair(2, c))) steps(c) = min(after, nint(list%impulse(last, sub%source(c))) + 1)
+      if (rests(sub%pair(1, c)) .and. rests(sub%pair(2, c))) steps(c) = min(after, list%state(row, sub%source(c)) + 1)
     end do
-    list%impulse(last, :) = 0.0_dp
+    list%state(row, :) = 0
     sums%of(:, :) = 0.0_dp
     do c = 1, sub%n_contacts
-      list%impulse(last, sub%source(c)) = steps(c)
+      list%state(row, sub%source(c)) = steps(c)
       if (2*steps(c) >= after) cycle
       sums%of(1, sub%pair(1, c)) = sums%of(1, sub%pair(1, c)) + 1.0_dp
       sums%of(1, sub%pair(2, c)) = sums%of(1, sub%pair(2, c)) + 1.0_dp

@@ -42,7 +42,7 @@ module gravier_checkpoint_file
 
   !> what /format says of itself
   character(len=*), parameter :: format_name = "gravier checkpoint"
-  integer(i8), parameter :: format_version = 2
+  integer(i8), parameter :: format_version = 3
   !> room for the headers of the file, and of a table
   integer(i8), parameter :: bytes_of_headers = 65536, bytes_of_table = 16384
   integer, parameter :: bytes_of_word = 8

@@ -33,8 +33,8 @@ module gravier_contact_problem
     integer, allocatable :: multiplicity(:)
     !> number of the boundary behind a column (n_grains + 1 to n_columns)
     integer, allocatable :: boundary(:)
-    !> centres of grains at q_m (nd, n_grains), radii (n_grains) [m]
-    real(dp), allocatable :: position(:, :), radius(:)
+    !> of grains (n_grains) [m]
+    real(dp), allocatable :: radius(:)
     !> velocity without contacts, M^-1 R^d, in a solve with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
     !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
@@ -137,23 +137,24 @@ contains
   end subroutine subproblem_update_local_operator
 
   !> W_nn and W_tt of contact `c` [1/kg], see gravier_contact_kernels; W_tt = W_nn without friction.
-  pure subroutine subproblem_local_operator(self, c, weight, w)
+  pure subroutine subproblem_local_operator(self, kernels, c, weight, w)
     class(subproblem_t), intent(in) :: self
+    type(kernels_t), intent(in) :: kernels
     integer, intent(in) :: c
     !> (nw, n_columns)
     real(dp), intent(in), contiguous :: weight(:, :)
     real(dp), intent(out) :: w(2)
-    real(dp) :: normal(size(self%position, 1))
+    real(dp) :: normal(kernels%nd)
     integer :: nd, i, j, q, g
 
-    nd = size(normal)
+    nd = kernels%nd
     i = self%pair(1, c)
     j = self%pair(2, c)
     q = lane_of(c)
     g = block_of(c)
     normal(:) = self%hot(q, 1:nd, g)
     call local_operator(normal, weight(:, i), weight(:, j), w(1), w(2))
-    if (size(self%hot, 2) > nd + 2) then
+    if (kernels%nf > 1) then
       w(2) = w(2) + self%hot(q, nd + 4, g)**2*weight(nd + 1, i) + self%hot(q, nd + 5, g)**2*weight(nd + 1, j)
     else
       w(2) = w(1)

@@ -52,7 +52,7 @@ contains
       & self%slope(nc, nc, n), self%softness(2, n), self%along(2, n), self%kept(n), source=0.0_dp)
     allocate (self%state(n), source=is_open)
     do c = 1, n
-      call sub%local_operator(c, sub%inverse_mass, w)
+      call sub%local_operator(kernels, c, sub%inverse_mass, w)
       self%softness(:, c) = 1.0_dp/w
     end do
   end subroutine proximal_law_init

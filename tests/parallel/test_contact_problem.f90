@@ -183,7 +183,7 @@ contains
               & 2*epsilon(1.0_dp)*sub%weight(:, b))
           end do
           do c = 1, sub%n_contacts
-            call sub%local_operator(c, sub%weight, w)
+            call sub%local_operator(sim%problem%kernels, c, sub%weight, w)
             call compare_operator(sim%problem, s, c, w, right)
             right = right .and. abs(sub%hot(lane_of(c), dimension + 2, block_of(c))*w(1) - 1.0_dp) <= 2*epsilon(1.0_dp)
             if (friction > 0.0_dp) right = right .and. &

@@ -100,7 +100,6 @@ contains
       newcomers(1)%velocity(:, n) = 2*newcomers(1)%position(:, n)
       newcomers(1)%radius(n) = radius_of(g)
       newcomers(1)%mass(n) = g
-      newcomers(1)%inertia(n) = -g
       newcomers(1)%glued(n) = mod(g, 3)
       newcomers(1)%image(:, n) = g
     end do
@@ -260,7 +259,7 @@ contains
     is_grain = is_grain .and. all(abs(apart) <= 200*epsilon(1.0_dp))
     call find_place(g, 0, place)
     is_grain = is_grain .and. all(abs(bodies%velocity(:, k) - 2*place) <= 4*epsilon(1.0_dp))
-    is_grain = is_grain .and. abs(bodies%radius(k) - radius_of(g)) <= epsilon(1.0_dp) .and. abs(bodies%inertia(k) + g) <= 0.0_dp
+    is_grain = is_grain .and. abs(bodies%radius(k) - radius_of(g)) <= epsilon(1.0_dp) .and. abs(bodies%mass(k) - g) <= 0.0_dp
   end function is_grain
 
   !> Records go to the ranks of the subdomains that hold their points, whoever has them.

@@ -88,7 +88,7 @@ contains
     sub%n_contacts = n
     sub%n_awake = n
     allocate (sub%id(sub%n_bodies), sub%home(sub%n_bodies), sub%multiplicity(sub%n_bodies))
-    allocate (sub%position(nd, sub%n_bodies), sub%v_free(problem%kernels%nv, sub%n_bodies), source=0.0_dp)
+    allocate (sub%v_free(problem%kernels%nv, sub%n_bodies), source=0.0_dp)
     allocate (sub%velocity, sub%v_global, sub%reaction, mold=sub%v_free)
     allocate (sub%inverse_mass(problem%kernels%nw, sub%n_bodies), source=0.0_dp)
     allocate (sub%weight, mold=sub%inverse_mass)

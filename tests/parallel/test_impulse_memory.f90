@@ -228,7 +228,8 @@ contains
     call cloud%make_periodic(axes)
     decomposition%rule = cloud%rule(0.02_dp, 0.04_dp, kind)
     call make_decomposition(comm, cloud, 7, nd, .false., decomposition)
-    call before%build(decomposition, 4)
+    before%memory%n_impulse = 4
+    call before%build(decomposition)
     allocate (owner(cloud%n, cloud%n), source=0_i8)
     call fill_lists(before, owner)
     do s = 1, size(decomposition%home)
@@ -243,7 +244,8 @@ contains
     call make_decomposition(comm, cloud, 7, nd, .true., other)
     decomposition%partition = other%partition
     call decomposition%settle()
-    call after%build(decomposition, 4)
+    after%memory%n_impulse = 4
+    call after%build(decomposition)
     call spread_impulses(decomposition, records, after)
     call count_pairs(decomposition, after, owner, counts)
     call check(count(owner > 0) > 60, "new partition: enough pairs to tell")
@@ -328,7 +330,8 @@ contains
     call make_decomposition(comm, cloud, 5, 6, .false., decomposition)
     call kernels%choose(3, effects_t(friction=.true.))
     call check_equal(impulse_entries(kernels), 4, "entries of an impulse in space with friction")
-    call seen%build(decomposition, 4)
+    seen%memory%n_impulse = 4
+    call seen%build(decomposition)
     call build_problem(decomposition, seen, kernels, physics, problem, figures)
     ! the tangential vector of each pair (3, candidate, antagonist)
     allocate (kept(3, cloud%n, cloud%n), source=0.0_dp)

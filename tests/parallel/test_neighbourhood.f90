@@ -57,7 +57,8 @@ contains
         home_of(g) = decomposition%partition%owner(cloud%place(:, g))
       end do
       call decomposition%settle()
-      call seen%build(decomposition, 2)
+      seen%memory%n_impulse = 2
+      call seen%build(decomposition)
       call check_equal(seen%builds, int(t + 1, i8), "lists made")
       call check(.not. seen%are_due(decomposition), "lists are not due when made")
       call check_views(decomposition, seen, cloud, home_of)
@@ -209,7 +210,8 @@ contains
     call cloud%init(2, n_grains, 0.03_dp, 0.1_dp, 70)
     decomposition%rule = cloud%rule(alert, skin, rule_dual)
     call make_decomposition(comm, cloud, 5, 2, .false., decomposition)
-    call seen%build(decomposition, 2)
+    seen%memory%n_impulse = 2
+    call seen%build(decomposition)
     do g = 1, n_grains, 23
       call shift_grain(decomposition, g, 0.49_dp*skin)
       call check(.not. seen%are_due(decomposition), "a grain within half the skin")
@@ -293,7 +295,8 @@ contains
     decomposition%boundaries(1) = plane(999, [0.0_dp, 0.0_dp, -9.0_dp], [0.0_dp, 0.0_dp, 1.0_dp])
     decomposition%boundaries(2) = boundary
     call make_decomposition(comm, cloud, 3, 3, .false., decomposition)
-    call seen%build(decomposition, 2)
+    seen%memory%n_impulse = 2
+    call seen%build(decomposition)
     ! in several steps, as the axis of a drum picks up roundings
     do k = 1, 300
       call decomposition%boundaries(2)%move(skin/300.0_dp)

@@ -106,7 +106,7 @@ contains
       bodies%position(:, n) = self%place(:, g)
       bodies%radius(n) = self%radius(g)
       bodies%mass(n) = 1.0_dp + draw(4, g, 5)
-      bodies%inertia(n) = 0.1_dp + draw(4, g, 6)
+      if (nv > self%nd) bodies%inertia(n) = 0.1_dp + draw(4, g, 6)
       do d = 1, nv
         bodies%velocity(d, n) = draw(4, g, 6 + d) - 0.5_dp
       end do

@@ -43,7 +43,7 @@ program test_neighbour_search
   use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t, shape_grains, shape_outlet, shape_circle
-  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_search, only: neighbour_rule_t, find_neighbours, sweep_order, owner_point, rule_dual, rule_primal
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane
   use test_search_region, only: sites_t
@@ -200,7 +200,7 @@ contains
     right = .true.
     ordered = .true.
     do s = 1, size(region%site, 2)
-      call find_neighbours(bodies, home, boundaries, cloud%period, region, s, rule, 3, list)
+      call find_neighbours(bodies, home, boundaries, cloud%period, region, s, rule, pair_memory_t(3), list)
       right = right .and. size(list%candidate) == list%n .and. size(list%impulse, 1) == 3 .and. size(list%impulse, 2) == list%n
       right = right .and. size(list%shift) == merge(list%n, 0, cloud%period%on()) .and. all(abs(list%impulse) <= 0.0_dp)
       do p = 1, list%n
@@ -340,7 +340,7 @@ contains
       do k = 1, 2
         call shuffled_bodies(cloud, merge(53, 67, k == 1), bodies(k))
         call find_homes(bodies(k), region, home)
-        call find_neighbours(bodies(k), home, boundaries, cloud%period, region, s, rule, 1, list(k))
+        call find_neighbours(bodies(k), home, boundaries, cloud%period, region, s, rule, pair_memory_t(1), list(k))
       end do
       same = same .and. list(1)%n == list(2)%n
       if (.not. same) exit
@@ -423,7 +423,6 @@ contains
     bodies%velocity(:, :) = 0.0_dp
     bodies%radius(:) = 1.0_dp
     bodies%mass(:) = 1.0_dp
-    bodies%inertia(:) = 1.0_dp
     bodies%glued(:) = 0
   end subroutine unit_bodies
 
@@ -443,7 +442,7 @@ contains
     rule%mean_radius = 1.0_dp
     call make_sites(bodies%nd, 1, whole)
     home(:) = 1
-    call find_neighbours(bodies, home, boundaries, period, whole, 1, rule, 1, list)
+    call find_neighbours(bodies, home, boundaries, period, whole, 1, rule, pair_memory_t(1), list)
   end subroutine list_units
 
   !> A gap equal to alert distance and skin is listed, a larger one is not; all numbers are exact in binary.
@@ -564,7 +563,7 @@ contains
     call unit_bodies(reshape([1.0_dp, 2.0_dp, 1.0_dp, 2.0_dp], [2, 2]), bodies)
     bodies%radius(:) = 0.0_dp
     call make_sites(2, 1, whole)
-    call find_neighbours(bodies, home, ground, period, whole, 1, point_like, 1, list)
+    call find_neighbours(bodies, home, ground, period, whole, 1, point_like, pair_memory_t(1), list)
     call check_equal(list%n, 1, "points that coincide")
   end subroutine test_few_bodies
 
