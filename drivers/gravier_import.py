@@ -250,8 +250,9 @@ def read_initial(path, bodies):
     return time
 
 
-def read_contacts(path, bodies):
-    """Rows of the contacts: body, contactor, body, contactor, status, gap, forces n, t, s, normal."""
+def read_contacts(path, bodies, laws):
+    """Rows of the contacts: body, contactor, body, contactor, status, gap, forces n, t, s, normal, force on the candidate along the axes
+    of space. The normal is from the antagonist to the candidate; t is (n2, -n1) in 2D and stands in the file in 3D, as s does."""
     rows, head = [], False
     for keyword, entry in entries(path):
         if keyword != "$icdan" or not entry.words:
@@ -268,8 +269,17 @@ def read_contacts(path, bodies):
                 entry.refuse(f"bodies {pair[0]} and {pair[1]}", f"bodies of BODIES.DAT, 1 to {len(bodies)}")
             status = next((word for word in words[kinds[1] + 4:] if not word.isdigit()), "")
             gap = next((entry.values[name] for name in ("gapTT", "gTT", "gap") if name in entry.values), math.nan)
+            law = laws.get(words[kinds[1] - 1])
+            if law and law.words[1] == "IQS_MOHR_DS_CLB" and not status.startswith("M"):
+                entry.refuse(f"bodies {pair[0]} and {pair[1]} with status {status}, whose bond is broken", "Mstck: near pairs begin bonded here")
             force = [entry.values.get(f"{name}/H", 0.0) for name in ("rln", "rlt", "rls")]
-            rows.append([pair[0], words[kinds[0] + 2], pair[1], words[kinds[1] + 2], status, gap, *force, *entry.vector("n", 3, 0.0)])
+            normal = entry.vector("n", 3, 0.0)
+            if bodies[0].dimension == 2:
+                tangents = np.array([[normal[1], -normal[0], 0.0], [0.0] * 3])
+            else:
+                tangents = np.stack([entry.vector(name, 3, math.nan) for name in "ts"])
+            rows.append([pair[0], words[kinds[0] + 2], pair[1], words[kinds[1] + 2], status, gap, *force, *normal,
+                         *(force[0] * normal + force[1:] @ tangents)])
     return rows
 
 
@@ -606,7 +616,7 @@ def write_files(case, stem, options, contacts):
               group_text("output", {"directory": stem + "_results", "every": max(1, options.steps // 10)})]
     made[stem + ".nml"] = "! " + f"made by gravier_import from {options.datbox}\n" + "\n".join(parts)
     if contacts is not None:
-        made[stem + "_contacts.csv"] = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz\n" + "".join(
+        made[stem + "_contacts.csv"] = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n" + "".join(
             ",".join(str(cell) for cell in row) + "\n" for row in contacts)
     for path, text in made.items():
         if text is not None:
@@ -647,7 +657,7 @@ def main():
         start = read_initial(box / "DOF.INI", bodies) if (box / "DOF.INI").is_file() else 0.0
         if (box / "DRV_DOF.DAT").is_file():
             read_drives(box / "DRV_DOF.DAT", bodies, start, start + options.step * options.steps)
-        contacts = read_contacts(box / "Vloc_Rloc.INI", bodies) if (box / "Vloc_Rloc.INI").is_file() else None
+        contacts = read_contacts(box / "Vloc_Rloc.INI", bodies, laws) if (box / "Vloc_Rloc.INI").is_file() else None
         if options.period and len(options.period) != bodies[0].dimension:
             raise Refused(f"--period: {len(options.period)} numbers: expected {bodies[0].dimension}, 0 along an axis that is not periodic")
         case = Case(bodies, density, gravity, laws, sees, options.planes, options.slip)

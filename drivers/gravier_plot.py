@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Draw what runs left in their directories: packings with force chains, histories, convergence, movies."""
+"""Draw what runs left in their directories: packings with force chains, histories, convergence, movies; and samples."""
 import argparse
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -65,20 +66,29 @@ def colours(run, step, bodies, kind):
         values = run.subdomain(step)
         count = values.max()
         return values, "subdomain", {"cmap": plt.get_cmap("tab20", count), "norm": BoundaryNorm(numpy.arange(count + 1) + 0.5, count)}
+    if kind == "rotation" and "spin" not in bodies:
+        refuse(f"{run.path}: no velocities; expected another --colour")
     if kind == "rotation" and run.dimension == 2:
         values, unit, name = bodies.spin[:, 0], "rad/s", "rotation, anticlockwise"
     elif kind == "rotation":
         values, unit, name = numpy.linalg.norm(bodies.spin, axis=1), "rad/s", "rotation"
+    elif kind == "radius" and bodies.radius.min() == bodies.radius.max():
+        return None, None, {}
+    elif kind == "radius":
+        values, unit, name = bodies.radius, "m", "radius"
     elif kind == "pressure":
         values, unit, name = run.pressure(step), "N/m" if run.dimension == 2 else "Pa", "pressure"
-    else:
+    elif "velocity" in bodies:
         values, unit, name = numpy.linalg.norm(bodies.velocity, axis=1), "m/s", "speed"
+    else:
+        refuse(f"{run.path}: no velocities; expected another --colour")
     # a few extreme bodies must not make all others look alike
     top = numpy.quantile(numpy.abs(values), 0.98) or numpy.abs(values).max() or 1.0
     power = 3 * int(numpy.floor(numpy.log10(top) / 3.0))
     label = f"{name} [$10^{{{power}}}$ {unit}]" if power != 0 else f"{name} [{unit}]"
     signed = values.min() < 0.0
-    limits = plt.Normalize(-top / 10.0**power if signed else 0.0, top / 10.0**power)
+    low = -top if signed else values.min() if kind == "radius" and values.min() < top else 0.0
+    limits = plt.Normalize(low / 10.0**power, top / 10.0**power)
     return values / 10.0**power, label, {"cmap": TURNS if signed else SPEEDS, "norm": limits}
 
 
@@ -154,15 +164,18 @@ def draw_packing(run, step, options, frame=None):
     chains = options.chains and contacts is not None and len(contacts) > 0
     order, diameter = view.order(bodies.position), 2.0 * bodies.radius
     through = 0.25 if chains and not view.flat else 1.0
+    # an outline would hide a body of a few points
+    points = 72.0 * options.size / (high - low).max() * numpy.median(diameter)
     disks = EllipseCollection(diameter[order], diameter[order], numpy.zeros_like(diameter), units="xy",
                               offsets=view.place(bodies.position)[order], offset_transform=axes.transData,
-                              edgecolors="0.55" if view.flat else "0.25", linewidths=0.4, alpha=through, **how)
+                              edgecolors="0.55" if view.flat else "0.25", linewidths=min(0.4, 0.06 * points), alpha=through, **how)
     if values is None:
         disks.set_facecolor("#dbe7f3")
     else:
         disks.set_array(values[order])
     axes.add_collection(disks)
-    title = f"step {step}, t = {run.time(step):.4g} s: {len(bodies)} {'disks' if view.flat else 'spheres'}"
+    title = run.path.name if isinstance(run, gravier.BodiesFile) else f"step {step}, t = {run.time(step):.4g} s"
+    title += f": {len(bodies)} {'disks' if view.flat else 'spheres'}"
     if contacts is not None:
         title += f", {len(contacts)} contacts"
     if chains:
@@ -306,43 +319,59 @@ def shared_frame(run, steps, options):
 
 def draw_movie(run, options):
     """A movie (.gif, .mp4) or, for any other path, a directory of frames."""
-    steps = [step for step in run.steps if len(run.bodies(step)) > 0][::options.every]
-    frame = shared_frame(run, steps, options)
     out = options.out or run.directory / "movie.gif"
     if out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
         refuse(f"{out}: no program ffmpeg; expected a movie .gif, or a directory for frames")
+    if out.suffix in (".avi", ".mkv", ".mov", ".webm"):
+        refuse(f"{out}: expected a movie .gif or .mp4, or a directory for frames")
     movie = out.suffix in (".gif", ".mp4")
+    try:
+        (out.parent if movie else out).mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        refuse(f"{out}: {reason.strerror}; expected a place for files")
+    steps = [step for step in run.steps if len(run.bodies(step)) > 0][::options.every]
+    frame = shared_frame(run, steps, options)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) if movie else out
         for k, step in enumerate(steps):
             figure = draw_packing(run, step, options, frame)
-            folder.mkdir(parents=True, exist_ok=True)
             # frames of one size
             figure.savefig(folder / f"frame_{k:05d}.png", dpi=100, metadata={"Software": None})
             plt.close(figure)
         if movie:
-            frames = [plt.imread(path) for path in sorted(folder.glob("frame_*.png"))]
-            height, width = frames[0].shape[:2]
-            figure = plt.figure(figsize=(width / 100, height / 100), dpi=100)
-            image = figure.figimage(frames[0])
-            play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(frames[k])], frames=len(frames))
-            out.parent.mkdir(parents=True, exist_ok=True)
-            play.save(out, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=options.fps)
-            plt.close(figure)
+            join_frames(sorted(folder.glob("frame_*.png")), out, options.fps)
     print(out)
+
+
+def join_frames(paths, out, fps):
+    """A movie of pictures of one size, which are read one after the other: all of a long run would not fit into memory."""
+    first = plt.imread(paths[0])
+    # players and the usual coding of .mp4 want even numbers of pixels
+    height, width = (2 * (size // 2) for size in first.shape[:2])
+    figure = plt.figure(figsize=(width / 100, height / 100), dpi=100)
+    image = figure.figimage(first[:height, :width])
+    play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k])[:height, :width])],
+                                              frames=len(paths))
+    try:
+        play.save(out, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
+    except OSError as reason:
+        refuse(f"{out}: {reason.strerror}; expected a file that can be written")
+    except subprocess.CalledProcessError as reason:
+        refuse(f"{out}: ffmpeg ended with status {reason.returncode}; expected a movie .gif, or a directory for frames")
+    plt.close(figure)
 
 
 def parse(arguments):
     parser = argparse.ArgumentParser(prog="gravier_plot", description=__doc__)
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
     one, several, look = (argparse.ArgumentParser(add_help=False) for _ in range(3))
-    one.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    one.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run (packing: or a bodies file .h5)")
     several.add_argument("directory", type=Path, metavar="DIR", nargs="+", help="output directories of runs, compared in one figure")
     for options in (one, several):
         options.add_argument("--out", type=Path, metavar="FILE",
                              help="picture, .png or .svg (movie: .gif, .mp4 or a directory of frames); in the first DIR unless told")
-    look.add_argument("--colour", choices=("speed", "rotation", "pressure", "subdomain", "none"), default="speed",
-                      help="what colours the bodies (speed); subdomain needs &output vtk = .true.")
+    look.add_argument("--colour", choices=("speed", "rotation", "pressure", "radius", "subdomain", "none"),
+                      help="what colours the bodies (speed; of a bodies file, radius); subdomain needs &output vtk = .true.")
     look.add_argument("--chains", action=argparse.BooleanOptionalAction,
                       help="lines from centre to centre as thick as the normal force; in 2D unless told, spheres become transparent")
     look.add_argument("--view", type=float, nargs=2, default=(-60.0, 20.0), metavar=("AZIMUTH", "ELEVATION"),
@@ -366,12 +395,17 @@ def main(arguments=None):
     plt.rcParams.update({"font.size": 9, "svg.hashsalt": "gravier"})
     if options.out and options.kind != "movie" and options.out.suffix not in (".png", ".svg"):
         refuse(f"--out {options.out}: expected a path that ends in .png or .svg")
+    if options.kind == "movie" and not (options.every >= 1 and 0.0 < options.fps < numpy.inf):
+        refuse(f"--every {options.every} --fps {options.fps:g}: expected 1 or more, and a number > 0")
     directories = options.directory if isinstance(options.directory, list) else [options.directory]
     try:
-        runs = [gravier.Run(directory) for directory in directories]
+        sample = options.kind == "packing" and directories[0].suffix == ".h5"
+        runs = [gravier.BodiesFile(directories[0])] if sample else [gravier.Run(directory) for directory in directories]
+        if options.kind in ("packing", "movie") and options.colour is None:
+            options.colour = "radius" if sample else "speed"
         if options.kind in ("packing", "movie") and options.chains is None:
             options.chains = runs[0].dimension == 2
-        out = options.out or directories[0] / f"{options.kind}.png"
+        out = options.out or (directories[0].with_suffix(".png") if sample else directories[0] / f"{options.kind}.png")
         if options.kind == "packing":
             save(draw_packing(runs[0], options.step, options), out, options.dpi)
         elif options.kind == "movie":

@@ -129,7 +129,7 @@ class Import(RunTestCase):
         box = self.box(2, bodies, laws, "".join(still(2, n + 1 + k) for k in range(3)), states, contacts=contacts)
         folder, _ = self.convert(box)
         with open(os.path.join(folder, "case_contacts.csv"), encoding="utf-8") as file:
-            self.assertEqual(file.read().splitlines()[1], "1,DISKx,2,DISKx,stick,-1e-06,2.0,0.1,0.0,0.0,1.0,0.0")
+            self.assertEqual(file.read().splitlines()[1], "1,DISKx,2,DISKx,stick,-1e-06,2.0,0.1,0.0,0.0,1.0,0.0,0.1,2.0,0.0")
         with h5py.File(os.path.join(folder, "case.h5")) as file:
             self.assertEqual(len(file["bodies/id"]), n + 6)
             np.testing.assert_allclose(file["bodies/mass"][:n], 2500.0 * math.pi * radius**2, rtol=1e-6)
@@ -308,6 +308,37 @@ class Import(RunTestCase):
         self.assertIn("note: law cohes IQS_MOHR_DS_CLB: bodies bonded across a gap keep it", notes)
         self.assertLess(abs(held), 1e-6)
         self.assertGreater(self.hanging(law, 0.9)[0], 5e-3)
+
+    def contact(self, kind, law, status, lines):
+        """A Vloc_Rloc.INI with one contact of bodies 1 and 2, as LMGC90 writes it: a number has its sign next to its name."""
+        shape, between = ("DISKx", "") if kind == "DKDKx" else ("SPHER", " " * 7)
+        text = "\n".join(" " * 29 + "  ".join(f"{name}{real(x)}" for name, x in line.items()) for line in lines)
+        rigid = "RBDY2" if kind == "DKDKx" else "RBDY3"
+        return (f"$steps      7                time= 0.0000000D+00\n\n$icdan  {kind}        1\n cdbdy  numbr  cdtac  numbr  behav  anbdy\n"
+                f" {rigid}      1  {shape}      1{between}  {law}  {rigid}      2  {shape}      1  {status}      2\n{text}\n")
+
+    def test_forces_of_contacts_along_the_axes_of_space(self):
+        """In 3D the frame (s, t, n) of a contact stands in the file, after the gap `gTT =`; in 2D t = (n2, -n1)."""
+        laws = LAW + SEE.format("RBDY3", "SPHER", "BLUEx", "SPHER", "BLUEx")
+        bodies = "".join(body(3, k, place, [("SPHER", "BLUEx", values(byrd=0.05))]) for k, place in ((1, [0.06, 0.0, 0.08]), (2, [0.0] * 3)))
+        axes = {"s": [0.0, 1.0, 0.0], "t": [0.8, 0.0, -0.6], "n": [0.6, 0.0, 0.8]}
+        lines = [{"rls/H": 3.0, "rlt/H": -0.5, "rln/H": 10.0}, {"vls =": 0.0, "vlt =": 0.1, "vln =": 0.0}, {"gTT =": -1e-6}]
+        lines += [{f"{name}({k})=": x for k, x in enumerate(axis, 1)} for name, axis in axes.items()]
+        folder, _ = self.convert(self.box(3, bodies, laws, contacts=self.contact("SPSPx", "iqsc0", "slide", lines)))
+        with open(os.path.join(folder, "case_contacts.csv"), encoding="utf-8") as file:
+            head, row = file.read().splitlines()
+        self.assertEqual(head.split(",")[-7:], ["force_s", "nx", "ny", "nz", "fx", "fy", "fz"])
+        self.assertTrue(row.startswith("1,SPHER,2,SPHER,slide,-1e-06,10.0,-0.5,3.0,0.6,0.0,0.8,"), row)
+        np.testing.assert_allclose([float(cell) for cell in row.split(",")[-3:]], [6.0 - 0.4, 3.0, 8.0 + 0.3], rtol=1e-12)
+
+    def test_a_broken_bond_is_refused(self):
+        """LMGC90 bonds at its first step what it does not know; a contact that Vloc_Rloc.INI has, it takes as it is."""
+        laws = self.law("cohes", "IQS_MOHR_DS_CLB", {"cohn": 10.0, "coht": 5.0}, {"dyfr": 0.3, "stfr": 0.3}) + self.see("cohes")
+        bodies = "".join(body(2, k, [0.1 * k, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) for k in (1, 2))
+        lines = [{"rlt/H": 0.0, "rln/H": 1.0, "rls/H": 0.0}, {"n(1)=": -1.0, "n(2)=": 0.0, "n(3)=": 0.0}]
+        self.convert(self.box(2, bodies, laws, contacts=self.contact("DKDKx", "cohes", "Mstck", lines)))
+        _, message = self.convert(self.box(2, bodies, laws, contacts=self.contact("DKDKx", "cohes", "slifw", lines)), status=2)
+        self.assertIn("Vloc_Rloc.INI: line 5: bodies 1 and 2 with status slifw, whose bond is broken: expected Mstck", message)
 
     def test_laws_that_mean_another_thing_are_refused(self):
         two, one = {"dyfr": 0.2, "stfr": 0.5}, {"dyfr": 0.3, "stfr": 0.3}

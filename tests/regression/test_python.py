@@ -4,9 +4,12 @@ import io
 import math
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 import types
+import unittest.mock
 
 import gravier_runs  # noqa: F401  puts the package on the path
 import h5py
@@ -152,13 +155,72 @@ class Package(RunTestCase):
         shapes = {matplotlib.image.imread(self.here("frames", name)).shape for name in os.listdir(self.here("frames"))}
         self.assertEqual(len(shapes), 1)
 
+    def test_movies_by_ffmpeg(self):
+        """Frames go to the program ffmpeg one after the other, of even size, which its coding of .mp4 wants; a program that keeps what it
+        is given stands in for it, one that fails, and none. Where the real one is installed it makes a movie too."""
+        real = shutil.which("ffmpeg")
+        programs = self.here("programs")
+        os.mkdir(programs)
+        with unittest.mock.patch.dict(os.environ, {"PATH": programs}):
+            status, said = self.plot("movie", "heap/results", "--out", "film.mp4")
+            self.assertEqual((status, said), (2, "gravier_plot: film.mp4: no program ffmpeg; expected a movie .gif, or a directory for frames\n"))
+            stub = os.path.join(programs, "ffmpeg")
+            for end, text in ((0, ""), (1, "1")):
+                with open(stub, "w", encoding="ascii") as file:
+                    file.write(f'#!/bin/sh\nfor last; do :; done\necho "$@" >"$last.said"\n/bin/cat >"$last"\nexit {text}\n')
+                os.chmod(stub, 0o755)
+                status, said = self.plot("movie", "heap/results", "--out", "film.mp4", "--every", "3", "--fps", "5")
+                if end == 0:
+                    self.assertEqual((status, said), (0, "film.mp4\n"))
+                    with open(self.here("film.mp4.said"), encoding="ascii") as file:
+                        width, height = map(int, re.search(r"-s (\d+)x(\d+) -pix_fmt rgba -.* 5.0 ", file.read()).groups())
+                    self.assertEqual((width % 2, height % 2), (0, 0))
+                    pictures = np.fromfile(self.here("film.mp4"), dtype=np.uint8).reshape(2, height, width, 4)
+                    self.assertGreater(min(picture[:, :, :3].std() for picture in pictures), 10.0)
+                    self.assertTrue((pictures[0] != pictures[1]).any())
+                else:
+                    self.assertEqual((status, len(said.splitlines())), (2, 1), said)
+                    self.assertIn("film.mp4: ffmpeg ended with status 1; expected a movie .gif", said)
+        if real:
+            status, said = self.plot("movie", "heap/results", "--out", "real.mp4")
+            self.assertEqual((status, said), (0, "real.mp4\n"))
+            with open(self.here("real.mp4"), "rb") as file:
+                self.assertIn(b"ftyp", file.read(16))
+
+    def test_pictures_of_bodies_files(self):
+        with h5py.File(self.here("two.h5"), "w") as file:
+            file["bodies/id"], file["bodies/radius"] = [4, 7], [0.1, 0.2]
+            file["bodies/position"] = [[0.1, 0.1], [0.5, 0.2]]
+            file["walls/id"], file["walls/point"], file["walls/normal"] = [8], [[0.0, 0.0]], [[0.0, 1.0]]
+        sample = gravier.BodiesFile(self.here("two.h5"))
+        self.assertEqual((sample.dimension, list(sample.bodies().id), list(sample.boundaries().name)), (2, [4, 7], ["wall 8"]))
+        status, said = self.plot("packing", "two.h5", "--dpi", "100")
+        self.assertEqual((status, said), (0, "two.png\n"))
+        self.assertGreater(matplotlib.image.imread(self.here("two.png"))[:, :, :3].std(), 0.05)
+        with h5py.File(self.here("bare.h5"), "w") as file:
+            file["bodies/id"], file["bodies/position"], file["bodies/radius"] = [1], [[0.0, 0.0, 0.0]], [0.1]
+        status, said = self.plot("packing", "bare.h5", "--out", "bare.png")
+        self.assertEqual((status, said), (0, "bare.png\n"))
+        for arguments, message in ((("two.h5", "--colour", "speed"), "two.h5: no velocities; expected another --colour"),
+                                   (("two.h5", "--colour", "pressure"), "two.h5: a bodies file has no contacts"),
+                                   (("two.h5", "--colour", "subdomain"), "two.h5: a bodies file has no subdomains"),
+                                   (("heap/results/results.h5",), "no /bodies with id, position and radius; expected a bodies file"),
+                                   (("none.h5",), "none.h5: cannot read this file; expected a bodies file")):
+            status, said = self.plot("packing", *arguments)
+            self.assertEqual((status, len(said.splitlines())), (2, 1), said)
+            self.assertIn(message, said)
+
     def test_refusals(self):
         for arguments, message in ((("packing", "nowhere"), "results.h5: cannot read this file"),
                                    (("packing", "heap/results", "--step", "5"), "no step 5; expected one of 0, 100"),
                                    (("packing", "heap/results", "--out", "x.txt"), "ends in .png or .svg"),
                                    (("packing", "heap/results", "--colour", "subdomain"), "vtk = .true."),
                                    (("history", "heap/results", "--columns", "nothing"), "no column nothing"),
-                                   (("convergence", "heap/results", "--step", "999"), "no step 999")):
+                                   (("convergence", "heap/results", "--step", "999"), "no step 999"),
+                                   (("movie", "heap/results", "--out", "x.avi"), "x.avi: expected a movie .gif or .mp4"),
+                                   (("movie", "heap/results", "--every", "0"), "--every 0 --fps 10: expected 1 or more"),
+                                   (("movie", "heap/results", "--out", "heap/case.nml/film.gif", "--every", "3"),
+                                    "heap/case.nml/film.gif: File exists; expected a place for files")):
             status, said = self.plot(*arguments)
             self.assertEqual((status, len(said.splitlines())), (2, 1), said)
             self.assertIn(message, said)

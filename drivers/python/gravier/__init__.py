@@ -7,6 +7,7 @@
 needs numpy and h5py; `Table.frame()` needs pandas too.
 """
 from .case import CaseError, namelist, parse_namelist, run, study, value_text
-from .results import ResultsError, Run, Table, read_table
+from .results import BodiesFile, ResultsError, Run, Table, read_table
 
-__all__ = ["CaseError", "ResultsError", "Run", "Table", "namelist", "parse_namelist", "read_table", "run", "study", "value_text"]
+__all__ = ["BodiesFile", "CaseError", "ResultsError", "Run", "Table", "namelist", "parse_namelist", "read_table", "run", "study",
+           "value_text"]

@@ -193,5 +193,50 @@ class Run:
         return row, np.where(bodies.id[other] == contacts.antagonist, other, -1)
 
 
+class BodiesFile(Run):
+    """A bodies file in HDF5, as gravier_sample and `final_bodies` leave it, read as a run of one step 0 without contacts: bodies, and
+    the walls as boundaries, which are planes. What is optional in the file is there only where the file has it."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.directory = self.path.parent
+        with self._open() as file:
+            self.dimension = int(file["bodies/position"].shape[1])
+        self.steps, self.times, self.case = np.array([0]), np.array([0.0]), {}
+
+    def _open(self):
+        try:
+            file = h5py.File(self.path, "r")
+        except OSError:
+            raise ResultsError(f"{self.path}: cannot read this file; expected a bodies file") from None
+        if any(f"bodies/{name}" not in file for name in ("id", "position", "radius")):
+            file.close()
+            raise ResultsError(f"{self.path}: no /bodies with id, position and radius; expected a bodies file")
+        return file
+
+    def _group(self, step, name):
+        self.find_step(step)
+        with self._open() as file:
+            return Table({key: node[()] for key, node in file[name].items()}) if name in file else None
+
+    def boundaries(self, step=None):
+        """id, name, shape, position, normal."""
+        rows = self._group(step, "walls") or Table(id=np.zeros(0, int), point=np.zeros((0, self.dimension)),
+                                                   normal=np.zeros((0, self.dimension)))
+        return Table(id=rows.id, name=np.array([f"wall {number}" for number in rows.id], dtype=str), shape=np.full(len(rows), "plane"),
+                     position=rows.point, normal=rows.normal)
+
+    def contacts(self, step=None):
+        """None: a bodies file has no contacts."""
+        self.find_step(step)
+
+    def _contacts_or_error(self, step):
+        raise ResultsError(f"{self.path}: a bodies file has no contacts; expected the results of a run")
+
+    def subdomain(self, step=None):
+        """An error: a bodies file has none."""
+        raise ResultsError(f"{self.path}: a bodies file has no subdomains; expected the results of a run")
+
+
 def _text(value):
     return value.decode() if isinstance(value, bytes) else str(value)
