@@ -58,38 +58,45 @@ class View:
         return numpy.arange(len(points)) if self.flat else numpy.argsort(points @ self.eye, kind="stable")
 
 
-def colours(run, step, bodies, kind):
-    """Values to colour bodies by, their label, and how: a dictionary for a collection; values None for no colour."""
-    if kind == "none":
-        return None, None, {}
+def quantity(run, step, bodies, kind):
+    """Values to colour bodies by, their unit and their name; values None for no colour."""
+    if kind == "none" or (kind == "radius" and bodies.radius.min() == bodies.radius.max()):
+        return None, None, None
+    if kind in ("speed", "rotation") and "velocity" not in bodies:
+        refuse(f"{run.path}: no velocities; expected another --colour")
+    if kind == "rotation" and run.dimension == 2:
+        return bodies.spin[:, 0], "rad/s", "rotation, anticlockwise"
+    if kind == "rotation":
+        return numpy.linalg.norm(bodies.spin, axis=1), "rad/s", "rotation"
+    if kind == "radius":
+        return bodies.radius, "m", "radius"
+    if kind == "pressure":
+        return run.pressure(step), "N/m" if run.dimension == 2 else "Pa", "pressure"
+    return numpy.linalg.norm(bodies.velocity, axis=1), "m/s", "speed"
+
+
+def spread(values, kind):
+    """Least and largest value of the colours: a few extreme bodies must not make all others look alike."""
+    top = numpy.quantile(numpy.abs(values), 0.98) or numpy.abs(values).max() or 1.0
+    if values.min() < 0.0:
+        return -top, top
+    return (values.min(), top) if kind == "radius" and values.min() < top else (0.0, top)
+
+
+def colours(run, step, bodies, kind, limits=None):
+    """Values to colour bodies by, their label, and how: a dictionary for a collection; values None for no colour. `limits` are those of
+    the colours where several pictures share them."""
     if kind == "subdomain":
         values = run.subdomain(step)
         count = values.max()
         return values, "subdomain", {"cmap": plt.get_cmap("tab20", count), "norm": BoundaryNorm(numpy.arange(count + 1) + 0.5, count)}
-    if kind == "rotation" and "spin" not in bodies:
-        refuse(f"{run.path}: no velocities; expected another --colour")
-    if kind == "rotation" and run.dimension == 2:
-        values, unit, name = bodies.spin[:, 0], "rad/s", "rotation, anticlockwise"
-    elif kind == "rotation":
-        values, unit, name = numpy.linalg.norm(bodies.spin, axis=1), "rad/s", "rotation"
-    elif kind == "radius" and bodies.radius.min() == bodies.radius.max():
+    values, unit, name = quantity(run, step, bodies, kind)
+    if values is None:
         return None, None, {}
-    elif kind == "radius":
-        values, unit, name = bodies.radius, "m", "radius"
-    elif kind == "pressure":
-        values, unit, name = run.pressure(step), "N/m" if run.dimension == 2 else "Pa", "pressure"
-    elif "velocity" in bodies:
-        values, unit, name = numpy.linalg.norm(bodies.velocity, axis=1), "m/s", "speed"
-    else:
-        refuse(f"{run.path}: no velocities; expected another --colour")
-    # a few extreme bodies must not make all others look alike
-    top = numpy.quantile(numpy.abs(values), 0.98) or numpy.abs(values).max() or 1.0
+    low, top = limits or spread(values, kind)
     power = 3 * int(numpy.floor(numpy.log10(top) / 3.0))
     label = f"{name} [$10^{{{power}}}$ {unit}]" if power != 0 else f"{name} [{unit}]"
-    signed = values.min() < 0.0
-    low = -top if signed else values.min() if kind == "radius" and values.min() < top else 0.0
-    limits = plt.Normalize(low / 10.0**power, top / 10.0**power)
-    return values / 10.0**power, label, {"cmap": TURNS if signed else SPEEDS, "norm": limits}
+    return values / 10.0**power, label, {"cmap": TURNS if low < 0.0 else SPEEDS, "norm": plt.Normalize(low / 10.0**power, top / 10.0**power)}
 
 
 def box_around(bodies, planes, view):
@@ -138,10 +145,10 @@ def draw_boundaries(axes, rows, keys, low, high):
 
 
 class Frame:
-    """What pictures of one movie share."""
+    """What pictures of one movie share: the box, the limits of the colours, the force of the thickest chain."""
 
-    def __init__(self, low=None, high=None, norm=None, force=None):
-        self.low, self.high, self.norm, self.force = low, high, norm, force
+    def __init__(self, low=None, high=None, limits=None, force=None):
+        self.low, self.high, self.limits, self.force = low, high, limits, force
 
 
 def draw_packing(run, step, options, frame=None):
@@ -158,9 +165,7 @@ def draw_packing(run, step, options, frame=None):
     size = (high - low) / (high - low).max()
     figure, axes = plt.subplots(figsize=(options.size * size[0] + 1.3, options.size * size[1] + 0.9))
 
-    values, label, how = colours(run, step, bodies, options.colour)
-    if frame.norm is not None and "norm" in how:
-        how["norm"] = frame.norm
+    values, label, how = colours(run, step, bodies, options.colour, frame.limits)
     chains = options.chains and contacts is not None and len(contacts) > 0
     order, diameter = view.order(bodies.position), 2.0 * bodies.radius
     through = 0.25 if chains and not view.flat else 1.0
@@ -294,27 +299,30 @@ def save(figure, path, dpi=200):
 
 def shared_frame(run, steps, options):
     """Box, colours and forces that hold for all steps of a movie."""
-    view, lows, highs, values, force = View(run.dimension, *options.view), [], [], [], 0.0
-    norm = None
+    view, lows, highs, limits, force = View(run.dimension, *options.view), [], [], [], 0.0
     for step in steps:
         bodies = run.bodies(step)
-        if len(bodies) == 0:
-            continue
         rows, _ = present(run, step)
         planes = gravier.Table({name: rows[name][rows.shape == "plane"] for name in ("position", "normal")})
         low, high = box_around(bodies, planes, view)
         lows.append(low)
         highs.append(high)
-        value, _, how = colours(run, step, bodies, options.colour)
-        if value is not None and options.colour != "subdomain":
-            values.append(numpy.abs(how["norm"].vmax))
-            if norm is None or how["norm"].vmax > norm.vmax:
-                norm = how["norm"]
+        values = None if options.colour == "subdomain" else quantity(run, step, bodies, options.colour)[0]
+        if values is not None and values.any():
+            limits.append(spread(values, options.colour))
         if options.chains and run.contacts(step) is not None:
             force = max(force, run.chains(step)[1].max(initial=0.0))
     if not lows:
         refuse(f"{run.path}: no body in any step; expected one at least")
-    return Frame(numpy.min(lows, axis=0), numpy.max(highs, axis=0), norm, force or None)
+    return Frame(numpy.min(lows, axis=0), numpy.max(highs, axis=0), shared_limits(limits), force or None)
+
+
+def shared_limits(limits):
+    """Limits of colours that hold for several pictures, about 0 where one has negative values; None where there are none."""
+    if not limits:
+        return None
+    low, top = min(least for least, _ in limits), max(most for _, most in limits)
+    return (min(low, -top), max(-low, top)) if low < 0.0 else (low, top)
 
 
 def draw_movie(run, options):

@@ -166,13 +166,14 @@ contains
 
     call write_lines(self, banner_text(), "", error)
     associate (config => simulation%config)
-      call self%line("case        "//config%file//"  "//trim(config%scene%title), error)
+      call self%line(trim("case        "//config%file//"  "//config%scene%title), error)
       call self%line("ranks       "//to_text(self%comm%size)//", subdomains "//to_text(simulation%decomposition%n_subdomains)// &
         & " ("//boxes_text(simulation)//", "//trim(config%decomposition%kind)//" rule)", error)
       if (self%comm%size > simulation%decomposition%n_subdomains) call self%line("warning     "// &
         & to_text(self%comm%size - simulation%decomposition%n_subdomains)//" ranks own no subdomain and stay idle", error)
       call self%line("bodies      "//to_text(simulation%n_grains)//" grains, "// &
-        & to_text(size(simulation%decomposition%boundaries))//" boundaries", error)
+        & to_text(size(simulation%decomposition%boundaries))//trim(merge(" boundary  ", " boundaries", &
+        & size(simulation%decomposition%boundaries) == 1)), error)
       call self%line("effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.), error)
       call self%line("off         "//effects_text(simulation%effects, .false.), error)
       call self%line("unknowns    "//cost_text(simulation), error)

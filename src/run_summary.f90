@@ -90,8 +90,9 @@ contains
       else if (phases(phase_output) > half) then
         text = "output takes most of it: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
-        text = "solves that give up take most iterations: a smaller &solver max_iterations, now "// &
-          & to_text(config%solver%max_iterations)//", or another method"
+        text = "solves that give up take most iterations: a &solver tolerance that they reach, now "// &
+          & to_text(config%solver%tolerance, 3)//" and at worst "//to_text(effort%worst, 3)//", or another method; a smaller "// &
+          & "max_iterations, now "//to_text(config%solver%max_iterations)//", leaves larger errors"
       else if (looser_seconds >= 0.0_dp .and. seconds - effort%seconds + looser_seconds <= half) then
         text = "ten times the tolerance: about "//duration_text(seconds - effort%seconds + looser_seconds)//" in all (estimated)"
       else if (shared > half .and. simulation%decomposition%n_subdomains > 1) then

@@ -221,6 +221,13 @@ class Words(unittest.TestCase):
 
 class Recipes(unittest.TestCase):
 
+    def test_every_shipped_case_stands_in_the_gallery(self):
+        """With a picture in its row."""
+        rows = [line for line in read(SOURCE / "doc/gallery.md")[1].splitlines() if line.startswith("|")]
+        for path in sorted((SOURCE / "data").rglob("*.nml")):
+            link = f"](../{path.relative_to(SOURCE)})"
+            self.assertTrue(any(link in row and "](figures/" in row for row in rows), f"{path}: no row with a picture in doc/gallery.md")
+
     def test_recipes_install_what_the_launcher_asks_for(self):
         launcher = (SOURCE / "gravier").read_text(encoding="utf-8")
         needed = set(re.findall(r"\|\| need ([a-z][\w.+-]*)", launcher))

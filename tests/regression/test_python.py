@@ -155,6 +155,22 @@ class Package(RunTestCase):
         shapes = {matplotlib.image.imread(self.here("frames", name)).shape for name in os.listdir(self.here("frames"))}
         self.assertEqual(len(shapes), 1)
 
+    def test_colours_of_a_movie(self):
+        """One value has one colour in all frames, also where a frame alone would have another unit."""
+        run, options = self.run_, types.SimpleNamespace(view=(-60.0, 20.0), colour="speed", chains=True)
+        frame = gravier_plot.shared_frame(run, list(run.steps), options)
+        speeds = [np.linalg.norm(run.bodies(step).velocity, axis=1) for step in run.steps]
+        tops = [np.quantile(values, 0.98) for values in speeds]
+        self.assertLess(min(tops), 1e-3 * max(tops))
+        self.assertEqual(frame.limits, (0.0, max(tops)))
+        how = [gravier_plot.colours(run, step, run.bodies(step), "speed", frame.limits) for step in run.steps]
+        self.assertEqual({label for _, label, _ in how}, {"speed [$10^{-3}$ m/s]"})
+        for values, (shown, _, keys) in zip(speeds, how):
+            np.testing.assert_allclose(shown, 1e3 * values, rtol=1e-12)
+            np.testing.assert_allclose([keys["norm"].vmin, keys["norm"].vmax], [0.0, 1e3 * max(tops)], rtol=1e-12)
+        self.assertEqual(gravier_plot.shared_limits([(0.0, 1.0), (-3.0, 3.0), (-2.0, 2.0)]), (-3.0, 3.0))
+        self.assertIsNone(gravier_plot.shared_limits([]))
+
     def test_movies_by_ffmpeg(self):
         """Frames go to the program ffmpeg one after the other, of even size, which its coding of .mp4 wants; a program that keeps what it
         is given stands in for it, one that fails, and none. Where the real one is installed it makes a movie too."""

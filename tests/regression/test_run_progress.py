@@ -131,4 +131,9 @@ class Progress(RunTestCase):
         lost = run_case(merged(self.case, {"time": {"steps": 5}, "solver": {"tolerance": 1e-16, "max_iterations": 3000},
                                            "output": {"every": 0}}), 1, self.here("lost"))
         self.assertIn("\nconverged   NO: 5 of 5 solves did not reach the tolerance 1.00E-016; at worst", lost.stdout)
-        self.assertIn("\nto halve it solves that give up take most iterations", lost.stdout)
+        worst = lost.history()["residual"].max()
+        said = re.search(r"^to halve it solves that give up take most iterations: a &solver tolerance that they reach, now (\S+) and at worst "
+                         r"(\S+), or another method; a smaller max_iterations, now (\d+), leaves larger errors$", lost.stdout, re.M)
+        self.assertTrue(said, lost.stdout)
+        self.assertAlmostEqual(float(said[2]) / worst, 1.0, delta=0.01)
+        self.assertRegex(lost.stdout, r"(?m)^case        case\.nml$")
