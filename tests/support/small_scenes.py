@@ -2,6 +2,7 @@
 
 What is compared is noted too: with the environment variable GRAVIER_VALIDATION_TABLE set to the path of a CSV file, each
 comparison adds a row (case, quantity, accepted, measured, error, tolerance) to it."""
+import functools
 import os
 
 import h5py
@@ -39,7 +40,8 @@ def bodies_csv(grains):
 
 
 class Record:
-    """All written states of a run. Arrays (states, grains, components) with NaN for grains that have left."""
+    """All written states of a run. Arrays (states, grains, components) with NaN for grains that have left. Contacts and
+    boundaries are read when they are asked for."""
 
     def __init__(self, run, grains, dimension):
         self.run, self.dimension = run, dimension
@@ -48,24 +50,37 @@ class Record:
             states = [file[f"steps/{number}"] for number in numbers]
             self.step = np.array(numbers)
             self.time = np.array([state.attrs["time"] for state in states])
-            self.present = [state["bodies/id"][:] for state in states]
+            bodies = [state["bodies"] for state in states]
+            self.present = [one["id"][:] for one in bodies]
             shape = (len(states), len(grains))
             self.position = np.full(shape + (dimension,), np.nan)
             self.all_velocities = np.full(shape + (3 * dimension - 3,), np.nan)
-            for k, state in enumerate(states):
-                rows = state["bodies/id"][:] - 1
-                self.position[k, rows] = state["bodies/position"]
-                self.all_velocities[k, rows] = state["bodies/velocity"]
             self.image = np.zeros(shape + (dimension,), dtype=int)
-            for k, state in enumerate(states):
-                if "image" in state["bodies"]:
-                    self.image[k, state["bodies/id"][:] - 1] = state["bodies/image"]
-            self.boundary = {name: np.array([state["boundaries"][name][:] for state in states])
-                             for name in ("position", "velocity", "force")} if "boundaries" in states[-1] else {}
-            self.contacts = [{name: state["contacts"][name][:] for name in state["contacts"]} if "contacts" in state else None
-                             for state in states]
+            for k, (one, ids) in enumerate(zip(bodies, self.present)):
+                self.position[k, ids - 1] = one["position"]
+                self.all_velocities[k, ids - 1] = one["velocity"]
+                if "image" in one:
+                    self.image[k, ids - 1] = one["image"]
         self.velocity = self.all_velocities[:, :, :dimension]
         self.spin = self.all_velocities[:, :, dimension:]
+
+    def read(self, group, *names):
+        """Of each state {name: array} of a group, all or the ones named; None where the run wrote no such group."""
+        with h5py.File(self.run.path("results", "results.h5")) as file:
+            groups = [file[f"steps/{number}"].get(group) for number in self.step]
+            return [None if one is None else {name: one[name][:] for name in names or one} for one in groups]
+
+    @functools.cached_property
+    def contacts(self):
+        """Of each state {name: array}, or None where the run wrote no contacts."""
+        return self.read("contacts")
+
+    @functools.cached_property
+    def boundary(self):
+        """Arrays (states, boundaries, components); none where the scene has no boundaries."""
+        names = ("position", "velocity", "force")
+        states = self.read("boundaries", *names)
+        return {} if states[-1] is None else {name: np.array([state[name] for state in states]) for name in names}
 
 
 def plane(point, normal, **more):

@@ -407,9 +407,10 @@ class Diagnostics(RunTestCase):
         whole = self.run_here("whole", merged(case, {"time": {"steps": 60}}), boundaries)
         self.run_here("restarted", merged(case, {"time": {"steps": 30}}), boundaries)
         again = self.run_here("restarted", merged(case, {"time": {"steps": 60}}), boundaries, 2, options=["--restart"])
+        history = again.history()
         for name, values in whole.history().items():
             if not name.endswith("_seconds"):
-                np.testing.assert_array_equal(again.history()[name], values, name)
+                np.testing.assert_array_equal(history[name], values, name)
         self.assertEqual([name for name in differences(whole.results(), again.results()) if "/run@" not in name], [])
 
     def test_only_what_is_asked_for(self):
@@ -421,14 +422,15 @@ class Diagnostics(RunTestCase):
         more = {"energy": 10, "stress": 7, "structure": 13, "boundary_forces": 4 * len(boundaries)}
         for group, count in more.items():
             run = self.run_here(group, merged(case, {"output": {group: True}}), boundaries)
-            self.assertEqual(len(run.history()), columns + count, group)
-            for step in steps_of(run.results())[1:]:
-                attributes = [name for name in run.results() if name.startswith(f"/steps/{step}/diagnostics@")]
+            history, results = run.history(), run.results()
+            self.assertEqual(len(history), columns + count, group)
+            for step in steps_of(results)[1:]:
+                attributes = [name for name in results if name.startswith(f"/steps/{step}/diagnostics@")]
                 self.assertEqual(len(attributes), 0 if group == "boundary_forces" else count, group)
             # nothing else changes
             for name, values in plain.history().items():
                 if not name.endswith("_seconds"):
-                    np.testing.assert_array_equal(run.history()[name], values, name)
+                    np.testing.assert_array_equal(history[name], values, name)
 
 
 if __name__ == "__main__":
