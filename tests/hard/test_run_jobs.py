@@ -143,6 +143,12 @@ class Jobs(RunTestCase):
         done = self.sh("gravier_job", "--fresh", "case.nml", SLURM_JOB_ID=1, SLURM_JOB_END_TIME=int(time.time()))
         self.assertEqual(done.returncode, 4)
         self.assertIn("GRAVIER_RESUBMIT is not set", done.stderr)
+        # the limit finds its place in a case without &output, too
+        group = {name: keys for name, keys in CASE.items() if name != "output"}
+        write(os.path.join(self.work, "silent.nml"), namelist({**group, "time": {"step": 1e-3, "steps": 100000}}))
+        done = self.sh("gravier_job", "--fresh", "--seconds", "0.01", "silent.nml", GRAVIER_RESUBMIT="true")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("silent: interrupted after step", done.stderr)
         done = self.sh("gravier_job", "--seconds", "0.01", "case.nml", GRAVIER_RESUBMIT="false")
         self.assertEqual(done.returncode, 4)
         self.assertIn("could not be submitted", done.stderr)

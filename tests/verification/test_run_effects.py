@@ -2,12 +2,13 @@
 Moreau-Jean stepping takes constant forces and moments exactly, so that what rolls or spins is right to round-off in each step but the
 one in which it stops."""
 import os
+import re
 import unittest
 
 import numpy as np
 
 from gravier_runs import contents, differences, gravier, read_csv
-from small_scenes import EPS, G, INERTIA, Grain, SmallScene, plane
+from small_scenes import EPS, G, INERTIA, Grain, SmallScene, floats, plane
 
 RADIUS, MASS = 0.05, 0.7
 
@@ -205,16 +206,20 @@ class Neutral(SmallScene):
     """An effect with a value too small to count: 1e-300 chooses its kernels, and every trajectory keeps its bits. What stands for
     round-off is the 1e-300 themselves."""
 
-    def pile(self, title, dimension, ranks=1, extra=(), steps=40, **scene):
+    def pile(self, title, dimension, ranks=1, extra=(), steps=40, ground=(), sides=True, speed=0.0, spin=None, **scene):
+        """Grains on the ground, a plane that may have more keys, between side walls that may be left out."""
         generator = np.random.default_rng(3)
         n = (5, 6) if dimension == 2 else (3, 3, 3)
-        grains = [Grain(0.0501 + 0.1 * np.array(place) + 0.0002 * generator.uniform(size=dimension), None, None,
+        grains = [Grain(0.0501 + 0.1 * np.array(place) + 0.0002 * generator.uniform(size=dimension), None, spin,
                         generator.uniform(0.045, 0.05)) for place in np.ndindex(*n)]
-        walls = [plane(np.zeros(dimension), np.eye(dimension)[-1])]
+        for grain in grains if speed > 0.0 else ():
+            grain.velocity = [float(v) for v in speed * generator.normal(size=dimension)]
+        walls = [plane(np.zeros(dimension), np.eye(dimension)[-1], **dict(ground))]
         walls += [plane(0.1003 * n[d] * side * np.eye(dimension)[d], (1 - 2 * side) * np.eye(dimension)[d])
-                  for d in range(dimension - 1) for side in (0, 1)]
-        gravity = np.append(np.zeros(dimension - 1), -G)
+                  for d in range(dimension - 1) for side in (0, 1) if sides]
         groups = dict(extra)
+        walls += groups.pop("boundary", [])
+        gravity = scene.pop("gravity", np.append(np.zeros(dimension - 1), -G))
         solver = {"tolerance": 1e-6, "check_every": 10, "warm_start": True, **groups.pop("solver", {})}
         return self.play(title, grains, walls, gravity, steps, ranks, scene=scene, solver=solver,
                          output={"every": 10, "contacts": True}, **groups)
@@ -240,6 +245,45 @@ class Neutral(SmallScene):
                 for quantity in ("position", "all_velocities"):
                     self.assertEqual(np.abs(getattr(plain, quantity) - getattr(forced, quantity)).max() > 1e-290, False, f"{name} {quantity}")
                 self.assertLessEqual(len(plain.contacts[-1]["gap"]), len(forced.contacts[-1]["gap"]))
+        self.both(check)
+
+    def test_motions_and_loads(self):
+        """What moves by nothing, a cell that nothing crosses, loads of nothing, sleep that nothing falls into."""
+        tiny = 1e-300
+
+        def check(dimension):
+            up, along = np.eye(dimension)[-1], np.eye(dimension)[0]
+            outlet = {"shape": "outlet", "point": floats(-5.0 * up), "normal": floats(up)}
+            turn = [tiny] if dimension == 2 else floats(tiny * along)
+            weightless = {"gravity": np.zeros(dimension), "speed": 0.3, "friction": 0.4}
+            plain = {"friction": 0.4}
+            # effects that the log names, what both runs have, what one of them has more
+            pairs = {
+                "drives": (plain, {"ground": {"velocity": floats(tiny * along)}}),
+                "drives, a table": (plain, {"ground": {"table": "still.csv"}, "extra": {"files": {"still.csv": "time,vx\n0,0\n1,0\n"}}}),
+                "drives, turning": (plain, {"ground": {"rotation": turn}}),
+                "driven by forces": (plain, {"ground": {"free": [True] + [False] * (dimension - 1), "mass": 1e30}}),
+                "periodic images": ({**plain, "sides": False}, {"period": [64.0] + [0.0] * (dimension - 1)}),
+                "gravity": (weightless, {"gravity": tiny * along}),
+                "rotation": ({"friction": 0.0}, {"spin": [tiny] * (2 * dimension - 3)}),
+                "removal": (plain, {"extra": {"boundary": [outlet]}}),
+                "sleeping": (plain, {"extra": {"solver": {"sleeping": True, "sleep_after": 1, "sleep_speed": tiny}}}),
+            }
+            for name, (common, more) in pairs.items():
+                without, run = [self.pile(f"neutral {dimension} {name} {k}", dimension, **{**common, **change})
+                                for k, change in enumerate(({}, more))]
+                with self.subTest(name):
+                    # the run has the effect, the other one does not
+                    said = [re.search(r"^effects +(.*(?:\n {6,}.*)*)", record.run.stdout, re.M)[1] for record in (without, run)]
+                    if name == "sleeping":
+                        self.assertEqual(run.run.history()["sleeping"].sum(), 0)
+                    else:
+                        self.assertEqual([name.split(",")[0] in words for words in said], [False, True], said)
+                    self.assertGreater(np.abs(without.all_velocities[-1]).max(), 1e-4)
+                    for quantity in ("position", "all_velocities"):
+                        apart = np.abs(getattr(without, quantity) - getattr(run, quantity)).max()
+                        # what pushes a boundary of 1e30 kg lets it move at all
+                        self.assertLess(apart, 1e-30 if name == "driven by forces" else 1e-290, quantity)
         self.both(check)
 
     ALL = {"friction": 0.4, "restitution": 0.3, "tangential_restitution": 0.3, "rolling_friction": 0.1}
