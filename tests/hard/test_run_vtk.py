@@ -1,9 +1,12 @@
 """bodies.vtkhdf and contacts.vtkhdf: what they hold is what results.h5 holds, the same bytes on any number of ranks; a run that is
-killed before any write leaves them readable, a restart goes on with them. They are read with h5py and, where a python3 with vtk is
-found ($GRAVIER_VTK_PYTHON, or the one that runs this), with VTK's own reader."""
+killed before any write, or while it writes, leaves them readable, a restart goes on with them. They are read with h5py and, where a
+python3 with vtk is found ($GRAVIER_VTK_PYTHON, or the one that runs this), with VTK's own reader."""
 import os
+import random
+import signal
 import subprocess
 import sys
+import time
 import unittest
 
 import h5py
@@ -137,6 +140,38 @@ class Pictures(RunTestCase):
 
         whole = each(killed, [(NAMES[k % 2], 1 + k % 2, count) for k, count in enumerate([175, 200, 221, 240, 262, 301, 353, 420])])
         self.assertGreater(len({tuple(counts) for counts in whole}), 3, whole)
+
+    def test_kills_around_writes(self):
+        """Killed at random from outside while either file is being written, on 1 and 2 ranks in turn: whole steps, as of the run that
+        nothing stopped, to h5py and to VTK's own reader."""
+        case = merged(DISKS, {"time": {"steps": 40}, "solver": {"max_iterations": 10, "tolerance": 0.1},
+                              "output": {"every": 1, "checkpoint_every": 0}})
+        seconds = np.median(run_case(case, 1, self.here("whole")).history()["wall_seconds"])
+        straight = {name: read(self.here("whole", "results", name)) for name in NAMES}
+        draw = random.Random(5)
+
+        def last_write(path):
+            """When a file changed last, under its name or before it has one [ns]."""
+            return max((os.stat(one).st_mtime_ns for one in (path, path + ".part") if os.path.exists(one)), default=0)
+
+        def killed(number, row, share):
+            directory = self.here(f"around {number}")
+            run = Going(case, 1 + number % 2, directory)
+            path = os.path.join(directory, "results", NAMES[number // 2 % 2])
+            run.wait_for_rows(row)
+            # a write of the file begins; until the next one all others of a step are under way
+            before = last_write(path)
+            run.wait_for(lambda: last_write(path) != before, "a write", pause=5e-4)
+            time.sleep(share * seconds)
+            run.send(signal.SIGKILL)
+            status, said = run.end()
+            self.assertNotIn(status, (0, 1, 2, 3), f"not killed after step {row}: {said}")
+            return self.check_steps(directory, straight)
+
+        moments = [(k, draw.randrange(1, 10), draw.random()) for k in range(14)]
+        counts = each(killed, moments)
+        self.assertGreater(len({tuple(count) for count in counts}), 5, counts)
+        self.vtk_reads([self.here(f"around {k}", "results", name) for k, _, _ in moments for name in NAMES], optional=True)
 
     def check_steps(self, directory, straight):
         """How many steps each file has; they are those of the run that nothing stopped."""

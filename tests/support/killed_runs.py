@@ -56,13 +56,13 @@ class Going:
                                          "case.nml"], cwd=directory, env=environment, stdin=subprocess.DEVNULL,
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
-    def wait_for(self, condition, what, timeout=30):
+    def wait_for(self, condition, what, timeout=30, pause=0.002):
         end = time.monotonic() + timeout
         while not condition():
             if self.process.poll() is not None or time.monotonic() > end:
                 self.process.terminate()
                 raise AssertionError(f"{self.directory}: {what} did not come: {self.process.communicate()[0]}")
-            time.sleep(0.002)
+            time.sleep(pause)
 
     def pids(self):
         names = [name for name in os.listdir(self.directory) if name.startswith("pid.") and name.count(".") == 1]
