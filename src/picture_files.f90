@@ -100,10 +100,7 @@ contains
 
     nd = simulation%decomposition%nd
     nv = simulation%decomposition%nv
-    n = 0
-    do s = 1, size(simulation%decomposition%home)
-      n = n + simulation%decomposition%home(s)%n
-    end do
+    n = sum(simulation%decomposition%home%n)
     allocate (rows%key(1, n))
     allocate (rows%point(3, n), rows%value(n_body_values, n), source=0.0_dp)
     n = 0
@@ -131,10 +128,7 @@ contains
     type(vtk_rows_t), intent(out) :: rows
     integer :: s, c, n
 
-    n = 0
-    do s = 1, size(simulation%problem%sub)
-      n = n + simulation%problem%sub(s)%n_contacts
-    end do
+    n = sum(simulation%problem%sub%n_contacts)
     allocate (rows%key(2, n))
     allocate (rows%point(6, n), rows%value(n_contact_values, n), source=0.0_dp)
     n = 0
@@ -189,7 +183,7 @@ contains
       if (held > 0.0_dp) status = sliding
       if (kernels%nf > 1) then
         tangential = norm2(sub%impulse(q, 2:kernels%nf, g))
-        if (held > 0.0_dp .and. tangential < (1.0_dp - unused)*sub%hot(q, kernels%nd + 6, g)*held) status = sticking
+        if (held > 0.0_dp .and. tangential < (1.0_dp - unused)*sub%hot(q, kernels%friction_row, g)*held) status = sticking
       end if
       value(1) = sub%impulse(q, 1, g)/simulation%physics%h
       value(2) = tangential/simulation%physics%h

@@ -208,8 +208,8 @@ contains
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
-      if (simulation%step == simulation%config%output%fclib_step .and. figures%solve%status /= solve_diverged .and. &
-        & simulation%step > 0) call output%write_problem(simulation, error)
+      if (simulation%step == simulation%config%output%fclib_step .and. figures%solve%status /= solve_diverged) &
+        & call output%write_problem(simulation, error)
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call write_step(simulation, figures, MPI_Wtime() - step_start, output, error)
       call simulation%comm%agree(error)
@@ -309,7 +309,6 @@ contains
     real(dp), intent(in) :: seconds
     type(run_output_t), intent(inout) :: output
     type(error_t), allocatable, intent(inout) :: error
-
     logical :: wanted
 
     call output%write_row(simulation, figures, seconds, figures%solve%status == solve_converged, error)

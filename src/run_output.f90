@@ -241,6 +241,7 @@ contains
       allocate (figures%histogram(0))
     end if
   end subroutine collect_figures
+
   !> Where the boundaries are, how they move and what the grains did to them in the last step.
   subroutine collect_boundaries(simulation, rows)
     type(simulation_t), intent(in) :: simulation
@@ -271,10 +272,7 @@ contains
 
     nd = simulation%decomposition%nd
     nv = simulation%decomposition%nv
-    n = 0
-    do s = 1, size(simulation%decomposition%home)
-      n = n + simulation%decomposition%home(s)%n
-    end do
+    n = sum(simulation%decomposition%home%n)
     allocate (rows%id(n), rows%position(nd, n), rows%velocity(3*nd - 3, n), rows%radius(n))
     if (simulation%decomposition%ni > 0) allocate (rows%image(nd, n))
     next = 0
@@ -301,10 +299,7 @@ contains
 
     nd = simulation%problem%kernels%nd
     nf = simulation%problem%kernels%nf
-    n = 0
-    do s = 1, size(simulation%problem%sub)
-      n = n + simulation%problem%sub(s)%n_contacts
-    end do
+    n = sum(simulation%problem%sub%n_contacts)
     allocate (rows%candidate(n), rows%antagonist(n), rows%normal(nd, n), rows%gap(n))
     allocate (rows%impulse(nd, n), source=0.0_dp)
     if (simulation%problem%kernels%rolling_row > 0) allocate (rows%moment(2*nd - 3, n))

@@ -9,7 +9,6 @@ module gravier_simulation
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
   use gravier_motion, only: predict_position, advance_position
-  use gravier_boundary, only: shape_outlet
   use gravier_facing_planes, only: find_facing_planes
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_effects, only: effects_t
@@ -18,9 +17,9 @@ module gravier_simulation
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: effort_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged
-  use gravier_partition, only: partition_t, choose_boxes, check_subdomains
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_departures, only: some_leave, let_grains_out
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_physics, only: physics_t
   use gravier_interface, only: interface_figures_t
@@ -37,13 +36,11 @@ module gravier_simulation
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
   use gravier_scheme_choice, only: choose_scheme
+  use gravier_division, only: divide, divide_again, division_is_due
   use gravier_column_solution, only: column_solution_t
   implicit none
   private
   public :: simulation_t, step_figures_t
-
-  !> times the imbalance that the last division reached: one that is worth another division
-  real(dp), parameter :: worth_dividing = 1.1_dp
 
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
@@ -195,7 +192,7 @@ contains
 
     if (allocated(error)) return
     newcomers(1) = grains
-    call divide(self, newcomers, error)
+    call divide(self%config, self%neighbourhoods, newcomers, self%decomposition, error)
     if (allocated(error)) return
     call self%make_subdomains()
     call self%decomposition%settle(grains)
@@ -284,100 +281,6 @@ contains
     end associate
   end subroutine set_control
 
-  !> Divide space for the grains given. Collective.
-  subroutine divide(self, bodies, error)
-    class(simulation_t), intent(inout) :: self
-    type(body_set_t), intent(in) :: bodies(:)
-    type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: lower(self%decomposition%nd), upper(self%decomposition%nd), edge
-
-    associate (config => self%config%decomposition, rule => self%decomposition%rule)
-      call self%decomposition%bounding_box(bodies, lower, upper)
-      edge = 2.0_dp*rule%largest_radius + rule%range()
-      ! without grains any edge serves
-      if (.not. edge > 0.0_dp) edge = 1.0_dp
-      call check_subdomains(lower, upper, edge, config%subdomains, error)
-      if (.not. allocated(error)) call cut(self, bodies, lower, upper, edge, error)
-    end associate
-    if (allocated(error)) error%message = self%config%file//": "//error%message
-    call self%comm%agree(error)
-  end subroutine divide
-
-  !> Divide space anew; where the scene has come to fill fewer cells than there are subdomains, the old partition
-  !> stays. Collective.
-  subroutine divide_again(self, refused)
-    class(simulation_t), intent(inout) :: self
-    logical, intent(out) :: refused
-    type(partition_t) :: old
-    type(error_t), allocatable :: error
-
-    old = self%decomposition%partition
-    call divide(self, self%decomposition%home, error)
-    refused = allocated(error)
-    if (refused) self%decomposition%partition = old
-  end subroutine divide_again
-
-  !> Cut the box [lower, upper] as &decomposition says. Collective.
-  subroutine cut(self, bodies, lower, upper, edge, error)
-    class(simulation_t), intent(inout) :: self
-    type(body_set_t), intent(in) :: bodies(:)
-    !> (nd) [m]; edge of a detection cell [m]
-    real(dp), intent(in) :: lower(:), upper(:), edge
-    type(error_t), allocatable, intent(inout) :: error
-    real(dp), allocatable :: points(:, :)
-    integer, allocatable :: weights(:)
-    integer :: boxes(3)
-
-    associate (config => self%config%decomposition, partition => self%decomposition%partition)
-      partition%period(:) = self%decomposition%period%length
-      if (config%partition == "metis") then
-        call collect_weights(self, bodies, points, weights)
-        call partition%init_graph(self%comm, lower, upper, edge, points, weights, config%subdomains, error)
-      else
-        boxes(:) = config%grid
-        if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, config%subdomains, self%decomposition%period%length)
-        call partition%init_grid(lower, upper, boxes, edge, error)
-      end if
-    end associate
-  end subroutine cut
-
-  !> What a subdomain has to carry: grains, and as far as they are known near pairs, at their candidates.
-  subroutine collect_weights(self, bodies, points, weights)
-    class(simulation_t), intent(in) :: self
-    type(body_set_t), intent(in) :: bodies(:)
-    !> (nd, n) [m]; (n)
-    real(dp), allocatable, intent(out) :: points(:, :)
-    integer, allocatable, intent(out) :: weights(:)
-    integer :: s, p, k, n, n_points
-
-    n_points = sum(bodies%n)
-    if (self%neighbourhoods%builds > 0) then
-      do s = 1, size(self%neighbourhoods%view)
-        n_points = n_points + self%neighbourhoods%view(s)%bodies%n
-      end do
-    end if
-    allocate (points(self%decomposition%nd, n_points))
-    allocate (weights(n_points), source=0)
-    n = 0
-    do s = 1, size(bodies)
-      do k = 1, bodies(s)%n
-        n = n + 1
-        points(:, n) = bodies(s)%position(:, k)
-        weights(n) = 1
-      end do
-    end do
-    if (self%neighbourhoods%builds == 0) return
-    do s = 1, size(self%neighbourhoods%view)
-      associate (view => self%neighbourhoods%view(s))
-        points(:, n + 1:n + view%bodies%n) = view%bodies%position
-        do p = 1, view%list%n
-          weights(n + view%list%candidate(p)) = weights(n + view%list%candidate(p)) + 1
-        end do
-        n = n + view%bodies%n
-      end associate
-    end do
-  end subroutine collect_weights
-
   !> Move grains and boundaries to q_m, bring the neighbour lists up to date, find the contacts and start them from the
   !> impulses of the last step. Collective.
   subroutine simulation_assemble(self, figures)
@@ -395,8 +298,8 @@ contains
     call stop_timer(phase_bodies)
     call start_timer(phase_neighbourhood)
     if (.not. listed) listed = self%neighbourhoods%are_due(self%decomposition)
-    if (.not. listed) listed = some_leave(self)
-    call check_division(self, figures)
+    if (.not. listed) listed = some_leave(self%decomposition)
+    figures%divided = division_is_due(self%config%decomposition, self%step, self%imbalance, self%reached_imbalance)
     figures%listed = listed .or. figures%divided
     call list_neighbours(self, figures)
     call stop_timer(phase_neighbourhood)
@@ -449,73 +352,6 @@ contains
       end associate
     end do
   end subroutine move_to_middle
-
-  !> Whether grain `k` of subdomain `s` of this rank stays in the scene: its centre lies behind no outlet, and the
-  !> boundary that it is glued to is there.
-  pure logical function stays(self, s, k)
-    class(simulation_t), intent(in) :: self
-    integer, intent(in) :: s, k
-    integer :: b
-    real(dp) :: distance, normal(self%decomposition%nd)
-
-    stays = .true.
-    associate (boundaries => self%decomposition%boundaries, home => self%decomposition%home(s))
-      if (home%glued(k) > 0) then
-        stays = boundaries(home%glued(k))%present
-        return
-      end if
-      do b = 1, size(boundaries)
-        if (boundaries(b)%shape /= shape_outlet .or. .not. boundaries(b)%present) cycle
-        call boundaries(b)%locate(home%position(:, k), distance, normal)
-        if (distance < 0.0_dp) stays = .false.
-      end do
-    end associate
-  end function stays
-
-  !> Whether some grain leaves the scene now. Collective.
-  logical function some_leave(self)
-    class(simulation_t), intent(in) :: self
-    integer :: s, k
-
-    some_leave = .false.
-    if (.not. any(self%decomposition%boundaries%shape == shape_outlet)) return
-    do s = 1, size(self%decomposition%home)
-      do k = 1, self%decomposition%home(s)%n
-        if (.not. stays(self, s, k)) some_leave = .true.
-      end do
-    end do
-    some_leave = self%comm%any_true(some_leave)
-  end function some_leave
-
-  !> Take the grains that leave out of the scene. Collective.
-  subroutine let_grains_out(self, figures)
-    class(simulation_t), intent(inout) :: self
-    type(step_figures_t), intent(inout) :: figures
-    logical, allocatable :: mask(:)
-    integer(i8) :: counts(2)
-    integer :: s, k
-
-    associate (boundaries => self%decomposition%boundaries)
-      if (.not. any(boundaries%shape == shape_outlet) .and. (self%n_glued == 0 .or. all(boundaries%present))) return
-    end associate
-    counts(:) = 0
-    do s = 1, size(self%decomposition%home)
-      associate (home => self%decomposition%home(s))
-        allocate (mask(home%n))
-        do k = 1, home%n
-          mask(k) = stays(self, s, k)
-        end do
-        counts(2) = counts(2) + count(.not. mask .and. home%glued > 0)
-        counts(1) = counts(1) + count(.not. mask .and. home%glued == 0)
-        if (.not. all(mask)) call home%keep_only(mask)
-        deallocate (mask)
-      end associate
-    end do
-    call self%comm%sum_counts(counts)
-    figures%left = counts(1)
-    self%n_grains = self%n_grains - sum(counts)
-    self%n_glued = self%n_glued - counts(2)
-  end subroutine let_grains_out
 
   !> Gravity and the velocities of boundaries at the end of the step, without contacts.
   subroutine drive(self)
@@ -590,33 +426,22 @@ contains
     figures%fast = counts(1)
   end subroutine count_fast
 
-  !> Whether this step starts from a new partition: by schedule, or because contacts lie unevenly, and more so than just after
-  !> the last one: what that could not cure is not tried again.
-  subroutine check_division(self, figures)
-    class(simulation_t), intent(in) :: self
-    type(step_figures_t), intent(inout) :: figures
-
-    associate (config => self%config%decomposition)
-      if (self%step == 0 .or. config%subdomains == 1) return
-      if (config%repartition_every > 0) figures%divided = mod(self%step, config%repartition_every) == 0
-      if (config%repartition_imbalance > 0.0_dp) figures%divided = figures%divided .or. &
-        & self%imbalance > max(config%repartition_imbalance, worth_dividing*self%reached_imbalance)
-    end associate
-  end subroutine check_division
-
   !> Bring views and lists up to date, or make them anew with the impulses carried over. Collective.
   subroutine list_neighbours(self, figures)
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(inout) :: figures
     integer(i8), allocatable :: records(:, :)
+    integer(i8) :: n_glued
     logical :: remembered
 
     if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
     if (.not. figures%listed) return
     remembered = self%neighbourhoods%memory%words() > 0 .and. self%neighbourhoods%builds > 0
     if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
-    call let_grains_out(self, figures)
-    if (figures%divided) call divide_again(self, figures%refused)
+    call let_grains_out(self%decomposition, self%n_glued > 0, figures%left, n_glued)
+    self%n_grains = self%n_grains - figures%left - n_glued
+    self%n_glued = self%n_glued - n_glued
+    if (figures%divided) call divide_again(self%config, self%neighbourhoods, self%decomposition, figures%refused)
     call self%decomposition%settle()
     call self%neighbourhoods%build(self%decomposition)
     if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)

@@ -42,8 +42,12 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     real(dp) :: parts(n_sums, size(decomposition%home)), sums(n_sums)
+    integer :: s
 
-    call add_home(decomposition, physics, parts)
+    parts(:, :) = 0.0_dp
+    do s = 1, size(parts, 2)
+      call add_grains(decomposition%home(s), physics, parts(:, s))
+    end do
     call decomposition%comm%sum_parts(parts, sums)
     call keep_motion(self, sums)
     self%start = self%kinetic
@@ -68,15 +72,21 @@ contains
     nd = decomposition%nd
     if (some_left) then
       kinetic = self%kinetic
-      call add_views(neighbourhoods, physics, parts)
+      parts(:, :) = 0.0_dp
+      do s = 1, size(parts, 2)
+        associate (view => neighbourhoods%view(s))
+          call add_grains(view%bodies, physics, parts(:, s), view%origin)
+        end associate
+      end do
       call decomposition%comm%sum_parts(parts, sums)
       call keep_motion(self, sums)
       self%carried_away = self%carried_away + (kinetic - self%kinetic)
     end if
     momentum(:) = self%momentum
     flux(:) = self%flux
-    call add_home(decomposition, physics, parts)
+    parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
+      call add_grains(decomposition%home(s), physics, parts(:, s))
       call add_contact_work(problem%sub(s), physics, nd, problem%kernels%nv, parts(in_contacts, s))
     end do
     call decomposition%comm%sum_parts(parts, sums)
@@ -96,41 +106,23 @@ contains
     self%flux(:) = sums(in_flux + 1:in_flux + 3)
   end subroutine keep_motion
 
-  !> Sums over the free grains at home.
-  pure subroutine add_home(decomposition, physics, parts)
-    type(decomposition_t), intent(in) :: decomposition
+  !> Sums over the free grains that are at home in a subdomain.
+  pure subroutine add_grains(bodies, physics, part, origin)
+    type(body_set_t), intent(in) :: bodies
     type(physics_t), intent(in) :: physics
-    !> (n_sums, subdomains)
-    real(dp), intent(out), contiguous :: parts(:, :)
-    integer :: s, k
+    real(dp), intent(inout) :: part(n_sums)
+    !> of a view: its grains with 0 are ghosts (n)
+    integer, intent(in), optional :: origin(:)
+    integer :: k
 
-    parts(:, :) = 0.0_dp
-    do s = 1, size(parts, 2)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) call add_grain(home, k, physics, parts(:, s))
-        end do
-      end associate
+    do k = 1, bodies%n
+      if (bodies%glued(k) > 0) cycle
+      if (present(origin)) then
+        if (origin(k) == 0) cycle
+      end if
+      call add_grain(bodies, k, physics, part)
     end do
-  end subroutine add_home
-
-  !> The same as the views have them, with the velocities of the start of the step.
-  pure subroutine add_views(neighbourhoods, physics, parts)
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
-    type(physics_t), intent(in) :: physics
-    !> (n_sums, subdomains)
-    real(dp), intent(out), contiguous :: parts(:, :)
-    integer :: s, k
-
-    parts(:, :) = 0.0_dp
-    do s = 1, size(parts, 2)
-      associate (view => neighbourhoods%view(s))
-        do k = 1, view%bodies%n
-          if (view%origin(k) > 0 .and. view%bodies%glued(k) == 0) call add_grain(view%bodies, k, physics, parts(:, s))
-        end do
-      end associate
-    end do
-  end subroutine add_views
+  end subroutine add_grains
 
   !> Add kinetic energy and momentum of grain `k`.
   pure subroutine add_grain(bodies, k, physics, part)

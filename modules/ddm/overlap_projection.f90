@@ -132,8 +132,8 @@ contains
       end do
       if (problem%kernels%nf > 1) then
         ! nothing turns then, and no moment is needed
-        borrowed%law(:, 2, :) = sub%hot(:, nd + 6, :)
-        sub%hot(:, nd + 6, :) = 0.0_dp
+        borrowed%law(:, 2, :) = sub%hot(:, problem%kernels%friction_row, :)
+        sub%hot(:, problem%kernels%friction_row, :) = 0.0_dp
       end if
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :, :) = 0.0_dp
@@ -151,7 +151,7 @@ contains
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
       sub%hot(:, nd + 1, :) = borrowed%law(:, 1, :)
-      if (problem%kernels%nf > 1) sub%hot(:, nd + 6, :) = borrowed%law(:, 2, :)
+      if (problem%kernels%nf > 1) sub%hot(:, problem%kernels%friction_row, :) = borrowed%law(:, 2, :)
       call move_alloc(borrowed%impulse, sub%impulse)
     end associate
   end subroutine give_back

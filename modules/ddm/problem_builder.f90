@@ -238,7 +238,7 @@ contains
       sub%hot(q, nd + 4, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
       sub%hot(q, nd + 5, g) = 0.0_dp
       if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
-      sub%hot(q, nd + 6, g) = terms%friction
+      sub%hot(q, kernels%friction_row, g) = terms%friction
       if (kernels%shift_row > 0) call pack_tangential_shift()
       if (kernels%rolling_row > 0) call pack_rolling()
     end do

@@ -2,15 +2,15 @@
 !>
 !> Contacts are packed in sweep order, in blocks of `lanes`; contact c is lane lane_of(c) of block block_of(c):
 !>   pair(1:2, c)  local numbers of the candidate i and the antagonist j
-!>   hot           (lanes, nh, blocks): normal (nd), shift = max(gap, 0)/h, 1/W_nn, and with friction 1/W_tt, levers of i
-!>                 and j, mu; with tangential restitution the tangential shift (nd - 1); with rolling R*, 1/W_rr, rolling
-!>                 friction and, of spheres, pivoting friction
+!>   hot           (lanes, nh, blocks): normal (nd), shift, which the law adds to the normal velocity: play/h, or with restitution
+!>                 e v_n of the start of the step; 1/W_nn; with friction 1/W_tt, levers of i and j, mu; with tangential
+!>                 restitution the tangential shift (nd - 1); with rolling R*, 1/W_rr, rolling friction and, of spheres,
+!>                 pivoting friction
 !>   impulse       (lanes, nc, blocks): (n[, t[, s]]) [N s], compression positive; with rolling the moment on i over R*: about
 !>                 the axis of disks, (t, s, n) of spheres [N s]
 !> What is left of the last block is filled with contacts of no effect: all zero, between the first body and itself.
 !> The first n_grouped contacts make whole blocks in which no two contacts share a moving body (gravier_sweep_order): these
-!> are relaxed `lanes` at a time. A body is
-!> a column of
+!> are relaxed `lanes` at a time. A body is a column of
 !>   velocity      (nv) translation, then spin
 !>   weight        inverse mass of each component of the translation, then, where bodies turn, inverse inertia (nw); zero
 !>                 for what cannot move. Grains have the same mass along all axes, boundaries need not.
@@ -108,7 +108,7 @@ module gravier_contact_kernels
       real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
       real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
     end subroutine velocity_kernel
-    !> 1/W_nn and 1/W_tt into `hot`.
+    !> 1/W_nn and, where the law has them, 1/W_tt and 1/W_rr into `hot`.
     pure subroutine operator_kernel(pair, hot, weight)
       import :: dp
       implicit none

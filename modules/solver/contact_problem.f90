@@ -43,7 +43,7 @@ module gravier_contact_problem
     real(dp), allocatable :: velocity(:, :)
     !> velocity of the undivided bodies under all impulses (nv, n_columns), made by `evaluate`
     real(dp), allocatable :: v_global(:, :)
-    !> work space, H r (nv, n_columns) [N s, N m s]
+    !> H r (nv, n_columns), of all copies after `evaluate`; work space of schemes [N s, N m s]
     real(dp), allocatable :: reaction(:, :)
     !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (nw, n_columns)
     real(dp), allocatable :: inverse_mass(:, :)

@@ -74,7 +74,8 @@ module gravier_solve
     type(descent_t) :: descent
     !> on this rank: the whole solve, and what comes before its first check [s]
     real(dp) :: seconds = 0.0_dp, start_seconds = 0.0_dp
-    !> one column a check: iteration, residual, jump, error, seconds of this rank without those of checks (5, n_trace)
+    !> one column a check, n_trace of them: iteration, residual, jump, error, seconds of this rank without those of checks
+    !> (n_traced, room)
     integer :: n_trace = 0
     real(dp), allocatable :: trace(:, :)
   end type solve_report_t
@@ -169,8 +170,8 @@ contains
       growth = merge(growth_limit, 1.0_dp, scheme%mends_growth())
     end function watched_growth
 
-    !> Whether the defect has been above the reference for 10 iterations and is 4 times it, where the method has no means
-    !> against it.
+    !> Whether the defect has been above the reference for unmended_iterations and is unmended_limit times it, where the method
+    !> has no means against it.
     logical function grows(defect)
       real(dp), intent(in) :: defect
 

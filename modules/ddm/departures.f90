@@ -1,0 +1,83 @@
+!> Grains that leave the scene: behind outlets, or with the boundary that they are glued to.
+module gravier_departures
+  use gravier_kinds, only: dp, i8
+  use gravier_boundary, only: shape_outlet
+  use gravier_decomposition, only: decomposition_t
+  implicit none
+  private
+  public :: some_leave, let_grains_out
+
+contains
+
+  !> Whether grain `k` of subdomain `s` of this rank stays in the scene: its centre lies behind no outlet, and the
+  !> boundary that it is glued to is there.
+  pure logical function stays(decomposition, s, k)
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: s, k
+    integer :: b
+    real(dp) :: distance, normal(decomposition%nd)
+
+    stays = .true.
+    associate (boundaries => decomposition%boundaries, home => decomposition%home(s))
+      if (home%glued(k) > 0) then
+        stays = boundaries(home%glued(k))%present
+        return
+      end if
+      do b = 1, size(boundaries)
+        if (boundaries(b)%shape /= shape_outlet .or. .not. boundaries(b)%present) cycle
+        call boundaries(b)%locate(home%position(:, k), distance, normal)
+        if (distance < 0.0_dp) stays = .false.
+      end do
+    end associate
+  end function stays
+
+  !> Whether some grain leaves the scene now. Collective.
+  logical function some_leave(decomposition)
+    type(decomposition_t), intent(in) :: decomposition
+    integer :: s, k
+
+    some_leave = .false.
+    if (.not. any(decomposition%boundaries%shape == shape_outlet)) return
+    do s = 1, size(decomposition%home)
+      do k = 1, decomposition%home(s)%n
+        if (.not. stays(decomposition, s, k)) some_leave = .true.
+      end do
+    end do
+    some_leave = decomposition%comm%any_true(some_leave)
+  end function some_leave
+
+  !> Take the grains that leave out of the scene. Collective.
+  subroutine let_grains_out(decomposition, has_glued, n_free, n_glued)
+    type(decomposition_t), intent(inout) :: decomposition
+    !> some grain of the scene is glued to a boundary
+    logical, intent(in) :: has_glued
+    !> grains of all ranks that leave
+    integer(i8), intent(out) :: n_free, n_glued
+    logical, allocatable :: mask(:)
+    integer(i8) :: counts(2)
+    integer :: s, k
+
+    n_free = 0
+    n_glued = 0
+    associate (boundaries => decomposition%boundaries)
+      if (.not. any(boundaries%shape == shape_outlet) .and. (.not. has_glued .or. all(boundaries%present))) return
+    end associate
+    counts(:) = 0
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        allocate (mask(home%n))
+        do k = 1, home%n
+          mask(k) = stays(decomposition, s, k)
+        end do
+        counts(2) = counts(2) + count(.not. mask .and. home%glued > 0)
+        counts(1) = counts(1) + count(.not. mask .and. home%glued == 0)
+        if (.not. all(mask)) call home%keep_only(mask)
+        deallocate (mask)
+      end associate
+    end do
+    call decomposition%comm%sum_counts(counts)
+    n_free = counts(1)
+    n_glued = counts(2)
+  end subroutine let_grains_out
+
+end module gravier_departures
