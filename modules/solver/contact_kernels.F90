@@ -108,13 +108,14 @@ module gravier_contact_kernels
       real(dp), intent(in), contiguous :: hot(:, :, :), velocity(:, :)
       real(dp), intent(inout), contiguous :: contact_velocity(:, :, :)
     end subroutine velocity_kernel
-    !> 1/W_nn and, where the law has them, 1/W_tt and 1/W_rr into `hot`.
-    pure subroutine operator_kernel(pair, hot, weight)
+    !> 1/W_nn and, where the law has them, 1/W_tt and 1/W_rr into `hot`, times the share of each that sweeps take.
+    pure subroutine operator_kernel(pair, hot, weight, share)
       import :: dp
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
       real(dp), intent(inout), contiguous :: hot(:, :, :)
       real(dp), intent(in), contiguous :: weight(:, :)
+      real(dp), intent(in) :: share(3)
     end subroutine operator_kernel
     !> sums = (sum of |r - P|^2, sum of |r|^2), P being the local solve with the undivided local operator.
     pure subroutine residual_kernel(pair, hot, weight, velocity, impulse, sums)

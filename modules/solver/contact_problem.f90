@@ -125,13 +125,18 @@ contains
     call self%update_local_operator(kernels)
   end subroutine subproblem_share_masses
 
-  !> Diagonal of the local operators from `weight`, into `hot`.
-  pure subroutine subproblem_update_local_operator(self, kernels)
+  !> Inverse diagonal of the local operators from `weight`, into `hot`.
+  pure subroutine subproblem_update_local_operator(self, kernels, share)
     class(subproblem_t), intent(inout) :: self
     type(kernels_t), intent(in) :: kernels
+    !> share of a local solve's step that sweeps take, of its normal, tangential and rolling part; 1 if absent
+    real(dp), intent(in), optional :: share(3)
+    real(dp) :: taken(3)
 
     if (self%n_contacts == 0) return
-    call kernels%set_operators(self%pair, self%hot, self%weight)
+    taken(:) = 1.0_dp
+    if (present(share)) taken(:) = share
+    call kernels%set_operators(self%pair, self%hot, self%weight, taken)
     ! contacts of no effect are all zero
     self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
   end subroutine subproblem_update_local_operator

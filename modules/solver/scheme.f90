@@ -20,6 +20,9 @@ module gravier_scheme
   !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
   integer, parameter :: window = 10, idle_limit = 20
   real(dp), parameter :: progress_made = 0.8_dp
+  !> share of a local solve's step that sweeps with momentum take after the first window, of its normal, tangential and rolling
+  !> part, of disks and of spheres
+  real(dp), parameter :: share_2d(3) = [1.0_dp, 0.7_dp, 1.0_dp], share_3d(3) = [1.1_dp, 0.7_dp, 1.0_dp]
 
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
@@ -54,6 +57,9 @@ module gravier_scheme
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
     logical :: resting = .false.
+    !> the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly, and
+    !> plain ones do; and whether the local operators in place say so
+    logical :: whole = .true., whole_in_place = .true.
     !> times that the memory was shortened in this solve
     integer :: shortened = 0
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
@@ -278,11 +284,33 @@ contains
 
     call start_timer(phase_sweep)
     problem%progress_is_summed = .false.
-    if (.not. scheme%momentum%on .or. scheme%momentum%resting) return
+    if (.not. scheme%momentum%on) return
+    if (scheme%momentum%whole .neqv. scheme%momentum%whole_in_place) call change_shares(scheme%momentum, problem)
+    if (scheme%momentum%resting) return
     do s = 1, size(problem%sub)
       call extrapolate(scheme%momentum%beta, problem%sub(s)%velocity, scheme%momentum%part(s)%velocity)
     end do
   end subroutine begin_sweeps
+
+  !> Put local operators in place that take the whole of a local solve, or the shares with which momentum gains most.
+  subroutine change_shares(momentum, problem)
+    type(momentum_t), intent(inout) :: momentum
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: share(3)
+    integer :: s
+
+    if (momentum%whole) then
+      share(:) = 1.0_dp
+    else if (problem%kernels%nd == 2) then
+      share(:) = share_2d
+    else
+      share(:) = share_3d
+    end if
+    do s = 1, size(problem%sub)
+      call problem%sub(s)%update_local_operator(problem%kernels, share)
+    end do
+    momentum%whole_in_place = momentum%whole
+  end subroutine change_shares
 
   !> v := v + beta (v - previous), previous := v.
   pure subroutine extrapolate(beta, velocity, previous)
@@ -394,6 +422,7 @@ contains
     self%iterations = self%iterations + 1
     if (mod(self%iterations, window) == 0) call close_window(self)
     self%resting = self%plain > 0
+    self%whole = self%resting .or. self%iterations < window
     self%beta = 0.0_dp
     if (self%resting) return
     t = self%t
