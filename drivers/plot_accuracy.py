@@ -97,9 +97,15 @@ def draw_errors(variants, axes, x, label):
             axes.plot(column(variants[variant], x), column(variants[variant], name), color=colour, marker=marker, markersize=4,
                       markerfacecolor="white", linewidth=1.0)
     finish(axes, label, "error")
-    handles = [plt.Line2D([], [], color="0.4", marker=marker, markersize=4, markerfacecolor="white", label=text(name))
-               for name, marker in zip(known, MARKERS)]
-    axes.legend(handles=handles, frameon=False, fontsize=7)
+    name_markers(axes, [text(name) for name in known])
+
+
+def name_markers(axes, labels):
+    """What each marker is, above the panel: within it a curve would run through the names."""
+    axes.legend(handles=[plt.Line2D([], [], color="0.4", marker=marker, markersize=4, markerfacecolor="white", linestyle="", label=label)
+                         for label, marker in zip(labels, MARKERS)],
+                loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1, ncol=max(1, len(labels)), columnspacing=0.8,
+                handlelength=0.8, handletextpad=0.3, frameon=False, fontsize=7)
 
 
 def text(name):
@@ -111,16 +117,16 @@ def text(name):
 def draw_tolerance(variants, panels, compared):
     draw_errors(variants, panels[0], "solve_seconds", "seconds in solves")
     axes = panels[1]
+    if not compared:
+        draw_errors(variants, axes, "tolerance", "tolerance")
+        return
     for variant, colour in styles(variants).items():
         for name, marker in zip(compared, MARKERS):
             axes.plot(column(variants[variant], "tolerance"), column(variants[variant], name + "_error"), color=colour,
                       marker=marker, markersize=4, markerfacecolor="white", linewidth=1.0)
     finish(axes, "tolerance", "deviation of the mean, relative")
-    if compared:
-        axes.axhline(number(next(iter(variants.values()))[0]["knee"]), color="0.6", linewidth=0.8, linestyle="--")
-    axes.legend(handles=[plt.Line2D([], [], color="0.4", marker=marker, markersize=4, markerfacecolor="white",
-                                    label=name.replace("_", " ")) for name, marker in zip(compared, MARKERS)],
-                frameon=False, fontsize=7)
+    axes.axhline(number(next(iter(variants.values()))[0]["knee"]), color="0.6", linewidth=0.8, linestyle="--")
+    name_markers(axes, [name.replace("_", " ") for name in compared])
 
 
 def draw_step(variants, panels):
@@ -211,7 +217,7 @@ def draw(directory, rows):
     handles = [plt.Line2D([], [], color=colour, label=variant) for variant, colour in styles(variants).items()]
     columns = min(4, len(handles))
     figure.legend(handles=handles, loc="lower center", ncol=columns, frameon=False, fontsize=8)
-    figure.subplots_adjust(left=0.09, right=0.98, top=0.91, wspace=0.28, bottom=0.15 + 0.045 * -(-len(handles) // columns))
+    figure.subplots_adjust(left=0.09, right=0.98, top=0.89, wspace=0.28, bottom=0.15 + 0.045 * -(-len(handles) // columns))
     figure.suptitle(rows[0]["title"], fontsize=10)
     # neither file says when it was made or by which version
     figure.savefig(directory / "accuracy.png", dpi=200, metadata={"Software": None})

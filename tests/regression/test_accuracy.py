@@ -141,6 +141,9 @@ class Columns(Studies):
             self.assertTrue(errors[0] > 10 * errors[1] > 100 * errors[2] > 0.0, errors)
         self.assertEqual({row["stress_error"] for row in rows}, {""})
         self.assert_figures(run)
+        # without quantities to compare, the errors against the tolerance stand in the second panel
+        with open(run.path("out", "accuracy.svg"), encoding="utf-8") as file:
+            self.assertEqual(file.read().count("impulses, relative"), 2)
 
     def test_size(self):
         """The growth of plain NLGS on columns is quadratic; other scenes are compared with nothing."""

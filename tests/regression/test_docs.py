@@ -235,6 +235,8 @@ class Recipes(unittest.TestCase):
         for path in ("doc/install.md", "cmake/packaging/Dockerfile", "cmake/packaging/gravier.def"):
             text = (SOURCE / path).read_text(encoding="utf-8")
             self.assertEqual({name for name in needed if name not in text}, set(), path)
+        recipe = SOURCE / "cmake/packaging/spack/packages/gravier/package.py"
+        compile(recipe.read_text(encoding="utf-8"), str(recipe), "exec")
         names = re.findall(r"conda:[^)]*\) name=(?:'([^'=]*)|([\w-]+)) *", launcher)
         conda = (SOURCE / "cmake/packaging/environment.yml").read_text(encoding="utf-8")
         self.assertGreaterEqual(len(names), 4)
