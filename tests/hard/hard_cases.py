@@ -5,6 +5,7 @@ takes a Played and returns complaints. A method may end a run with exit status 3
 result, a crash, a NaN or energy from nowhere is a failure everywhere. To try a method, add it to METHODS."""
 import copy
 import dataclasses
+import functools
 import os
 from typing import Callable
 
@@ -123,7 +124,7 @@ class Played:
         self.wrote = os.path.exists(run.path("results", "history.csv"))
         self.figures = Figures(run, self.scene) if self.wrote else None
 
-    @property
+    @functools.cached_property
     def record(self):
         return Record(self.run, self.case.grains, self.case.dimension)
 

@@ -7,7 +7,7 @@ import array
 
 import numpy as np
 
-from gravier_runs import contents, steps_of
+from gravier_runs import steps_of
 from small_scenes import EPS, INERTIA
 
 #: sums of a dozen terms, each rounded, and the reckoning here
@@ -235,7 +235,7 @@ def kinetic(contacts, scene, velocity):
 def check_numbers(run):
     """Complaints about what is not a finite number in any file."""
     wrong = []
-    for name, value in contents(run.path("results", "results.h5")).items():
+    for name, value in run.results().items():
         if np.asarray(value).dtype.kind == "f" and not np.all(np.isfinite(value)):
             wrong.append(f"{name} is not finite")
     for name in ("history.csv", "run.log"):

@@ -20,9 +20,17 @@ def selection(number, case):
 
 
 class HardCases(RunTestCase):
+    #: runs of cases by the name of the case, the method and the number of ranks
+    played = {}
+
+    def run_once(self, case, title, groups, ranks):
+        key = case.name, title, ranks
+        if key not in self.played:
+            self.played[key] = play(case, title, groups, ranks, self.here(f"{list(CASES).index(case.name)} {title} {ranks}"))
+        return self.played[key]
 
     def play(self, number, case):
-        runs = [play(case, title, groups, ranks, self.here(f"{number} {title}")) for title, groups, ranks in selection(number, case)]
+        runs = [self.run_once(case, title, groups, ranks) for title, groups, ranks in selection(number, case)]
         wrong = [f"{run.method}: {words}" for run in runs for words in run.failures()]
         return wrong + [words for run in runs[1:] for words in disagreement(runs[0], run)]
 
@@ -34,8 +42,7 @@ class HardCases(RunTestCase):
     def test_no_direction_is_nscdd(self):
         """l = 0 is NSCDD, bit for bit."""
         case = CASES["no direction"]
-        first, *others = [play(case, title, groups, 1, self.here(f"zero {title}")).run.results()
-                          for title, groups in case.methods.items()]
+        first, *others = [self.run_once(case, title, groups, 1).run.results() for title, groups in case.methods.items()]
         for other in others:
             self.assertEqual([name for name in differences(first, other) if not name.startswith("/run")], [])
 
@@ -46,7 +53,7 @@ class HardCases(RunTestCase):
             base = play(BASE, title, METHODS[title], 1, self.here(f"base {title}")).record
             for case in units():
                 with self.subTest(case.name, method=title):
-                    record = play(case, title, METHODS[title], 1, self.here(f"{case.name} {title}")).record
+                    record = self.run_once(case, title, METHODS[title], 1).record
                     scale = case.change
                     wanted = base.velocity @ scale.turn.T * (scale.length / scale.time)
                     spin = base.spin * np.linalg.det(scale.turn) / scale.time

@@ -39,12 +39,20 @@ class Run:
 
     def __init__(self, directory, status, stdout, stderr, launcher):
         self.directory, self.status, self.stdout, self.stderr, self.launcher = directory, status, stdout, stderr, launcher
+        #: file that `results` has read, by name, time of its last change and size; and what was in it
+        self._read, self._found = None, {}
 
     def path(self, *names):
         return os.path.join(self.directory, *names)
 
     def results(self, directory="results"):
-        return contents(self.path(directory, "results.h5"))
+        """Everything in results.h5, read once as long as the file stays as it is."""
+        path = self.path(directory, "results.h5")
+        state = os.stat(path)
+        if self._read != (path, state.st_mtime_ns, state.st_size):
+            self._found = contents(path)
+            self._read = path, state.st_mtime_ns, state.st_size
+        return dict(self._found)
 
     def history(self, directory="results"):
         return read_csv(self.path(directory, "history.csv"))
