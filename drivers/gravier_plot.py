@@ -354,12 +354,10 @@ def draw_movie(run, options):
 def join_frames(paths, out, fps):
     """A movie of pictures of one size, which are read one after the other: all of a long run would not fit into memory."""
     first = plt.imread(paths[0])
-    # players and the usual coding of .mp4 want even numbers of pixels
-    height, width = (2 * (size // 2) for size in first.shape[:2])
+    height, width = first.shape[:2]
     figure = plt.figure(figsize=(width / 100, height / 100), dpi=100)
-    image = figure.figimage(first[:height, :width])
-    play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k])[:height, :width])],
-                                              frames=len(paths))
+    image = figure.figimage(first)
+    play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k]))], frames=len(paths))
     try:
         play.save(out, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
     except OSError as reason:

@@ -172,8 +172,8 @@ class Package(RunTestCase):
         self.assertIsNone(gravier_plot.shared_limits([]))
 
     def test_movies_by_ffmpeg(self):
-        """Frames go to the program ffmpeg one after the other, of even size, which its coding of .mp4 wants; a program that keeps what it
-        is given stands in for it, one that fails, and none. Where the real one is installed it makes a movie too."""
+        """Frames go to the program ffmpeg one after the other, of even size, which its coding of .mp4 wants. A program that keeps what it is
+        given stands in for it, one that fails, and none; where the real one is installed it makes a movie too."""
         real = shutil.which("ffmpeg")
         programs = self.here("programs")
         os.mkdir(programs)
@@ -185,7 +185,7 @@ class Package(RunTestCase):
                 with open(stub, "w", encoding="ascii") as file:
                     file.write(f'#!/bin/sh\nfor last; do :; done\necho "$@" >"$last.said"\n/bin/cat >"$last"\nexit {text}\n')
                 os.chmod(stub, 0o755)
-                status, said = self.plot("movie", "heap/results", "--out", "film.mp4", "--every", "3", "--fps", "5")
+                status, said = self.plot("movie", "heap/results", "--out", "film.mp4", "--every", "3", "--fps", "5", "--size", "4.37")
                 if end == 0:
                     self.assertEqual((status, said), (0, "film.mp4\n"))
                     with open(self.here("film.mp4.said"), encoding="ascii") as file:
