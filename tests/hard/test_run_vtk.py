@@ -144,9 +144,10 @@ class Pictures(RunTestCase):
     def test_kills_around_writes(self):
         """Killed at random from outside while either file is being written, on 1 and 2 ranks in turn: whole steps, as of the run that
         nothing stopped, to h5py and to VTK's own reader."""
-        case = merged(DISKS, {"time": {"steps": 40}, "solver": {"max_iterations": 10, "tolerance": 0.1},
+        # many more steps than a run is given time for
+        case = merged(DISKS, {"time": {"steps": 400}, "solver": {"max_iterations": 10, "tolerance": 0.1},
                               "output": {"every": 1, "checkpoint_every": 0}})
-        seconds = np.median(run_case(case, 1, self.here("whole")).history()["wall_seconds"])
+        seconds = np.median(run_case(merged(case, {"time": {"steps": 80}}), 1, self.here("whole")).history()["wall_seconds"])
         straight = {name: read(self.here("whole", "results", name)) for name in NAMES}
         draw = random.Random(5)
 
