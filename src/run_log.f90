@@ -443,7 +443,7 @@ contains
           & trim(solver%method)//"; the step is not kept"
       else
         if (solve%closing > 0.0_dp) then
-          text = "NOT CONVERGED: a heavy body goes through a light one with "//to_text(solve%closing, 3)// &
+          text = "NOT CONVERGED: a body goes against its contacts with "//to_text(solve%closing, 3)// &
             & " of the largest momentum after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
           return
         end if

@@ -5,7 +5,7 @@
 !> Three windows in a row of which each exceeds the one before, the last by more than a factor 2 the one before the first, halve
 !> l: at most 20 iterations after the growth sets in, where it is that fast. Growth by orders of magnitude, as of an l far too
 !> large, does not wait for the end of a window. Changes that neither grow nor fall, of some percent of the impulses at each
-!> iteration, are those of a cycle, of an l far too large as well.
+!> iteration, are those of a cycle, of an l far too large as well. Growth that no l mends is for the method to say (`give_up`).
 module gravier_direction_guard
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -46,6 +46,7 @@ module gravier_direction_guard
   contains
     procedure :: start => direction_guard_start
     procedure :: watch => direction_guard_watch
+    procedure :: give_up => direction_guard_give_up
   end type direction_guard_t
 
 contains
@@ -107,6 +108,14 @@ contains
       if (self%iterations == window) call close_window(self, problem, sums(2), lowered)
     end if
   end subroutine direction_guard_watch
+
+  !> Set l to 0 for the rest of the solve, as `watch` does where it lowers l.
+  subroutine direction_guard_give_up(self, problem, lowered)
+    class(direction_guard_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(out) :: lowered
+    call lower(self, problem, 0.0_dp, lowered)
+  end subroutine direction_guard_give_up
 
   subroutine close_window(guard, problem, impulses, lowered)
     type(direction_guard_t), intent(inout) :: guard

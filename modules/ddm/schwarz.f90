@@ -33,8 +33,12 @@ module gravier_schwarz
     real(dp) :: factor = 1.0_dp
     !> whether `adapt` may lower the factor; each solve starts at 1 then
     logical :: automatic = .true.
+    !> whether a factor that stays is asked for `grows`
+    logical :: watched = .false.
     !> the automatic factor is not lowered beyond this
     real(dp) :: least = 1.0_dp
+    !> by the last `adapt`, the changes alternate and grow
+    logical :: grows = .false.
     !> |d|^2 of the last iteration, negative before the first, and lowest |d_k - d_k-1|^2 since the factor was lowered [J]
     real(dp) :: last = -1.0_dp, lowest = unknown
   contains
@@ -110,7 +114,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     !> whether the loads are to be extrapolated
     logical, intent(in) :: momentum
-    !> started anew where automatic
+    !> started anew
     type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), allocatable, intent(out) :: load(:)
     integer :: s, k, d
@@ -134,7 +138,11 @@ contains
       load(s)%change(:, :) = 0.0_dp
       if (momentum) load(s)%previous = load(s)%value
     end do
-    if (relaxation%automatic) relaxation = relaxation_t(least=1.0_dp/largest_multiplicity(problem))
+    if (relaxation%automatic) then
+      relaxation = relaxation_t(least=1.0_dp/largest_multiplicity(problem))
+    else
+      relaxation = relaxation_t(factor=relaxation%factor, automatic=.false., watched=relaxation%watched)
+    end if
   end subroutine start_neighbour_loads
 
   !> Subdomains that share the body which most share. Collective.
@@ -193,12 +201,14 @@ contains
         end do
       end associate
     end do
-    if (relaxation%automatic) then
+    if (relaxation%automatic .or. relaxation%watched) then
       call problem%comm%sum_parts(parts, sums)
       factor = relaxation%factor
       call relaxation%adapt(sums(1), sums(2))
-      if (relaxation%factor < factor) work%relaxed = work%relaxed + 1
-      work%least_factor = min(work%least_factor, relaxation%factor)
+      if (relaxation%factor < factor) then
+        work%relaxed = work%relaxed + 1
+        work%least_factor = min(work%least_factor, relaxation%factor)
+      end if
     end if
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), sub => problem%sub(s), load => load(s))
@@ -227,17 +237,19 @@ contains
     end do
   end function energy
 
-  !> Lower the automatic factor where the changes of the loads alternate and grow.
+  !> Whether the changes of the loads alternate and grow; the automatic factor is lowered then.
   pure subroutine relaxation_adapt(self, change, product)
     class(relaxation_t), intent(inout) :: self
     !> |d_k|^2 and d_k . d_k-1 over all subdomains, 0 in the first iteration [J]
     real(dp), intent(in) :: change, product
     real(dp) :: alternating
 
+    self%grows = .false.
     if (self%last >= 0.0_dp) then
       alternating = change + self%last - 2.0_dp*product
-      if (alternating > growth_allowed*self%lowest .and. 2.0_dp*product < self%last) then
-        self%factor = max(self%least, factor_kept*self%factor)
+      self%grows = alternating > growth_allowed*self%lowest .and. 2.0_dp*product < self%last
+      if (self%grows) then
+        if (self%automatic) self%factor = max(self%least, factor_kept*self%factor)
         self%lowest = alternating
       end if
       self%lowest = min(self%lowest, alternating)

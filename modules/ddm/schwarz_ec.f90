@@ -35,6 +35,7 @@ contains
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
     self%adapts = self%relaxation%automatic
+    self%relaxation%watched = .true.
     call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
     call self%matrix%set_share(1.0_dp)
@@ -76,7 +77,12 @@ contains
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
     if (.not. is_enriched(self)) return
-    call self%guard%watch(problem, lowered)
+    ! a growth of the loads that a given factor lets go on is that of Schwarz, which no lower l mends
+    if (self%relaxation%grows .and. .not. self%relaxation%automatic) then
+      call self%guard%give_up(problem, lowered)
+    else
+      call self%guard%watch(problem, lowered)
+    end if
     if (.not. lowered) return
     call start_sweeps(self, problem, shared_masses=.false.)
     call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)

@@ -97,7 +97,7 @@ module gravier_contact_problem
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
     procedure :: wake => contact_problem_wake
-    procedure :: closing => contact_problem_closing
+    procedure :: rounded_defect => contact_problem_rounded_defect
     procedure :: sum_progress => contact_problem_sum_progress
     procedure :: jump => contact_problem_jump
     procedure :: received_jump => contact_problem_received_jump
@@ -318,7 +318,7 @@ contains
     if (self%n_asleep > 0) self%asleep_share = all_sums(3)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
     self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
-    if (defect <= rounding*self%rounded_scale*sqrt(real(self%n_contacts, dp))) then
+    if (defect <= self%rounded_defect()) then
       ! velocities are not known better; where impulses vanish, as in a group that flies on after a shock, no iteration
       ! would bring the defect below a part of them
       residual = 0.0_dp
@@ -331,78 +331,11 @@ contains
     end if
   end subroutine contact_problem_residual
 
-  !> The largest momentum with which a body presses on a contact that closes under v_global against its law: the mass of one of the
-  !> bodies in contact, or of the heaviest that leans on one of them, times the lesser of the velocity at which the contact
-  !> closes and that of this body along the normal; relative to the larger of force_scale and impulse_scale. The residual goes by
-  !> the lighter of two bodies, and knows little of what a heavy one lacks. Collective.
-  real(dp) function contact_problem_closing(self) result(closing)
+  !> A defect that is rounding [N s].
+  pure real(dp) function contact_problem_rounded_defect(self) result(defect)
     class(contact_problem_t), intent(in) :: self
-    !> the heaviest body that leans on each
-    integer, allocatable :: heaviest(:)
-    real(dp) :: v
-    integer :: s, c, k, nd
-
-    nd = self%kernels%nd
-    closing = 0.0_dp
-    do s = 1, size(self%sub)
-      associate (sub => self%sub(s))
-        allocate (heaviest(sub%n_columns), source=0)
-        do c = 1, sub%n_contacts
-          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
-          do k = 1, 2
-            call lean(sub%pair(3 - k, c), heaviest(sub%pair(k, c)))
-          end do
-        end do
-        do c = 1, sub%n_contacts
-          v = approach(sub%pair(2, c)) - approach(sub%pair(1, c)) - sub%hot(lane_of(c), nd + 1, block_of(c))
-          if (.not. v > 0.0_dp) cycle
-          do k = 1, 2
-            call press(sub%pair(k, c))
-            if (heaviest(sub%pair(k, c)) > 0) call press(heaviest(sub%pair(k, c)))
-          end do
-        end do
-        deallocate (heaviest)
-      end associate
-    end do
-    closing = self%comm%highest(closing)/max(self%force_scale, self%impulse_scale, tiny(1.0_dp))
-
-  contains
-
-    !> 1/M of body `b`, 0 for what cannot move [1/kg].
-    pure real(dp) function inverse_mass(b)
-      integer, intent(in) :: b
-      inverse_mass = maxval(self%sub(s)%inverse_mass(1:nd, b))
-    end function inverse_mass
-
-    !> Put body `b` in the place of one that is lighter, or of none.
-    pure subroutine lean(b, place)
-      integer, intent(in) :: b
-      integer, intent(inout) :: place
-
-      if (.not. inverse_mass(b) > 0.0_dp) return
-      if (place > 0) then
-        if (inverse_mass(b) >= inverse_mass(place)) return
-      end if
-      place = b
-    end subroutine lean
-
-    !> Velocity of body `b` along the normal of contact c.
-    real(dp) function approach(b)
-      integer, intent(in) :: b
-      integer :: d
-
-      approach = 0.0_dp
-      do d = 1, nd
-        approach = approach + self%sub(s)%v_global(d, b)*self%sub(s)%hot(lane_of(c), d, block_of(c))
-      end do
-    end function approach
-
-    subroutine press(b)
-      integer, intent(in) :: b
-      if (inverse_mass(b) > 0.0_dp) closing = max(closing, min(v, abs(approach(b)))/inverse_mass(b))
-    end subroutine press
-
-  end function contact_problem_closing
+    defect = rounding*self%rounded_scale*sqrt(real(self%n_contacts, dp))
+  end function contact_problem_rounded_defect
 
   !> Let sweeps take all contacts for the rest of the solve.
   subroutine contact_problem_wake(self)

@@ -7,6 +7,7 @@ module gravier_solve
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: descent_t
+  use gravier_closing, only: find_closing
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
@@ -22,9 +23,9 @@ module gravier_solve
   !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
-  !> momentum with which a heavier body may go through a lighter one, see `closing`: at most, and over the tolerance; packings that
-  !> have converged have a third of it and less
-  real(dp), parameter :: most_closing = 0.5_dp, closing_of_tolerance = 1.0e3_dp
+  !> momentum with which a body may go against contacts, see `find_closing`: at most, and over the tolerance; packings that have
+  !> converged have a third of it and less
+  real(dp), parameter :: most_closing = 0.3_dp, closing_of_tolerance = 3.0e2_dp
   !> ratio of a residual to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
   !> figures of a check that a trace keeps
@@ -61,8 +62,8 @@ module gravier_solve
     integer :: status = solve_exhausted
     integer :: iterations = 0
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
-    !> above 0, a heavy body went through a light one with this share of the largest momentum, and the solve had not converged
-    !> whatever the figure
+    !> above 0, a body went against contacts with this share of the largest momentum, and the solve had not converged whatever the
+    !> figure
     real(dp) :: closing = 0.0_dp
     !> the contacts that slept were woken
     logical :: woken = .false.
@@ -217,14 +218,15 @@ contains
       ratio = 0.0_dp
     end subroutine wake_if_due
 
-    !> A residual below the tolerance says little where a heavy body goes through a light one, or where there is no impulse yet
-    !> and some contact asks for one.
+    !> A residual below the tolerance says little where a heavy body or one in strong bonds goes against contacts, or where there is
+    !> no impulse yet and some contact asks for one.
     subroutine weigh_bodies()
-      real(dp) :: closing
+      real(dp) :: closing, allowed
 
-      closing = problem%closing()
+      allowed = min(most_closing, closing_of_tolerance*control%tolerance)
+      closing = find_closing(problem, allowed)
       if (.not. problem%impulse_scale > 0.0_dp) closing = 1.0_dp
-      if (closing > min(most_closing, closing_of_tolerance*control%tolerance)) report%closing = closing
+      if (closing > allowed) report%closing = closing
     end subroutine weigh_bodies
 
     subroutine judge(defect, finished)

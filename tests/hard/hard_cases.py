@@ -91,8 +91,6 @@ class Case:
     #: methods other than those of METHODS
     methods: dict = dataclasses.field(default_factory=dict)
     files: dict = dataclasses.field(default_factory=dict)
-    #: words of a complaint that a run may lead to: a limit that the page states
-    known: str = ""
     #: from BASE to this scene
     change: Change | None = None
 
@@ -127,10 +125,6 @@ class Played:
     @functools.cached_property
     def record(self):
         return Record(self.run, self.case.grains, self.case.dimension)
-
-    def failures(self):
-        """What is wrong with the run and not known to be; empty if nothing is."""
-        return [words for words in self.complaints() if not self.case.known or self.case.known not in words]
 
     def complaints(self):
         """All that is wrong with the run; empty if nothing is."""
@@ -371,12 +365,15 @@ def towers():
              tower(np.logspace(6, 0, 10)), [floor()], {"scene": {"friction": 0.3}}, steps=10, holds=at_rest(1e-4)),
         Case("tower, heavy on light", "the same upside down: an iteration moves the top by 10^-6 of its error",
              tower(np.logspace(0, 6, 10)), [floor()], {"scene": {"friction": 0.3}}, steps=10, may_fail=ALL, holds=at_rest(1e-4)),
+        Case("tower, heavy on light, tolerance 1e-4", "impulses that bear little of the top would meet it: each disk lacks little",
+             tower(np.logspace(0, 6, 10)), [floor()], {"scene": {"friction": 0.3}, "solver": {"tolerance": 1e-4}}, steps=10,
+             may_fail=ALL, holds=converged_at_most(0.5 * 1e6 * (0.1 * STEP * G) ** 2)),
         Case("heavy on one light disk", "a body bears 10^6 times its own weight",
              tower([1.0, 1e6]), [floor()], steps=10, subdomains=2, may_fail=ALL, holds=at_rest(1e-4)),
         Case("heavy on one light disk, tolerance 1e-4", "the residual compares what a local solve changes, which the light disk keeps "
              "small, with the impulses: it alone would meet the tolerance while the heavy one falls", tower([1.0, 1e6]), [floor()],
              {"solver": {"tolerance": 1e-4}}, steps=10, subdomains=2, may_fail=ALL,
-             holds=together(at_rest(1e-2), converged_at_most(0.5 * 1e6 * (0.3 * STEP * G) ** 2)), known="not at rest"),
+             holds=converged_at_most(0.5 * 1e6 * (0.1 * STEP * G) ** 2)),
         Case("column of 1000", "impulses travel from end to end, one contact a sweep",
              tower([1.0] * 1000, 0.01), [floor()], {"solver": {"max_iterations": 100}}, steps=2, subdomains=8, may_fail=ALL,
              holds=at_rest(1e-4)),
@@ -483,7 +480,7 @@ def resistances():
         Case("hanging chain, strong bonds", "the same in bonds 10^3 times as strong: tensions are what is left of large numbers",
              chain, held, bonds(1e3 * weight), may_fail=ALL, holds=at_rest(1e-2)),
         Case("hanging chain, bonds beyond the tolerance", "the same in bonds 10^9 times as strong: a residual of 1e-8 is ten times the "
-             "weight", chain, held, bonds(1e9 * weight), steps=1, may_fail=ALL, holds=at_rest(1e-2), known="not at rest"),
+             "weight", chain, held, bonds(1e9 * weight), steps=1, may_fail=ALL, holds=at_rest(1e-2)),
         Case("sticky heap", "twelve disks that attract each other with 100 times their weight are thrown into a box", heap(),
              heap_box(), sticky(100 * 0.7 * G), holds=overlaps_below(0.02, 0.5)),
         Case("sticky heap that rolls badly", "the same with rolling friction 0.3 of the law", heap(), heap_box(),

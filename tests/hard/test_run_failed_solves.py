@@ -71,7 +71,7 @@ class FailedSolves(RunTestCase):
         """At most 20 iterations from the first check at which the residual is above that of the start to the stop, with checks at
         each iteration and at each tenth."""
         for every in (1, 10):
-            for title in ("schwarz", "schwarz, many sweeps"):
+            for title in DIVERGING:
                 with self.subTest(title, check_every=every):
                     case = merged(self.case, DIVERGING[title], {"solver": {"check_every": every}, "time": {"steps": 1}})
                     run = run_case(case, 1, self.here(f"soon {title} {every}"))

@@ -31,7 +31,7 @@ class HardCases(RunTestCase):
 
     def play(self, number, case):
         runs = [self.run_once(case, title, groups, ranks) for title, groups, ranks in selection(number, case)]
-        wrong = [f"{run.method}: {words}" for run in runs for words in run.failures()]
+        wrong = [f"{run.method}: {words}" for run in runs for words in run.complaints()]
         return wrong + [words for run in runs[1:] for words in disagreement(runs[0], run)]
 
     def test_cases(self):

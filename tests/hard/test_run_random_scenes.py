@@ -19,7 +19,7 @@ class RandomScenes(RunTestCase):
     def play(self, number):
         case = scene(number)
         runs = [play(case, title, METHODS[title], 1 + number % 2, self.here(f"{number} {title}")) for title in methods(number)]
-        wrong = [f"{run.method}: {words}" for run in runs for words in run.failures()]
+        wrong = [f"{run.method}: {words}" for run in runs for words in run.complaints()]
         return wrong + disagreement(*runs)
 
     def test_laws(self):

@@ -1,0 +1,253 @@
+!> What a residual below the tolerance does not tell: momenta with which bodies go against contacts. A residual goes by the lighter
+!> of two bodies, and by impulses with attractions in them: it knows little of what a heavy body, or one in strong bonds, lacks.
+module gravier_closing
+  use gravier_kinds, only: dp, i8
+  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  implicit none
+  private
+  public :: find_closing
+
+  !> contacts between a contact and the heaviest body that is seen to lean on it
+  integer, parameter :: reach = 16
+
+  !> Of each body of a subdomain, the heaviest that leans on it, or itself: mass [kg] and velocity [m/s].
+  type :: leaning_t
+    !> (at least nd + 1, n_columns)
+    real(dp), allocatable :: value(:, :)
+  end type leaning_t
+
+contains
+
+  !> The largest momentum with which a body goes against a contact under v_global, relative to `scale_of`. A contact misses its law
+  !> by the velocity at which it closes, or opens though it holds an impulse. The body is one of the two, or the heaviest that leans
+  !> on one of them through `reach` contacts with impulses; it counts with the least of that velocity, of the same between it and
+  !> the other side of the contact, and of its own along the normal. 0 where it is rounding, or found to be at most `allowed`
+  !> without a search for heavy bodies. Collective.
+  real(dp) function find_closing(problem, allowed) result(closing)
+    !> v_global as `evaluate` has made it, impulse_scale as `residual` has
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp), intent(in) :: allowed
+    type(leaning_t) :: heaviest(size(problem%sub))
+    real(dp) :: scale, most(2)
+    integer :: s, c
+
+    scale = max(scale_of(problem), tiny(1.0_dp))
+    most(:) = 0.0_dp
+    do s = 1, size(problem%sub)
+      call find_most(problem%sub(s), most)
+    end do
+    call problem%comm%highest_of(most)
+    closing = 0.0_dp
+    if (most(1)*most(2) <= max(allowed*scale, problem%rounded_defect())) return
+    call find_heaviest(problem, heaviest)
+    do s = 1, size(problem%sub)
+      do c = 1, problem%sub(s)%n_contacts
+        closing = max(closing, pressing(problem%sub(s), heaviest(s)%value, c))
+      end do
+    end do
+    closing = problem%comm%highest(closing)
+    if (closing <= problem%rounded_defect()) closing = 0.0_dp
+    closing = closing/scale
+  end function find_closing
+
+  !> What closing momenta are compared with: the larger of the largest |R^d| of a body in contact and the root mean square of the
+  !> impulses; where there are attractions without them, and the impulses, of which errors are a part then, up to the sum of all
+  !> |R^d| at most [N s]. Collective.
+  real(dp) function scale_of(problem) result(scale)
+    type(contact_problem_t), intent(in) :: problem
+    !> sums of squared impulses and of |R^d| of each subdomain
+    real(dp) :: parts(2, size(problem%sub)), sums(2), largest
+    integer :: s, c
+    logical :: attracts
+
+    attracts = .false.
+    if (size(problem%sub) > 0) attracts = allocated(problem%sub(1)%attraction)
+    scale = max(problem%force_scale, problem%impulse_scale)
+    if (.not. problem%comm%any_true(attracts)) return
+    parts(:, :) = 0.0_dp
+    largest = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          parts(1, s) = parts(1, s) + (sub%impulse(lane_of(c), 1, block_of(c)) - sub%attraction(lane_of(c), block_of(c)))**2 &
+            & + sum(sub%impulse(lane_of(c), 2:, block_of(c))**2)
+        end do
+        call add_loads(sub, size(sub%position, 1), parts(2, s), largest)
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    scale = max(problem%comm%highest(largest), min(sums(2), sqrt(sums(1)/real(max(1_i8, problem%n_contacts), dp))))
+  end function scale_of
+
+  !> |R^d| of the bodies of a subdomain without attractions [N s], of shared ones a part for each copy; what moves as prescribed
+  !> counts with the heaviest body.
+  subroutine add_loads(sub, nd, total, largest)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: nd
+    !> added to, and raised
+    real(dp), intent(inout) :: total, largest
+    real(dp) :: load(nd), size_of_load, heaviest
+    integer :: b, d
+
+    heaviest = 0.0_dp
+    do b = 1, sub%n_columns
+      do d = 1, nd
+        load(d) = sub%v_free(d, b) - sub%inverse_mass(d, b)*sub%pull(d, b)
+        if (b <= sub%n_bodies .and. .not. sub%moves(d, b)) load(d) = 0.0_dp
+      end do
+      if (b <= sub%n_bodies) then
+        heaviest = max(heaviest, mass(sub, b))
+        size_of_load = mass(sub, b)*norm2(load)
+        total = total + size_of_load/sub%multiplicity(b)
+      else
+        size_of_load = heaviest*norm2(load)
+        total = total + size_of_load
+      end if
+      largest = max(largest, size_of_load)
+    end do
+  end subroutine add_loads
+
+  !> Raise `most` to the largest mass of a body [kg] and the largest velocity by which a contact misses its law [m/s].
+  subroutine find_most(sub, most)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: most(2)
+    integer :: b, c
+
+    do b = 1, sub%n_columns
+      most(1) = max(most(1), mass(sub, b))
+    end do
+    do c = 1, sub%n_contacts
+      most(2) = max(most(2), abs(missed_velocity(sub, c)))
+    end do
+  end subroutine find_most
+
+  !> Mass of body `b`, 0 of what cannot move [kg].
+  pure real(dp) function mass(sub, b)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: b
+    real(dp) :: inverse
+
+    inverse = maxval(sub%inverse_mass(1:size(sub%position, 1), b))
+    mass = 0.0_dp
+    if (inverse > 0.0_dp) mass = 1.0_dp/inverse
+  end function mass
+
+  !> Velocity by which contact `c` misses its law along the normal, v_n + s or what of it the impulse could take: below 0 where it
+  !> closes, above where it opens though it holds an impulse [m/s].
+  pure real(dp) function missed_velocity(sub, c) result(missed)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    real(dp) :: w(2)
+    integer :: d, nd
+
+    nd = size(sub%position, 1)
+    missed = sub%hot(lane_of(c), nd + 1, block_of(c))
+    do d = 1, nd
+      missed = missed + sub%hot(lane_of(c), d, block_of(c))*(sub%v_global(d, sub%pair(1, c)) - sub%v_global(d, sub%pair(2, c)))
+    end do
+    if (.not. missed > 0.0_dp) return
+    call sub%local_operator(c, sub%inverse_mass, w)
+    missed = min(missed, max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))*w(1))
+  end function missed_velocity
+
+  !> The heaviest body that leans on each, through `reach` contacts at most. Collective.
+  subroutine find_heaviest(problem, heaviest)
+    type(contact_problem_t), intent(inout) :: problem
+    type(leaning_t), intent(out) :: heaviest(:)
+    integer :: s, b, nd, step
+    logical :: changed
+
+    nd = problem%kernels%nd
+    do s = 1, size(heaviest)
+      associate (sub => problem%sub(s))
+        allocate (heaviest(s)%value(max(nd + 1, problem%kernels%nv), sub%n_columns), source=0.0_dp)
+        do b = 1, sub%n_columns
+          heaviest(s)%value(1, b) = mass(sub, b)
+          heaviest(s)%value(2:nd + 1, b) = sub%v_global(1:nd, b)
+        end do
+      end associate
+    end do
+    do step = 1, reach
+      changed = .false.
+      do s = 1, size(heaviest)
+        call lean(problem%sub(s), heaviest(s)%value, changed)
+        call problem%shared%load(s, heaviest(s)%value)
+      end do
+      if (.not. problem%comm%any_true(changed)) return
+      call problem%shared%pass()
+      do s = 1, size(heaviest)
+        call take_copies(problem, s, heaviest(s)%value)
+      end do
+    end do
+  end subroutine find_heaviest
+
+  !> Hand heavy bodies on, from each body that moves to those it presses on.
+  subroutine lean(sub, value, changed)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout), contiguous :: value(:, :)
+    logical, intent(inout) :: changed
+    real(dp), allocatable :: before(:, :)
+    integer :: c, k, i, j
+
+    allocate (before(size(value, 1), size(value, 2)), source=value)
+    do c = 1, sub%n_contacts
+      if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+      do k = 1, 2
+        i = sub%pair(k, c)
+        j = sub%pair(3 - k, c)
+        ! what cannot move hands nothing on
+        if (.not. (before(1, j) > value(1, i) .and. mass(sub, i) > 0.0_dp)) cycle
+        value(:, i) = before(:, j)
+        changed = .true.
+      end do
+    end do
+  end subroutine lean
+
+  subroutine take_copies(problem, s, value)
+    type(contact_problem_t), intent(in) :: problem
+    !> subdomain of this rank
+    integer, intent(in) :: s
+    real(dp), intent(inout), contiguous :: value(:, :)
+    integer :: j, b
+
+    associate (part => problem%shared%part(s))
+      do j = 1, part%n_slots
+        b = part%slot_body(j)
+        if (part%recv(1, j) > value(1, b)) value(1:problem%shared%width, b) = part%recv(:, j)
+      end do
+    end associate
+  end subroutine take_copies
+
+  !> The largest momentum with which a body goes against contact `c` [N s].
+  pure real(dp) function pressing(sub, heaviest, c)
+    type(subproblem_t), intent(in) :: sub
+    !> (at least nd + 1, n_columns), see leaning_t
+    real(dp), intent(in), contiguous :: heaviest(:, :)
+    integer, intent(in) :: c
+    real(dp) :: missed, along(2), heavy, side, v
+    integer :: k, d, nd
+
+    nd = size(sub%position, 1)
+    pressing = 0.0_dp
+    missed = missed_velocity(sub, c)
+    if (.not. abs(missed) > 0.0_dp) return
+    do k = 1, 2
+      along(k) = 0.0_dp
+      do d = 1, nd
+        along(k) = along(k) + sub%hot(lane_of(c), d, block_of(c))*sub%v_global(d, sub%pair(k, c))
+      end do
+    end do
+    do k = 1, 2
+      pressing = max(pressing, mass(sub, sub%pair(k, c))*min(abs(missed), abs(along(k))))
+      heavy = 0.0_dp
+      do d = 1, nd
+        heavy = heavy + sub%hot(lane_of(c), d, block_of(c))*heaviest(d + 1, sub%pair(k, c))
+      end do
+      side = merge(1.0_dp, -1.0_dp, k == 1)
+      v = sign(1.0_dp, missed)*(side*(heavy - along(3 - k)) + sub%hot(lane_of(c), nd + 1, block_of(c)))
+      pressing = max(pressing, heaviest(1, sub%pair(k, c))*min(abs(missed), abs(heavy), v))
+    end do
+  end function pressing
+
+end module gravier_closing
