@@ -2,7 +2,7 @@
 !> of two bodies, and by impulses with attractions in them: it knows little of what a heavy body, or one in strong bonds, lacks.
 module gravier_closing
   use gravier_kinds, only: dp, i8
-  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
@@ -11,10 +11,10 @@ module gravier_closing
   !> contacts between a contact and the heaviest body that is seen to lean on it
   integer, parameter :: reach = 16
 
-  !> Of each body of a subdomain, the heaviest that leans on it, or itself: mass [kg] and velocity [m/s].
+  !> Of each body of a subdomain, the heaviest that leans on it, or itself.
   type :: leaning_t
-    !> (at least nd + 1, n_columns)
-    real(dp), allocatable :: value(:, :)
+    !> mass, in the first row [kg], and velocity [m/s, rad/s], both (nv, n_columns)
+    real(dp), allocatable :: mass(:, :), velocity(:, :)
   end type leaning_t
 
 contains
@@ -35,7 +35,7 @@ contains
     scale = max(scale_of(problem), tiny(1.0_dp))
     most(:) = 0.0_dp
     do s = 1, size(problem%sub)
-      call find_most(problem%sub(s), most)
+      call find_most(problem%kernels, problem%sub(s), most)
     end do
     call problem%comm%highest_of(most)
     closing = 0.0_dp
@@ -43,7 +43,7 @@ contains
     call find_heaviest(problem, heaviest)
     do s = 1, size(problem%sub)
       do c = 1, problem%sub(s)%n_contacts
-        closing = max(closing, pressing(problem%sub(s), heaviest(s)%value, c))
+        closing = max(closing, pressing(problem%kernels, problem%sub(s), heaviest(s), c))
       end do
     end do
     closing = problem%comm%highest(closing)
@@ -73,7 +73,7 @@ contains
           parts(1, s) = parts(1, s) + (sub%impulse(lane_of(c), 1, block_of(c)) - sub%attraction(lane_of(c), block_of(c)))**2 &
             & + sum(sub%impulse(lane_of(c), 2:, block_of(c))**2)
         end do
-        call add_loads(sub, size(sub%position, 1), parts(2, s), largest)
+        call add_loads(sub, problem%kernels%nd, parts(2, s), largest)
       end associate
     end do
     call problem%comm%sum_parts(parts, sums)
@@ -85,7 +85,7 @@ contains
   subroutine add_loads(sub, nd, total, largest)
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: nd
-    !> added to, and raised
+    !> added to, and raised [N s]
     real(dp), intent(inout) :: total, largest
     real(dp) :: load(nd), size_of_load, heaviest
     integer :: b, d
@@ -97,8 +97,8 @@ contains
         if (b <= sub%n_bodies .and. .not. sub%moves(d, b)) load(d) = 0.0_dp
       end do
       if (b <= sub%n_bodies) then
-        heaviest = max(heaviest, mass(sub, b))
-        size_of_load = mass(sub, b)*norm2(load)
+        heaviest = max(heaviest, mass(sub, nd, b))
+        size_of_load = mass(sub, nd, b)*norm2(load)
         total = total + size_of_load/sub%multiplicity(b)
       else
         size_of_load = heaviest*norm2(load)
@@ -109,45 +109,47 @@ contains
   end subroutine add_loads
 
   !> Raise `most` to the largest mass of a body [kg] and the largest velocity by which a contact misses its law [m/s].
-  subroutine find_most(sub, most)
+  subroutine find_most(kernels, sub, most)
+    type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     real(dp), intent(inout) :: most(2)
     integer :: b, c
 
     do b = 1, sub%n_columns
-      most(1) = max(most(1), mass(sub, b))
+      most(1) = max(most(1), mass(sub, kernels%nd, b))
     end do
     do c = 1, sub%n_contacts
-      most(2) = max(most(2), abs(missed_velocity(sub, c)))
+      most(2) = max(most(2), abs(missed_velocity(kernels, sub, c)))
     end do
   end subroutine find_most
 
   !> Mass of body `b`, 0 of what cannot move [kg].
-  pure real(dp) function mass(sub, b)
+  pure real(dp) function mass(sub, nd, b)
     type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: b
+    integer, intent(in) :: nd, b
     real(dp) :: inverse
 
-    inverse = maxval(sub%inverse_mass(1:size(sub%position, 1), b))
+    inverse = maxval(sub%inverse_mass(1:nd, b))
     mass = 0.0_dp
     if (inverse > 0.0_dp) mass = 1.0_dp/inverse
   end function mass
 
   !> Velocity by which contact `c` misses its law along the normal, v_n + s or what of it the impulse could take: below 0 where it
   !> closes, above where it opens though it holds an impulse [m/s].
-  pure real(dp) function missed_velocity(sub, c) result(missed)
+  pure real(dp) function missed_velocity(kernels, sub, c) result(missed)
+    type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: c
     real(dp) :: w(2)
     integer :: d, nd
 
-    nd = size(sub%position, 1)
+    nd = kernels%nd
     missed = sub%hot(lane_of(c), nd + 1, block_of(c))
     do d = 1, nd
       missed = missed + sub%hot(lane_of(c), d, block_of(c))*(sub%v_global(d, sub%pair(1, c)) - sub%v_global(d, sub%pair(2, c)))
     end do
     if (.not. missed > 0.0_dp) return
-    call sub%local_operator(c, sub%inverse_mass, w)
+    call sub%local_operator(kernels, c, sub%inverse_mass, w)
     missed = min(missed, max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))*w(1))
   end function missed_velocity
 
@@ -155,82 +157,99 @@ contains
   subroutine find_heaviest(problem, heaviest)
     type(contact_problem_t), intent(inout) :: problem
     type(leaning_t), intent(out) :: heaviest(:)
-    integer :: s, b, nd, step
+    integer :: s, b, step
     logical :: changed
 
-    nd = problem%kernels%nd
     do s = 1, size(heaviest)
       associate (sub => problem%sub(s))
-        allocate (heaviest(s)%value(max(nd + 1, problem%kernels%nv), sub%n_columns), source=0.0_dp)
+        allocate (heaviest(s)%mass(problem%kernels%nv, sub%n_columns), source=0.0_dp)
+        allocate (heaviest(s)%velocity(problem%kernels%nv, sub%n_columns), source=sub%v_global)
         do b = 1, sub%n_columns
-          heaviest(s)%value(1, b) = mass(sub, b)
-          heaviest(s)%value(2:nd + 1, b) = sub%v_global(1:nd, b)
+          heaviest(s)%mass(1, b) = mass(sub, problem%kernels%nd, b)
         end do
       end associate
     end do
     do step = 1, reach
       changed = .false.
       do s = 1, size(heaviest)
-        call lean(problem%sub(s), heaviest(s)%value, changed)
-        call problem%shared%load(s, heaviest(s)%value)
+        call lean(problem%kernels%nd, problem%sub(s), heaviest(s), changed)
       end do
       if (.not. problem%comm%any_true(changed)) return
-      call problem%shared%pass()
-      do s = 1, size(heaviest)
-        call take_copies(problem, s, heaviest(s)%value)
-      end do
+      call agree_on_copies(problem, heaviest)
     end do
   end subroutine find_heaviest
 
-  !> Hand heavy bodies on, from each body that moves to those it presses on.
-  subroutine lean(sub, value, changed)
+  !> Hand heavy bodies on, from each body to those it presses on.
+  subroutine lean(nd, sub, heaviest, changed)
+    integer, intent(in) :: nd
     type(subproblem_t), intent(in) :: sub
-    real(dp), intent(inout), contiguous :: value(:, :)
+    type(leaning_t), intent(inout) :: heaviest
     logical, intent(inout) :: changed
-    real(dp), allocatable :: before(:, :)
+    type(leaning_t) :: before
     integer :: c, k, i, j
 
-    allocate (before(size(value, 1), size(value, 2)), source=value)
+    before = heaviest
     do c = 1, sub%n_contacts
       if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
       do k = 1, 2
         i = sub%pair(k, c)
         j = sub%pair(3 - k, c)
-        ! what cannot move hands nothing on
-        if (.not. (before(1, j) > value(1, i) .and. mass(sub, i) > 0.0_dp)) cycle
-        value(:, i) = before(:, j)
+        ! on what cannot move nothing leans that would go through it, nor does it hand anything on
+        if (.not. (before%mass(1, j) > heaviest%mass(1, i) .and. mass(sub, nd, i) > 0.0_dp)) cycle
+        heaviest%mass(1, i) = before%mass(1, j)
+        heaviest%velocity(:, i) = before%velocity(:, j)
         changed = .true.
       end do
     end do
   end subroutine lean
 
-  subroutine take_copies(problem, s, value)
-    type(contact_problem_t), intent(in) :: problem
-    !> subdomain of this rank
-    integer, intent(in) :: s
-    real(dp), intent(inout), contiguous :: value(:, :)
-    integer :: j, b
+  !> All copies of a body take the heaviest that any of them knows. Collective.
+  subroutine agree_on_copies(problem, heaviest)
+    type(contact_problem_t), intent(inout) :: problem
+    type(leaning_t), intent(inout) :: heaviest(:)
+    !> slot of the copy that knows it, 0 for the own one
+    type :: slots_t
+      integer, allocatable :: of_body(:)
+    end type slots_t
+    type(slots_t) :: slot(size(heaviest))
+    integer :: s, j, b
 
-    associate (part => problem%shared%part(s))
-      do j = 1, part%n_slots
-        b = part%slot_body(j)
-        if (part%recv(1, j) > value(1, b)) value(1:problem%shared%width, b) = part%recv(:, j)
+    do s = 1, size(heaviest)
+      call problem%shared%load(s, heaviest(s)%mass)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(heaviest)
+      allocate (slot(s)%of_body(problem%sub(s)%n_columns), source=0)
+      associate (part => problem%shared%part(s))
+        do j = 1, part%n_slots
+          b = part%slot_body(j)
+          if (.not. part%recv(1, j) > heaviest(s)%mass(1, b)) cycle
+          heaviest(s)%mass(1, b) = part%recv(1, j)
+          slot(s)%of_body(b) = j
+        end do
+      end associate
+      call problem%shared%load(s, heaviest(s)%velocity)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(heaviest)
+      do b = 1, problem%sub(s)%n_columns
+        if (slot(s)%of_body(b) > 0) heaviest(s)%velocity(:, b) = problem%shared%part(s)%recv(:, slot(s)%of_body(b))
       end do
-    end associate
-  end subroutine take_copies
+    end do
+  end subroutine agree_on_copies
 
   !> The largest momentum with which a body goes against contact `c` [N s].
-  pure real(dp) function pressing(sub, heaviest, c)
+  pure real(dp) function pressing(kernels, sub, heaviest, c)
+    type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
-    !> (at least nd + 1, n_columns), see leaning_t
-    real(dp), intent(in), contiguous :: heaviest(:, :)
+    type(leaning_t), intent(in) :: heaviest
     integer, intent(in) :: c
     real(dp) :: missed, along(2), heavy, side, v
     integer :: k, d, nd
 
-    nd = size(sub%position, 1)
+    nd = kernels%nd
     pressing = 0.0_dp
-    missed = missed_velocity(sub, c)
+    missed = missed_velocity(kernels, sub, c)
     if (.not. abs(missed) > 0.0_dp) return
     do k = 1, 2
       along(k) = 0.0_dp
@@ -239,14 +258,14 @@ contains
       end do
     end do
     do k = 1, 2
-      pressing = max(pressing, mass(sub, sub%pair(k, c))*min(abs(missed), abs(along(k))))
+      pressing = max(pressing, mass(sub, nd, sub%pair(k, c))*min(abs(missed), abs(along(k))))
       heavy = 0.0_dp
       do d = 1, nd
-        heavy = heavy + sub%hot(lane_of(c), d, block_of(c))*heaviest(d + 1, sub%pair(k, c))
+        heavy = heavy + sub%hot(lane_of(c), d, block_of(c))*heaviest%velocity(d, sub%pair(k, c))
       end do
       side = merge(1.0_dp, -1.0_dp, k == 1)
       v = sign(1.0_dp, missed)*(side*(heavy - along(3 - k)) + sub%hot(lane_of(c), nd + 1, block_of(c)))
-      pressing = max(pressing, heaviest(1, sub%pair(k, c))*min(abs(missed), abs(heavy), v))
+      pressing = max(pressing, heaviest%mass(1, sub%pair(k, c))*min(abs(missed), abs(heavy), v))
     end do
   end function pressing
 
