@@ -144,7 +144,7 @@ contains
       if (.not. known) return
       motion%normal(:) = boundaries(1)%axis(1:nd)
       motion%gravity = -dot_product(scene%gravity(1:nd), motion%normal)
-      motion%restitution = boundaries(1)%restitution
+      motion%restitution = boundaries(1)%contact%restitution
       ! the rank that has the grain tells the others
       along(:) = 0.0_dp
       do s = 1, size(simulation%decomposition%home)

@@ -185,8 +185,8 @@ contains
       effects%tangential_restitution = index(name, "tangential") > 0
       effects%rolling = index(name, "roll") > 0
       call simulation%problem%kernels%choose(packing%nd, effects)
-      simulation%physics%rolling_friction = rolling_friction
-      simulation%physics%pivoting_friction = rolling_friction
+      simulation%physics%contact%rolling_friction = rolling_friction
+      simulation%physics%contact%pivoting_friction = rolling_friction
       call simulation%assemble(figures)
       associate (sub => simulation%problem%sub(1))
         if (index(name, "restitution") > 0) sub%hot(:, packing%nd + 1, :) = 0.5_dp*sub%hot(:, packing%nd + 1, :)

@@ -3,9 +3,10 @@ module gravier_config
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
                                   enriched_config_t, output_config_t, boundary_config_t, sample_config_t, material_config_t, &
-                                  law_config_t
+                                  law_config_t, given_coefficients_t
   use gravier_config_table, only: groups, keys, fill_keys, kind_real
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
@@ -274,16 +275,17 @@ contains
   subroutine settle(config, report)
     type(config_t), intent(inout) :: config
     type(report_t), intent(inout) :: report
+    type(given_coefficients_t) :: given
     integer :: i
 
     report%instance = 1
     associate (scene => config%scene, parts => config%decomposition, sample => config%sample)
-      if (.not. is_given(report, "scene", "wall_friction")) scene%wall_friction = scene%friction
-      if (.not. is_given(report, "scene", "wall_restitution")) scene%wall_restitution = scene%restitution
-      if (.not. is_given(report, "scene", "wall_tangential_restitution")) &
-        scene%wall_tangential_restitution = scene%tangential_restitution
-      if (.not. is_given(report, "scene", "wall_rolling_friction")) scene%wall_rolling_friction = scene%rolling_friction
-      if (.not. is_given(report, "scene", "wall_pivoting_friction")) scene%wall_pivoting_friction = scene%pivoting_friction
+      given%friction = is_given(report, "scene", "wall_friction")
+      given%restitution = is_given(report, "scene", "wall_restitution")
+      given%tangential_restitution = is_given(report, "scene", "wall_tangential_restitution")
+      given%rolling_friction = is_given(report, "scene", "wall_rolling_friction")
+      given%pivoting_friction = is_given(report, "scene", "wall_pivoting_friction")
+      call settle_contact(given, scene%contact, scene%wall_contact)
       call fill_third(scene%dimension, scene%lattice_count)
       call fill_third(scene%dimension, parts%grid)
       where (.not. abs(sample%box) > 0.0_dp) sample%box = scene%period
@@ -316,14 +318,23 @@ contains
 
     if (.not. is_given(report, "boundary", "name")) boundary%name = "boundary "//to_text(report%instance)
     where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = boundary%point
-    if (.not. boundary%friction_given) boundary%friction = scene%wall_friction
-    if (.not. boundary%restitution_given) boundary%restitution = scene%wall_restitution
-    if (.not. boundary%tangential_restitution_given) boundary%tangential_restitution = scene%wall_tangential_restitution
-    if (.not. boundary%rolling_given) boundary%rolling_friction = scene%wall_rolling_friction
-    if (.not. boundary%pivoting_given) boundary%pivoting_friction = scene%wall_pivoting_friction
+    call settle_contact(boundary%contact_given, scene%wall_contact, boundary%contact)
     if (.not. boundary%material_given) boundary%material = scene%wall_material
     if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)
   end subroutine settle_boundary
+
+  !> Take the coefficients that are not given from others.
+  pure subroutine settle_contact(given, others, contact)
+    type(given_coefficients_t), intent(in) :: given
+    type(coefficients_t), intent(in) :: others
+    type(coefficients_t), intent(inout) :: contact
+
+    if (.not. given%friction) contact%friction = others%friction
+    if (.not. given%restitution) contact%restitution = others%restitution
+    if (.not. given%tangential_restitution) contact%tangential_restitution = others%tangential_restitution
+    if (.not. given%rolling_friction) contact%rolling_friction = others%rolling_friction
+    if (.not. given%pivoting_friction) contact%pivoting_friction = others%pivoting_friction
+  end subroutine settle_contact
 
   !> One layer along the third axis in 2D, when counts are given and this one is not.
   pure subroutine fill_third(dimension, counts)

@@ -9,7 +9,7 @@ module gravier_config_check
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
-  use gravier_config_check_boundary, only: check_boundaries, is_pivoting, pivoting_text
+  use gravier_config_check_boundary, only: check_boundaries, check_contact
   use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
   implicit none
@@ -158,21 +158,8 @@ contains
     associate (scene => config%scene)
       call expect(report, scene%bodies /= "file" .or. scene%bodies_file /= "", "scene", "bodies_file", error)
       call expect(report, scene%density > 0.0_dp, "scene", "density", error)
-      call expect(report, scene%friction >= 0.0_dp, "scene", "friction", error)
-      call expect(report, scene%wall_friction >= 0.0_dp, "scene", "wall_friction", error)
-      call expect(report, scene%restitution >= 0.0_dp .and. scene%restitution <= 1.0_dp, "scene", "restitution", error)
-      call expect(report, scene%wall_restitution >= 0.0_dp .and. scene%wall_restitution <= 1.0_dp, &
-                  "scene", "wall_restitution", error)
-      call expect(report, scene%tangential_restitution >= 0.0_dp .and. scene%tangential_restitution <= 1.0_dp, &
-                  "scene", "tangential_restitution", error)
-      call expect(report, scene%wall_tangential_restitution >= 0.0_dp .and. scene%wall_tangential_restitution <= 1.0_dp, &
-                  "scene", "wall_tangential_restitution", error)
-      call expect(report, scene%rolling_friction >= 0.0_dp, "scene", "rolling_friction", error)
-      call expect(report, scene%wall_rolling_friction >= 0.0_dp, "scene", "wall_rolling_friction", error)
-      call expect(report, is_pivoting(scene%dimension, scene%pivoting_friction), "scene", "pivoting_friction", error, &
-                  pivoting_text)
-      call expect(report, is_pivoting(scene%dimension, scene%wall_pivoting_friction), "scene", "wall_pivoting_friction", error, &
-                  pivoting_text)
+      call check_contact(report, scene%dimension, scene%contact, "scene", "", error)
+      call check_contact(report, scene%dimension, scene%wall_contact, "scene", "wall_", error)
       call expect(report, all(scene%period >= 0.0_dp), "scene", "period", error)
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)

@@ -3,12 +3,13 @@ module gravier_config_check_boundary
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_magnitude, only: is_size
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_config_keys, only: choices_text, has_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, ordinal
   implicit none
   private
-  public :: check_boundaries, is_pivoting, pivoting_text
+  public :: check_boundaries, check_contact
 
   !> shapes of each dimension
   character(len=*), parameter :: shapes_of(2:3) = ["plane segment circle grains outlet     ", &
@@ -38,7 +39,8 @@ contains
       call check_size(report, config%boundaries(i), error)
       call check_free(report, config%boundaries(i), error)
       call check_loads(report, config%boundaries(i), error)
-      call check_contact(report, config%scene%dimension, config%boundaries(i), error)
+      call check_contact(report, config%scene%dimension, config%boundaries(i)%contact, "boundary", "", error)
+      call expect(report, config%boundaries(i)%remove_at >= 0.0_dp, "boundary", "remove_at", error)
       if (allocated(error)) return
     end do
     report%instance = 1
@@ -159,19 +161,21 @@ contains
     is_pivoting = coefficient >= 0.0_dp .and. (dimension == 3 .or. coefficient <= 0.0_dp)
   end function is_pivoting
 
-  subroutine check_contact(report, dimension, boundary, error)
+  !> Coefficients of contact that a group has under keys that begin with a prefix.
+  subroutine check_contact(report, dimension, contact, group, prefix, error)
     type(report_t), intent(in) :: report
     integer, intent(in) :: dimension
-    type(boundary_config_t), intent(in) :: boundary
+    type(coefficients_t), intent(in) :: contact
+    character(len=*), intent(in) :: group, prefix
     type(error_t), allocatable, intent(inout) :: error
 
-    call expect(report, boundary%friction >= 0.0_dp, "boundary", "friction", error)
-    call expect(report, boundary%restitution >= 0.0_dp .and. boundary%restitution <= 1.0_dp, "boundary", "restitution", error)
-    call expect(report, boundary%tangential_restitution >= 0.0_dp .and. boundary%tangential_restitution <= 1.0_dp, "boundary", &
-                "tangential_restitution", error)
-    call expect(report, boundary%rolling_friction >= 0.0_dp, "boundary", "rolling_friction", error)
-    call expect(report, is_pivoting(dimension, boundary%pivoting_friction), "boundary", "pivoting_friction", error, pivoting_text)
-    call expect(report, boundary%remove_at >= 0.0_dp, "boundary", "remove_at", error)
+    call expect(report, contact%friction >= 0.0_dp, group, prefix//"friction", error)
+    call expect(report, contact%restitution >= 0.0_dp .and. contact%restitution <= 1.0_dp, group, prefix//"restitution", error)
+    call expect(report, contact%tangential_restitution >= 0.0_dp .and. contact%tangential_restitution <= 1.0_dp, group, &
+                prefix//"tangential_restitution", error)
+    call expect(report, contact%rolling_friction >= 0.0_dp, group, prefix//"rolling_friction", error)
+    call expect(report, is_pivoting(dimension, contact%pivoting_friction), group, prefix//"pivoting_friction", error, &
+                pivoting_text)
   end subroutine check_contact
 
   !> Is it another vector than 0?

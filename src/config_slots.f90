@@ -1,6 +1,7 @@
 !> Where the value of each key of the table lives in a config_t.
 module gravier_config_slots
   use gravier_kinds, only: dp
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, text_length, choice_length
   use gravier_config_table, only: key_t, groups, keys
   use gravier_config_keys, only: find_group, find_key, has_word
@@ -115,16 +116,6 @@ contains
     case ("radius_min"); slot%real => config%scene%radius_min
     case ("radius_max"); slot%real => config%scene%radius_max
     case ("seed"); slot%integer => config%scene%seed
-    case ("friction"); slot%real => config%scene%friction
-    case ("wall_friction"); slot%real => config%scene%wall_friction
-    case ("restitution"); slot%real => config%scene%restitution
-    case ("wall_restitution"); slot%real => config%scene%wall_restitution
-    case ("tangential_restitution"); slot%real => config%scene%tangential_restitution
-    case ("wall_tangential_restitution"); slot%real => config%scene%wall_tangential_restitution
-    case ("rolling_friction"); slot%real => config%scene%rolling_friction
-    case ("wall_rolling_friction"); slot%real => config%scene%wall_rolling_friction
-    case ("pivoting_friction"); slot%real => config%scene%pivoting_friction
-    case ("wall_pivoting_friction"); slot%real => config%scene%wall_pivoting_friction
     case ("wall_material"); slot%text => config%scene%wall_material
     case ("rotation"); slot%logical => config%scene%rotation
     case ("period"); slot%reals => config%scene%period
@@ -139,7 +130,23 @@ contains
     case ("skin"); slot%given => config%scene%skin_given
     case ("overlap_allowed"); slot%given => config%scene%overlap_given
     end select
+    call contact_slot(config%scene%contact, name, slot)
+    if (index(name, "wall_") == 1) call contact_slot(config%scene%wall_contact, name(6:), slot)
   end subroutine scene_slot
+
+  subroutine contact_slot(contact, name, slot)
+    type(coefficients_t), target, intent(inout) :: contact
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("friction"); slot%real => contact%friction
+    case ("restitution"); slot%real => contact%restitution
+    case ("tangential_restitution"); slot%real => contact%tangential_restitution
+    case ("rolling_friction"); slot%real => contact%rolling_friction
+    case ("pivoting_friction"); slot%real => contact%pivoting_friction
+    end select
+  end subroutine contact_slot
 
   subroutine boundary_slot(config, instance, name, slot)
     type(config_t), target, intent(inout) :: config
@@ -167,24 +174,20 @@ contains
     case ("pressure"); slot%real => config%boundaries(instance)%pressure
     case ("mass"); slot%real => config%boundaries(instance)%mass
     case ("table"); slot%text => config%boundaries(instance)%table
-    case ("friction"); slot%real => config%boundaries(instance)%friction
-    case ("restitution"); slot%real => config%boundaries(instance)%restitution
-    case ("tangential_restitution"); slot%real => config%boundaries(instance)%tangential_restitution
-    case ("rolling_friction"); slot%real => config%boundaries(instance)%rolling_friction
-    case ("pivoting_friction"); slot%real => config%boundaries(instance)%pivoting_friction
     case ("material"); slot%text => config%boundaries(instance)%material
     case ("remove_at"); slot%real => config%boundaries(instance)%remove_at
     end select
     select case (name)
     case ("pivot"); slot%given => config%boundaries(instance)%pivot_given
-    case ("friction"); slot%given => config%boundaries(instance)%friction_given
-    case ("restitution"); slot%given => config%boundaries(instance)%restitution_given
-    case ("tangential_restitution"); slot%given => config%boundaries(instance)%tangential_restitution_given
-    case ("rolling_friction"); slot%given => config%boundaries(instance)%rolling_given
-    case ("pivoting_friction"); slot%given => config%boundaries(instance)%pivoting_given
+    case ("friction"); slot%given => config%boundaries(instance)%contact_given%friction
+    case ("restitution"); slot%given => config%boundaries(instance)%contact_given%restitution
+    case ("tangential_restitution"); slot%given => config%boundaries(instance)%contact_given%tangential_restitution
+    case ("rolling_friction"); slot%given => config%boundaries(instance)%contact_given%rolling_friction
+    case ("pivoting_friction"); slot%given => config%boundaries(instance)%contact_given%pivoting_friction
     case ("material"); slot%given => config%boundaries(instance)%material_given
     case ("remove_at"); slot%given => config%boundaries(instance)%remove_given
     end select
+    call contact_slot(config%boundaries(instance)%contact, name, slot)
   end subroutine boundary_slot
 
   subroutine sample_slot(config, name, slot)

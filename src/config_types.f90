@@ -2,16 +2,23 @@
 !> The defaults are in the table of keys (gravier_config_keys) and nowhere else: fill a config_t with parse_config.
 module gravier_config_types
   use gravier_kinds, only: dp
+  use gravier_contact_coefficients, only: coefficients_t
   implicit none
   private
   public :: scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t
   public :: output_config_t, boundary_config_t, sample_config_t, material_config_t, law_config_t, config_t
-  public :: text_length, choice_length
+  public :: given_coefficients_t, text_length, choice_length
 
   !> longest title or path
   integer, parameter :: text_length = 4096
   !> longest of the words among which a key lets the user choose
   integer, parameter :: choice_length = 16
+
+  !> Which of some coefficients of contact are given.
+  type :: given_coefficients_t
+    logical :: friction = .false., restitution = .false., tangential_restitution = .false.
+    logical :: rolling_friction = .false., pivoting_friction = .false.
+  end type given_coefficients_t
 
   !> &scene: the bodies, their loads and their contact laws.
   type :: scene_config_t
@@ -34,12 +41,8 @@ module gravier_config_types
     !> m; 0 unless bodies is lattice
     real(dp) :: radius_min, radius_max
     integer :: seed
-    real(dp) :: friction, wall_friction
-    !> in [0, 1]
-    real(dp) :: restitution, wall_restitution
-    real(dp) :: tangential_restitution, wall_tangential_restitution
-    !> >= 0, times R*: the lever of the largest moment; 0 in 2D: pivoting
-    real(dp) :: rolling_friction, wall_rolling_friction, pivoting_friction, wall_pivoting_friction
+    !> between grains, and with boundaries
+    type(coefficients_t) :: contact, wall_contact
     !> of the boundaries; blank: none
     character(len=text_length) :: wall_material
     !> false: no grain turns; true: grains turn where friction asks
@@ -183,15 +186,9 @@ module gravier_config_types
     real(dp) :: mass
     !> CSV table of the motion and the loads in time; blank: none
     character(len=text_length) :: table
-    !> wall_friction of &scene when not given
-    real(dp) :: friction
-    logical :: friction_given = .false.
-    !> wall_restitution of &scene when not given
-    real(dp) :: restitution
-    logical :: restitution_given = .false.
-    !> the value for walls of &scene when not given
-    real(dp) :: tangential_restitution, rolling_friction, pivoting_friction
-    logical :: tangential_restitution_given = .false., rolling_given = .false., pivoting_given = .false.
+    !> wall_contact of &scene where not given
+    type(coefficients_t) :: contact
+    type(given_coefficients_t) :: contact_given
     !> name; wall_material of &scene when not given; blank: none
     character(len=text_length) :: material
     logical :: material_given = .false.

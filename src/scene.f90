@@ -9,6 +9,7 @@ module gravier_scene
   use gravier_bodies_file, only: read_bodies
   use gravier_periodic, only: period_t
   use gravier_body_store, only: body_set_t
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_boundary, only: boundary_t, shape_outlet
   use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
@@ -236,20 +237,17 @@ contains
 
     nd = config%dimension
     associate (effects => scene%effects)
-      if (data%total > 1) call add_law(config%friction, config%restitution, config%tangential_restitution, &
-        & config%rolling_friction, config%pivoting_friction)
+      if (data%total > 1) call add_law(config%contact)
       do k = 1, size(scene%boundaries)
         associate (boundary => scene%boundaries(k))
           effects%drives = effects%drives .or. moves(boundary)
           effects%forces = effects%forces .or. boundary%is_driven()
           effects%removal = effects%removal .or. boundary%shape == shape_outlet
-          if (boundary%shape /= shape_outlet) call add_law(boundary%friction, boundary%restitution, &
-            & boundary%tangential_restitution, boundary%rolling_friction, boundary%pivoting_friction)
+          if (boundary%shape /= shape_outlet) call add_law(boundary%contact)
         end associate
       end do
       if (scene%laws%n > 0) then
-        call add_law(scene%laws%largest_friction, scene%laws%largest_restitution, scene%laws%largest_tangential_restitution, &
-          & scene%laws%largest_rolling, scene%laws%largest_pivoting)
+        call add_law(scene%laws%largest)
         effects%cohesion = scene%laws%attracts
       end if
       ! moments are in the kernels of friction
@@ -264,16 +262,17 @@ contains
 
   contains
 
-    subroutine add_law(friction, restitution, tangential, rolling, pivoting)
-      real(dp), intent(in) :: friction, restitution, tangential, rolling, pivoting
+    subroutine add_law(contact)
+      type(coefficients_t), intent(in) :: contact
 
       associate (effects => scene%effects)
-        effects%friction = effects%friction .or. friction > 0.0_dp
-        effects%restitution = effects%restitution .or. restitution > 0.0_dp
-        effects%tangential_restitution = effects%tangential_restitution .or. (friction > 0.0_dp .and. tangential > 0.0_dp)
+        effects%friction = effects%friction .or. contact%friction > 0.0_dp
+        effects%restitution = effects%restitution .or. contact%restitution > 0.0_dp
+        effects%tangential_restitution = effects%tangential_restitution .or. &
+          & (contact%friction > 0.0_dp .and. contact%tangential_restitution > 0.0_dp)
         if (.not. config%rotation) return
-        effects%rolling = effects%rolling .or. rolling > 0.0_dp .or. pivoting > 0.0_dp
-        effects%pivoting = effects%pivoting .or. pivoting > 0.0_dp
+        effects%rolling = effects%rolling .or. contact%rolling_friction > 0.0_dp .or. contact%pivoting_friction > 0.0_dp
+        effects%pivoting = effects%pivoting .or. contact%pivoting_friction > 0.0_dp
       end associate
     end subroutine add_law
 

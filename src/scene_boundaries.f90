@@ -35,11 +35,7 @@ contains
         wall%point(1:nd) = data%wall_point(:, w)
         wall%pivot(:) = wall%point
         wall%axis(1:nd) = data%wall_normal(:, w)
-        wall%friction = config%scene%wall_friction
-        wall%restitution = config%scene%wall_restitution
-        wall%tangential_restitution = config%scene%wall_tangential_restitution
-        wall%rolling_friction = config%scene%wall_rolling_friction
-        wall%pivoting_friction = config%scene%wall_pivoting_friction
+        wall%contact = config%scene%wall_contact
         wall%material = material_number(config, config%scene%wall_material)
       end associate
     end do
@@ -148,11 +144,7 @@ contains
     boundary%given_force(:) = config%force
     boundary%given_pressure = config%pressure
     boundary%mass = config%mass
-    boundary%friction = config%friction
-    boundary%restitution = config%restitution
-    boundary%tangential_restitution = config%tangential_restitution
-    boundary%rolling_friction = config%rolling_friction
-    boundary%pivoting_friction = config%pivoting_friction
+    boundary%contact = config%contact
     boundary%remove_at = config%remove_at
   end subroutine set_boundary
 

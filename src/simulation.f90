@@ -227,14 +227,10 @@ contains
     associate (config => self%config%scene, rule => self%decomposition%rule)
       self%physics%gravity(:) = config%gravity
       self%physics%body_force(:) = config%body_force
-      self%physics%friction = config%friction
-      self%physics%restitution = config%restitution
+      self%physics%contact = config%contact
       self%physics%rotation = config%rotation
       self%physics%laws = scene%laws
       self%physics%h = self%config%time%step
-      self%physics%tangential_restitution = config%tangential_restitution
-      self%physics%rolling_friction = config%rolling_friction
-      self%physics%pivoting_friction = config%pivoting_friction
       associate (solver => self%config%solver)
         self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
       end associate

@@ -2,6 +2,7 @@
 !> are few of them, and every rank knows them all.
 module gravier_boundary
   use gravier_kinds, only: dp, i8
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_time_table, only: time_table_t
   implicit none
   private
@@ -50,8 +51,8 @@ module gravier_boundary
     !> inertia against forces [kg]
     real(dp) :: mass = 0.0_dp
     type(time_table_t) :: table
-    real(dp) :: friction = 0.0_dp, restitution = 0.0_dp
-    real(dp) :: tangential_restitution = 0.0_dp, rolling_friction = 0.0_dp, pivoting_friction = 0.0_dp
+    !> with grains
+    type(coefficients_t) :: contact
     !> number of its material, 0 for none
     integer :: material = 0
     !> [s]

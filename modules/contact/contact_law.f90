@@ -4,6 +4,7 @@
 !> F [N] costs it nothing: with r~_n = r_n + h F the law of the pair is Coulomb's in r~, and the pair force -h F n is a load.
 module gravier_contact_law
   use gravier_kinds, only: dp
+  use gravier_contact_coefficients, only: coefficients_t
   implicit none
   private
   public :: contact_law_t, contact_pair_t, contact_terms_t, law_key_t, add_resistance_keys, unused
@@ -29,14 +30,7 @@ module gravier_contact_law
     &  law_key_t("pivoting_friction", "0.0", ">= 0", "", "pivoting friction coefficient, the same about the normal; 0 in 2D")]
 
   !> What holds at a contact over a step.
-  type :: contact_terms_t
-    real(dp) :: friction = 0.0_dp
-    !> of the normal velocity: where it is not 0 the contact acts from touching on
-    real(dp) :: restitution = 0.0_dp
-    !> of the tangential velocity, likewise; 0 without friction, which alone can send it back
-    real(dp) :: tangential_restitution = 0.0_dp
-    !> the largest moments over R* r~_n: rolling and, of spheres, pivoting
-    real(dp) :: rolling = 0.0_dp, pivoting = 0.0_dp
+  type, extends(coefficients_t) :: contact_terms_t
     !> [N]
     real(dp) :: attraction = 0.0_dp
     !> gap that the bodies may close in the step [m]
@@ -64,12 +58,8 @@ module gravier_contact_law
   type, abstract :: contact_law_t
     !> some pair may have an attraction; pairs have states
     logical :: attracts = .false., remembers = .false.
-    !> the largest coefficient of friction that it hands over
-    real(dp) :: largest_friction = 0.0_dp
-    !> coefficients of normal and tangential restitution of its pairs
-    real(dp) :: restitution = 0.0_dp, tangential_restitution = 0.0_dp
-    !> coefficients of rolling and pivoting friction of its pairs
-    real(dp) :: rolling = 0.0_dp, pivoting = 0.0_dp
+    !> the largest coefficients that it hands over; all but that of friction are the same for all its pairs
+    type(coefficients_t) :: largest
     !> gap up to which bodies that have not been nearer act on each other [m]
     real(dp) :: range = 0.0_dp
   contains
@@ -134,8 +124,8 @@ contains
     class(contact_law_t), intent(inout) :: self
     real(dp), intent(in) :: rolling, pivoting
 
-    self%rolling = rolling
-    self%pivoting = pivoting
+    self%largest%rolling_friction = rolling
+    self%largest%pivoting_friction = pivoting
   end subroutine contact_law_set_resistance
 
   !> Whether a contact carries nothing or uses all its friction.

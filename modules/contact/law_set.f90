@@ -1,6 +1,7 @@
 !> The laws of a scene by pairs of materials.
 module gravier_law_set
   use gravier_kinds, only: dp
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_contact_law, only: law_key_t
   use gravier_law_registry, only: law_holder_t, registered_laws
   implicit none
@@ -17,8 +18,8 @@ module gravier_law_set
     !> some law attracts, has a memory
     logical :: attracts = .false., remembers = .false.
     !> the largest of all laws; range in [m]
-    real(dp) :: largest_friction = 0.0_dp, largest_restitution = 0.0_dp, largest_tangential_restitution = 0.0_dp
-    real(dp) :: largest_rolling = 0.0_dp, largest_pivoting = 0.0_dp, range = 0.0_dp
+    type(coefficients_t) :: largest
+    real(dp) :: range = 0.0_dp
   contains
     procedure :: init => law_set_init
     procedure :: add => law_set_add
@@ -69,11 +70,7 @@ contains
     associate (law => self%of(self%n)%law)
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
-      self%largest_friction = max(self%largest_friction, law%largest_friction)
-      self%largest_restitution = max(self%largest_restitution, law%restitution)
-      self%largest_tangential_restitution = max(self%largest_tangential_restitution, law%tangential_restitution)
-      self%largest_rolling = max(self%largest_rolling, law%rolling)
-      self%largest_pivoting = max(self%largest_pivoting, law%pivoting)
+      call self%largest%raise_to(law%largest)
       self%range = max(self%range, law%range)
     end associate
   end subroutine law_set_add

@@ -132,18 +132,8 @@ contains
 
     b = boundary_of(view, p)
     terms%play = max(gap, 0.0_dp)
-    terms%friction = physics%friction
-    terms%restitution = physics%restitution
-    terms%tangential_restitution = physics%tangential_restitution
-    terms%rolling = physics%rolling_friction
-    terms%pivoting = physics%pivoting_friction
-    if (b > 0) then
-      terms%friction = boundaries(b)%friction
-      terms%restitution = boundaries(b)%restitution
-      terms%tangential_restitution = boundaries(b)%tangential_restitution
-      terms%rolling = boundaries(b)%rolling_friction
-      terms%pivoting = boundaries(b)%pivoting_friction
-    end if
+    terms%coefficients_t = physics%contact
+    if (b > 0) terms%coefficients_t = boundaries(b)%contact
     ! friction alone can send a tangential velocity back
     if (.not. terms%friction > 0.0_dp) terms%tangential_restitution = 0.0_dp
   end function scene_terms

@@ -86,8 +86,8 @@ contains
     pair%slip = norm2(v - pair%normal_velocity*normal)
     pair%terms%play = max(pair%gap, 0.0_dp)
     associate (law => laws%of(l)%law)
-      pair%terms%rolling = law%rolling
-      pair%terms%pivoting = law%pivoting
+      pair%terms%rolling_friction = law%largest%rolling_friction
+      pair%terms%pivoting_friction = law%largest%pivoting_friction
       call law%evaluate(pair)
     end associate
   end subroutine evaluate_pair

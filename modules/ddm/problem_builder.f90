@@ -324,8 +324,8 @@ contains
     subroutine pack_rolling()
       associate (row => kernels%rolling_row)
         sub%hot(q, row + 1, g) = rolling_radius(sub%hot(q, nd + 4, g), sub%hot(q, nd + 5, g))
-        sub%hot(q, row + 3, g) = terms%rolling
-        if (nd == 3) sub%hot(q, row + 4, g) = terms%pivoting
+        sub%hot(q, row + 3, g) = terms%rolling_friction
+        if (nd == 3) sub%hot(q, row + 4, g) = terms%pivoting_friction
       end associate
     end subroutine pack_rolling
 

@@ -108,7 +108,7 @@ contains
     axis(nd) = 0.0_dp
     decomposition%boundaries(2) = plane(n_grains + 2, origin, axis)
     do w = 1, n_walls
-      decomposition%boundaries(w)%friction = 0.75_dp
+      decomposition%boundaries(w)%contact%friction = 0.75_dp
     end do
     call make_decomposition(comm, truth%cloud, n_subdomains, merge(3*nd - 3, nd, rotation), by_cells, decomposition)
     call find_truth(decomposition, truth)
@@ -175,7 +175,7 @@ contains
     call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
     call kernels%choose(nd, effects_t(friction=friction))
     physics%gravity(:) = gravity
-    physics%friction = 0.25_dp
+    physics%contact%friction = 0.25_dp
     physics%h = h
     neighbourhoods%memory%n_impulse = 4
     call neighbourhoods%build(decomposition)
@@ -558,7 +558,7 @@ contains
       floor%velocity(1) = 0.5_dp
       floor%last_velocity(2) = 0.3_dp
       floor%last_spin(3) = 1.0_dp
-      floor%restitution = 0.5_dp
+      floor%contact%restitution = 0.5_dp
       lid = plane(12, [0.0_dp, 0.95_dp], [0.0_dp, -1.0_dp])
       lid%free(2) = .true.
       lid%mass = 4.0_dp
@@ -567,7 +567,7 @@ contains
     glue%id = 13
     glue%shape = shape_grains
     glue%velocity(1:2) = [0.125_dp, 0.5_dp]
-    glue%friction = 0.3_dp
+    glue%contact%friction = 0.3_dp
     glue%pivot(1) = 0.8_dp
     if (turning) glue%given_spin(3) = 1.0_dp
     if (turning) glue%spin(3) = 1.0_dp
@@ -596,7 +596,7 @@ contains
 
     call make_boundary_scene(n_subdomains, 0.0_dp, turning, decomposition)
     call kernels%choose(2, effects_t(friction=.true.))
-    physics%friction = 0.1_dp
+    physics%contact%friction = 0.1_dp
     physics%h = h
     neighbourhoods%memory%n_impulse = 2
     call neighbourhoods%build(decomposition)
@@ -733,7 +733,7 @@ contains
     call neighbourhoods%build(decomposition)
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")
-    decomposition%boundaries(1)%restitution = 0.0_dp
+    decomposition%boundaries(1)%contact%restitution = 0.0_dp
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 3_i8, "no restitution: contacts within the alert distance")
     decomposition%boundaries(1)%present = .false.

@@ -117,6 +117,10 @@ class Messages(RunTestCase):
                     "&scene period: expected more than", "two diameters of the largest grain")
         self.refuse(bad({"scene": {"lattice_count": [100000, 100000]}}), "expected at most 2147483647 bodies")
         self.refuse(bad({"scene": {"friction": -1.0}}), "&scene friction = -1.0: expected a finite real number >= 0")
+        for group, prefix in (("scene", ""), ("scene", "wall_"), ("boundary", "")):
+            for name in ("friction", "restitution", "tangential_restitution", "rolling_friction", "pivoting_friction"):
+                given = {**(PLANE if group == "boundary" else {}), prefix + name: -1.0}
+                self.refuse(bad({group: given}), f"&{group}", f"{prefix}{name} = -1.0: expected")
         self.refuse(bad({"material": {"name": "glass"}, "law": {"materials": "glass", "kind": "coulomb", "friction": -1.0}}),
                     "&law", "friction = -1.0: expected a finite real number >= 0")
         self.refuse(bad({"scene": {"bodies": "sample", "lattice_count": None, "radius_min": None, "radius_max": None},

@@ -391,7 +391,7 @@ contains
     end do
     b%present = .false.
     call b%get_state(words)
-    back%friction = 0.5_dp
+    back%contact%friction = 0.5_dp
     call back%set_state(words)
     call back%get_state(again)
     call check(all(words == again), "words of a state")
@@ -405,7 +405,7 @@ contains
     call check_vector(back%last_velocity, b%last_velocity, 0.0_dp, "state: velocity before")
     call check_vector(back%last_spin, b%last_spin, 0.0_dp, "state: spin before")
     call check(.not. back%present, "state: removed")
-    call check_close(back%friction, 0.5_dp, 0.0_dp, "properties stay")
+    call check_close(back%contact%friction, 0.5_dp, 0.0_dp, "properties stay")
   end subroutine test_state
 
   !> Put elsewhere, it keeps its directions and velocities.

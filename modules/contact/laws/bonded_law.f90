@@ -54,7 +54,7 @@ contains
     self%range = self%bond_distance
     self%attracts = .true.
     self%remembers = .true.
-    self%largest_friction = max(self%friction, self%bond_friction)
+    self%largest%friction = max(self%friction, self%bond_friction)
     call self%set_resistance(values(5), values(6))
   end subroutine bonded_set
 

@@ -55,7 +55,7 @@ contains
     self%range = self%debonding_distance
     self%attracts = .true.
     self%remembers = .true.
-    self%largest_friction = self%friction
+    self%largest%friction = self%friction
     call self%set_resistance(values(5), values(6))
   end subroutine capillary_set
 

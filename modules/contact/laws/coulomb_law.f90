@@ -37,9 +37,9 @@ contains
     real(dp), intent(in) :: values(:)
 
     self%friction = values(1)
-    self%restitution = values(2)
-    self%tangential_restitution = values(3)
-    self%largest_friction = self%friction
+    self%largest%restitution = values(2)
+    self%largest%tangential_restitution = values(3)
+    self%largest%friction = self%friction
     call self%set_resistance(values(4), values(5))
   end subroutine coulomb_set
 
@@ -48,8 +48,8 @@ contains
     type(contact_pair_t), intent(inout) :: pair
 
     pair%terms%friction = self%friction
-    pair%terms%restitution = self%restitution
-    if (pair%terms%friction > 0.0_dp) pair%terms%tangential_restitution = self%tangential_restitution
+    pair%terms%restitution = self%largest%restitution
+    if (pair%terms%friction > 0.0_dp) pair%terms%tangential_restitution = self%largest%tangential_restitution
   end subroutine coulomb_evaluate
 
 end module gravier_coulomb_law

@@ -32,13 +32,13 @@ contains
   pure subroutine frictionless_set(self, values)
     class(frictionless_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
-    self%restitution = values(1)
+    self%largest%restitution = values(1)
   end subroutine frictionless_set
 
   pure subroutine frictionless_evaluate(self, pair)
     class(frictionless_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
-    pair%terms%restitution = self%restitution
+    pair%terms%restitution = self%largest%restitution
   end subroutine frictionless_evaluate
 
 end module gravier_frictionless_law

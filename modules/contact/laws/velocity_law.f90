@@ -45,9 +45,9 @@ contains
     self%static_friction = values(1)
     self%dynamic_friction = values(2)
     self%slip_scale = values(3)
-    self%restitution = values(4)
-    self%tangential_restitution = values(5)
-    self%largest_friction = max(self%static_friction, self%dynamic_friction)
+    self%largest%restitution = values(4)
+    self%largest%tangential_restitution = values(5)
+    self%largest%friction = max(self%static_friction, self%dynamic_friction)
     call self%set_resistance(values(6), values(7))
   end subroutine velocity_set
 
@@ -56,8 +56,8 @@ contains
     type(contact_pair_t), intent(inout) :: pair
 
     pair%terms%friction = self%dynamic_friction + (self%static_friction - self%dynamic_friction)*exp(-pair%slip/self%slip_scale)
-    pair%terms%restitution = self%restitution
-    if (pair%terms%friction > 0.0_dp) pair%terms%tangential_restitution = self%tangential_restitution
+    pair%terms%restitution = self%largest%restitution
+    if (pair%terms%friction > 0.0_dp) pair%terms%tangential_restitution = self%largest%tangential_restitution
   end subroutine velocity_evaluate
 
 end module gravier_velocity_law
