@@ -139,13 +139,13 @@ def large_cases():
             yield case(packing, friction, "nscdd_ep", True, 1, 3), 30
 
 
-def column(directory, subdomains, method, groups, sweeps):
+def column(directory, subdomains, method, acceleration, groups, sweeps):
     """Iterations on a column of 4 disks a subdomain, until the error on the impulses is below 1e-6."""
-    place = directory / "columns" / f"{method}_{subdomains}_{sweeps}_{len(groups)}"
+    place = directory / "columns" / f"{method}_{acceleration}_{subdomains}_{sweeps}_{len(groups)}"
     run(place, {"scene": {"bodies": "column", "column_count": 4 * subdomains, "gravity": [0.0, -1.0, 0.0]},
                 "time": {"step": 1.0, "steps": 1},
                 "solver": {"method": method, "sweeps": sweeps, "criterion": "error", "tolerance": 1e-6, "check_every": 1,
-                           "max_iterations": 2000},
+                           "max_iterations": 2000, "acceleration": acceleration},
                 "decomposition": {"subdomains": subdomains}, **groups,
                 "output": {"directory": "results", "every": 0}})
     history = read_history(place / "results")
@@ -154,15 +154,16 @@ def column(directory, subdomains, method, groups, sweeps):
 
 def study_columns(directory, quick):
     given = {"enriched": {"direction": 1e4, "direction_unit": "absolute"}}
-    kinds = {"NSCDD": ("nscdd", {}), "NSCDD-EP, l = 1e4, all": ("nscdd_ep", given), "NSCDD-EP, automatic": ("nscdd_ep", {}),
-             "Schwarz": ("schwarz", {}), "Schwarz-EC, l = 1e4": ("schwarz_ec", given)}
+    kinds = {"NSCDD": ("nscdd", "none", {}), "NSCDD-EP, l = 1e4, all": ("nscdd_ep", "none", given),
+             "NSCDD-EP, automatic": ("nscdd_ep", "none", {}), "Schwarz": ("schwarz", "none", {}),
+             "Schwarz-EC, l = 1e4": ("schwarz_ec", "none", given), "NSCDD, momentum": ("nscdd", "momentum", {}),
+             "NSCDD-EP, automatic, momentum": ("nscdd_ep", "momentum", {})}
     rows = []
     for sweeps in (1, 10):
-        for name, (method, groups) in kinds.items():
+        for name, kind in kinds.items():
             for subdomains in (2, 4, 8, 16) if quick else (2, 4, 8, 16, 32, 64):
                 rows.append({"method": name, "sweeps": sweeps, "subdomains": subdomains,
-                             "iterations": column(directory, subdomains, method,
-                                                  groups, sweeps)})
+                             "iterations": column(directory, subdomains, *kind, sweeps)})
     return rows
 
 

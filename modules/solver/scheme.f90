@@ -285,7 +285,10 @@ contains
     call start_timer(phase_sweep)
     problem%progress_is_summed = .false.
     if (.not. scheme%momentum%on) return
-    if (scheme%momentum%whole .neqv. scheme%momentum%whole_in_place) call change_shares(scheme%momentum, problem)
+    ! what alternates between subdomains, which a Schwarz method adapts a factor to, bears no longer steps
+    if (.not. scheme%adapts .and. (scheme%momentum%whole .neqv. scheme%momentum%whole_in_place)) then
+      call change_shares(scheme%momentum, problem)
+    end if
     if (scheme%momentum%resting) return
     do s = 1, size(problem%sub)
       call extrapolate(scheme%momentum%beta, problem%sub(s)%velocity, scheme%momentum%part(s)%velocity)

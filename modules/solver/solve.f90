@@ -19,7 +19,7 @@ module gravier_solve
   real(dp), parameter :: growth_limit = 1.0e4_dp
   !> the same for methods that cannot mend it themselves, whose defect has stayed above the reference for so many iterations
   real(dp), parameter :: unmended_limit = 4.0_dp
-  integer, parameter :: unmended_iterations = 10
+  integer, parameter :: unmended_iterations = 9
   !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp

@@ -81,8 +81,7 @@ class FailedSolves(RunTestCase):
                     run = run_case(merged(case, {"solver": {"max_iterations": end - every}}), 1, self.here(f"way {title} {every}"))
                     trace = run.trace()
                     onset = trace["iteration"][trace["residual"] > trace["residual"][0]][0]
-                    # one that has a direction to give up first may take a few more
-                    self.assertLessEqual(end - onset, 25 if title == "schwarz_ec" else 20)
+                    self.assertLessEqual(end - onset, 20)
 
     def test_recoveries_are_said(self):
         """Where relaxation is lowered, or momentum put off, the log says so in the step, counts it and sums it up at the end."""
