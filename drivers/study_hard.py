@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """The hard cases of tests/hard by every method, on 1 and 2 ranks: what converges, in how many iterations, and what does not.
 
-    python3 drivers/study_hard.py --out DIR [--cases REGEX] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
+    python3 drivers/study_hard.py --out DIR [--cases REGEX] [--methods TITLE...] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
 
 leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page of the table. --short leaves out the long runs. With
---cases the rows of other cases that DIR/hard_cases.csv has already stay."""
+--cases and --methods the rows of others that DIR/hard_cases.csv has already stay."""
 import argparse
 import csv
 import re
@@ -37,8 +37,12 @@ def study(options, case):
     """Rows of a case."""
     reference, rows = None, []
     for title, groups in methods_of(case).items():
+        wanted = not options.methods or title in options.methods
+        # the first one is what the others are compared with
+        if not wanted and reference is not None:
+            continue
         several = groups["solver"]["method"] != "nlgs" and (not options.several or title in options.several)
-        for ranks in options.ranks if several else options.ranks[:1]:
+        for ranks in options.ranks if several and wanted else options.ranks[:1]:
             directory = options.out / "runs" / re.sub(r"\W+", "_", f"{case.name} {title} {ranks}")
             shutil.rmtree(directory, ignore_errors=True)
             long = case.long > 0 and title in LONG and ranks == 1 and not options.short
@@ -48,22 +52,25 @@ def study(options, case):
                 reference = played
             elif played.figures is not None and played.figures.steps == reference.figures.steps:
                 wrong += disagreement(reference, played)
-            rows.append(row(case, title, groups, ranks, played, wrong))
-            options.failed += len(wrong)
-            print(*rows[-1].values(), sep=", ", flush=True)
+            if wanted:
+                rows.append(row(case, title, groups, ranks, played, wrong))
+                options.failed += len(wrong)
+                print(*rows[-1].values(), sep=", ", flush=True)
             if played is not reference:
                 shutil.rmtree(directory, ignore_errors=True)
     shutil.rmtree(reference.run.directory, ignore_errors=True)
     return rows
 
 
-def joined(path, chosen, rows):
-    """New rows and those of the file of cases that were not chosen, in the order of the cases."""
+def joined(path, rows):
+    """New rows and those of the file of cases and methods that were not run, in the order of the cases and their methods."""
     if path.exists():
         with open(path, encoding="ascii", newline="") as file:
-            rows = rows + [r for r in csv.DictReader(file) if r["case"] not in {case.name for case in chosen}]
-    order = list(cases())
-    return sorted((r for r in rows if r["case"] in order), key=lambda r: order.index(r["case"]))
+            done = {(r["case"], r["method"]) for r in rows}
+            rows = rows + [r for r in csv.DictReader(file) if (r["case"], r["method"]) not in done]
+    order = [(name, title) for name, case in cases().items() for title in methods_of(case)]
+    rows = [r for r in rows if (r["case"], r["method"]) in order]
+    return sorted(rows, key=lambda r: (order.index((r["case"], r["method"])), int(r["ranks"])))
 
 
 def page(rows):
@@ -92,6 +99,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--cases", default="", help="names of cases that match")
+    parser.add_argument("--methods", nargs="+", help="titles of the methods; all")
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--several", nargs="+", help="titles of the methods that run on more than the first of the ranks; all")
     parser.add_argument("--short", action="store_true", help="no long runs")
@@ -101,7 +109,7 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     chosen = [case for name, case in cases().items() if re.search(options.cases, name)]
     found = gravier_runs.each(study, [(options, case) for case in chosen], options.workers)
-    rows = joined(options.out / "hard_cases.csv", chosen, [r for several in found for r in several])
+    rows = joined(options.out / "hard_cases.csv", [r for several in found for r in several])
     with open(options.out / "hard_cases.csv", "w", encoding="ascii", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
