@@ -13,7 +13,7 @@ module gravier_closing
 
   !> Of each body of a subdomain, the heaviest that leans on it, or itself.
   type :: leaning_t
-    !> mass, in the first row [kg], and velocity [m/s, rad/s], both (nv, n_columns)
+    !> mass, or the share of it that leans, in the first row [kg], and velocity [m/s, rad/s], both (nv, n_columns)
     real(dp), allocatable :: mass(:, :), velocity(:, :)
   end type leaning_t
 
@@ -30,7 +30,7 @@ contains
     real(dp), intent(in) :: allowed
     type(leaning_t) :: heaviest(size(problem%sub))
     real(dp) :: scale, most(2)
-    integer :: s, c
+    integer :: s
 
     scale = max(scale_of(problem), tiny(1.0_dp))
     most(:) = 0.0_dp
@@ -40,16 +40,31 @@ contains
     call problem%comm%highest_of(most)
     closing = 0.0_dp
     if (most(1)*most(2) <= max(allowed*scale, problem%rounded_defect())) return
-    call find_heaviest(problem, heaviest)
-    do s = 1, size(problem%sub)
-      do c = 1, problem%sub(s)%n_contacts
-        closing = max(closing, pressing(problem%kernels, problem%sub(s), heaviest(s), c))
-      end do
-    end do
-    closing = problem%comm%highest(closing)
+    call start_leaning(problem, heaviest)
+    closing = largest_pressing(problem, heaviest)
+    ! the bodies of the contacts alone may say enough: no search then
+    if (closing <= max(allowed*scale, problem%rounded_defect())) then
+      call find_heaviest(problem, heaviest)
+      closing = largest_pressing(problem, heaviest)
+    end if
     if (closing <= problem%rounded_defect()) closing = 0.0_dp
     closing = closing/scale
   end function find_closing
+
+  !> The largest momentum with which a body goes against a contact [N s]. Collective.
+  real(dp) function largest_pressing(problem, heaviest) result(largest)
+    type(contact_problem_t), intent(in) :: problem
+    type(leaning_t), intent(in) :: heaviest(:)
+    integer :: s, c
+
+    largest = 0.0_dp
+    do s = 1, size(problem%sub)
+      do c = 1, problem%sub(s)%n_contacts
+        largest = max(largest, pressing(problem%kernels, problem%sub(s), heaviest(s), c))
+      end do
+    end do
+    largest = problem%comm%highest(largest)
+  end function largest_pressing
 
   !> What closing momenta are compared with: the larger of the largest |R^d| of a body in contact and the root mean square of the
   !> impulses; where there are attractions without them, and the impulses, of which errors are a part then, up to the sum of all
@@ -153,12 +168,11 @@ contains
     missed = min(missed, max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))*w(1))
   end function missed_velocity
 
-  !> The heaviest body that leans on each, through `reach` contacts at most. Collective.
-  subroutine find_heaviest(problem, heaviest)
-    type(contact_problem_t), intent(inout) :: problem
+  !> Each body alone.
+  subroutine start_leaning(problem, heaviest)
+    type(contact_problem_t), intent(in) :: problem
     type(leaning_t), intent(out) :: heaviest(:)
-    integer :: s, b, step
-    logical :: changed
+    integer :: s, b
 
     do s = 1, size(heaviest)
       associate (sub => problem%sub(s))
@@ -169,6 +183,15 @@ contains
         end do
       end associate
     end do
+  end subroutine start_leaning
+
+  !> The heaviest body that leans on each, through `reach` contacts at most. Collective.
+  subroutine find_heaviest(problem, heaviest)
+    type(contact_problem_t), intent(inout) :: problem
+    type(leaning_t), intent(inout) :: heaviest(:)
+    integer :: s, step
+    logical :: changed
+
     do step = 1, reach
       changed = .false.
       do s = 1, size(heaviest)
@@ -179,24 +202,38 @@ contains
     end do
   end subroutine find_heaviest
 
-  !> Hand heavy bodies on, from each body to those it presses on.
+  !> Hand heavy bodies on, from each body to those it presses on: the share of the mass that goes with the share of the impulses on
+  !> the body, the whole where a chain hands it on. Of shared bodies copies are taken to bear alike.
   subroutine lean(nd, sub, heaviest, changed)
     integer, intent(in) :: nd
     type(subproblem_t), intent(in) :: sub
     type(leaning_t), intent(inout) :: heaviest
     logical, intent(inout) :: changed
     type(leaning_t) :: before
+    real(dp) :: pressed(sub%n_columns), r, handed
     integer :: c, k, i, j
 
     before = heaviest
+    pressed(:) = 0.0_dp
     do c = 1, sub%n_contacts
-      if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+      r = max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))
+      do k = 1, 2
+        pressed(sub%pair(k, c)) = pressed(sub%pair(k, c)) + r
+      end do
+    end do
+    do i = 1, sub%n_bodies
+      pressed(i) = sub%multiplicity(i)*pressed(i)
+    end do
+    do c = 1, sub%n_contacts
+      r = sub%impulse(lane_of(c), 1, block_of(c))
+      if (.not. r > 0.0_dp) cycle
       do k = 1, 2
         i = sub%pair(k, c)
         j = sub%pair(3 - k, c)
         ! on what cannot move nothing leans that would go through it, nor does it hand anything on
-        if (.not. (before%mass(1, j) > heaviest%mass(1, i) .and. mass(sub, nd, i) > 0.0_dp)) cycle
-        heaviest%mass(1, i) = before%mass(1, j)
+        handed = before%mass(1, j)*min(1.0_dp, 2.0_dp*r/pressed(j))
+        if (.not. (handed > heaviest%mass(1, i) .and. mass(sub, nd, i) > 0.0_dp)) cycle
+        heaviest%mass(1, i) = handed
         heaviest%velocity(:, i) = before%velocity(:, j)
         changed = .true.
       end do

@@ -116,9 +116,9 @@ contains
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
-      ! sums of the iterations before are there with momentum
-      if (.not. (control%trace .or. present(exact)) .and. (measure .or. (scheme%momentum%on .and. report%iterations > 1))) &
-        & measure = is_worth_a_check(measure)
+      ! sums of the iterations before are there with momentum; they tell nothing of bodies that go against contacts
+      if (.not. (control%trace .or. present(exact)) .and. (measure .or. (scheme%momentum%on .and. report%iterations > 1 .and. &
+        & .not. report%closing > 0.0_dp))) measure = is_worth_a_check(measure)
       measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
