@@ -44,7 +44,7 @@ contains
     closing = largest_pressing(problem, heaviest)
     ! the bodies of the contacts alone may say enough: no search then
     if (closing <= max(allowed*scale, problem%rounded_defect())) then
-      call find_heaviest(problem, heaviest)
+      call find_heaviest(problem, allowed*scale/most(2), heaviest)
       closing = largest_pressing(problem, heaviest)
     end if
     if (closing <= problem%rounded_defect()) closing = 0.0_dp
@@ -186,8 +186,10 @@ contains
   end subroutine start_leaning
 
   !> The heaviest body that leans on each, through `reach` contacts at most. Collective.
-  subroutine find_heaviest(problem, heaviest)
+  subroutine find_heaviest(problem, least, heaviest)
     type(contact_problem_t), intent(inout) :: problem
+    !> mass below which a body is not handed on: it would not press by more than is allowed [kg]
+    real(dp), intent(in) :: least
     type(leaning_t), intent(inout) :: heaviest(:)
     integer :: s, step
     logical :: changed
@@ -195,7 +197,7 @@ contains
     do step = 1, reach
       changed = .false.
       do s = 1, size(heaviest)
-        call lean(problem%kernels%nd, problem%sub(s), heaviest(s), changed)
+        call lean(problem%kernels%nd, problem%sub(s), least, heaviest(s), changed)
       end do
       if (.not. problem%comm%any_true(changed)) return
       call agree_on_copies(problem, heaviest)
@@ -204,9 +206,10 @@ contains
 
   !> Hand heavy bodies on, from each body to those it presses on: the share of the mass that goes with the share of the impulses on
   !> the body, the whole where a chain hands it on. Of shared bodies copies are taken to bear alike.
-  subroutine lean(nd, sub, heaviest, changed)
+  subroutine lean(nd, sub, least, heaviest, changed)
     integer, intent(in) :: nd
     type(subproblem_t), intent(in) :: sub
+    real(dp), intent(in) :: least
     type(leaning_t), intent(inout) :: heaviest
     logical, intent(inout) :: changed
     type(leaning_t) :: before
@@ -232,7 +235,7 @@ contains
         j = sub%pair(3 - k, c)
         ! on what cannot move nothing leans that would go through it, nor does it hand anything on
         handed = before%mass(1, j)*min(1.0_dp, 2.0_dp*r/pressed(j))
-        if (.not. (handed > heaviest%mass(1, i) .and. mass(sub, nd, i) > 0.0_dp)) cycle
+        if (.not. (handed > max(least, heaviest%mass(1, i)) .and. mass(sub, nd, i) > 0.0_dp)) cycle
         heaviest%mass(1, i) = handed
         heaviest%velocity(:, i) = before%velocity(:, j)
         changed = .true.
