@@ -15,6 +15,8 @@ module gravier_closing
   type :: leaning_t
     !> mass, or the share of it that leans, in the first row [kg], and velocity [m/s, rad/s], both (nv, n_columns)
     real(dp), allocatable :: mass(:, :), velocity(:, :)
+    !> sum of the impulses that press on each body, in all copies (n_columns) [N s]
+    real(dp), allocatable :: pressed(:)
   end type leaning_t
 
 contains
@@ -194,6 +196,9 @@ contains
     integer :: s, step
     logical :: changed
 
+    do s = 1, size(heaviest)
+      call sum_impulses(problem%sub(s), heaviest(s)%pressed)
+    end do
     do step = 1, reach
       changed = .false.
       do s = 1, size(heaviest)
@@ -204,8 +209,27 @@ contains
     end do
   end subroutine find_heaviest
 
+  !> The impulses that press on each body of a subdomain; of shared bodies copies are taken to bear alike.
+  subroutine sum_impulses(sub, pressed)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), allocatable, intent(out) :: pressed(:)
+    real(dp) :: r
+    integer :: c, k, b
+
+    allocate (pressed(sub%n_columns), source=0.0_dp)
+    do c = 1, sub%n_contacts
+      r = max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))
+      do k = 1, 2
+        pressed(sub%pair(k, c)) = pressed(sub%pair(k, c)) + r
+      end do
+    end do
+    do b = 1, sub%n_bodies
+      pressed(b) = sub%multiplicity(b)*pressed(b)
+    end do
+  end subroutine sum_impulses
+
   !> Hand heavy bodies on, from each body to those it presses on: the share of the mass that goes with the share of the impulses on
-  !> the body, the whole where a chain hands it on. Of shared bodies copies are taken to bear alike.
+  !> the body, the whole where a chain hands it on.
   subroutine lean(nd, sub, least, heaviest, changed)
     integer, intent(in) :: nd
     type(subproblem_t), intent(in) :: sub
@@ -213,20 +237,10 @@ contains
     type(leaning_t), intent(inout) :: heaviest
     logical, intent(inout) :: changed
     type(leaning_t) :: before
-    real(dp) :: pressed(sub%n_columns), r, handed
+    real(dp) :: r, handed
     integer :: c, k, i, j
 
     before = heaviest
-    pressed(:) = 0.0_dp
-    do c = 1, sub%n_contacts
-      r = max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))
-      do k = 1, 2
-        pressed(sub%pair(k, c)) = pressed(sub%pair(k, c)) + r
-      end do
-    end do
-    do i = 1, sub%n_bodies
-      pressed(i) = sub%multiplicity(i)*pressed(i)
-    end do
     do c = 1, sub%n_contacts
       r = sub%impulse(lane_of(c), 1, block_of(c))
       if (.not. r > 0.0_dp) cycle
@@ -234,7 +248,7 @@ contains
         i = sub%pair(k, c)
         j = sub%pair(3 - k, c)
         ! on what cannot move nothing leans that would go through it, nor does it hand anything on
-        handed = before%mass(1, j)*min(1.0_dp, 2.0_dp*r/pressed(j))
+        handed = before%mass(1, j)*min(1.0_dp, 2.0_dp*r/before%pressed(j))
         if (.not. (handed > max(least, heaviest%mass(1, i)) .and. mass(sub, nd, i) > 0.0_dp)) cycle
         heaviest%mass(1, i) = handed
         heaviest%velocity(:, i) = before%velocity(:, j)

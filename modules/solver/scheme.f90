@@ -57,9 +57,8 @@ module gravier_scheme
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
     logical :: resting = .false.
-    !> the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly, and
-    !> plain ones do; and whether the local operators in place say so
-    logical :: whole = .true., whole_in_place = .true.
+    !> the local operators in place are those of whole local solves
+    logical :: whole_in_place = .true.
     !> times that the memory was shortened in this solve
     integer :: shortened = 0
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
@@ -70,6 +69,7 @@ module gravier_scheme
     type(momentum_part_t), allocatable :: part(:)
   contains
     procedure :: steer => momentum_steer
+    procedure :: whole => momentum_whole
   end type momentum_t
 
   type, abstract :: scheme_t
@@ -286,7 +286,7 @@ contains
     problem%progress_is_summed = .false.
     if (.not. scheme%momentum%on) return
     ! what alternates between subdomains, which a Schwarz method adapts a factor to, bears no longer steps
-    if (.not. scheme%adapts .and. (scheme%momentum%whole .neqv. scheme%momentum%whole_in_place)) then
+    if (.not. scheme%adapts .and. (scheme%momentum%whole() .neqv. scheme%momentum%whole_in_place)) then
       call change_shares(scheme%momentum, problem)
     end if
     if (scheme%momentum%resting) return
@@ -302,7 +302,7 @@ contains
     real(dp) :: share(3)
     integer :: s
 
-    if (momentum%whole) then
+    if (momentum%whole()) then
       share(:) = 1.0_dp
     else if (problem%kernels%nd == 2) then
       share(:) = share_2d
@@ -312,7 +312,7 @@ contains
     do s = 1, size(problem%sub)
       call problem%sub(s)%update_local_operator(problem%kernels, share)
     end do
-    momentum%whole_in_place = momentum%whole
+    momentum%whole_in_place = momentum%whole()
   end subroutine change_shares
 
   !> v := v + beta (v - previous), previous := v.
@@ -425,13 +425,19 @@ contains
     self%iterations = self%iterations + 1
     if (mod(self%iterations, window) == 0) call close_window(self)
     self%resting = self%plain > 0
-    self%whole = self%resting .or. self%iterations < window
     self%beta = 0.0_dp
     if (self%resting) return
     t = self%t
     self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
     self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin)
   end subroutine momentum_steer
+
+  !> Whether the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly,
+  !> and plain ones do.
+  pure logical function momentum_whole(self) result(whole)
+    class(momentum_t), intent(in) :: self
+    whole = self%resting .or. self%iterations < window
+  end function momentum_whole
 
   !> The end of a window of iterations: the margin, and whether momentum still pays.
   pure subroutine close_window(momentum)

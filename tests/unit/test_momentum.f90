@@ -24,10 +24,10 @@ contains
 
     change = 1.0_dp
     t = 1.0_dp
-    call check(momentum%whole, "decay: the first iteration takes whole local solves")
+    call check(momentum%whole(), "decay: the first iteration takes whole local solves")
     do k = 1, 9
       call momentum%steer(change)
-      call check(momentum%whole, "decay: the first window takes whole local solves")
+      call check(momentum%whole(), "decay: the first window takes whole local solves")
       next = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
       call check_close(momentum%beta, (t - 1.0_dp)/next, 1e-15_dp, "decay: beta of the sequence")
       t = next
@@ -35,7 +35,7 @@ contains
     end do
     do k = 10, 2000
       call momentum%steer(change)
-      call check(.not. momentum%whole, "decay: later windows take shares")
+      call check(.not. momentum%whole(), "decay: later windows take shares")
       change = 0.9_dp*change
     end do
     call check_close(momentum%beta, 0.98_dp, 1e-15_dp, "decay: beta in the end")
@@ -100,7 +100,7 @@ contains
     plain = 0
     do k = 210, 419
       call momentum%steer(1.0_dp)
-      if (abs(momentum%beta) <= 0.0_dp .and. momentum%resting .and. momentum%whole) plain = plain + 1
+      if (abs(momentum%beta) <= 0.0_dp .and. momentum%resting .and. momentum%whole()) plain = plain + 1
     end do
     call check_equal(plain, 210, "idle: plain iterations")
     call momentum%steer(1.0_dp)
