@@ -3,6 +3,7 @@ module gravier_drawing
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
   use gravier_file_system, only: remove_file
+  use gravier_command_line, only: argument
   use gravier_build_info, only: drivers_directory, share_directory
   implicit none
   private
@@ -14,24 +15,23 @@ module gravier_drawing
 contains
 
   !> Draw DIRECTORY/NAME.png and DIRECTORY/NAME.svg from the tables in a directory, by the script plot_NAME.py and a Python that
-  !> has matplotlib. Call it on one rank, after the end of MPI, which need not bear the start of another process. Failure:
-  !> status_failure.
+  !> has matplotlib. An installation, wherever it was put, draws with the script beside it, a build with that of the source tree.
+  !> Call it on one rank, after the end of MPI, which need not bear the start of another process. Failure: status_failure.
   subroutine draw_figure(name, directory, error)
     character(len=*), intent(in) :: name, directory
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: script
     integer :: failed, status
-    logical :: found
 
     ! none is better than that of other tables
     call remove_file(directory//"/"//name//".png")
     call remove_file(directory//"/"//name//".svg")
-    script = drivers_directory//"/plot_"//name//".py"
-    inquire (file=script, exist=found)
-    if (.not. found) script = share_directory//"/plot_"//name//".py"
+    script = "plot_"//name//".py"
     status = 0
-    call execute_command_line("for python in ""$GRAVIER_PYTHON"" python3 /usr/bin/python3; do "// &
-      & """$python"" -c 'import matplotlib' >/dev/null 2>&1 && exec ""$python"" "//quoted(script)//" "//quoted(directory)// &
+    call execute_command_line("program=$(command -v "//quoted(argument(0))//"); program=$(readlink -f ""$program""); "// &
+      & "script=$(dirname ""$program"")/"//quoted(share_directory//"/"//script)//"; [ -e ""$script"" ] || script="// &
+      & quoted(drivers_directory//"/"//script)//"; for python in ""$GRAVIER_PYTHON"" python3 /usr/bin/python3; do "// &
+      & """$python"" -c 'import matplotlib' >/dev/null 2>&1 && exec ""$python"" ""$script"" "//quoted(directory)// &
       & "; done; exit "//to_text(no_python), exitstat=status, cmdstat=failed)
     if (failed /= 0) then
       call raise(error, status_failure, "the figure is NOT drawn: no shell could be started")
