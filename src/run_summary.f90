@@ -104,7 +104,7 @@ contains
         text = "twice the ranks, now "//to_text(simulation%comm%size)//", with as many &decomposition subdomains or more, now "// &
           & to_text(simulation%decomposition%n_subdomains)
       else
-        text = "no single key that is known of; a longer &time step makes fewer steps, at the price of accuracy"
+        text = "no single key does; a longer &time step makes fewer steps, at the price of accuracy"
       end if
     end associate
   end function halving_text

@@ -232,7 +232,7 @@ class Recipes(unittest.TestCase):
         launcher = (SOURCE / "gravier").read_text(encoding="utf-8")
         needed = set(re.findall(r"\|\| need ([a-z][\w.+-]*)", launcher))
         self.assertGreater(len(needed), 8, needed)
-        for path in ("README.md", "doc/install.md", "cmake/packaging/Dockerfile", "cmake/packaging/gravier.def"):
+        for path in ("README.md", "doc/install.md", "doc/user_guide.md", "cmake/packaging/Dockerfile", "cmake/packaging/gravier.def"):
             text = (SOURCE / path).read_text(encoding="utf-8")
             self.assertEqual({name for name in needed if name not in text}, set(), path)
         recipe = SOURCE / "cmake/packaging/spack/packages/gravier/package.py"
