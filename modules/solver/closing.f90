@@ -2,7 +2,7 @@
 !> of two bodies, and by impulses with attractions in them: it knows little of what a heavy body, or one in strong bonds, lacks.
 module gravier_closing
   use gravier_kinds, only: dp, i8
-  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
@@ -13,8 +13,14 @@ module gravier_closing
 
   !> Of each body of a subdomain, the heaviest that leans on it, or itself.
   type :: leaning_t
+    !> velocity by which each contact may miss its law, see `velocity_at` (n_contacts) [m/s]
+    real(dp), allocatable :: missed(:)
+    !> mass of each body, 0 of what cannot move (n_columns) [kg]
+    real(dp), allocatable :: own(:)
     !> mass, or the share of it that leans, in the first row [kg], and velocity [m/s, rad/s], both (nv, n_columns)
     real(dp), allocatable :: mass(:, :), velocity(:, :)
+    !> mass that each body has handed on already (n_columns) [kg]
+    real(dp), allocatable :: handed_on(:)
     !> sum of the impulses that press on each body, in all copies (n_columns) [N s]
     real(dp), allocatable :: pressed(:)
   end type leaning_t
@@ -37,7 +43,7 @@ contains
     scale = max(scale_of(problem), tiny(1.0_dp))
     most(:) = 0.0_dp
     do s = 1, size(problem%sub)
-      call find_most(problem%kernels, problem%sub(s), most)
+      call find_most(problem%kernels, problem%sub(s), heaviest(s), most)
     end do
     call problem%comm%highest_of(most)
     closing = 0.0_dp
@@ -61,9 +67,12 @@ contains
 
     largest = 0.0_dp
     do s = 1, size(problem%sub)
-      do c = 1, problem%sub(s)%n_contacts
-        largest = max(largest, pressing(problem%kernels, problem%sub(s), heaviest(s), c))
-      end do
+      associate (sub => problem%sub(s), mass => heaviest(s)%mass)
+        do c = 1, sub%n_contacts
+          if (abs(heaviest(s)%missed(c))*max(mass(1, sub%pair(1, c)), mass(1, sub%pair(2, c))) <= largest) cycle
+          largest = max(largest, pressing(problem%kernels, sub, heaviest(s), c))
+        end do
+      end associate
     end do
     largest = problem%comm%highest(largest)
   end function largest_pressing
@@ -125,18 +134,25 @@ contains
     end do
   end subroutine add_loads
 
-  !> Raise `most` to the largest mass of a body [kg] and the largest velocity by which a contact misses its law [m/s].
-  subroutine find_most(kernels, sub, most)
+  !> The masses of the bodies and what the contacts miss, and the largest of both, to which `most` is raised [kg], [m/s].
+  subroutine find_most(kernels, sub, heaviest, most)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
+    type(leaning_t), intent(inout) :: heaviest
     real(dp), intent(inout) :: most(2)
-    integer :: b, c
+    integer :: b, c, q, g
 
+    allocate (heaviest%own(sub%n_columns), heaviest%missed(sub%n_contacts))
     do b = 1, sub%n_columns
-      most(1) = max(most(1), mass(sub, kernels%nd, b))
+      heaviest%own(b) = mass(sub, kernels%nd, b)
+      most(1) = max(most(1), heaviest%own(b))
     end do
-    do c = 1, sub%n_contacts
-      most(2) = max(most(2), abs(missed_velocity(kernels, sub, c)))
+    do g = 1, n_blocks(sub%n_contacts)
+      do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
+        c = (g - 1)*lanes + q
+        heaviest%missed(c) = velocity_at(kernels%nd, sub, c, q, g)
+        if (abs(heaviest%missed(c)) > most(2)) most(2) = max(most(2), abs(missed_velocity(kernels, sub, heaviest%missed(c), c)))
+      end do
     end do
   end subroutine find_most
 
@@ -151,38 +167,48 @@ contains
     if (inverse > 0.0_dp) mass = 1.0_dp/inverse
   end function mass
 
-  !> Velocity by which contact `c` misses its law along the normal, v_n + s or what of it the impulse could take: below 0 where it
+  !> v_n + s of contact `c`, in lane `q` of block `g`; 0 of one that opens and holds no impulse [m/s].
+  pure real(dp) function velocity_at(nd, sub, c, q, g) result(v)
+    integer, intent(in) :: nd
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c, q, g
+    integer :: d
+
+    v = sub%hot(q, nd + 1, g)
+    do d = 1, nd
+      v = v + sub%hot(q, d, g)*(sub%v_global(d, sub%pair(1, c)) - sub%v_global(d, sub%pair(2, c)))
+    end do
+    if (v > 0.0_dp .and. .not. sub%impulse(q, 1, g) > 0.0_dp) v = 0.0_dp
+  end function velocity_at
+
+  !> Velocity by which contact `c` misses its law along the normal, `v` or what of it the impulse could take: below 0 where it
   !> closes, above where it opens though it holds an impulse [m/s].
-  pure real(dp) function missed_velocity(kernels, sub, c) result(missed)
+  pure real(dp) function missed_velocity(kernels, sub, v, c) result(missed)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
+    !> of `velocity_at`
+    real(dp), intent(in) :: v
     integer, intent(in) :: c
     real(dp) :: w(2)
-    integer :: d, nd
 
-    nd = kernels%nd
-    missed = sub%hot(lane_of(c), nd + 1, block_of(c))
-    do d = 1, nd
-      missed = missed + sub%hot(lane_of(c), d, block_of(c))*(sub%v_global(d, sub%pair(1, c)) - sub%v_global(d, sub%pair(2, c)))
-    end do
-    if (.not. missed > 0.0_dp) return
+    missed = v
+    if (.not. v > 0.0_dp) return
     call sub%local_operator(kernels, c, sub%inverse_mass, w)
-    missed = min(missed, max(0.0_dp, sub%impulse(lane_of(c), 1, block_of(c)))*w(1))
+    missed = min(v, sub%impulse(lane_of(c), 1, block_of(c))*w(1))
   end function missed_velocity
 
   !> Each body alone.
   subroutine start_leaning(problem, heaviest)
     type(contact_problem_t), intent(in) :: problem
-    type(leaning_t), intent(out) :: heaviest(:)
-    integer :: s, b
+    type(leaning_t), intent(inout) :: heaviest(:)
+    integer :: s
 
     do s = 1, size(heaviest)
       associate (sub => problem%sub(s))
         allocate (heaviest(s)%mass(problem%kernels%nv, sub%n_columns), source=0.0_dp)
-        allocate (heaviest(s)%velocity(problem%kernels%nv, sub%n_columns), source=sub%v_global)
-        do b = 1, sub%n_columns
-          heaviest(s)%mass(1, b) = mass(sub, problem%kernels%nd, b)
-        end do
+        heaviest(s)%mass(1, :) = heaviest(s)%own
+        heaviest(s)%velocity = sub%v_global
+        allocate (heaviest(s)%handed_on(sub%n_columns), source=0.0_dp)
       end associate
     end do
   end subroutine start_leaning
@@ -202,7 +228,7 @@ contains
     do step = 1, reach
       changed = .false.
       do s = 1, size(heaviest)
-        call lean(problem%kernels%nd, problem%sub(s), least, heaviest(s), changed)
+        call lean(problem%sub(s), least, heaviest(s), changed)
       end do
       if (.not. problem%comm%any_true(changed)) return
       call agree_on_copies(problem, heaviest)
@@ -230,31 +256,40 @@ contains
 
   !> Hand heavy bodies on, from each body to those it presses on: the share of the mass that goes with the share of the impulses on
   !> the body, the whole where a chain hands it on.
-  subroutine lean(nd, sub, least, heaviest, changed)
-    integer, intent(in) :: nd
+  subroutine lean(sub, least, heaviest, changed)
     type(subproblem_t), intent(in) :: sub
     real(dp), intent(in) :: least
     type(leaning_t), intent(inout) :: heaviest
     logical, intent(inout) :: changed
-    type(leaning_t) :: before
+    !> mass and velocity at the start of this step
+    real(dp), allocatable :: before(:), velocity(:, :)
+    !> the body has something to hand on that it has not handed on before
+    logical, allocatable :: news(:)
     real(dp) :: r, handed
     integer :: c, k, i, j
 
-    before = heaviest
+    allocate (before, source=heaviest%mass(1, :))
+    allocate (news(sub%n_columns))
+    news(:) = before > max(least, heaviest%handed_on)
+    if (.not. any(news)) return
+    allocate (velocity, source=heaviest%velocity)
     do c = 1, sub%n_contacts
+      if (.not. (news(sub%pair(1, c)) .or. news(sub%pair(2, c)))) cycle
       r = sub%impulse(lane_of(c), 1, block_of(c))
       if (.not. r > 0.0_dp) cycle
       do k = 1, 2
         i = sub%pair(k, c)
         j = sub%pair(3 - k, c)
         ! on what cannot move nothing leans that would go through it, nor does it hand anything on
-        handed = before%mass(1, j)*min(1.0_dp, 2.0_dp*r/before%pressed(j))
-        if (.not. (handed > max(least, heaviest%mass(1, i)) .and. mass(sub, nd, i) > 0.0_dp)) cycle
+        if (.not. (news(j) .and. heaviest%own(i) > 0.0_dp)) cycle
+        handed = before(j)*min(1.0_dp, 2.0_dp*r/heaviest%pressed(j))
+        if (.not. handed > max(least, heaviest%mass(1, i))) cycle
         heaviest%mass(1, i) = handed
-        heaviest%velocity(:, i) = before%velocity(:, j)
+        heaviest%velocity(:, i) = velocity(:, j)
         changed = .true.
       end do
     end do
+    heaviest%handed_on(:) = before
   end subroutine lean
 
   !> All copies of a body take the heaviest that any of them knows. Collective.
@@ -303,8 +338,7 @@ contains
 
     nd = kernels%nd
     pressing = 0.0_dp
-    missed = missed_velocity(kernels, sub, c)
-    if (.not. abs(missed) > 0.0_dp) return
+    missed = missed_velocity(kernels, sub, heaviest%missed(c), c)
     do k = 1, 2
       along(k) = 0.0_dp
       do d = 1, nd
@@ -312,7 +346,7 @@ contains
       end do
     end do
     do k = 1, 2
-      pressing = max(pressing, mass(sub, nd, sub%pair(k, c))*min(abs(missed), abs(along(k))))
+      pressing = max(pressing, heaviest%own(sub%pair(k, c))*min(abs(missed), abs(along(k))))
       heavy = 0.0_dp
       do d = 1, nd
         heavy = heavy + sub%hot(lane_of(c), d, block_of(c))*heaviest%velocity(d, sub%pair(k, c))
