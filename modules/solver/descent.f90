@@ -17,8 +17,8 @@ module gravier_descent
   type :: descent_t
     !> iteration of the first figure at or below each level, -1 for none
     integer :: first(at_tolerance:tenfold) = -1
-    !> iteration of the first figure after the start, 0 for none
-    integer :: first_check = 0
+    !> the first iteration that may end a solve
+    integer :: first_check = 1
   contains
     procedure :: note => descent_note
   end type descent_t
@@ -50,7 +50,6 @@ contains
     real(dp), intent(in) :: figure, tolerance
     integer :: k
 
-    if (self%first_check == 0) self%first_check = iteration
     do k = at_tolerance, tenfold
       if (self%first(k) < 0 .and. figure <= tolerance*10.0_dp**(0.5_dp*k)) self%first(k) = iteration
     end do

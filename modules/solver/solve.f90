@@ -26,6 +26,8 @@ module gravier_solve
   !> momentum with which a body may go against contacts, see `find_closing`: at most, and over the tolerance; packings that have
   !> converged have a third of it and less
   real(dp), parameter :: most_closing = 0.3_dp, closing_of_tolerance = 3.0e2_dp
+  !> the first iteration that sweeps with momentum may have checked before it is due
+  integer, parameter :: early_check = 2
   !> ratio of a residual to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
   !> figures of a check that a trace keeps
@@ -112,13 +114,15 @@ contains
     call stop_timer(phase_setup)
     if (allocated(error)) return
     report%start_seconds = clock() - began
+    report%descent%first_check = control%check_every
+    if (scheme%momentum%on) report%descent%first_check = min(early_check, control%check_every)
     call check(done)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
       ! sums of the iterations before are there with momentum; they tell nothing of bodies that go against contacts
-      if (.not. (control%trace .or. present(exact)) .and. (measure .or. (scheme%momentum%on .and. report%iterations > 1 .and. &
-        & .not. report%closing > 0.0_dp))) measure = is_worth_a_check(measure)
+      if (.not. (control%trace .or. present(exact)) .and. (measure .or. (scheme%momentum%on .and. &
+        & report%iterations >= early_check .and. .not. report%closing > 0.0_dp))) measure = is_worth_a_check(measure)
       measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
@@ -160,9 +164,9 @@ contains
       end if
       if (is_worth) then
         skips = 0
-      else if (regular) then
-        skips = skips + 1
-        call report%descent%note(report%iterations, expected, control%tolerance)
+      else
+        if (regular) skips = skips + 1
+        if (regular .or. ratio > 0.0_dp) call report%descent%note(report%iterations, expected, control%tolerance)
       end if
     end function is_worth_a_check
 
