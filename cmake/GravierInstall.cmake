@@ -15,7 +15,8 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/gravierConfig.cmake.in
   INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/generated/gravierConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/generated/gravierConfig.cmake ${PROJECT_BINARY_DIR}/generated/gravierConfigVersion.cmake
-  ${PROJECT_SOURCE_DIR}/cmake/FindMUMPS.cmake ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake DESTINATION ${package_dir})
+  ${PROJECT_SOURCE_DIR}/cmake/GravierHDF5.cmake ${PROJECT_SOURCE_DIR}/cmake/FindMUMPS.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake DESTINATION ${package_dir})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/gravier)
 
 # gravier_program(NAME SOURCE): a program on the application library, in bin/ of the build and of the installation

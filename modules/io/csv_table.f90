@@ -331,9 +331,10 @@ contains
   !> could raise a floating-point exception).
   pure integer function number_size(text) result(size)
     character(len=*), intent(in) :: text
-    integer :: mantissa_end, exponent
+    integer :: mantissa_start, mantissa_end, exponent
 
     size = not_a_number
+    mantissa_start = 1 + sign_length(text)
     mantissa_end = scan(text, "eEdD") - 1
     if (mantissa_end < 0) mantissa_end = len(text)
     exponent = 0
@@ -341,7 +342,7 @@ contains
       if (.not. is_integer(text(mantissa_end + 2:))) return
       exponent = bounded_integer(text(mantissa_end + 2:))
     end if
-    associate (mantissa => text(1 + sign_length(text):mantissa_end))
+    associate (mantissa => text(mantissa_start:mantissa_end))
       if (verify(mantissa, "0123456789.") > 0 .or. scan(mantissa, "0123456789") == 0) return
       if (index(mantissa, ".") /= index(mantissa, ".", back=.true.)) return
       size = size_usual

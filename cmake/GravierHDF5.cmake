@@ -1,0 +1,11 @@
+# A package of HDF5 may name directories that it does not have (Debian's 2.2), which CMake refuses: they are left out.
+if(TARGET hdf5_fortran-shared)
+  get_target_property(named hdf5_fortran-shared INTERFACE_INCLUDE_DIRECTORIES)
+  set(there "")
+  foreach(directory ${named})
+    if(EXISTS "${directory}")
+      list(APPEND there "${directory}")
+    endif()
+  endforeach()
+  set_target_properties(hdf5_fortran-shared PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${there}")
+endif()
