@@ -318,10 +318,10 @@ contains
   end subroutine test_checks
 
   !> Checks that are left out are known from what the sweeps moved: the levels are passed within a check of where a trace, which
-  !> leaves none out, has them.
+  !> leaves none out, has them. With momentum a check may come early, and figures are known at each iteration.
   subroutine test_descent()
     type(simulation_t) :: sim
-    type(nlgs_t) :: nlgs
+    type(nlgs_t) :: nlgs, accelerated
     type(solve_control_t) :: control
     type(solve_report_t) :: traced, report
     type(error_t), allocatable :: error
@@ -342,6 +342,13 @@ contains
     do k = 1, 2
       call check(abs(report%descent%first(k) - traced%descent%first(k)) <= control%check_every, "descent: levels")
     end do
+    call check_equal(report%descent%first_check, control%check_every, "descent: the first check")
+    accelerated%momentum%on = .true.
+    call make_column(sim, 2, 20, 0.0_dp)
+    call solve_contacts(sim%problem, accelerated, control, report, error)
+    call sim%free()
+    call check_equal(report%descent%first_check, 2, "descent with momentum: the first check")
+    call check(mod(report%descent%first(2), control%check_every) /= 0, "descent with momentum: a level between checks")
     call check_close(report%figure, report%residual, 0.0_dp, "descent: the figure is the residual")
     call check(report%start_seconds > 0.0_dp .and. report%seconds > report%start_seconds, "seconds of the solve")
     ! of a check: not before the one before it, and not after the solve
