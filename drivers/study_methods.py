@@ -141,7 +141,7 @@ def large_cases():
     for friction, subdomains in ((0.3, 8), (0.3, 32), (0.0, 32)):
         for momentum in (True, False):
             yield case("spheres 1e4", friction, "nscdd_ep", momentum, subdomains, 3), 40
-    yield case("spheres 1e5", 0.3, "nscdd_ep", True, 32, 3), 40
+    yield case("spheres 1e5", 0.0, "nscdd_ep", True, 64, 3), 16
     # one domain: factors, no interface
     for packing in ("spheres 1e4", "disks 1e5"):
         for friction in (0.3, 0.0):
