@@ -99,7 +99,7 @@ contains
     class(exact_solution_t), intent(in), optional :: exact
     real(dp) :: reference, progress, ratio, began, checking, ignored
     integer :: skips, exceeded_at
-    logical :: measure, done
+    logical :: measure, done, choosy
 
     began = clock()
     checking = 0.0_dp
@@ -115,14 +115,16 @@ contains
     if (allocated(error)) return
     report%start_seconds = clock() - began
     report%descent%first_check = control%check_every
-    if (scheme%momentum%on) report%descent%first_check = min(early_check, control%check_every)
+    ! a trace and the error are of regular checks alone, and of all of them
+    choosy = .not. (control%trace .or. present(exact))
+    if (choosy .and. scheme%momentum%on) report%descent%first_check = min(early_check, control%check_every)
     call check(done)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
       ! sums of the iterations before are there with momentum; they tell nothing of bodies that go against contacts
-      if (.not. (control%trace .or. present(exact)) .and. (measure .or. (scheme%momentum%on .and. &
-        & report%iterations >= early_check .and. .not. report%closing > 0.0_dp))) measure = is_worth_a_check(measure)
+      if (choosy .and. (measure .or. (scheme%momentum%on .and. report%iterations >= early_check .and. &
+        & .not. report%closing > 0.0_dp))) measure = is_worth_a_check(measure)
       measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return

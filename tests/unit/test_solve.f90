@@ -349,6 +349,11 @@ contains
     call sim%free()
     call check_equal(report%descent%first_check, 2, "descent with momentum: the first check")
     call check(mod(report%descent%first(2), control%check_every) /= 0, "descent with momentum: a level between checks")
+    control%trace = .true.
+    call make_column(sim, 2, 20, 0.0_dp)
+    call solve_contacts(sim%problem, accelerated, control, traced, error)
+    call sim%free()
+    call check_equal(traced%descent%first_check, control%check_every, "descent with momentum: the first check of a trace")
     call check_close(report%figure, report%residual, 0.0_dp, "descent: the figure is the residual")
     call check(report%start_seconds > 0.0_dp .and. report%seconds > report%start_seconds, "seconds of the solve")
     ! of a check: not before the one before it, and not after the solve
