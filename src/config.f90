@@ -299,6 +299,7 @@ contains
       if (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
           (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
     end if
+    if (.not. config%solver%tolerance_given .and. config%solver%criterion == "velocity_error") config%solver%tolerance = 1.0e-2_dp
     if (.not. config%solver%sleep_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)
     do i = 1, size(config%materials)
       if (.not. config%materials(i)%density_given) config%materials(i)%density = config%scene%density

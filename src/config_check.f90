@@ -214,6 +214,7 @@ contains
     associate (solver => config%solver)
       call expect(report, solver%criterion /= "error" .or. config%scene%bodies == "column", "solver", "criterion", error, &
                   "'residual': the exact solution, and so the error, is known for bodies = 'column' only")
+      call expect(report, solver%accuracy > 0.0_dp, "solver", "accuracy", error)
       call expect(report, solver%tolerance > 0.0_dp, "solver", "tolerance", error)
       call expect(report, solver%max_iterations >= 1, "solver", "max_iterations", error)
       call expect(report, solver%sweeps >= 1, "solver", "sweeps", error)

@@ -264,6 +264,7 @@ contains
     select case (name)
     case ("method"); slot%choice => config%solver%method
     case ("criterion"); slot%choice => config%solver%criterion
+    case ("accuracy"); slot%real => config%solver%accuracy
     case ("tolerance"); slot%real => config%solver%tolerance
     case ("max_iterations"); slot%integer => config%solver%max_iterations
     case ("sweeps"); slot%integer => config%solver%sweeps
@@ -276,6 +277,7 @@ contains
     case ("sleep_speed"); slot%real => config%solver%sleep_speed
     case ("on_failure"); slot%choice => config%solver%on_failure
     end select
+    if (name == "tolerance") slot%given => config%solver%tolerance_given
     if (name == "relaxation") slot%given => config%solver%relaxation_given
     if (name == "sleep_speed") slot%given => config%solver%sleep_given
   end subroutine solver_slot

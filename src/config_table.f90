@@ -270,9 +270,14 @@ module gravier_config_table
     [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton", &
            "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP; "// &
            "sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method"), &
-     key_t("solver", "criterion", kind_choice, "'residual'", "residual error", &
-           "figure that is compared with the tolerance; `error` is known for `bodies = 'column'` only"), &
-     key_t("solver", "tolerance", kind_real, "1e-4", "> 0", "value of the criterion at which a solve has converged"), &
+     key_t("solver", "criterion", kind_choice, "'velocity_error'", "velocity_error residual error", &
+           "what ends a solve: the estimated velocity error, with the residual as a guard; the residual alone; "// &
+           "the known error on the impulses of `bodies = 'column'`"), &
+     key_t("solver", "accuracy", kind_real, "0.1", "> 0", &
+           "estimated velocity error over the velocity scale at which a solve has converged (`velocity_error` only)"), &
+     key_t("solver", "tolerance", kind_real, "1e-4", "> 0", &
+           "residual, or error on the impulses, at which a solve has converged; with `velocity_error` both must be met", &
+           note="1e-2 with `velocity_error`, else 1e-4"), &
      key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
      key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &

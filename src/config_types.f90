@@ -82,9 +82,14 @@ module gravier_config_types
   type :: solver_config_t
     !> nlgs, schwarz, schwarz_ec, nscdd, nscdd_ep or newton
     character(len=choice_length) :: method
-    !> residual or error
+    !> velocity_error, residual or error
     character(len=choice_length) :: criterion
+    !> velocity error over the velocity scale
+    real(dp) :: accuracy
+    !> of the residual, or of the error on the impulses
     real(dp) :: tolerance
+    !> false: 1e-2 where the velocity error ends solves, 1e-4 elsewhere
+    logical :: tolerance_given = .false.
     integer :: max_iterations, sweeps, check_every
     !> in (0, 1]
     real(dp) :: relaxation

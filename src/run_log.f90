@@ -11,7 +11,8 @@ module gravier_run_log
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
   use gravier_descent, only: effort_t, tenfold
-  use gravier_solve, only: solve_converged, solve_diverged
+  use gravier_solve, only: solve_report_t, solve_converged, solve_diverged, solve_stagnated, solve_unbounded
+  use gravier_config_types, only: solver_config_t
   use gravier_interface, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -202,8 +203,8 @@ contains
   subroutine run_log_write_head(self, error)
     class(run_log_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
-    call self%line("    step       time [s]    contacts  iterations   residual       jump    overlap [m]  energy [J]  wall [s]"// &
-      & "       left", error)
+    call self%line("    step       time [s]    contacts  iterations   residual  error/scale    overlap [m]  "// &
+      & "energy [J]  wall [s]       left", error)
   end subroutine run_log_write_head
 
   function boxes_text(simulation) result(text)
@@ -333,9 +334,9 @@ contains
       return
     end if
     if (self%progress%line_due(simulation%step == simulation%config%time%steps)) then
-      write (row, "(i8,es15.6,i12,i12,2es11.2,es15.3,es12.3,f10.3,a11)") simulation%step, simulation%time, figures%contacts, &
-        & figures%solve%iterations, figures%solve%residual, figures%solve%jump, figures%max_overlap, figures%kinetic_energy, &
-        & seconds, left_text(self, simulation)
+      write (row, "(i8,es15.6,i12,i12,es11.2,es13.2,es15.3,es12.3,f10.3,a11)") simulation%step, simulation%time, figures%contacts, &
+        & figures%solve%iterations, figures%solve%residual, relative_error(figures%solve), figures%max_overlap, &
+        & figures%kinetic_energy, seconds, left_text(self, simulation)
       if (self%live) then
         call note_line(self, trim(row), error)
       else
@@ -345,6 +346,13 @@ contains
     call write_warnings(self, simulation, figures, error)
     if (self%live) call write_live_line(self, simulation, figures)
   end subroutine run_log_write_step
+
+  !> The estimated velocity error over its scale; 0 where nothing is to be expected to move.
+  pure real(dp) function relative_error(solve)
+    type(solve_report_t), intent(in) :: solve
+    relative_error = 0.0_dp
+    if (solve%velocity_scale > 0.0_dp) relative_error = solve%velocity_error/solve%velocity_scale
+  end function relative_error
 
   !> Time left, where the number of steps is known.
   function left_text(self, simulation) result(text)
@@ -442,17 +450,29 @@ contains
         text = "DIVERGED: step "//to_text(simulation%step + 1)//" after "//to_text(solve%iterations)//" iterations of "// &
           & trim(solver%method)//"; the step is not kept"
       else
-        if (solve%closing > 0.0_dp) then
-          text = "NOT CONVERGED: a body goes against its contacts with "//to_text(solve%closing, 3)// &
-            & " of the largest momentum after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
-          return
-        end if
-        text = "NOT CONVERGED: "//trim(solver%criterion)//" "// &
-          & to_text(merge(solve%error, solve%residual, solver%criterion == "error"), 3)//" above the tolerance "// &
-          & to_text(solver%tolerance, 3)//" after "//to_text(solve%iterations)//" iterations of "//trim(solver%method)
+        text = "NOT CONVERGED: "//miss_text(solve, solver)//" after "//to_text(solve%iterations)//" iterations of "// &
+          & trim(solver%method)
+        if (solve%status == solve_stagnated) text = text//"; more iterations gain nothing (stagnation)"
+        if (solve%status == solve_unbounded) text = text//"; no solution found: loads grow without bound"
       end if
     end associate
   end function failure_text
+
+  !> What of the criterion a solve has missed.
+  function miss_text(solve, solver) result(text)
+    type(solve_report_t), intent(in) :: solve
+    type(solver_config_t), intent(in) :: solver
+    character(len=:), allocatable :: text
+
+    if (solver%criterion == "error") then
+      text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
+    else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
+      text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
+    else
+      text = "velocity error "//to_text(solve%velocity_error, 3)//" m/s above "//to_text(solver%accuracy, 3)//" of "// &
+        & to_text(solve%velocity_scale, 3)//" m/s"
+    end if
+  end function miss_text
 
   !> Closing table: time by phase over the ranks, the work of the solver and the memory over all ranks. Collective.
   subroutine run_log_write_end(self, simulation, seconds, error)

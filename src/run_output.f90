@@ -90,9 +90,9 @@ contains
     character(len=:), allocatable :: header
     integer :: k
 
-    header = "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds,interface_bodies,"// &
-      & "converged,grains,left,fast,listed,divided,projected,exchange_messages,exchange_values,most_messages,most_values,"// &
-      & "ghosts,solve_seconds"
+    header = "step,time,contacts,iterations,sweeps,residual,velocity_error,velocity_scale,jump,max_overlap,"// &
+      & "kinetic_energy,wall_seconds,interface_bodies,converged,grains,left,fast,listed,divided,projected,"// &
+      & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds"
     if (simulation%config%solver%sleeping) header = header//",sleeping,woken"
     do k = 1, simulation%diagnostics%n_columns
       header = header//","//trim(simulation%diagnostics%name(k))
@@ -102,7 +102,7 @@ contains
   pure function trace_header(simulation) result(header)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: header
-    header = "step,iteration,residual,jump"
+    header = "step,iteration,residual,velocity_error,jump"
     if (simulation%config%solver%criterion == "error") header = header//",error"
   end function trace_header
 
@@ -148,6 +148,8 @@ contains
       call self%history%add(figures%solve%iterations)
       call self%history%add(figures%solve%iterations*simulation%config%solver%sweeps)
       call self%history%add(figures%solve%residual)
+      call self%history%add(figures%solve%velocity_error)
+      call self%history%add(figures%solve%velocity_scale)
       call self%history%add(figures%solve%jump)
       call self%history%add(figures%max_overlap)
       call self%history%add(figures%kinetic_energy)
@@ -191,6 +193,7 @@ contains
       call self%trace%add(simulation%step)
       call self%trace%add(nint(figures%solve%trace(1, k)))
       call self%trace%add(figures%solve%trace(2, k))
+      call self%trace%add(figures%solve%trace(5, k))
       call self%trace%add(figures%solve%trace(3, k))
       if (simulation%config%solver%criterion == "error") call self%trace%add(figures%solve%trace(4, k))
       call self%trace%end_row(error)

@@ -16,7 +16,8 @@ module gravier_simulation
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: effort_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged
+  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged, solve_unbounded, &
+    & by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_departures, only: some_leave, let_grains_out
@@ -268,6 +269,15 @@ contains
     class(simulation_t), intent(inout) :: self
 
     associate (config => self%config)
+      select case (config%solver%criterion)
+      case ("residual")
+        self%control%criterion = by_residual
+      case ("error")
+        self%control%criterion = by_error
+      case default
+        self%control%criterion = by_velocity
+      end select
+      self%control%accuracy = config%solver%accuracy
       self%control%tolerance = config%solver%tolerance
       self%control%max_iterations = config%solver%max_iterations
       self%control%check_every = config%solver%check_every
@@ -303,6 +313,7 @@ contains
     call start_timer(phase_setup)
     if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
+    self%problem%error_scale = norm2(self%physics%gravity)*self%physics%h
     figures%contacts = self%problem%n_contacts
     figures%asleep = self%problem%n_asleep
     do s = 1, size(self%problem%sub)
@@ -452,11 +463,7 @@ contains
 
     if (allocated(error)) return
     call self%assemble(figures)
-    if (self%config%solver%criterion == "error") then
-      call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column)
-    else
-      call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error)
-    end if
+    call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column)
     if (.not. allocated(error) .and. figures%solve%status /= solve_converged) self%failed = self%failed + 1
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values

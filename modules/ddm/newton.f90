@@ -97,6 +97,9 @@ contains
     if (allocated(error)) return
     self%momentum%on = .true.
     call self%nscdd_t%start(problem, error)
+    ! Newton's steps leave other velocities
+    self%velocities_are_global = .false.
+    self%persists = .true.
     self%matrix%general = .true.
     call self%matrix%start(problem, error)
     call problem%comm%agree(error)

@@ -40,6 +40,13 @@ module gravier_contact_kernels
   integer, parameter :: operators_2d_friction_roll(3) = [4, 5, 10], operators_3d_friction_roll(3) = [5, 6, 11]
   integer, parameter :: operators_2d_friction_full(3) = [4, 5, 11], operators_3d_friction_full(3) = [5, 6, 13]
 
+  ! of each component of an impulse, which of these operators is its own
+  integer, parameter :: own_2d_frictionless(1) = [1], own_3d_frictionless(1) = [1]
+  integer, parameter :: own_2d_friction(2) = [1, 2], own_3d_friction(3) = [1, 2, 2]
+  integer, parameter :: own_2d_friction_shift(2) = [1, 2], own_3d_friction_shift(3) = [1, 2, 2]
+  integer, parameter :: own_2d_friction_roll(3) = [1, 2, 3], own_3d_friction_roll(6) = [1, 2, 2, 3, 3, 3]
+  integer, parameter :: own_2d_friction_full(3) = [1, 2, 3], own_3d_friction_full(6) = [1, 2, 2, 3, 3, 3]
+
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
     !> the impulse that the sweep started from.
@@ -117,14 +124,24 @@ module gravier_contact_kernels
       real(dp), intent(in), contiguous :: weight(:, :)
       real(dp), intent(in) :: share(3)
     end subroutine operator_kernel
-    !> sums = (sum of |r - P|^2, sum of |r|^2), P being the local solve with the undivided local operator.
+    !> sums = (sum of |r - P|^2, sum of |r|^2, sum of r_n times the shift), P being the local solve with the undivided local
+    !> operator.
     pure subroutine residual_kernel(pair, hot, weight, velocity, impulse, sums)
       import :: dp
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-      real(dp), intent(out) :: sums(2)
+      real(dp), intent(out) :: sums(3)
     end subroutine residual_kernel
+    !> correction := P - r and violation := W (P - r), the velocity by which each contact misses its law, with the undivided local
+    !> operator W.
+    pure subroutine violation_kernel(pair, hot, weight, velocity, impulse, correction, violation)
+      import :: dp
+      implicit none
+      integer, intent(in), contiguous :: pair(:, :)
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
+      real(dp), intent(inout), contiguous :: correction(:, :, :), violation(:, :, :)
+    end subroutine violation_kernel
   end interface
 
   type :: kernels_t
@@ -142,6 +159,7 @@ module gravier_contact_kernels
     procedure(velocity_kernel), pointer, nopass :: contact_velocity => null()
     procedure(operator_kernel), pointer, nopass :: set_operators => null()
     procedure(residual_kernel), pointer, nopass :: residual => null()
+    procedure(violation_kernel), pointer, nopass :: violation => null()
   contains
     procedure :: choose => kernels_choose
   end type kernels_t
@@ -711,39 +729,36 @@ contains
     end do
   end subroutine weigh_3d_frictionless
 
-  ! |r - P|^2 and |r|^2 added lane by lane.
+  ! The changes P - r by which a local solve with the undivided local operator would correct each impulse of a block, and that
+  ! operator.
 
-  pure subroutine defect_2d_frictionless(pair, hot, weight, velocity, impulse, parts)
+  pure subroutine correct_2d_frictionless(pair, hot, weight, velocity, impulse, correction, w)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 4), weight(2, *), velocity(2, *), impulse(lanes, 1)
-    real(dp), intent(inout) :: parts(lanes, 2)
+    real(dp), intent(out) :: correction(lanes, 1), w(lanes, 1)
     integer :: q
-    real(dp) :: v(lanes, 1), w(lanes, 1), rn
+    real(dp) :: v(lanes, 1)
 
     call velocity_2d_frictionless(pair, hot, velocity, v)
     call weigh_2d_frictionless(pair, hot, weight, w)
     do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/w(q, 1))
-      parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2
-      parts(q, 2) = parts(q, 2) + impulse(q, 1)**2
+      correction(q, 1) = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 3))/w(q, 1)) - impulse(q, 1)
     end do
-  end subroutine defect_2d_frictionless
+  end subroutine correct_2d_frictionless
 
-  pure subroutine defect_3d_frictionless(pair, hot, weight, velocity, impulse, parts)
+  pure subroutine correct_3d_frictionless(pair, hot, weight, velocity, impulse, correction, w)
     integer, intent(in) :: pair(2, lanes)
     real(dp), intent(in) :: hot(lanes, 5), weight(3, *), velocity(3, *), impulse(lanes, 1)
-    real(dp), intent(inout) :: parts(lanes, 2)
+    real(dp), intent(out) :: correction(lanes, 1), w(lanes, 1)
     integer :: q
-    real(dp) :: v(lanes, 1), w(lanes, 1), rn
+    real(dp) :: v(lanes, 1)
 
     call velocity_3d_frictionless(pair, hot, velocity, v)
     call weigh_3d_frictionless(pair, hot, weight, w)
     do q = 1, lanes
-      rn = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/w(q, 1))
-      parts(q, 1) = parts(q, 1) + (rn - impulse(q, 1))**2
-      parts(q, 2) = parts(q, 2) + impulse(q, 1)**2
+      correction(q, 1) = max(0.0_dp, impulse(q, 1) - (v(q, 1) + hot(q, 4))/w(q, 1)) - impulse(q, 1)
     end do
-  end subroutine defect_3d_frictionless
+  end subroutine correct_3d_frictionless
 
 #include "contact_friction_blocks.inc"
 #define SHIFTED

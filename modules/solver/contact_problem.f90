@@ -66,6 +66,7 @@ module gravier_contact_problem
     procedure :: local_operator => subproblem_local_operator
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
+    procedure :: product_of => subproblem_product_of
     procedure :: held_impulse => subproblem_held_impulse
   end type subproblem_t
 
@@ -89,8 +90,12 @@ module gravier_contact_problem
     real(dp) :: impulse_scale = 0.0_dp
     !> share of the squared defect that lies in contacts that sleep, by the last `residual`
     real(dp) :: asleep_share = 0.0_dp
+    !> sum of r_n times the shift, and |V|_M^2 of the bodies in contact, by the last `residual` [J]
+    real(dp) :: shift_power = 0.0_dp, kinetic = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
+    !> velocity that errors of a solve are compared with [m/s]
+    real(dp) :: error_scale = 0.0_dp
     !> largest term of a sum R^d [N s], whose roundings no solve gets below: where loads take a momentum away, R^d has nothing else
     real(dp) :: rounded_scale = 0.0_dp
   contains
@@ -189,6 +194,25 @@ contains
       end if
     end do
   end subroutine subproblem_multiply_mass
+
+  !> (a, b)_M of two velocities of the bodies that can move, a copy of a shared body counting with its part [J].
+  pure real(dp) function subproblem_product_of(self, a, b) result(total)
+    class(subproblem_t), intent(in) :: self
+    !> (nv, n_columns)
+    real(dp), intent(in), contiguous :: a(:, :), b(:, :)
+    real(dp) :: inverse, squares
+    integer :: k, d
+
+    total = 0.0_dp
+    do k = 1, self%n_bodies
+      squares = 0.0_dp
+      do d = 1, size(a, 1)
+        inverse = self%inverse_mass(min(d, size(self%inverse_mass, 1)), k)
+        if (inverse > 0.0_dp) squares = squares + a(d, k)*b(d, k)/inverse
+      end do
+      total = total + squares/self%multiplicity(k)
+    end do
+  end function subproblem_product_of
 
   !> Normal impulse of contact `c` of a step that is over as the solve had it, r_n + h F [N s]: it is not 0 where the bodies touch.
   pure real(dp) function subproblem_held_impulse(self, c) result(impulse)
@@ -293,29 +317,32 @@ contains
     !> the same, not divided by the norm of the impulses [N s]
     real(dp), intent(out) :: defect
     real(dp), allocatable :: parts(:, :)
-    real(dp) :: all_sums(merge(4, 2, self%n_asleep > 0)), sums(2)
+    real(dp) :: all_sums(merge(7, 4, self%n_asleep > 0)), sums(3)
     integer :: s
 
-    allocate (parts(merge(4, 2, self%n_asleep > 0), size(self%sub)), source=0.0_dp)
+    allocate (parts(size(all_sums), size(self%sub)), source=0.0_dp)
     do s = 1, size(self%sub)
       associate (sub => self%sub(s), g => n_blocks(merge(self%sub(s)%n_awake, self%sub(s)%n_contacts, self%n_asleep > 0)))
         call self%kernels%residual(sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%inverse_mass, sub%v_global, &
-          & sub%impulse(:, :, 1:g), parts(1:2, s))
+          & sub%impulse(:, :, 1:g), parts(1:3, s))
+        parts(4, s) = sub%product_of(sub%v_global, sub%v_global)
         if (g < size(sub%hot, 3)) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
-          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(3:4, s))
+          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(5:7, s))
       end associate
     end do
     call start_timer(phase_reduction)
     call self%comm%sum_parts(parts, all_sums)
     call stop_timer(phase_reduction)
-    sums(:) = all_sums(1:2)
-    if (self%n_asleep > 0) sums(:) = sums + all_sums(3:4)
-    if (.not. all(ieee_is_finite(sums))) then
+    sums(:) = all_sums(1:3)
+    if (self%n_asleep > 0) sums(:) = sums + all_sums(5:7)
+    self%shift_power = sums(3)
+    self%kinetic = all_sums(4)
+    if (.not. all(ieee_is_finite(sums(1:2)))) then
       residual = ieee_value(residual, ieee_quiet_nan)
       defect = residual
       return
     end if
-    if (self%n_asleep > 0) self%asleep_share = all_sums(3)/max(sums(1), tiny(1.0_dp))
+    if (self%n_asleep > 0) self%asleep_share = all_sums(5)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
     self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
     if (defect <= self%rounded_defect()) then

@@ -1,4 +1,4 @@
-!> The iterations of one solve: run a method until its impulses meet the tolerance.
+!> The iterations of one solve: run a method until its velocities, or its impulses, are as exact as asked for.
 module gravier_solve
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -7,34 +7,48 @@ module gravier_solve
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: descent_t
-  use gravier_closing, only: find_closing
+  use gravier_velocity_error, only: velocity_error_t, copies_ready
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
-  public :: solve_converged, solve_exhausted, solve_diverged
+  public :: by_velocity, by_residual, by_error
+  public :: solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
 
-  integer, parameter :: solve_converged = 0, solve_exhausted = 1, solve_diverged = 2
+  !> what ends a solve: the estimated velocity error and the residual; the residual alone; the error of known impulses
+  integer, parameter :: by_velocity = 1, by_residual = 2, by_error = 3
+
+  !> met; not met in max_iterations; grown beyond bounds; not met, and nothing gained any more; no solution seems to exist
+  integer, parameter :: solve_converged = 0, solve_exhausted = 1, solve_diverged = 2, solve_stagnated = 3, solve_unbounded = 4
 
   !> growth of the defect, relative to that at the start or to the largest |R^d| of a body, taken for divergence
   real(dp), parameter :: growth_limit = 1.0e4_dp
   !> the same for methods that cannot mend it themselves, whose defect has stayed above the reference for so many iterations
   real(dp), parameter :: unmended_limit = 4.0_dp
   integer, parameter :: unmended_iterations = 9
-  !> checks that may be left out one after the other, and times the tolerance: an expected residual that is worth a check
+  !> checks that may be left out one after the other, and times the goal: an expected figure that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
-  !> momentum with which a body may go against contacts, see `find_closing`: at most, and over the tolerance; packings that have
-  !> converged have a third of it and less
-  real(dp), parameter :: most_closing = 0.3_dp, closing_of_tolerance = 3.0e2_dp
   !> the first iteration that sweeps with momentum may have checked before it is due
   integer, parameter :: early_check = 2
-  !> ratio of a residual to what the sweeps before it moved impulses by, until a check has measured it, with momentum
+  !> least iterations between two checks that are not due, and due ones, over those made
+  real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
+  !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
+  !> what is left of the figure where a solve has gained something; a solve that has gained nothing since the first half of its
+  !> iterations has stagnated, if it has had so many more, and so many times those that a wave takes from end to end
+  real(dp), parameter :: gained = 0.9_dp
+  integer, parameter :: patience = 500, waves = 6
+  !> growth of the impulses since anything was gained that is one without bound
+  real(dp), parameter :: unbounded_growth = 1.5_dp
   !> figures of a check that a trace keeps
-  integer, parameter :: n_traced = 5
+  integer, parameter :: n_traced = 6
 
   type :: solve_control_t
+    integer :: criterion = by_residual
+    !> of the residual, or the error
     real(dp) :: tolerance = 1.0e-4_dp
+    !> velocity error over the velocity scale of the problem
+    real(dp) :: accuracy = 0.1_dp
     integer :: max_iterations = 10000
     !> iterations between two checks; of these, some that would tell nothing new are left out; with momentum, whose sums are
     !> there after each iteration, a check comes as soon as they speak for one
@@ -60,45 +74,48 @@ module gravier_solve
   end interface
 
   type :: solve_report_t
-    !> solve_converged, solve_exhausted (tolerance not met in max_iterations) or solve_diverged
+    !> solve_converged or the reason why not
     integer :: status = solve_exhausted
     integer :: iterations = 0
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
-    !> above 0, a body went against contacts with this share of the largest momentum, and the solve had not converged whatever the
-    !> figure
-    real(dp) :: closing = 0.0_dp
+    !> the estimate of gravier_velocity_error, and what it is compared with [m/s]
+    real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
     !> the contacts that slept were woken
     logical :: woken = .false.
     !> relative error on the impulses, negative where no exact solution is known
     real(dp) :: error = -1.0_dp
-    !> what the tolerance is compared with at the end: residual or error
-    real(dp) :: figure = 0.0_dp
+    !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
+    !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
+    real(dp) :: figure = 0.0_dp, goal = 0.0_dp
+    !> root mean square of the impulses over that when the solve gained something last; of a solve that has stagnated
+    real(dp) :: growth = 1.0_dp
     !> how the figure came down
     type(descent_t) :: descent
     !> on this rank: the whole solve, and what comes before its first check [s]
     real(dp) :: seconds = 0.0_dp, start_seconds = 0.0_dp
-    !> one column a check, n_trace of them: iteration, residual, jump, error, seconds of this rank without those of checks
-    !> (n_traced, room)
+    !> one column a check, n_trace of them: iteration, residual, jump, error, velocity error, seconds of this rank without those of
+    !> checks (n_traced, room)
     integer :: n_trace = 0
     real(dp), allocatable :: trace(:, :)
   end type solve_report_t
 
 contains
 
-  !> Solve. The state is checked at the start, every check_every iterations and at the end, by the residual, or by
-  !> the error where `exact` is given. A residual costs as much as two sweeps; what sweeps move impulses by goes with it and
-  !> comes for nothing: a check is left out where that, times the ratio of the two at the last check, is far from the
-  !> tolerance. Collective.
+  !> Solve. The state is checked at the start, every check_every iterations and at the end. A residual costs as much as two
+  !> sweeps, the estimate of the velocity error as much again; what sweeps move impulses by goes with them and comes for nothing:
+  !> a check is left out where that, times the ratio of the two at the last check, is far from the goal. Collective.
   subroutine solve_contacts(problem, scheme, control, report, error, exact)
+    !> with its velocity scale
     type(contact_problem_t), intent(inout) :: problem
     class(scheme_t), intent(inout) :: scheme
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
-    !> criterion 'error'
+    !> needed where the criterion is by_error
     class(exact_solution_t), intent(in), optional :: exact
-    real(dp) :: reference, progress, ratio, began, checking, ignored
-    integer :: skips, exceeded_at
+    type(velocity_error_t) :: velocity
+    real(dp) :: reference, progress, ratio, began, checking, ignored, best, scale_of_best
+    integer :: skips, exceeded_at, last_check, best_at
     logical :: measure, done, choosy
 
     began = clock()
@@ -109,35 +126,41 @@ contains
     ratio = 0.0_dp
     skips = 0
     exceeded_at = -1
+    last_check = 0
+    best = huge(1.0_dp)
+    best_at = 0
+    scale_of_best = 0.0_dp
+    report%goal = merge(control%accuracy, control%tolerance, control%criterion == by_velocity)
+    report%velocity_scale = problem%error_scale
     call start_timer(phase_setup)
     call scheme%start(problem, error)
+    if (.not. allocated(error)) call velocity%start(problem)
     call stop_timer(phase_setup)
     if (allocated(error)) return
     report%start_seconds = clock() - began
     report%descent%first_check = control%check_every
     ! a trace and the error are of regular checks alone, and of all of them
-    choosy = .not. (control%trace .or. present(exact))
+    choosy = .not. (control%trace .or. control%criterion == by_error)
     if (choosy .and. scheme%momentum%on) report%descent%first_check = min(early_check, control%check_every)
     call check(done)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
-      ! sums of the iterations before are there with momentum; they tell nothing of bodies that go against contacts
-      if (choosy .and. (measure .or. (scheme%momentum%on .and. report%iterations >= early_check .and. &
-        & .not. report%closing > 0.0_dp))) measure = is_worth_a_check(measure)
+      ! sums of the iterations before are there with momentum
+      if (choosy .and. (measure .or. (scheme%momentum%on .and. report%iterations >= early_check))) &
+        & measure = is_worth_a_check(measure)
       measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) call check(done)
+      if (.not. done) call velocity%keep_copy(problem, scheme, report%iterations)
     end do
-    if (report%status == solve_exhausted .and. scheme%keeps_best) then
+    if (report%status /= solve_converged .and. report%status /= solve_diverged .and. scheme%keeps_best) then
       call scheme%conclude(problem)
       call problem%residual(report%residual, ignored)
-      report%figure = report%residual
-      if (present(exact)) then
-        report%error = exact%error(problem)
-        report%figure = report%error
-      end if
+      call complete_estimate()
+      if (control%criterion == by_error) report%error = exact%error(problem)
+      call take_figure()
     end if
     report%seconds = clock() - began
 
@@ -148,11 +171,14 @@ contains
       !> whether check_every asks for one
       logical, intent(in) :: regular
       real(dp) :: sums(2), expected, enough
+      logical :: due
 
       call problem%sum_progress(sums)
       progress = 0.0_dp
       is_worth = regular
       expected = 0.0_dp
+      due = skips >= most_skips
+      if (control%criterion == by_velocity) due = due .or. report%iterations - last_check >= most_pause*report%iterations
       if (all(ieee_is_finite(sums))) then
         if (sums(2) > 0.0_dp) progress = sqrt(sums(1)/sums(2))
         expected = ratio*progress
@@ -161,14 +187,15 @@ contains
           if (.not. ratio > 0.0_dp) expected = first_ratio*progress
           enough = 1.0_dp
         end if
-        if (expected > 0.0_dp) is_worth = expected <= enough*control%tolerance .or. &
-          & (regular .and. (.not. ratio > 0.0_dp .or. skips >= most_skips .or. sqrt(sums(1)) > watched_growth()*reference))
+        if (expected > 0.0_dp) is_worth = (expected <= enough*report%goal .and. &
+          & (regular .or. report%iterations - last_check > least_pause*report%iterations)) .or. &
+          & (regular .and. (.not. ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth()*reference))
       end if
       if (is_worth) then
         skips = 0
       else
         if (regular) skips = skips + 1
-        if (regular .or. ratio > 0.0_dp) call report%descent%note(report%iterations, expected, control%tolerance)
+        if (regular .or. ratio > 0.0_dp) call report%descent%note(report%iterations, expected, report%goal)
       end if
     end function is_worth_a_check
 
@@ -200,15 +227,12 @@ contains
       start = clock()
       if (report%iterations > 0) call problem%evaluate()
       call problem%residual(report%residual, defect)
-      report%figure = report%residual
-      if (present(exact)) then
-        report%error = exact%error(problem)
-        report%figure = report%error
-      end if
-      if (control%trace) call keep_trace(report, start - began - checking)
-      if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, control%tolerance)
-      if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%residual/progress
+      if (control%criterion == by_error) report%error = exact%error(problem)
       call judge(defect, finished)
+      if (control%trace) call keep_trace(report, start - began - checking)
+      if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, report%goal)
+      if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%figure/progress
+      last_check = report%iterations
       if (.not. finished .and. problem%n_asleep > 0) call wake_if_due()
       checking = checking + clock() - start
       call stop_timer(phase_check)
@@ -217,37 +241,85 @@ contains
     !> Where most of the defect lies in contacts that sleep, no sweep would lower it: they wake. Else the other contacts'
     !> part has to fall first, and may do.
     subroutine wake_if_due()
-      if (problem%asleep_share < 0.5_dp) return
+      if (problem%asleep_share < 0.5_dp .and. report%residual > control%tolerance) return
       call problem%wake()
       report%woken = .true.
       ! changes of all contacts are other changes
       ratio = 0.0_dp
     end subroutine wake_if_due
 
-    !> A residual below the tolerance says little where a heavy body or one in strong bonds goes against contacts, or where there is
-    !> no impulse yet and some contact asks for one.
-    subroutine weigh_bodies()
-      real(dp) :: closing, allowed
+    !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
+    logical function is_met()
+      is_met = .false.
+      if (report%residual > control%tolerance .and. control%criterion /= by_error) return
+      select case (control%criterion)
+      case (by_residual)
+        is_met = .true.
+      case (by_error)
+        is_met = report%error <= control%tolerance
+      case default
+        is_met = velocity_is_met()
+      end select
+    end function is_met
 
-      allowed = min(most_closing, closing_of_tolerance*control%tolerance)
-      closing = find_closing(problem, allowed)
-      if (.not. problem%impulse_scale > 0.0_dp) closing = 1.0_dp
-      if (closing > allowed) report%closing = closing
-    end subroutine weigh_bodies
+    !> Whether the estimated velocity error is within its limit: the bound by rest tells at once, the projection alone where the
+    !> error is larger, and from zero impulses neither before some iterations. Collective.
+    logical function velocity_is_met() result(is_met)
+      real(dp) :: limit
+
+      limit = control%accuracy*problem%error_scale
+      is_met = .not. (report%residual > 0.0_dp .and. report%velocity_error > limit)
+      if (is_met .or. report%iterations < copies_ready) return
+      call velocity%project(problem, scheme, report%iterations)
+      velocity%levels = 0.0_dp
+      report%velocity_error = velocity%estimate()
+      if (report%velocity_error > limit) return
+      call velocity%add_levels(problem)
+      report%velocity_error = velocity%estimate()
+      is_met = report%velocity_error <= limit
+    end function velocity_is_met
+
+    !> The whole estimate. Where the residual is rounding the velocities are exact. Collective.
+    subroutine complete_estimate()
+      call velocity%bound(problem)
+      report%velocity_error = 0.0_dp
+      if (.not. report%residual > 0.0_dp) return
+      call velocity%project(problem, scheme, report%iterations)
+      call velocity%add_levels(problem)
+      report%velocity_error = velocity%estimate()
+    end subroutine complete_estimate
+
+    !> What the goal is compared with.
+    subroutine take_figure()
+      select case (control%criterion)
+      case (by_residual)
+        report%figure = report%residual
+      case (by_error)
+        report%figure = report%error
+      case default
+        report%figure = report%residual*(control%accuracy/control%tolerance)
+        if (problem%error_scale > 0.0_dp) report%figure = max(report%figure, report%velocity_error/problem%error_scale)
+      end select
+    end subroutine take_figure
 
     subroutine judge(defect, finished)
       real(dp), intent(in) :: defect
       logical, intent(out) :: finished
+      logical :: met
 
       finished = .true.
-      if (.not. (ieee_is_finite(report%figure) .and. ieee_is_finite(defect))) then
+      report%figure = report%residual
+      if (.not. (ieee_is_finite(report%residual) .and. ieee_is_finite(defect))) then
         report%status = solve_diverged
         return
       end if
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
-      report%closing = 0.0_dp
-      if (report%figure <= control%tolerance .and. report%residual > 0.0_dp .and. .not. present(exact)) call weigh_bodies()
-      if (report%figure <= control%tolerance .and. .not. report%closing > 0.0_dp) then
+      call velocity%bound(problem)
+      report%velocity_error = velocity%bound_by_rest
+      if (.not. report%residual > 0.0_dp) report%velocity_error = 0.0_dp
+      met = is_met()
+      call take_figure()
+      if (met) then
         report%status = solve_converged
       else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
         report%status = solve_diverged
@@ -255,10 +327,30 @@ contains
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
+      else if (stagnates()) then
+        report%status = merge(solve_unbounded, solve_stagnated, report%growth > unbounded_growth)
       else
         finished = .false.
       end if
+      if (control%trace .or. (finished .and. .not. (met .and. control%criterion == by_velocity))) call complete_estimate()
+      if (control%trace) call take_figure()
     end subroutine judge
+
+    !> Whether nothing was gained in so many iterations that nothing is to be expected of more. Collective.
+    logical function stagnates()
+      stagnates = .false.
+      if (report%figure < gained*best .or. report%iterations == 0) then
+        best = report%figure
+        best_at = report%iterations
+        scale_of_best = problem%impulse_scale
+        return
+      end if
+      if (scheme%persists .or. report%iterations < 2*best_at + patience) return
+      if (velocity%most_depth < 0) call velocity%find_depth(problem)
+      if (report%iterations < waves*velocity%most_depth) return
+      stagnates = .true.
+      if (scale_of_best > 0.0_dp) report%growth = problem%impulse_scale/scale_of_best
+    end function stagnates
 
   end subroutine solve_contacts
 
@@ -278,7 +370,8 @@ contains
     report%trace(2, report%n_trace) = report%residual
     report%trace(3, report%n_trace) = report%jump
     report%trace(4, report%n_trace) = report%error
-    report%trace(5, report%n_trace) = seconds
+    report%trace(5, report%n_trace) = report%velocity_error
+    report%trace(6, report%n_trace) = seconds
   end subroutine keep_trace
 
 end module gravier_solve

@@ -1,0 +1,528 @@
+!> The velocity error of a solve, estimated without knowing the solution: |V - V*|_M over the root of the mass of the grains in
+!> contact, a root mean square velocity. The natural-map residual does not see waves that are long against a grain; this does.
+!>
+!> What is looked at is the velocity by which a contact violates its law, w = W (P(r - (v + s n)/W) - r). With e = V - V* and
+!> the set of pressing and sticking contacts known, H^T e = -w there, so that any test impulse y gives y . w = -(M^-1 H y, e)_M.
+!>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
+!>      The test impulses are w/W (local errors), r (a wrong total load), r less the impulses one iteration before (the wave that
+!>      momentum carries), r less older copies (slower waves behind it).
+!>   L  sum over levels. The depth of a body is the number of contacts to the nearest body that moves as prescribed. The power
+!>      of the violations between two levels over the force that crosses, 0.65 being the mean cosine between a normal and the
+!>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
+!>      L^2 = sum m_l e_l^2.
+!>   E  = sqrt((2 Y)^2 + L^2).
+!>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
+!>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
+!>      at rest. The estimate is the smaller of E and C.
+!> All are divided by the root of the mass. See doc/theory.md, section 24.
+module gravier_velocity_error
+  use gravier_kinds, only: dp, i8
+  use gravier_timers, only: start_timer, stop_timer, phase_reduction
+  use gravier_contact_kernels, only: lanes, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_scheme, only: scheme_t
+  use gravier_dense_direct, only: projected_square
+  implicit none
+  private
+  public :: velocity_error_t, copies_ready
+
+  !> weight of Y in the estimate; mean cosine between normals and the way down
+  real(dp), parameter :: weight_of_projection = 2.0_dp, cosine = 0.65_dp
+  !> share of the largest eigenvalue of G below which it counts as 0
+  real(dp), parameter :: rank_cut = 1.0e-10_dp
+  !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
+  integer, parameter :: n_copies = 2, first_copy = 2
+  real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
+  !> test impulses at most: w/W, r, the change of the last iteration, those since the copies
+  integer, parameter :: most_tests = 3 + n_copies
+  !> no way leads to what moves as prescribed
+  integer, parameter :: unreached = -1
+  !> iterations before which Y and L are not trusted
+  integer, parameter :: copies_ready = 4
+
+  !> A state of one subdomain some iterations ago.
+  type :: copy_t
+    !> (lanes, nc, blocks) [N s], (nv, n_columns) [m/s, rad/s]
+    real(dp), allocatable :: impulse(:, :, :), velocity(:, :)
+  end type copy_t
+
+  !> What the estimate holds for one subdomain.
+  type :: error_part_t
+    !> P - r [N s] and w [m/s] of each contact (lanes, nc, blocks)
+    real(dp), allocatable :: correction(:, :, :), violation(:, :, :)
+    !> H y of a test impulse, and M^-1 of it, summed over copies of bodies (nv, n_columns)
+    real(dp), allocatable :: motion(:, :)
+    type(copy_t) :: copy(n_copies)
+    !> contacts to what moves as prescribed, of each body (n_columns)
+    integer, allocatable :: depth(:)
+  end type error_part_t
+
+  type :: velocity_error_t
+    !> mass of the grains in contact [kg]
+    real(dp) :: mass = 0.0_dp
+    !> whether rest is admissible, so that C is a bound
+    logical :: rest_is_admissible = .false.
+    !> by the last `bound` and `measure` [m/s]
+    real(dp) :: bound_by_rest = huge(1.0_dp), projection = 0.0_dp, levels = 0.0_dp
+    !> largest |w| of a contact, by the last `measure` [m/s]
+    real(dp) :: largest_violation = 0.0_dp
+    !> largest depth; negative while it is not known
+    integer :: most_depth = -1
+    !> iterations at which the copies were taken, the older one first, 0 for none; the next one
+    integer, private :: taken_at(n_copies) = 0, next_copy = first_copy
+    !> places of the copies in the parts, the older one first
+    integer, private :: place(n_copies) = [1, 2]
+    type(error_part_t), allocatable, private :: part(:)
+  contains
+    procedure :: start => velocity_error_start
+    procedure :: keep_copy => velocity_error_keep_copy
+    procedure :: bound => velocity_error_bound
+    procedure :: project => velocity_error_project
+    procedure :: add_levels => velocity_error_add_levels
+    procedure :: estimate => velocity_error_estimate
+    procedure :: find_depth => velocity_error_find_depth
+    procedure :: depth_of => velocity_error_depth_of
+  end type velocity_error_t
+
+contains
+
+  !> Make ready for a solve. Collective.
+  subroutine velocity_error_start(self, problem)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: parts(1, size(problem%sub)), sums(1)
+    logical :: moves
+    integer :: s, b
+
+    allocate (self%part(size(problem%sub)))
+    parts(:, :) = 0.0_dp
+    moves = .false.
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+        do b = 1, sub%n_grains
+          parts(1, s) = parts(1, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+        end do
+        moves = moves .or. any(abs(sub%v_free(:, sub%n_bodies + 1:)) > 0.0_dp)
+        if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
+        if (problem%kernels%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
+          & any(abs(sub%hot(:, problem%kernels%shift_row + 1:problem%kernels%shift_row + nd - 1, :)) > 0.0_dp)
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    self%mass = sums(1)
+    self%rest_is_admissible = .not. problem%comm%any_true(moves)
+  end subroutine velocity_error_start
+
+  !> Keep a copy of impulses and velocities after an iteration, where one is due. Collective.
+  subroutine velocity_error_keep_copy(self, problem, scheme, iteration)
+    class(velocity_error_t), intent(inout) :: self
+    !> v_global is made anew where the method's own velocities are not those of the whole
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: iteration
+    integer :: s
+
+    if (iteration < self%next_copy) return
+    self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
+    self%place(:) = n_copies + 1 - self%place
+    self%taken_at(1) = self%taken_at(2)
+    self%taken_at(2) = iteration
+    if (.not. scheme%velocities_are_global) call problem%evaluate()
+    do s = 1, size(self%part)
+      associate (copy => self%part(s)%copy(self%place(2)), sub => problem%sub(s))
+        copy%impulse = sub%impulse
+        if (scheme%velocities_are_global) then
+          copy%velocity = sub%velocity
+        else
+          copy%velocity = sub%v_global
+        end if
+      end associate
+    end do
+  end subroutine velocity_error_keep_copy
+
+  !> C, from what `residual` of the problem has summed [m/s].
+  subroutine velocity_error_bound(self, problem)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+
+    self%bound_by_rest = huge(1.0_dp)
+    if (.not. (self%rest_is_admissible .and. self%mass > 0.0_dp)) return
+    self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
+  end subroutine velocity_error_bound
+
+  !> The smaller of E and C [m/s].
+  pure real(dp) function velocity_error_estimate(self) result(estimate)
+    class(velocity_error_t), intent(in) :: self
+    estimate = min(self%bound_by_rest, hypot(weight_of_projection*self%projection, self%levels))
+  end function velocity_error_estimate
+
+  !> Y, with v_global evaluated. Collective.
+  subroutine velocity_error_project(self, problem, scheme, iteration)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: iteration
+    !> b, then the columns of the upper triangle of G, of each subdomain, and their sums
+    real(dp), allocatable :: parts(:, :), sums(:), b(:), g(:, :)
+    real(dp) :: largest(1)
+    logical :: with_last
+    integer :: s, i, j, n, at
+
+    with_last = scheme%momentum%on .and. .not. scheme%momentum%resting .and. scheme%velocities_are_global .and. iteration > 0
+    n = 2 + merge(1, 0, with_last) + count(self%taken_at > 0 .and. self%taken_at < iteration)
+    do s = 1, size(problem%sub)
+      call find_violations(problem, s, self%part(s))
+    end do
+    call spread_corrections(problem, self%part)
+    allocate (parts(n + n*(n + 1)/2, size(problem%sub)), sums(n + n*(n + 1)/2), b(n), g(n, n))
+    parts(:, :) = 0.0_dp
+    largest(1) = 0.0_dp
+    do s = 1, size(problem%sub)
+      call add_tests(self, problem, scheme, s, iteration, with_last, parts(:, s))
+      if (problem%sub(s)%n_contacts > 0) largest(1) = max(largest(1), maxval(sum(self%part(s)%violation**2, dim=2)))
+    end do
+    call start_timer(phase_reduction)
+    call problem%comm%sum_parts(parts, sums)
+    call problem%comm%highest_of(largest)
+    call stop_timer(phase_reduction)
+    self%largest_violation = sqrt(largest(1))
+    b(:) = sums(1:n)
+    at = n
+    do j = 1, n
+      do i = 1, j
+        at = at + 1
+        g(i, j) = sums(at)
+        g(j, i) = sums(at)
+      end do
+    end do
+    self%projection = sqrt(projected_square(g, b, rank_cut)/self%mass)
+  end subroutine velocity_error_project
+
+  !> P - r and w of the contacts of a subdomain.
+  subroutine find_violations(problem, s, part)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    type(error_part_t), intent(inout) :: part
+
+    associate (sub => problem%sub(s))
+      if (.not. allocated(part%correction)) then
+        allocate (part%correction, part%violation, mold=sub%impulse)
+        allocate (part%motion, mold=sub%v_global)
+      end if
+      call problem%kernels%violation(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, part%correction, &
+        & part%violation)
+    end associate
+  end subroutine find_violations
+
+  !> M^-1 H (P - r), summed over the copies of bodies, into `motion`. Collective.
+  subroutine spread_corrections(problem, part)
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_part_t), intent(inout) :: part(:)
+    integer :: s, b, d
+
+    do s = 1, size(part)
+      associate (sub => problem%sub(s))
+        part(s)%motion(:, :) = 0.0_dp
+        call problem%kernels%add_reaction(sub%pair, sub%hot, part(s)%correction, part(s)%motion)
+        call problem%shared%load(s, part(s)%motion)
+      end associate
+    end do
+    call problem%shared%pass()
+    do s = 1, size(part)
+      call problem%shared%sum_copies(s, part(s)%motion, mean=.false.)
+      associate (inverse => problem%sub(s)%inverse_mass)
+        do b = 1, size(inverse, 2)
+          do d = 1, size(part(s)%motion, 1)
+            part(s)%motion(d, b) = inverse(min(d, size(inverse, 1)), b)*part(s)%motion(d, b)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine spread_corrections
+
+  !> The products of the test impulses with w, and those of the velocities they make with each other, in one subdomain.
+  subroutine add_tests(self, problem, scheme, s, iteration, with_last, sums)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: s, iteration
+    logical, intent(in) :: with_last
+    real(dp), intent(inout), contiguous :: sums(:)
+    real(dp) :: load
+    integer :: k, n
+
+    associate (sub => problem%sub(s), part => self%part(s))
+      load = sum(sub%impulse*part%violation)
+      sums(1) = sum(part%correction*part%violation)
+      sums(2) = load
+      n = 2
+      if (with_last) then
+        n = 3
+        sums(n) = load - sum(scheme%momentum%part(s)%impulse*part%violation)
+      end if
+      do k = 1, n_copies
+        if (.not. (self%taken_at(k) > 0 .and. self%taken_at(k) < iteration)) cycle
+        n = n + 1
+        sums(n) = load - sum(part%copy(self%place(k))%impulse*part%violation)
+      end do
+      call add_products()
+    end associate
+
+  contains
+
+    !> G, body by body.
+    subroutine add_products()
+      real(dp) :: h(problem%kernels%nv, most_tests), weighed(problem%kernels%nv), inverse, share
+      integer :: b, d, i, j, m, at
+
+      associate (sub => problem%sub(s), part => self%part(s))
+        do b = 1, sub%n_bodies
+          h(:, 1) = part%motion(:, b)
+          h(:, 2) = sub%v_global(:, b) - sub%v_free(:, b)
+          m = 2
+          if (with_last) then
+            m = 3
+            h(:, 3) = sub%v_global(:, b) - scheme%momentum%part(s)%velocity(:, b)
+          end if
+          do k = 1, n_copies
+            if (.not. (self%taken_at(k) > 0 .and. self%taken_at(k) < iteration)) cycle
+            m = m + 1
+            h(:, m) = sub%v_global(:, b) - part%copy(self%place(k))%velocity(:, b)
+          end do
+          share = 1.0_dp/sub%multiplicity(b)
+          at = m
+          do j = 1, m
+            do d = 1, size(weighed)
+              inverse = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b)
+              weighed(d) = 0.0_dp
+              if (inverse > 0.0_dp) weighed(d) = share*h(d, j)/inverse
+            end do
+            do i = 1, j
+              at = at + 1
+              do d = 1, size(weighed)
+                sums(at) = sums(at) + weighed(d)*h(d, i)
+              end do
+            end do
+          end do
+        end do
+      end associate
+    end subroutine add_products
+
+  end subroutine add_tests
+
+  !> L, after `project`. Collective.
+  subroutine velocity_error_add_levels(self, problem)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    !> of each level: power r . w, force sum r_n, mass of its bodies (3 levels, subdomains)
+    real(dp), allocatable :: parts(:, :), sums(:)
+    real(dp) :: sinking, squares
+    integer :: s, c, b, l, n, i, j, q, g
+
+    if (self%most_depth < 0) call self%find_depth(problem)
+    self%levels = 0.0_dp
+    n = self%most_depth
+    if (n < 1) return
+    allocate (parts(3*n, size(problem%sub)), sums(3*n))
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), part => self%part(s))
+        do c = 1, sub%n_contacts
+          i = part%depth(sub%pair(1, c))
+          j = part%depth(sub%pair(2, c))
+          if (i == j .or. i == unreached .or. j == unreached) cycle
+          l = max(i, j)
+          q = lane_of(c)
+          g = block_of(c)
+          parts(l, s) = parts(l, s) + sum(sub%impulse(q, :, g)*part%violation(q, :, g))
+          parts(n + l, s) = parts(n + l, s) + sub%impulse(q, 1, g)
+        end do
+        do b = 1, sub%n_grains
+          l = part%depth(b)
+          if (l > 0) parts(2*n + l, s) = parts(2*n + l, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+        end do
+      end associate
+    end do
+    call start_timer(phase_reduction)
+    call problem%comm%sum_parts(parts, sums)
+    call stop_timer(phase_reduction)
+    sinking = 0.0_dp
+    squares = 0.0_dp
+    do l = 1, n
+      if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
+      squares = squares + sums(2*n + l)*sinking**2
+    end do
+    self%levels = sqrt(squares/self%mass)
+  end subroutine velocity_error_add_levels
+
+  !> Depth of every body: contacts to the nearest body that moves as prescribed, over contacts that press or are closed; in parts
+  !> without one, to the nearest boundary that forces move. It does not depend on subdomains or ranks. Collective.
+  subroutine velocity_error_find_depth(self, problem)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: most
+    integer :: s, b, round
+    logical :: changed
+
+    do s = 1, size(problem%sub)
+      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
+      self%part(s)%depth(:) = unreached
+    end do
+    do round = 1, 2
+      changed = .false.
+      do s = 1, size(problem%sub)
+        associate (sub => problem%sub(s), depth => self%part(s)%depth)
+          if (round == 1) then
+            do b = sub%n_grains + 1, sub%n_columns
+              if (.not. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) depth(b) = 0
+            end do
+          else
+            do b = sub%n_grains + 1, sub%n_bodies
+              if (depth(b) == unreached) then
+                depth(b) = 0
+                changed = .true.
+              end if
+            end do
+          end if
+        end associate
+      end do
+      if (round == 2) then
+        if (.not. problem%comm%any_true(changed)) exit
+      end if
+      call spread_depth(problem, self%part)
+    end do
+    most = 0.0_dp
+    do s = 1, size(problem%sub)
+      if (size(self%part(s)%depth) > 0) most = max(most, real(maxval(self%part(s)%depth), dp))
+    end do
+    self%most_depth = nint(problem%comm%highest(most))
+  end subroutine velocity_error_find_depth
+
+  !> Depths from those that are known, across subdomains. Collective.
+  subroutine spread_depth(problem, part)
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_part_t), intent(inout) :: part(:)
+    !> ways of a subdomain: neighbours of body b are towards(first(b):first(b + 1) - 1)
+    type :: ways_t
+      integer, allocatable :: first(:), towards(:)
+      real(dp), allocatable :: field(:, :)
+    end type ways_t
+    type(ways_t) :: ways(size(part))
+    integer :: s, b, j, d
+    logical :: changed, shares
+
+    shares = .false.
+    do s = 1, size(part)
+      call list_ways(problem%sub(s), ways(s)%first, ways(s)%towards)
+      shares = shares .or. problem%shared%part(s)%n_slots > 0
+      call search_breadth_first(ways(s)%first, ways(s)%towards, part(s)%depth)
+    end do
+    if (.not. problem%comm%any_true(shares)) return
+    do s = 1, size(part)
+      allocate (ways(s)%field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+    end do
+    do
+      do s = 1, size(part)
+        ways(s)%field(1, :) = real(part(s)%depth, dp)
+        call problem%shared%load(s, ways(s)%field)
+      end do
+      call problem%shared%pass()
+      changed = .false.
+      do s = 1, size(part)
+        associate (shared => problem%shared%part(s), depth => part(s)%depth)
+          shares = .false.
+          do j = 1, shared%n_slots
+            d = nint(shared%recv(1, j))
+            b = shared%slot_body(j)
+            if (d == unreached .or. (depth(b) /= unreached .and. depth(b) <= d)) cycle
+            depth(b) = d
+            shares = .true.
+          end do
+          if (shares) call search_breadth_first(ways(s)%first, ways(s)%towards, depth)
+          changed = changed .or. shares
+        end associate
+      end do
+      if (.not. problem%comm%any_true(changed)) exit
+    end do
+  end subroutine spread_depth
+
+  !> The contacts that press or are closed, as lists of neighbours.
+  subroutine list_ways(sub, first, towards)
+    type(subproblem_t), intent(in) :: sub
+    integer, allocatable, intent(out) :: first(:), towards(:)
+    integer, allocatable :: next(:)
+    logical :: counts
+    integer :: c, k, round
+
+    allocate (first(sub%n_columns + 1), next(sub%n_columns + 1), source=0)
+    do round = 1, 2
+      do c = 1, sub%n_contacts
+        counts = sub%gap(c) <= 0.0_dp .or. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp
+        if (.not. counts) cycle
+        do k = 1, 2
+          associate (b => sub%pair(k, c))
+            if (round == 1) then
+              next(b) = next(b) + 1
+            else
+              towards(next(b)) = sub%pair(3 - k, c)
+              next(b) = next(b) + 1
+            end if
+          end associate
+        end do
+      end do
+      if (round == 2) exit
+      first(1) = 1
+      do k = 1, sub%n_columns
+        first(k + 1) = first(k) + next(k)
+      end do
+      allocate (towards(first(sub%n_columns + 1) - 1))
+      next(:) = first
+    end do
+  end subroutine list_ways
+
+  !> Lower depths to one more than that of the nearest neighbour, until nothing changes.
+  subroutine search_breadth_first(first, towards, depth)
+    integer, intent(in), contiguous :: first(:), towards(:)
+    integer, intent(inout), contiguous :: depth(:)
+    integer, allocatable :: front(:), next(:)
+    integer :: b, d, k, n, m, level, most
+
+    allocate (front(size(depth)), next(size(depth)))
+    most = maxval(depth)
+    level = -1
+    n = 0
+    do
+      level = level + 1
+      ! bodies that start at this level join those just reached
+      if (level <= most) then
+        do b = 1, size(depth)
+          if (depth(b) /= level) cycle
+          n = n + 1
+          front(n) = b
+        end do
+      end if
+      if (n == 0 .and. level > most) exit
+      m = 0
+      do k = 1, n
+        do d = first(front(k)), first(front(k) + 1) - 1
+          b = towards(d)
+          if (depth(b) /= unreached .and. depth(b) <= level + 1) cycle
+          depth(b) = level + 1
+          m = m + 1
+          next(m) = b
+        end do
+      end do
+      n = m
+      front(1:n) = next(1:n)
+      if (level < most) n = 0
+    end do
+  end subroutine search_breadth_first
+
+  !> Depth of body `b` of subdomain `s` of this rank, negative where no way leads to what is prescribed; after `find_depth`.
+  pure integer function velocity_error_depth_of(self, s, b) result(depth)
+    class(velocity_error_t), intent(in) :: self
+    integer, intent(in) :: s, b
+    depth = self%part(s)%depth(b)
+  end function velocity_error_depth_of
+
+end module gravier_velocity_error
