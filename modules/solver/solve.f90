@@ -303,7 +303,7 @@ contains
       limit = control%accuracy*problem%error_scale
       is_met = .not. (report%residual > 0.0_dp .and. report%velocity_error > limit)
       if (is_met .or. report%iterations < copies_ready) return
-      call velocity%project(problem, scheme, report%iterations)
+      call velocity%project(problem, report%iterations)
       velocity%levels = 0.0_dp
       report%velocity_error = velocity%estimate()
       if (report%velocity_error > limit) return
@@ -317,7 +317,7 @@ contains
       call velocity%bound(problem)
       report%velocity_error = 0.0_dp
       if (.not. report%residual > 0.0_dp) return
-      call velocity%project(problem, scheme, report%iterations)
+      call velocity%project(problem, report%iterations)
       call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
     end subroutine complete_estimate
