@@ -27,6 +27,8 @@ module gravier_velocity_error
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
   real(dp), parameter :: weight_of_projection = 2.4_dp, cosine = 0.65_dp
+  !> share of the error allowed that bodies at rest may move with
+  real(dp), parameter :: share_at_rest = 0.35_dp
   !> share of the largest eigenvalue of G below which it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
@@ -36,6 +38,8 @@ module gravier_velocity_error
   real(dp), parameter :: oldest = 0.8_dp
   !> products of the velocities that half of the test impulses make
   integer, parameter :: n_products = (n_tests/2)*(n_tests/2 + 1)/2
+  !> what is not known; its multiples and those of a weight are numbers still [m/s]
+  real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> no way leads to what moves as prescribed
   integer, parameter :: unreached = -1
   !> iterations before which Y and L are not trusted
@@ -63,7 +67,7 @@ module gravier_velocity_error
     !> whether rest is admissible, so that C is a bound
     logical :: rest_is_admissible = .false.
     !> by the last `bound` and `measure` [m/s]
-    real(dp) :: bound_by_rest = huge(1.0_dp), projection = 0.0_dp, levels = 0.0_dp
+    real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
     !> largest |w| of a contact, by the last `measure` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest depth; negative while it is not known
@@ -80,6 +84,7 @@ module gravier_velocity_error
     procedure :: project => velocity_error_project
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
+    procedure :: criterion => velocity_error_criterion
     procedure :: find_depth => velocity_error_find_depth
     procedure :: forget_copies => velocity_error_forget_copies
   end type velocity_error_t
@@ -130,15 +135,24 @@ contains
     end do
   end subroutine velocity_error_keep_copy
 
-  !> C, from what `residual` of the problem has summed [m/s].
+  !> C, from what `residual` of the problem has summed; Y and L are not known then [m/s].
   subroutine velocity_error_bound(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
 
-    self%bound_by_rest = huge(1.0_dp)
+    self%bound_by_rest = unknown
+    self%projection = unknown
+    self%levels = 0.0_dp
     if (.not. (self%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
+
+  !> What is compared with the error that is allowed [m/s]: E, or C over the share of it that is. Where the solution is at rest, all
+  !> that moves is error, and creeps on with one sign from step to step: less of it is allowed there.
+  pure real(dp) function velocity_error_criterion(self) result(criterion)
+    class(velocity_error_t), intent(in) :: self
+    criterion = min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, self%levels))
+  end function velocity_error_criterion
 
   !> The smaller of E and C [m/s].
   pure real(dp) function velocity_error_estimate(self) result(estimate)
