@@ -13,6 +13,7 @@ module gravier_run
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_start_overlap, only: check_start_overlap
   use gravier_checkpoint, only: load_checkpoint, checkpoint_name
   use gravier_run_log, only: run_log_t
   use gravier_run_output, only: run_output_t
@@ -93,6 +94,7 @@ contains
       call load_checkpoint(simulation, path, error)
     else
       call simulation%start(grains, error)
+      call check_start_overlap(simulation, error)
     end if
   end subroutine start
 
@@ -109,6 +111,7 @@ contains
     call log%init(comm)
     call read_config(comm, path, config, error)
     if (.not. allocated(error)) call simulation%init(comm, config, error)
+    call check_start_overlap(simulation, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
     call simulation%assemble(figures)
