@@ -433,7 +433,7 @@ class BadInput(RunTestCase):
              ("bodies 1 and 2 overlap by 160.0 %", *limit)),
             ("in glued disks", "1,0,1,0.1,1\n2,0.1,1,0.1,1\n3,0.15,1.1,0.1,0\n" + apart, {},
              {"boundary": [{"name": "clump", "shape": "grains", "group": 1}]},
-             ("bodies 2 and 3 (glued to boundary 'clump') overlap by 88.2 %", "the most of 2 pairs", *limit)),
+             ("bodies 2 and 3 (glued to boundary 'clump') overlap by 88.2 %", *limit)),
             ("a limit of its own", "1,0,1,0.1,0\n2,0.18,1,0.1,0\n" + apart, {"start_overlap": 0.1}, floor,
              ("bodies 1 and 2 overlap by 20.0 %", "expected at most 10.0 %")),
             ("an overlap that grows in the first step", "1,0,1,0.1,0\n2,0.18,1,0.1,0\n" + apart, {"start_overlap": 0.0}, floor,
@@ -458,10 +458,11 @@ class BadInput(RunTestCase):
                 write(os.path.join(directory, "bodies.csv"), bodies.replace(*words) if words else bodies)
                 for ranks in (1, 2):
                     self.assert_status(run_case(merged(groups, {"scene": more}), ranks, directory), 0)
-        # the checkpoint is that of disks in one place after a step; without it the scene is refused
-        close = merged(groups, {"scene": {"start_overlap": 2.0, "overlap_projection": False, "gravity": [0.0, 0.0]}})
-        write(os.path.join(directory, "bodies.csv"), bodies.replace("2,0.15,1,0", "2,0.15,1,-100"))
-        self.assert_status(run_case(merged(close, {"time": {"steps": 1}}), 1, directory), 0)
+        # a run that goes on from a checkpoint starts where the one before has ended
+        write(os.path.join(directory, "bodies.csv"), bodies.replace("5,4,-1", "5,0,1"))
+        self.assert_status(run_case(merged(groups, {"scene": {"start_overlap": 2.0}, "time": {"steps": 1}}), 1, directory), 0)
+        self.assert_status(run_case(groups, 2, directory, options=("--restart",)), 0)
+        self.assert_refused(run_case(groups, 2, directory), ("bodies 1 and 5 overlap by 200.0 %",))
 
     def test_csv_bodies(self):
         def prepare_csv(directory, text):
