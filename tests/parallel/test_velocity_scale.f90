@@ -1,5 +1,5 @@
-!> The velocity against which errors of a solve are compared: each of its parts against its formula, the one that rules, the same bits
-!> on any number of ranks, and the factor of a velocity under another choice of units.
+!> The velocity against which errors of a solve are compared: each of its parts against its formula, the one that rules, the same
+!> bits on any number of ranks, and the factor of a velocity under another choice of units.
 program test_velocity_scale
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp
