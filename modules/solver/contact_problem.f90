@@ -101,6 +101,8 @@ module gravier_contact_problem
     real(dp) :: error_scale = 0.0_dp
     !> largest term of a sum R^d [N s], whose roundings no solve gets below: where loads take a momentum away, R^d has nothing else
     real(dp) :: rounded_scale = 0.0_dp
+    !> velocity against which errors of a solve are compared, see gravier_velocity_scale; set by whoever builds the problem [m/s]
+    real(dp) :: error_scale = 0.0_dp
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
