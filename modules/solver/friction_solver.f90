@@ -93,8 +93,8 @@ contains
   end subroutine solve_friction
 
   !> Sweeps and Newton's steps in turn. A proof that there is no solution ends them; growth with friction in it is no proof: it
-  !> has to be met by both methods, or by one of them over and over, before Newton's method tries for the last time. A proof is sought
-  !> then, or when some turns have brought no result.
+  !> has to be met by both methods, or by one of them over and over, before Newton's method tries for the last time. When some turns
+  !> have brought no result, a proof is sought.
   subroutine solve_in_turn(problem, control, r, report, error)
     type(delassus_t), intent(in) :: problem
     type(friction_control_t), intent(in) :: control
@@ -128,7 +128,6 @@ contains
       if (is_over(2)) exit
     end do
     call newton%free()
-    if (turn < proof_turn .and. report%growth%ends()) call seek_proof()
     if (report%growth%ends() .and. report%growth%kind /= growth_proven) then
       call start_afresh(problem)
       call keep_best()

@@ -351,6 +351,15 @@ class Fclib(RunTestCase):
                              {"masses_2d.h5", "masses_3d.h5"})
             self.assertNotIn("no_solution", rows["verdict"])
 
+    def test_impulses_beyond_loads_end(self):
+        # a wedge so narrow that the grain slides out by impulses of 5e9: a solution, but none that loads can make, and Newton's
+        # method comes to where rounding hides what a step could change
+        w, q, mu = impossible_problems.wedge(2, 0.0, 1e-5).problem()
+        write_local(self.path("a.h5"), w, q, mu, dimension=2)
+        for method in ("newton", "auto"):
+            self.solve("a.h5", "--method", method, "--csv", "results.csv", status=3)
+            self.assertEqual(read_table(self.path("results.csv"))["verdict"], ["not_converged"])
+
     def test_huge_impulses_are_no_solution(self):
         # two walls that move alike: the start is in balance, but q is lost beside it
         w, q, mu = impossible_problems.one_grain(2, 0.5, (1.0, 1.0))[0].problem()
