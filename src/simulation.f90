@@ -322,7 +322,6 @@ contains
     if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
-    self%problem%error_scale = norm2(self%physics%gravity)*self%physics%h
     figures%contacts = self%problem%n_contacts
     figures%asleep = self%problem%n_asleep
     do s = 1, size(self%problem%sub)
