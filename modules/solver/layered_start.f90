@@ -26,9 +26,9 @@ module gravier_layered_start
 
   !> of a layer and of the halo below it, in mean diameters
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
-  !> relative change of the impulses of a layer by a sweep at which the layer is done, times the number of layers, which hand errors on;
-  !> layers above whose number it falls with the square; sweeps of a layer at least and at most
-  real(dp), parameter :: change_allowed = 0.012_dp, few_layers = 9.0_dp
+  !> relative change of the impulses of a layer by a sweep at which the layer is done; layers above whose number it falls with the
+  !> cube, because each hands its error on; sweeps of a layer at least and at most
+  real(dp), parameter :: change_allowed = 1.5e-3_dp, few_layers = 20.0_dp
   integer, parameter :: least_sweeps = 20, most_sweeps = 200
   !> way of what no way leads to
   real(dp), parameter :: unreached = huge(1.0_dp)
@@ -81,7 +81,7 @@ contains
     if (n_layers < 2) return
     call start_timer(phase_sweep)
     call start_velocities(problem, layers)
-    change = change_allowed/n_layers*min(1.0_dp, few_layers/n_layers)
+    change = change_allowed*min(1.0_dp, few_layers/n_layers)**3
     relaxed(:, :) = 0.0_dp
     do l = 0, n_layers - 1
       do s = 1, size(layers)

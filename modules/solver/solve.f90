@@ -37,17 +37,18 @@ module gravier_solve
   real(dp), parameter :: falling = 0.85_dp
   !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
-  !> what is left of the figure where a solve has gained something; a solve that has gained nothing since the first half of its
-  !> iterations has stagnated, if it has had so many more, and so many times those that a wave takes from end to end
+  !> what is left of the figure where a solve has gained something; a solve that has gained nothing for so many times the iterations
+  !> until then has stagnated, if it has had so many more, and so many times those that a wave takes from end to end; where residuals
+  !> are to become small, phases with and without momentum take turns that grow
   real(dp), parameter :: gained = 0.9_dp
-  integer, parameter :: patience = 500, waves = 6
+  integer, parameter :: patience = 500, waves = 6, idle_share = 1, idle_share_of_residual = 4
   !> growth of the impulses since anything was gained that is one without bound
   real(dp), parameter :: unbounded_growth = 1.5_dp
   !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
   !> depth are above these; later, after a part of the depth, where that is above another; iterations after it until it is judged,
   !> and what must be left of the error then
   real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp, late = 0.3_dp
-  real(dp), parameter :: deep = 15.0_dp, very_deep = 60.0_dp
+  real(dp), parameter :: deep = 25.0_dp, very_deep = 60.0_dp
   integer, parameter :: trial = 6
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 6
@@ -434,7 +435,8 @@ contains
         scale_of_best = problem%impulse_scale
         return
       end if
-      if (scheme%persists .or. report%iterations < 2*best_at + patience) return
+      if (scheme%persists .or. report%iterations - best_at < patience + &
+        & merge(idle_share, idle_share_of_residual, control%criterion == by_velocity)*best_at) return
       if (velocity%most_depth < 0) call velocity%find_depth(problem)
       if (report%iterations < waves*velocity%most_depth) return
       stagnates = .true.
