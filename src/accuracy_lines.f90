@@ -6,7 +6,7 @@ module gravier_accuracy_lines
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, goal_name, percent
+  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, goal_name, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
 
@@ -99,6 +99,18 @@ contains
     if (share > 0.0_dp .and. nint(100.0_dp*share) == 0) text = "less than 1 %"
     if (share < 1.0_dp .and. nint(100.0_dp*share) == 100) text = "more than 99 %"
   end function percent
+
+  !> A number as people write it, with two decimals where it has a few digits before them.
+  pure function plain(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=16) :: row
+
+    text = to_text(value, 2)
+    if (value < 0.05_dp .or. value >= 1000.0_dp) return
+    write (row, "(f8.2)") value
+    text = trim(adjustl(row))
+  end function plain
 
   !> Whether solves went through a pass over layers; nothing where none did.
   function layer_line(tally) result(text)

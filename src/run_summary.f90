@@ -7,7 +7,7 @@ module gravier_run_summary
   use gravier_descent, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
-  use gravier_accuracy_lines, only: goal_name, percent
+  use gravier_accuracy_lines, only: goal_name, percent, plain
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -91,7 +91,7 @@ contains
         & to_text(simulation%config%solver%tolerance, 2)
       if (simulation%failed > 0) text = "*** "//to_text(simulation%failed)//" of the steps did NOT reach the "// &
         & goal_name(simulation)//": the accuracy of the results is not known"
-      if (tally%worst_error > far_off) text = text//", but velocities were wrong by up to "//to_text(tally%worst_error, 2)// &
+      if (tally%worst_error > far_off) text = text//", but velocities were wrong by up to "//plain(tally%worst_error)// &
         & " of U in "//to_text(tally%far_off)//" of "//steps
       if (tally%mended_share() > often_mended) text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "// &
         & steps//": the results are not those of the contact law"
@@ -174,7 +174,7 @@ contains
         text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
           & to_text(simulation%comm%size)//" ranks own no subdomain and wait: as many &decomposition subdomains, now "// &
           & to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
-      else if (phases(phase_output) > half) then
+      else if (phases(phase_output) > half .and. config%output%every > 0) then
         text = "output takes most of it: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
         text = "solves that give up take most iterations: another &solver method or a smaller &time step may let them reach "// &

@@ -19,7 +19,7 @@ module gravier_run_tally
   type :: run_tally_t
     !> solves, and how those that missed the criterion ended
     integer(i8) :: solves = 0, stagnated = 0, unbounded = 0, exhausted = 0, diverged = 0
-    !> steps made, and those in which overlaps were projected
+    !> steps made, and those in which projections of overlaps shifted grains by more than rounding
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
     real(dp) :: shift = 0.0_dp, path = 0.0_dp
@@ -104,11 +104,12 @@ contains
   end subroutine add_kind
 
   !> Add what moved in a step.
-  pure subroutine run_tally_add_step(self, overlap, projected, shift, path)
+  pure subroutine run_tally_add_step(self, overlap, mended, shift, path)
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
-    logical, intent(in) :: projected
+    !> a projection has shifted grains by more than rounding
+    logical, intent(in) :: mended
     !> means over the free grains [m]
     real(dp), intent(in) :: shift, path
 
@@ -118,7 +119,7 @@ contains
     else
       self%later_overlap = max(self%later_overlap, overlap)
     end if
-    if (projected) self%projected = self%projected + 1
+    if (mended) self%projected = self%projected + 1
     self%shift = self%shift + shift
     self%path = self%path + path
   end subroutine run_tally_add_step

@@ -46,6 +46,10 @@ module gravier_simulation
   private
   public :: simulation_t, step_figures_t
 
+  !> shifts of all grains by a projection, over the overlap allowed, that are rounding: grains that a projection has left at the
+  !> overlap allowed are projected again where it is exceeded by rounding
+  real(dp), parameter :: rounded_shift = 1.0e-6_dp
+
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
     type(solve_report_t) :: solve
@@ -555,7 +559,7 @@ contains
     shifts = 0.0_dp
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed, shifts)
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
-    call self%tally%add_step(figures%max_overlap, figures%projected, shifts/free_grains, &
+    call self%tally%add_step(figures%max_overlap, shifts/self%overlap_allowed > rounded_shift, shifts/free_grains, &
       & self%physics%h*self%balance%speeds/free_grains)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
