@@ -81,7 +81,7 @@ contains
       if (descent%first(k) < 0) then
         self%unreached(k) = self%unreached(k) + 1
       else if (iterations > 0) then
-        self%reached(k) = self%reached(k) + max(descent%first(k), descent%first_check)
+        self%reached(k) = self%reached(k) + max(descent%first(k), min(descent%first_check, iterations))
       end if
     end do
   end subroutine effort_add
@@ -114,7 +114,7 @@ contains
     least = self%looser()
     most = least
     if (least < 0.0_dp) return
-    most = max(real(self%iterations, dp), least)
+    most = real(self%iterations, dp)
     least = merge(least_looser*least, 0.0_dp, self%sees_decay() .or. self%unreached(at_tolerance) > 0)
   end subroutine effort_looser_range
 
