@@ -17,6 +17,7 @@ module gravier_simulation
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: effort_t
+  use gravier_run_tally, only: run_tally_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged, solve_unbounded, &
     & by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
@@ -44,6 +45,10 @@ module gravier_simulation
   implicit none
   private
   public :: simulation_t, step_figures_t
+
+  !> shifts of all grains by a projection, over the overlap allowed, that are rounding: grains that a projection has left at the
+  !> overlap allowed are projected again where it is exceeded by rounding
+  real(dp), parameter :: rounded_shift = 1.0e-6_dp
 
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
@@ -110,6 +115,8 @@ module gravier_simulation
     !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
     real(dp) :: worst_overlap = 0.0_dp
     type(effort_t) :: effort
+    !> how solves ended and what was mended, since this run began or went on from a checkpoint
+    type(run_tally_t) :: tally
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
@@ -514,11 +521,15 @@ contains
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: shifts, free_grains
 
     if (allocated(error)) return
     call self%assemble(figures)
     call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column)
-    if (.not. allocated(error) .and. figures%solve%status /= solve_converged) self%failed = self%failed + 1
+    if (.not. allocated(error)) then
+      if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
+      call self%tally%add_solve(figures%solve, self%velocity_scale%kind)
+    end if
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
     if (allocated(error)) return
@@ -545,7 +556,11 @@ contains
     call move_to_end(self)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
-    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
+    shifts = 0.0_dp
+    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed, shifts)
+    free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
+    call self%tally%add_step(figures%max_overlap, shifts/self%overlap_allowed > rounded_shift, shifts/free_grains, &
+      & self%physics%h*self%balance%speeds/free_grains)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
@@ -667,6 +682,7 @@ contains
     self%restarted = .false.
     self%worst_overlap = 0.0_dp
     self%effort = effort_t()
+    self%tally = run_tally_t()
     self%imbalance = 1.0_dp
     self%reached_imbalance = 0.0_dp
   end subroutine simulation_free

@@ -49,7 +49,7 @@ class FailedSolves(RunTestCase):
             log = file.read()
         for text in (run.stdout, log):
             self.assertRegex(text, r"\*\*\* " + words)
-            self.assertRegex(text, r"finished +\*\*\* \d+ of the steps did NOT reach the tolerance")
+            self.assertRegex(text, r"finished +\*\*\* \d+ of the steps did NOT reach the (accuracy|tolerance)")
 
     def test_divergence_is_noticed(self):
         """A step that diverged is never kept, whatever on_failure says, and ends the run."""
