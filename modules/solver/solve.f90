@@ -7,7 +7,7 @@ module gravier_solve
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: descent_t
-  use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_layered_start, only: carry_loads
   implicit none
   private
@@ -94,6 +94,8 @@ module gravier_solve
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
     !> the estimate of gravier_velocity_error, and what it is compared with [m/s]
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
+    !> largest velocity by which a contact violates its law, and what is allowed of it; 0 where it is not known [m/s]
+    real(dp) :: violation = 0.0_dp, violation_allowed = 0.0_dp
     !> the contacts that slept were woken
     logical :: woken = .false.
     !> sweeps over all contacts that a pass over layers took, 0 where there was none; whether the solve went on from it
@@ -155,6 +157,7 @@ contains
     error_before = 0.0_dp
     report%goal = merge(control%accuracy, control%tolerance, control%criterion == by_velocity)
     report%velocity_scale = problem%error_scale
+    report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
     call start_timer(phase_setup)
     call scheme%start(problem, error)
     if (.not. allocated(error)) call velocity%start(problem)
@@ -295,14 +298,21 @@ contains
       end select
     end function is_met
 
-    !> Whether the estimated velocity error is within its limit: the bound by rest tells at once, the projection alone where the
-    !> error is larger, and from zero impulses neither before some iterations. Collective.
+    !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
+    !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
+    !> zero impulses neither before some iterations. Collective.
     logical function velocity_is_met() result(is_met)
       real(dp) :: limit
 
       limit = control%accuracy*problem%error_scale
-      is_met = .not. report%residual > 0.0_dp .or. velocity%criterion() <= limit
-      if (is_met .or. report%iterations < copies_ready) return
+      is_met = .not. report%residual > 0.0_dp
+      if (is_met) return
+      if (velocity%criterion() <= limit) then
+        is_met = velocity%excludes_violations(problem, limit)
+        if (is_met) return
+      else if (report%iterations < copies_ready) then
+        return
+      end if
       call velocity%project(problem, report%iterations)
       if (velocity%criterion() <= limit) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
@@ -317,6 +327,7 @@ contains
       call velocity%project(problem, report%iterations)
       call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
+      report%violation = velocity%largest_violation
     end subroutine complete_estimate
 
     !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
