@@ -9,6 +9,7 @@ module gravier_solve
   use gravier_descent, only: descent_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_layered_start, only: carry_loads
+  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
@@ -41,8 +42,6 @@ module gravier_solve
   !> iterations has stagnated, if it has had so many more, and so many times those that a wave takes from end to end
   real(dp), parameter :: gained = 0.9_dp
   integer, parameter :: patience = 500, waves = 6
-  !> growth of the impulses since anything was gained that is one without bound
-  real(dp), parameter :: unbounded_growth = 1.5_dp
   !> residual at the start, velocity error over its scale and depth after some iterations from which on a pass over layers is tried;
   !> iterations after it until it is judged, and what must be left of the error then
   real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp
@@ -65,11 +64,6 @@ module gravier_solve
     !> try a start that carries loads across layers
     logical :: layered = .true.
   end type solve_control_t
-
-  !> Impulses of a subdomain (lanes, nc, blocks) [N s].
-  type :: kept_impulses_t
-    real(dp), allocatable :: value(:, :, :)
-  end type kept_impulses_t
 
   !> The known impulses of a problem, for the criterion 'error'.
   type, abstract :: exact_solution_t
@@ -106,8 +100,6 @@ module gravier_solve
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
-    !> root mean square of the impulses over that when the solve gained something last; of a solve that has stagnated
-    real(dp) :: growth = 1.0_dp
     !> how the figure came down
     type(descent_t) :: descent
     !> on this rank: the whole solve, and what comes before its first check [s]
@@ -133,8 +125,8 @@ contains
     !> needed where the criterion is by_error
     class(exact_solution_t), intent(in), optional :: exact
     type(velocity_error_t) :: velocity
-    real(dp) :: reference, progress, ratio, began, checking, ignored, best, scale_of_best, last_figure, pause
-    integer :: skips, exceeded_at, last_check, best_at, trial_end
+    real(dp) :: reference, progress, ratio, began, checking, ignored, best, last_figure, pause
+    integer :: skips, exceeded_at, last_check, best_at, trial_end, next_look
     logical :: measure, done, choosy, wants_layers
     type(kept_impulses_t) :: kept(size(problem%sub))
     real(dp) :: error_before
@@ -152,7 +144,7 @@ contains
     pause = 0.0_dp
     best = huge(1.0_dp)
     best_at = 0
-    scale_of_best = 0.0_dp
+    next_look = 0
     trial_end = 0
     error_before = 0.0_dp
     report%goal = merge(control%accuracy, control%tolerance, control%criterion == by_velocity)
@@ -413,30 +405,46 @@ contains
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
-      else if (stagnates()) then
-        report%status = merge(solve_unbounded, solve_stagnated, report%growth > unbounded_growth)
       else
-        finished = .false.
+        finished = stagnates()
       end if
       if (control%trace .or. (finished .and. .not. (met .and. control%criterion == by_velocity))) call complete_estimate()
       if (control%trace) call take_figure()
     end subroutine judge
 
-    !> Whether nothing was gained in so many iterations that nothing is to be expected of more. Collective.
+    !> Whether nothing was gained in so many iterations that nothing is to be expected of more: because there is no solution, or
+    !> because the method finds none. Collective.
     logical function stagnates()
       stagnates = .false.
       if (report%figure < gained*best .or. report%iterations == 0) then
         best = report%figure
         best_at = report%iterations
-        scale_of_best = problem%impulse_scale
+        next_look = 2*best_at + patience
         return
       end if
-      if (scheme%persists .or. report%iterations < 2*best_at + patience) return
+      if (report%iterations < next_look) return
       if (velocity%most_depth < 0) call velocity%find_depth(problem)
       if (report%iterations < waves*velocity%most_depth) return
-      stagnates = .true.
-      if (scale_of_best > 0.0_dp) report%growth = problem%impulse_scale/scale_of_best
+      next_look = report%iterations + patience
+      if (grow_in_vain()) then
+        stagnates = .true.
+        report%status = solve_unbounded
+      else if (.not. scheme%persists) then
+        stagnates = .true.
+        report%status = solve_stagnated
+      end if
     end function stagnates
+
+    !> Whether impulses have grown in vain since the older copy of them. Collective.
+    logical function grow_in_vain() result(in_vain)
+      type(kept_impulses_t) :: earlier(size(problem%sub))
+      integer :: s
+
+      do s = 1, size(problem%sub)
+        call velocity%copy_of(problem, s, earlier(s)%value)
+      end do
+      in_vain = are_in_vain(problem, earlier)
+    end function grow_in_vain
 
   end subroutine solve_contacts
 

@@ -84,6 +84,7 @@ module gravier_velocity_error
   contains
     procedure :: start => velocity_error_start
     procedure :: keep_copy => velocity_error_keep_copy
+    procedure :: copy_of => velocity_error_copy_of
     procedure :: bound => velocity_error_bound
     procedure :: project => velocity_error_project
     procedure :: add_levels => velocity_error_add_levels
@@ -139,6 +140,21 @@ contains
       self%part(s)%copy(self%place(2))%impulse = problem%sub(s)%impulse
     end do
   end subroutine velocity_error_keep_copy
+
+  !> The older copy of the impulses of subdomain `s`, or those that it has now where there is none.
+  pure subroutine velocity_error_copy_of(self, problem, s, impulse)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (lanes, nc, blocks) [N s]
+    real(dp), allocatable, intent(out) :: impulse(:, :, :)
+
+    if (self%taken_at(1) > 0) then
+      impulse = self%part(s)%copy(self%place(1))%impulse
+    else
+      impulse = problem%sub(s)%impulse
+    end if
+  end subroutine velocity_error_copy_of
 
   !> C, from what `residual` of the problem has summed; Y, L and the largest violation are not known then [m/s].
   subroutine velocity_error_bound(self, problem)
@@ -360,6 +376,7 @@ contains
     squares = 0.0_dp
     do l = 1, n
       if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
+      self%largest_violation = max(self%largest_violation, abs(sinking))
       squares = squares + sums(2*n + l)*sinking**2
     end do
     self%levels = sqrt(squares/self%mass)
