@@ -68,7 +68,8 @@ module gravier_simulation
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
-    !> after a solve that diverged to NaN or infinity: a contact where it did
+    !> after a solve that diverged to NaN or infinity: a contact where it did; after one whose impulses grow without bound: the
+    !> contact with the largest
     character(len=:), allocatable :: cause
   end type step_figures_t
 
@@ -537,6 +538,7 @@ contains
       call find_cause(self, figures)
       return
     end if
+    if (figures%solve%status == solve_unbounded) call find_largest_impulse(self, figures)
     associate (solve => figures%solve)
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
@@ -595,6 +597,35 @@ contains
     call self%comm%agree(found)
     if (allocated(found)) figures%cause = found%message
   end subroutine find_cause
+
+  !> After a solve whose impulses grow without bound: the contact with the largest one. Collective.
+  subroutine find_largest_impulse(self, figures)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(inout) :: figures
+    type(error_t), allocatable :: found
+    real(dp) :: largest, size_of
+    integer :: s, c, k
+
+    largest = -1.0_dp
+    do k = 1, 2
+      do s = 1, size(self%problem%sub)
+        associate (sub => self%problem%sub(s))
+          do c = 1, sub%n_contacts
+            size_of = norm2(sub%impulse(lane_of(c), :, block_of(c)))
+            if (k == 1) then
+              largest = max(largest, size_of)
+            else if (size_of >= largest .and. .not. allocated(found)) then
+              call raise(found, status_unconverged, "largest impulse: contact of bodies "//to_text(sub%id(sub%pair(1, c)))// &
+                & " and "//to_text(sub%id(sub%pair(2, c))))
+            end if
+          end do
+        end associate
+      end do
+      if (k == 1) largest = self%comm%highest(largest)
+    end do
+    call self%comm%agree(found)
+    if (allocated(found)) figures%cause = found%message
+  end subroutine find_largest_impulse
 
   !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
   subroutine check_numbers(self, figures, error)

@@ -24,12 +24,14 @@ module gravier_velocity_error
   use gravier_supports, only: supports_t, find_supports
   implicit none
   private
-  public :: velocity_error_t, copies_ready
+  public :: velocity_error_t, copies_ready, violations_allowed
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
   real(dp), parameter :: weight_of_projection = 2.4_dp, cosine = 0.65_dp
   !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
-  real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 3.0_dp
+  real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
+  !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
+  real(dp), parameter :: violations_allowed = 5.0_dp
   !> share of the largest eigenvalue of G below which it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
@@ -69,9 +71,9 @@ module gravier_velocity_error
     real(dp) :: mass = 0.0_dp
     !> whether rest is admissible, so that C is a bound
     logical :: rest_is_admissible = .false.
-    !> C, Y and L, as far as they are known [m/s]
+    !> C, Y and L, as far as they are known, by the last `bound` and `project` [m/s]
     real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
-    !> largest |w| of a contact, by the last `measure` [m/s]
+    !> largest |w| of a contact, by the last `project`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest depth; negative while it is not known
     integer :: most_depth = -1
@@ -83,11 +85,13 @@ module gravier_velocity_error
   contains
     procedure :: start => velocity_error_start
     procedure :: keep_copy => velocity_error_keep_copy
+    procedure :: copy_of => velocity_error_copy_of
     procedure :: bound => velocity_error_bound
     procedure :: project => velocity_error_project
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
+    procedure :: excludes_violations => velocity_error_excludes_violations
     procedure :: find_depth => velocity_error_find_depth
     procedure :: forget_copies => velocity_error_forget_copies
   end type velocity_error_t
@@ -138,7 +142,22 @@ contains
     end do
   end subroutine velocity_error_keep_copy
 
-  !> C, from what `residual` of the problem has summed; Y and L are not known then [m/s].
+  !> The older copy of the impulses of subdomain `s`, or those that it has now where there is none.
+  pure subroutine velocity_error_copy_of(self, problem, s, impulse)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (lanes, nc, blocks) [N s]
+    real(dp), allocatable, intent(out) :: impulse(:, :, :)
+
+    if (self%taken_at(1) > 0) then
+      impulse = self%part(s)%copy(self%place(1))%impulse
+    else
+      impulse = problem%sub(s)%impulse
+    end if
+  end subroutine velocity_error_copy_of
+
+  !> C, from what `residual` of the problem has summed; Y, L and the largest violation are not known then [m/s].
   subroutine velocity_error_bound(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
@@ -146,15 +165,40 @@ contains
     self%bound_by_rest = unknown
     self%projection = unknown
     self%levels = 0.0_dp
+    self%largest_violation = 0.0_dp
     if (.not. (self%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
+  !> Whether no contact violates its law by more than what is allowed where the error may be `limit`, told by the velocities of the
+  !> bodies alone: where everything prescribed is at rest, a violation is at most twice the largest of them. Collective.
+  logical function velocity_error_excludes_violations(self, problem, limit) result(excludes)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    !> [m/s]
+    real(dp), intent(in) :: limit
+    real(dp) :: fastest, rim
+    integer :: s, b
+
+    fastest = 0.0_dp
+    do s = 1, size(self%part)
+      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+        do b = 1, sub%n_bodies
+          rim = 0.0_dp
+          if (b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_global(nd + 1:, b))
+          fastest = max(fastest, norm2(sub%v_global(1:nd, b)) + rim)
+        end do
+      end associate
+    end do
+    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*limit
+  end function velocity_error_excludes_violations
+
   !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
-  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed.
+  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
-    criterion = min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, weight_of_sinking*self%levels))
+    criterion = max(self%largest_violation/violations_allowed, &
+      & min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, weight_of_sinking*self%levels)))
   end function velocity_error_criterion
 
   !> The smaller of E and C [m/s].
@@ -333,6 +377,7 @@ contains
     squares = 0.0_dp
     do l = 1, n
       if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
+      self%largest_violation = max(self%largest_violation, abs(sinking))
       squares = squares + sums(2*n + l)*sinking**2
     end do
     self%levels = sqrt(squares/self%mass)
