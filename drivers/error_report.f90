@@ -13,7 +13,7 @@ module gravier_error_report
 
   character(len=*), parameter :: header = "title,method,situation,step,iterations,residual,true_error,estimate,projection,"// &
     & "levels,bound,depth,velocity_scale,mass,grains,contacts,subdomains,ranks,reference_residual,reference_estimate,"// &
-    & "reference_iterations,machine,compiler,flags,build,version,revision,date"
+    & "reference_spread,reference_iterations,machine,compiler,flags,build,version,revision,date"
 
 contains
 
@@ -48,9 +48,10 @@ contains
         call table%add(row%contacts)
         call table%add(plan%config%decomposition%subdomains)
         call table%add(ranks)
-        call table%add(row%reference_residual)
-        call table%add(row%reference_estimate)
-        call table%add(row%reference_iterations)
+        call table%add(row%reference%residual)
+        call table%add(row%reference%estimate)
+        call table%add(row%reference%spread)
+        call table%add(row%reference%iterations)
       end associate
       call table%add(processor_model())
       call table%add(compiler)

@@ -39,9 +39,19 @@ module gravier_error_situations
     logical :: at_rest = .false.
     real(dp) :: tight = 1.0e-10_dp
     integer :: limit = 20000
+    !> sweeps without momentum after these, where the residual is not reached
+    integer :: sweeps = 20000
     !> solve by the program's own control, too, from zero impulses
     logical :: by_program = .false.
   end type plan_t
+
+  !> The solve that takes the place of an exact solution.
+  type :: reference_t
+    real(dp) :: residual = 0.0_dp
+    !> its own estimate, and how far its velocities have still gone in the second half of its sweeps [m/s]
+    real(dp) :: estimate = 0.0_dp, spread = 0.0_dp
+    integer :: iterations = 0
+  end type reference_t
 
   !> One state that was looked at. Velocities are root mean squares over the mass of the grains in contact [m/s].
   type :: row_t
@@ -54,9 +64,8 @@ module gravier_error_situations
     !> what the estimate is made of, see gravier_velocity_error; negative where the solver has kept it to itself
     real(dp) :: projection = -1.0_dp, levels = -1.0_dp, bound = -1.0_dp
     integer :: depth = -1
-    !> of the solve that took the place of an exact solution; 0 where that is known
-    real(dp) :: reference_residual = 0.0_dp, reference_estimate = 0.0_dp
-    integer :: reference_iterations = 0
+    !> all zero where the exact velocities are known
+    type(reference_t) :: reference
     !> velocity that errors are compared with [m/s]; contacts, and mass of the grains in contact [kg]
     real(dp) :: scale = 0.0_dp, mass = 0.0_dp
     integer(i8) :: grains = 0, contacts = 0
@@ -74,6 +83,10 @@ module gravier_error_situations
   character(len=*), parameter :: cold_text = "zero impulses"
   !> seed of what is random
   integer, parameter :: seed = 20
+  !> sweeps between two residuals
+  integer, parameter :: check_interval = 100
+  !> states kept of the second half of the sweeps
+  integer, parameter :: kept_states = 5
   !> an accuracy that no solve reaches: its limit of iterations ends it
   real(dp), parameter :: unreachable = tiny(1.0_dp)
 
@@ -137,7 +150,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> the free velocities of the step; its impulses and velocities when it is solved
     type(field_t), allocatable :: free(:), solved(:)
-    type(solve_report_t) :: report
+    type(reference_t) :: reference
     integer :: k, s
 
     allocate (free(size(simulation%problem%sub)))
@@ -149,7 +162,7 @@ contains
       if (allocated(error)) return
       if (plan%situations(k)%start /= start_cold .and. .not. allocated(solved)) then
         call set_impulses(simulation%problem)
-        call solve_tightly(plan, simulation, report, error)
+        call solve_tightly(plan, simulation, reference, error)
         call take_fields(simulation%problem, solved)
         if (allocated(error)) return
       end if
@@ -169,15 +182,27 @@ contains
 
     select case (situation%start)
     case (start_lost)
-      name = to_text(100.0_dp*situation%amount, 3)//" % of the impulses lost"
+      name = number_text(100.0_dp*situation%amount)//" % of the impulses lost"
     case (start_turned)
-      name = "gravity turned by "//to_text(situation%amount, 3)//" degrees"
+      name = "gravity turned by "//number_text(situation%amount)//" degrees"
     case (start_loose)
-      name = "velocities of "//to_text(situation%amount, 3)//" g h at random"
+      name = "velocities of "//number_text(situation%amount)//" g h at random"
     case default
       name = cold_text
     end select
   end function name_of
+
+  !> A whole number without decimals.
+  function number_text(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+
+    if (abs(value - nint(value)) <= 1.0e-9_dp*abs(value)) then
+      text = to_text(nint(value))
+    else
+      text = to_text(value, 3)
+    end if
+  end function number_text
 
   !> Impulses and free velocities at the start of a situation.
   subroutine prepare(situation, simulation, solved)
@@ -287,11 +312,11 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(velocity_error_t) :: velocity
     type(row_t) :: seen(size(plan%iterations))
-    type(solve_report_t) :: report
+    type(reference_t) :: reference
     !> states that were looked at, one column of subdomains each
     type(field_t) :: states(size(simulation%problem%sub), size(plan%iterations))
     real(dp) :: jump
-    integer :: k, n, s
+    integer :: k, n
 
     associate (problem => simulation%problem, scheme => simulation%scheme)
       call scheme%start(problem, error)
@@ -304,22 +329,19 @@ contains
         if (k == plan%iterations(n)) then
           call look(simulation, velocity, k, seen(n))
           seen(n)%situation = name
-          do s = 1, size(problem%sub)
-            states(s, n)%velocity = problem%sub(s)%v_global
-          end do
+          call take_velocities(problem, states(:, n))
           n = n + 1
         end if
         call velocity%keep_copy(problem, scheme, k)
       end do
     end associate
-    if (.not. plan%at_rest) call solve_tightly(plan, simulation, report, error)
+    call solve_tightly(plan, simulation, reference, error)
     if (allocated(error)) return
     do n = 1, size(seen)
-      call take_reference(plan, report, seen(n))
-      seen(n)%true_error = distance(plan, simulation%problem, states(:, n), velocity%mass)
+      if (.not. plan%at_rest) seen(n)%reference = reference
+      seen(n)%true_error = distance(simulation%problem, states(:, n), velocity%mass, plan%at_rest)
       call append(rows, seen(n))
     end do
-    if (plan%at_rest) call solve_tightly(plan, simulation, report, error)
   end subroutine follow
 
   !> The whole estimate of a state, as a solve that ends there would have it. Collective.
@@ -408,20 +430,83 @@ contains
     end do
   end subroutine take_fields
 
-  !> Solve on from where the problem is, as tightly as the plan says; v_global is that of the solution then. Collective.
-  subroutine solve_tightly(plan, simulation, report, error)
+  subroutine take_velocities(problem, fields)
+    type(contact_problem_t), intent(in) :: problem
+    type(field_t), intent(inout) :: fields(:)
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      fields(s)%velocity = problem%sub(s)%v_global
+    end do
+  end subroutine take_velocities
+
+  !> Solve on from where the problem is, as tightly as the plan says; v_global is that of the solution then. Where friction makes
+  !> momentum run in circles, sweeps without it follow. Collective.
+  subroutine solve_tightly(plan, simulation, reference, error)
     type(plan_t), intent(in) :: plan
     type(simulation_t), intent(inout) :: simulation
-    type(solve_report_t), intent(out) :: report
+    type(reference_t), intent(out) :: reference
     type(error_t), allocatable, intent(inout) :: error
     type(solve_control_t) :: control
+    type(solve_report_t) :: report
 
     control%criterion = by_residual
     control%tolerance = plan%tight
     control%max_iterations = plan%limit
-    control%check_every = 100
+    control%check_every = check_interval
     call solve_contacts(simulation%problem, simulation%scheme, control, report, error)
+    reference%residual = report%residual
+    reference%estimate = report%velocity_error
+    reference%iterations = report%iterations
+    if (.not. (allocated(error) .or. plan%sweeps == 0 .or. report%residual <= plan%tight)) &
+      & call sweep_on(plan, simulation, reference, error)
   end subroutine solve_tightly
+
+  !> Sweeps without momentum from where the problem is. How far velocities still go in the second half of them tells how well
+  !> the solution is known, without the estimate that is judged by it. Collective.
+  subroutine sweep_on(plan, simulation, reference, error)
+    type(plan_t), intent(in) :: plan
+    type(simulation_t), intent(inout) :: simulation
+    type(reference_t), intent(inout) :: reference
+    type(error_t), allocatable, intent(inout) :: error
+    type(velocity_error_t) :: velocity
+    type(field_t) :: states(size(simulation%problem%sub), kept_states)
+    type(row_t) :: row
+    real(dp) :: jump
+    integer :: k, n
+    logical :: accelerated
+
+    associate (problem => simulation%problem, scheme => simulation%scheme)
+      accelerated = scheme%momentum%on
+      scheme%momentum%on = .false.
+      call scheme%start(problem, error)
+      if (.not. allocated(error)) call velocity%start(problem)
+      n = 0
+      do k = 1, plan%sweeps
+        call scheme%iterate(problem, .false., jump, error)
+        if (allocated(error)) exit
+        if (mod(k, check_interval) == 0 .or. k == plan%sweeps) then
+          call look(simulation, velocity, k, row)
+          if (row%residual <= plan%tight) exit
+          if (2*k > plan%sweeps .and. n < kept_states .and. k >= plan%sweeps/2 + n*plan%sweeps/(2*kept_states)) then
+            n = n + 1
+            call take_velocities(problem, states(:, n))
+          end if
+        end if
+        call velocity%keep_copy(problem, scheme, k)
+      end do
+      scheme%momentum%on = accelerated
+      if (allocated(error)) return
+      reference%residual = row%residual
+      reference%estimate = row%estimate
+      reference%iterations = reference%iterations + min(k, plan%sweeps)
+      reference%spread = 0.0_dp
+      if (row%residual <= plan%tight) return
+      do k = 1, n
+        reference%spread = max(reference%spread, distance(problem, states(:, k), velocity%mass, at_rest=.false.))
+      end do
+    end associate
+  end subroutine sweep_on
 
   !> The error of a state against the solution that is found by going on from it. Collective.
   subroutine compare(plan, simulation, reached, row, error)
@@ -430,39 +515,26 @@ contains
     type(field_t), intent(in) :: reached(:)
     type(row_t), intent(inout) :: row
     type(error_t), allocatable, intent(inout) :: error
-    type(solve_report_t) :: report
 
     row%mass = mass_of(simulation%problem)
-    if (.not. plan%at_rest) call solve_tightly(plan, simulation, report, error)
+    if (.not. plan%at_rest) call solve_tightly(plan, simulation, row%reference, error)
     if (allocated(error)) return
-    call take_reference(plan, report, row)
-    row%true_error = distance(plan, simulation%problem, reached, row%mass)
+    row%true_error = distance(simulation%problem, reached, row%mass, plan%at_rest)
   end subroutine compare
 
-  subroutine take_reference(plan, report, row)
-    type(plan_t), intent(in) :: plan
-    type(solve_report_t), intent(in) :: report
-    type(row_t), intent(inout) :: row
-
-    if (plan%at_rest) return
-    row%reference_residual = report%residual
-    row%reference_estimate = report%velocity_error
-    row%reference_iterations = report%iterations
-  end subroutine take_reference
-
   !> |V - V*|_M over the root of the mass, V* being v_global of the problem, or rest [m/s]. Collective.
-  real(dp) function distance(plan, problem, state, mass)
-    type(plan_t), intent(in) :: plan
+  real(dp) function distance(problem, state, mass, at_rest)
     type(contact_problem_t), intent(in) :: problem
     type(field_t), intent(in) :: state(:)
     real(dp), intent(in) :: mass
+    logical, intent(in) :: at_rest
     real(dp) :: parts(1, size(state)), sums(1)
     real(dp), allocatable :: difference(:, :)
     integer :: s
 
     do s = 1, size(state)
       allocate (difference, source=state(s)%velocity)
-      if (.not. plan%at_rest) difference(:, :) = difference - problem%sub(s)%v_global
+      if (.not. at_rest) difference(:, :) = difference - problem%sub(s)%v_global
       parts(1, s) = problem%sub(s)%product_of(difference, difference)
       deallocate (difference)
     end do

@@ -27,7 +27,8 @@ program gravier_error
     & "  --every M           look at the state after every M-th of these steps"//nl// &
     & "  --rest              the exact velocities are zero; otherwise each solve goes on to find them:"//nl// &
     & "  --tight RESIDUAL    until this residual (1e-10)"//nl// &
-    & "  --limit N           or for so many iterations (20000)"//nl// &
+    & "  --limit N           or for so many iterations (20000),"//nl// &
+    & "  --sweeps N          and then for so many sweeps without momentum (20000)"//nl// &
     & "  --help"//nl// &
     & "exit status: 0 done; 2 bad input or usage; 4 anything else"
 
@@ -95,7 +96,7 @@ contains
         help = .true.
       case ("--rest")
         plan%at_rest = .true.
-      case ("--out", "--situations", "--iterations", "--steps", "--every", "--tight", "--limit")
+      case ("--out", "--situations", "--iterations", "--steps", "--every", "--tight", "--limit", "--sweeps")
         call read_value(argument(k), option_value(k), error)
         k = k + 1
       case default
@@ -134,6 +135,7 @@ contains
       if (option == "--steps") plan%steps = positive_integer(word)
       if (option == "--every") plan%every = positive_integer(word)
       if (option == "--limit") plan%limit = positive_integer(word)
+      if (option == "--sweeps") plan%sweeps = positive_integer(word)
     end select
     if (expected /= "") call raise(error, status_input, option//" '"//word//"': expected "//expected)
   end subroutine read_value
