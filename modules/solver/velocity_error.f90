@@ -35,6 +35,8 @@ module gravier_velocity_error
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
   !> test impulses at most: w/W, r, the change of the last iteration, those since the copies
   integer, parameter :: most_tests = 3 + n_copies
+  !> share of the largest free speed below which the shift of a closed contact is rounding of places
+  real(dp), parameter :: rounded = 1.0e-3_dp
   !> no way leads to what moves as prescribed
   integer, parameter :: unreached = -1
   !> iterations before which Y and L are not trusted
@@ -413,7 +415,7 @@ contains
 
     shares = .false.
     do s = 1, size(part)
-      call list_ways(problem%sub(s), ways(s)%first, ways(s)%towards)
+      call list_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, ways(s)%first, ways(s)%towards)
       shares = shares .or. problem%shared%part(s)%n_slots > 0
       call search_breadth_first(ways(s)%first, ways(s)%towards, part(s)%depth)
     end do
@@ -447,8 +449,12 @@ contains
   end subroutine spread_depth
 
   !> The contacts that press or are closed, as lists of neighbours.
-  subroutine list_ways(sub, first, towards)
+  subroutine list_ways(sub, at, closed, first, towards)
     type(subproblem_t), intent(in) :: sub
+    !> row of `hot` that holds the shift
+    integer, intent(in) :: at
+    !> shift below which a contact counts as closed [m/s]
+    real(dp), intent(in) :: closed
     integer, allocatable, intent(out) :: first(:), towards(:)
     integer, allocatable :: next(:)
     logical :: counts
@@ -457,7 +463,8 @@ contains
     allocate (first(sub%n_columns + 1), next(sub%n_columns + 1), source=0)
     do round = 1, 2
       do c = 1, sub%n_contacts
-        counts = sub%gap(c) <= 0.0_dp .or. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp
+        counts = sub%gap(c) <= 0.0_dp .or. sub%hot(lane_of(c), at, block_of(c)) <= closed .or. &
+          & sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp
         if (.not. counts) cycle
         do k = 1, 2
           associate (b => sub%pair(k, c))
