@@ -272,6 +272,7 @@ contains
     case ("acceleration"); slot%choice => config%solver%acceleration
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
+    case ("layered_start"); slot%logical => config%solver%layered_start
     case ("sleeping"); slot%logical => config%solver%sleeping
     case ("sleep_after"); slot%integer => config%solver%sleep_after
     case ("sleep_speed"); slot%real => config%solver%sleep_speed

@@ -289,6 +289,8 @@ module gravier_config_table
            note="by the method"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
+     key_t("solver", "layered_start", kind_logical, ".true.", "", &
+           "carry loads across in layers where a solve starts far from the solution (with `velocity_error` and gravity)"), &
      key_t("solver", "sleeping", kind_logical, ".false.", "", &
            "contacts of bodies at rest leave the sweeps until these are disturbed (`nlgs`, `nscdd` and `schwarz` only)"), &
      key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &

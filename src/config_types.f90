@@ -98,6 +98,8 @@ module gravier_config_types
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start
+    !> cold starts may go through layers first
+    logical :: layered_start
     logical :: sleeping
     !> steps; momentum of a body at rest over the root mean square of the impulses
     integer :: sleep_after

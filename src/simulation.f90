@@ -278,6 +278,7 @@ contains
         self%control%criterion = by_velocity
       end select
       self%control%accuracy = config%solver%accuracy
+      self%control%layered = config%solver%layered_start
       self%control%tolerance = config%solver%tolerance
       self%control%max_iterations = config%solver%max_iterations
       self%control%check_every = config%solver%check_every
@@ -313,6 +314,7 @@ contains
     call start_timer(phase_setup)
     if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
+    self%problem%load(:) = self%physics%h*self%physics%gravity
     self%problem%error_scale = norm2(self%physics%gravity)*self%physics%h
     figures%contacts = self%problem%n_contacts
     figures%asleep = self%problem%n_asleep

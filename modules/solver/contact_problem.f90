@@ -66,6 +66,7 @@ module gravier_contact_problem
     procedure :: local_operator => subproblem_local_operator
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
+    procedure :: find_masses => subproblem_find_masses
     procedure :: product_of => subproblem_product_of
     procedure :: held_impulse => subproblem_held_impulse
   end type subproblem_t
@@ -94,6 +95,8 @@ module gravier_contact_problem
     real(dp) :: shift_power = 0.0_dp, kinetic = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
+    !> change of velocity in a step by loads that are the same for all grains; 0 where there are none or their like (3) [m/s]
+    real(dp) :: load(3) = 0.0_dp
     !> velocity that errors of a solve are compared with [m/s]
     real(dp) :: error_scale = 0.0_dp
     !> largest term of a sum R^d [N s], whose roundings no solve gets below: where loads take a momentum away, R^d has nothing else
@@ -195,22 +198,41 @@ contains
     end do
   end subroutine subproblem_multiply_mass
 
+  !> Masses of the components of body `b`, 0 for what cannot move: a copy of a shared body counts with its part.
+  pure subroutine subproblem_find_masses(self, b, masses)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: b
+    !> (nv) [kg, kg m^2]
+    real(dp), intent(out) :: masses(:)
+    real(dp) :: inverse
+    integer :: d, nw
+
+    nw = size(self%inverse_mass, 1)
+    do d = 1, size(masses)
+      if (d > nw) then
+        masses(d) = masses(nw)
+        cycle
+      end if
+      inverse = self%inverse_mass(d, b)
+      masses(d) = 0.0_dp
+      if (inverse > 0.0_dp) masses(d) = 1.0_dp/(inverse*self%multiplicity(b))
+    end do
+  end subroutine subproblem_find_masses
+
   !> (a, b)_M of two velocities of the bodies that can move, a copy of a shared body counting with its part [J].
   pure real(dp) function subproblem_product_of(self, a, b) result(total)
     class(subproblem_t), intent(in) :: self
     !> (nv, n_columns)
     real(dp), intent(in), contiguous :: a(:, :), b(:, :)
-    real(dp) :: inverse, squares
+    real(dp) :: masses(size(a, 1))
     integer :: k, d
 
     total = 0.0_dp
     do k = 1, self%n_bodies
-      squares = 0.0_dp
+      call self%find_masses(k, masses)
       do d = 1, size(a, 1)
-        inverse = self%inverse_mass(min(d, size(self%inverse_mass, 1)), k)
-        if (inverse > 0.0_dp) squares = squares + a(d, k)*b(d, k)/inverse
+        total = total + masses(d)*a(d, k)*b(d, k)
       end do
-      total = total + squares/self%multiplicity(k)
     end do
   end function subproblem_product_of
 

@@ -8,6 +8,7 @@ module gravier_solve
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: descent_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_layered_start, only: carry_loads
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
@@ -30,8 +31,10 @@ module gravier_solve
   real(dp), parameter :: worth_a_check = 1.2_dp
   !> the first iteration that sweeps with momentum may have checked before it is due
   integer, parameter :: early_check = 2
-  !> least iterations between two checks that are not due, and due ones, over those made
+  !> iterations between two checks, over those made: at least where they are not due, and at most
   real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
+  !> what is left of the figure since the last check where the next one need not wait twice as long
+  real(dp), parameter :: falling = 0.85_dp
   !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
   !> what is left of the figure where a solve has gained something; a solve that has gained nothing since the first half of its
@@ -40,6 +43,10 @@ module gravier_solve
   integer, parameter :: patience = 500, waves = 6
   !> growth of the impulses since anything was gained that is one without bound
   real(dp), parameter :: unbounded_growth = 1.5_dp
+  !> residual at the start, velocity error over its scale and depth after some iterations from which on a pass over layers is tried;
+  !> iterations after it until it is judged, and what must be left of the error then
+  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp
+  integer, parameter :: deep = 15, trial = 6
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 6
 
@@ -55,7 +62,14 @@ module gravier_solve
     integer :: check_every = 10
     !> keep the figures of every check, and leave none out
     logical :: trace = .false.
+    !> try a start that carries loads across layers
+    logical :: layered = .true.
   end type solve_control_t
+
+  !> Impulses of a subdomain (lanes, nc, blocks) [N s].
+  type :: kept_impulses_t
+    real(dp), allocatable :: value(:, :, :)
+  end type kept_impulses_t
 
   !> The known impulses of a problem, for the criterion 'error'.
   type, abstract :: exact_solution_t
@@ -82,6 +96,9 @@ module gravier_solve
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
     !> the contacts that slept were woken
     logical :: woken = .false.
+    !> sweeps over all contacts that a pass over layers took, 0 where there was none; whether the solve went on from it
+    real(dp) :: layered_sweeps = 0.0_dp
+    logical :: layered = .false.
     !> relative error on the impulses, negative where no exact solution is known
     real(dp) :: error = -1.0_dp
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
@@ -114,9 +131,11 @@ contains
     !> needed where the criterion is by_error
     class(exact_solution_t), intent(in), optional :: exact
     type(velocity_error_t) :: velocity
-    real(dp) :: reference, progress, ratio, began, checking, ignored, best, scale_of_best
-    integer :: skips, exceeded_at, last_check, best_at
-    logical :: measure, done, choosy
+    real(dp) :: reference, progress, ratio, began, checking, ignored, best, scale_of_best, last_figure, pause
+    integer :: skips, exceeded_at, last_check, best_at, trial_end
+    logical :: measure, done, choosy, wants_layers
+    type(kept_impulses_t) :: kept(size(problem%sub))
+    real(dp) :: error_before
 
     began = clock()
     checking = 0.0_dp
@@ -127,9 +146,13 @@ contains
     skips = 0
     exceeded_at = -1
     last_check = 0
+    last_figure = huge(1.0_dp)
+    pause = 0.0_dp
     best = huge(1.0_dp)
     best_at = 0
     scale_of_best = 0.0_dp
+    trial_end = 0
+    error_before = 0.0_dp
     report%goal = merge(control%accuracy, control%tolerance, control%criterion == by_velocity)
     report%velocity_scale = problem%error_scale
     call start_timer(phase_setup)
@@ -143,17 +166,24 @@ contains
     choosy = .not. (control%trace .or. control%criterion == by_error)
     if (choosy .and. scheme%momentum%on) report%descent%first_check = min(early_check, control%check_every)
     call check(done)
+    wants_layers = control%layered .and. control%criterion == by_velocity .and. report%residual > unsettled .and. &
+      & any(abs(problem%load) > 0.0_dp)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
       ! sums of the iterations before are there with momentum
       if (choosy .and. (measure .or. (scheme%momentum%on .and. report%iterations >= early_check))) &
         & measure = is_worth_a_check(measure)
-      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations
+      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations .or. &
+        & (wants_layers .and. report%iterations == copies_ready) .or. report%iterations == trial_end
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) call check(done)
-      if (.not. done) call velocity%keep_copy(problem, scheme, report%iterations)
+      if (done) exit
+      if (wants_layers .and. report%iterations == copies_ready) call try_layers(error)
+      if (report%iterations == trial_end) call judge_layers(error)
+      if (allocated(error)) return
+      call velocity%keep_copy(problem, report%iterations)
     end do
     if (report%status /= solve_converged .and. report%status /= solve_diverged .and. scheme%keeps_best) then
       call scheme%conclude(problem)
@@ -188,7 +218,7 @@ contains
           enough = 1.0_dp
         end if
         if (expected > 0.0_dp) is_worth = (expected <= enough*report%goal .and. &
-          & (regular .or. report%iterations - last_check > least_pause*report%iterations)) .or. &
+          & (regular .or. report%iterations - last_check > max(pause, least_pause*report%iterations))) .or. &
           & (regular .and. (.not. ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth()*reference))
       end if
       if (is_worth) then
@@ -232,6 +262,9 @@ contains
       if (control%trace) call keep_trace(report, start - began - checking)
       if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, report%goal)
       if (report%iterations > 0 .and. progress > 0.0_dp) ratio = report%figure/progress
+      if (report%iterations > 0) pause = merge(0.0_dp, min(2.0_dp*max(pause, 1.0_dp), most_pause*report%iterations), &
+        & report%figure < falling*last_figure)
+      last_figure = report%figure
       last_check = report%iterations
       if (.not. finished .and. problem%n_asleep > 0) call wake_if_due()
       checking = checking + clock() - start
@@ -288,6 +321,50 @@ contains
       call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
     end subroutine complete_estimate
+
+    !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
+    subroutine try_layers(error)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: s
+
+      call complete_estimate()
+      if (report%velocity_error <= much*problem%error_scale) return
+      if (velocity%most_depth < 0) call velocity%find_depth(problem)
+      if (velocity%most_depth <= deep) return
+      do s = 1, size(problem%sub)
+        kept(s)%value = problem%sub(s)%impulse
+      end do
+      error_before = report%velocity_error
+      call carry_loads(problem, scheme%work, report%layered_sweeps)
+      if (.not. report%layered_sweeps > 0.0_dp) return
+      report%layered = .true.
+      trial_end = report%iterations + trial
+      call begin_anew(error)
+    end subroutine try_layers
+
+    !> Go on from the pass over layers where it has brought something, else from the impulses before it. Collective.
+    subroutine judge_layers(error)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: s
+
+      call complete_estimate()
+      if (report%velocity_error < worth_keeping*error_before) return
+      report%layered = .false.
+      do s = 1, size(problem%sub)
+        problem%sub(s)%impulse(:, :, :) = kept(s)%value
+      end do
+      call begin_anew(error)
+    end subroutine judge_layers
+
+    !> The method starts anew from the impulses that the problem holds now.
+    subroutine begin_anew(error)
+      type(error_t), allocatable, intent(inout) :: error
+
+      call scheme%start(problem, error)
+      scheme%work%solves = scheme%work%solves - 1
+      call velocity%forget_copies(report%iterations)
+      ratio = 0.0_dp
+    end subroutine begin_anew
 
     !> What the goal is compared with.
     subroutine take_figure()

@@ -18,7 +18,7 @@
 module gravier_velocity_error
   use gravier_kinds, only: dp, i8
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
-  use gravier_contact_kernels, only: lanes, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: scheme_t
   use gravier_dense_direct, only: projected_square
@@ -33,8 +33,12 @@ module gravier_velocity_error
   !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
   integer, parameter :: n_copies = 2, first_copy = 2
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
-  !> test impulses at most: w/W, r, the change of the last iteration, those since the copies
-  integer, parameter :: most_tests = 3 + n_copies
+  !> test impulses at most: free are w/W, r, the change of the last iteration, that since the older copy; held the first three
+  integer, parameter :: most_tests = 7
+  !> kinds of test impulses; those since the copies are 1 to n_copies
+  integer, parameter :: test_correction = -2, test_load = -1, test_last = 0, test_none = -3
+  !> share of its limit from which on a component counts as at it
+  real(dp), parameter :: within = 1.0_dp - 1.0e-9_dp
   !> share of the largest free speed below which the shift of a closed contact is rounding of places
   real(dp), parameter :: rounded = 1.0e-3_dp
   !> no way leads to what moves as prescribed
@@ -42,18 +46,19 @@ module gravier_velocity_error
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
 
-  !> A state of one subdomain some iterations ago.
+  !> The impulses of one subdomain some iterations ago (lanes, nc, blocks) [N s].
   type :: copy_t
-    !> (lanes, nc, blocks) [N s], (nv, n_columns) [m/s, rad/s]
-    real(dp), allocatable :: impulse(:, :, :), velocity(:, :)
+    real(dp), allocatable :: impulse(:, :, :)
   end type copy_t
 
   !> What the estimate holds for one subdomain.
   type :: error_part_t
-    !> P - r [N s] and w [m/s] of each contact (lanes, nc, blocks)
-    real(dp), allocatable :: correction(:, :, :), violation(:, :, :)
-    !> H y of a test impulse, and M^-1 of it, summed over copies of bodies (nv, n_columns)
-    real(dp), allocatable :: motion(:, :)
+    !> P - r [N s] and w [m/s] of each contact, 1 where a component of its impulse is free, a test impulse [N s] (lanes, nc, blocks)
+    real(dp), allocatable :: correction(:, :, :), violation(:, :, :), mask(:, :, :), test(:, :, :)
+    !> H y of the test impulses, summed over copies of bodies (nv, n_columns, most_tests) [N s, N m s]
+    real(dp), allocatable :: motion(:, :, :)
+    !> y . w of the test impulses [J]
+    real(dp) :: power(most_tests) = 0.0_dp
     type(copy_t) :: copy(n_copies)
     !> contacts to what moves as prescribed, of each body (n_columns)
     integer, allocatable :: depth(:)
@@ -83,7 +88,7 @@ module gravier_velocity_error
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: find_depth => velocity_error_find_depth
-    procedure :: depth_of => velocity_error_depth_of
+    procedure :: forget_copies => velocity_error_forget_copies
   end type velocity_error_t
 
 contains
@@ -115,12 +120,10 @@ contains
     self%rest_is_admissible = .not. problem%comm%any_true(moves)
   end subroutine velocity_error_start
 
-  !> Keep a copy of impulses and velocities after an iteration, where one is due. Collective.
-  subroutine velocity_error_keep_copy(self, problem, scheme, iteration)
+  !> Keep a copy of the impulses after an iteration, where one is due.
+  subroutine velocity_error_keep_copy(self, problem, iteration)
     class(velocity_error_t), intent(inout) :: self
-    !> v_global is made anew where the method's own velocities are not those of the whole
-    type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
+    type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: iteration
     integer :: s
 
@@ -129,16 +132,8 @@ contains
     self%place(:) = n_copies + 1 - self%place
     self%taken_at(1) = self%taken_at(2)
     self%taken_at(2) = iteration
-    if (.not. scheme%velocities_are_global) call problem%evaluate()
     do s = 1, size(self%part)
-      associate (copy => self%part(s)%copy(self%place(2)), sub => problem%sub(s))
-        copy%impulse = sub%impulse
-        if (scheme%velocities_are_global) then
-          copy%velocity = sub%velocity
-        else
-          copy%velocity = sub%v_global
-        end if
-      end associate
+      self%part(s)%copy(self%place(2))%impulse = problem%sub(s)%impulse
     end do
   end subroutine velocity_error_keep_copy
 
@@ -164,31 +159,98 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     class(scheme_t), intent(in) :: scheme
     integer, intent(in) :: iteration
-    !> b, then the columns of the upper triangle of G, of each subdomain, and their sums
-    real(dp), allocatable :: parts(:, :), sums(:), b(:), g(:, :)
+    !> of each subdomain, and over all: b, then the columns of the upper triangle of G, of the free and of the held test impulses
+    real(dp), allocatable :: parts(:, :), sums(:)
     real(dp) :: largest(1)
-    logical :: with_last
-    integer :: s, i, j, n, at
+    integer :: s, n, n_free, n_held, recent
 
-    with_last = scheme%momentum%on .and. .not. scheme%momentum%resting .and. scheme%velocities_are_global .and. iteration > 0
-    n = 2 + merge(1, 0, with_last) + count(self%taken_at > 0 .and. self%taken_at < iteration)
     do s = 1, size(problem%sub)
       call find_violations(problem, s, self%part(s))
     end do
-    call spread_corrections(problem, self%part)
-    allocate (parts(n + n*(n + 1)/2, size(problem%sub)), sums(n + n*(n + 1)/2), b(n), g(n, n))
-    parts(:, :) = 0.0_dp
+    recent = test_none
+    if (self%taken_at(2) > 0 .and. self%taken_at(2) < iteration) recent = 2
+    if (self%taken_at(1) > 0 .and. recent == test_none) recent = 1
+    if (scheme%momentum%on .and. .not. scheme%momentum%resting .and. iteration > 0) recent = test_last
+    n = 0
+    call add_test(test_correction, .false.)
+    call add_test(test_load, .false.)
+    call add_test(recent, .false.)
+    if (self%taken_at(1) > 0) call add_test(1, .false.)
+    n_free = n
+    call add_test(test_correction, .true.)
+    call add_test(test_load, .true.)
+    call add_test(recent, .true.)
+    n_held = n - n_free
+    allocate (parts(n_sums(n_free) + n_sums(n_held), size(problem%sub)), sums(n_sums(n_free) + n_sums(n_held)))
     largest(1) = 0.0_dp
     do s = 1, size(problem%sub)
-      call add_tests(self, problem, scheme, s, iteration, with_last, parts(:, s))
-      if (problem%sub(s)%n_contacts > 0) largest(1) = max(largest(1), maxval(sum(self%part(s)%violation**2, dim=2)))
+      associate (sub => problem%sub(s), part => self%part(s), held => n_sums(n_free))
+        parts(1:n_free, s) = part%power(1:n_free)
+        call add_products(sub, part%motion(:, :, 1:n_free), parts(n_free + 1:held, s))
+        parts(held + 1:held + n_held, s) = part%power(n_free + 1:n)
+        call add_products(sub, part%motion(:, :, n_free + 1:n), parts(held + n_held + 1:, s))
+        if (sub%n_contacts > 0) largest(1) = max(largest(1), largest_square(part%violation))
+      end associate
     end do
     call start_timer(phase_reduction)
     call problem%comm%sum_parts(parts, sums)
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
     self%largest_violation = sqrt(largest(1))
-    b(:) = sums(1:n)
+    self%projection = sqrt(sqrt(projection_of(n_free, sums(1:n_sums(n_free)))* &
+      & projection_of(n_held, sums(n_sums(n_free) + 1:)))/self%mass)
+
+  contains
+
+    !> One more test impulse: its product with w and the velocities that it makes.
+    subroutine add_test(kind, held)
+      integer, intent(in) :: kind
+      !> without what slides or opens
+      logical, intent(in) :: held
+
+      if (kind == test_none) return
+      n = n + 1
+      do s = 1, size(problem%sub)
+        associate (sub => problem%sub(s), part => self%part(s))
+          select case (kind)
+          case (test_correction)
+            part%test(:, :, :) = part%correction
+          case (test_load)
+            part%test(:, :, :) = sub%impulse
+          case (test_last)
+            part%test(:, :, :) = sub%impulse - scheme%momentum%part(s)%impulse
+          case default
+            part%test(:, :, :) = sub%impulse - part%copy(self%place(kind))%impulse
+          end select
+          if (held) part%test(:, :, :) = part%mask*part%test
+          part%power(n) = contact_product(part%test, part%violation)
+          part%motion(:, :, n) = 0.0_dp
+          call problem%kernels%add_reaction(sub%pair, sub%hot, part%test, part%motion(:, :, n))
+          call problem%shared%load(s, part%motion(:, :, n))
+        end associate
+      end do
+      call problem%shared%pass()
+      do s = 1, size(problem%sub)
+        call problem%shared%sum_copies(s, self%part(s)%motion(:, :, n), mean=.false.)
+      end do
+    end subroutine add_test
+
+  end subroutine velocity_error_project
+
+  !> Numbers in b and the upper triangle of G of so many test impulses.
+  pure integer function n_sums(n_tests)
+    integer, intent(in) :: n_tests
+    n_sums = n_tests + n_tests*(n_tests + 1)/2
+  end function n_sums
+
+  !> b^T G^+ b [J].
+  real(dp) function projection_of(n, sums) result(square)
+    integer, intent(in) :: n
+    !> b, then the columns of the upper triangle of G
+    real(dp), intent(in), contiguous :: sums(:)
+    real(dp) :: g(n, n)
+    integer :: i, j, at
+
     at = n
     do j = 1, n
       do i = 1, j
@@ -197,120 +259,140 @@ contains
         g(j, i) = sums(at)
       end do
     end do
-    self%projection = sqrt(projected_square(g, b, rank_cut)/self%mass)
-  end subroutine velocity_error_project
+    square = projected_square(g, sums(1:n), rank_cut)
+  end function projection_of
 
-  !> P - r and w of the contacts of a subdomain.
+  !> P - r, w and the mask of the contacts of a subdomain.
   subroutine find_violations(problem, s, part)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
     type(error_part_t), intent(inout) :: part
 
-    associate (sub => problem%sub(s))
+    associate (sub => problem%sub(s), kernels => problem%kernels)
       if (.not. allocated(part%correction)) then
-        allocate (part%correction, part%violation, mold=sub%impulse)
-        allocate (part%motion, mold=sub%v_global)
+        allocate (part%correction, part%violation, part%mask, part%test, mold=sub%impulse)
+        allocate (part%motion(kernels%nv, sub%n_columns, most_tests))
       end if
-      call problem%kernels%violation(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, part%correction, &
-        & part%violation)
+      call kernels%violation(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, part%correction, part%violation)
+      call find_mask(kernels, sub%hot, sub%impulse, part%correction, part%mask)
     end associate
   end subroutine find_violations
 
-  !> M^-1 H (P - r), summed over the copies of bodies, into `motion`. Collective.
-  subroutine spread_corrections(problem, part)
-    type(contact_problem_t), intent(inout) :: problem
-    type(error_part_t), intent(inout) :: part(:)
-    integer :: s, b, d
+  !> 1 where a component of an impulse is free to answer a change of velocity, 0 where its contact opens, or where it slides or
+  !> rolls at its limit: what such a component lacks is not known.
+  subroutine find_mask(kernels, hot, impulse, correction, mask)
+    type(kernels_t), intent(in) :: kernels
+    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :), correction(:, :, :)
+    !> (lanes, nc, blocks)
+    real(dp), intent(inout), contiguous :: mask(:, :, :)
+    real(dp) :: normal(lanes)
+    integer :: g
 
-    do s = 1, size(part)
-      associate (sub => problem%sub(s))
-        part(s)%motion(:, :) = 0.0_dp
-        call problem%kernels%add_reaction(sub%pair, sub%hot, part(s)%correction, part(s)%motion)
-        call problem%shared%load(s, part(s)%motion)
-      end associate
+    do g = 1, size(mask, 3)
+      normal(:) = impulse(:, 1, g) + correction(:, 1, g)
+      mask(:, 1, g) = merge(1.0_dp, 0.0_dp, normal > 0.0_dp)
+      if (kernels%nf > 1) call limit(kernels%friction_row, 2, kernels%nf)
+      if (kernels%rolling_row == 0) cycle
+      call limit(kernels%rolling_row + 3, kernels%nf + 1, kernels%nf + kernels%nd - 1)
+      if (kernels%nd == 3) call limit(kernels%rolling_row + 4, 6, 6)
     end do
-    call problem%shared%pass()
-    do s = 1, size(part)
-      call problem%shared%sum_copies(s, part(s)%motion, mean=.false.)
-      associate (inverse => problem%sub(s)%inverse_mass)
-        do b = 1, size(inverse, 2)
-          do d = 1, size(part(s)%motion, 1)
-            part(s)%motion(d, b) = inverse(min(d, size(inverse, 1)), b)*part(s)%motion(d, b)
-          end do
-        end do
-      end associate
-    end do
-  end subroutine spread_corrections
-
-  !> The products of the test impulses with w, and those of the velocities they make with each other, in one subdomain.
-  subroutine add_tests(self, problem, scheme, s, iteration, with_last, sums)
-    class(velocity_error_t), intent(in) :: self
-    type(contact_problem_t), intent(in) :: problem
-    class(scheme_t), intent(in) :: scheme
-    integer, intent(in) :: s, iteration
-    logical, intent(in) :: with_last
-    real(dp), intent(inout), contiguous :: sums(:)
-    real(dp) :: load
-    integer :: k, n
-
-    associate (sub => problem%sub(s), part => self%part(s))
-      load = sum(sub%impulse*part%violation)
-      sums(1) = sum(part%correction*part%violation)
-      sums(2) = load
-      n = 2
-      if (with_last) then
-        n = 3
-        sums(n) = load - sum(scheme%momentum%part(s)%impulse*part%violation)
-      end if
-      do k = 1, n_copies
-        if (.not. (self%taken_at(k) > 0 .and. self%taken_at(k) < iteration)) cycle
-        n = n + 1
-        sums(n) = load - sum(part%copy(self%place(k))%impulse*part%violation)
-      end do
-      call add_products()
-    end associate
 
   contains
 
-    !> G, body by body.
-    subroutine add_products()
-      real(dp) :: h(problem%kernels%nv, most_tests), weighed(problem%kernels%nv), inverse, share
-      integer :: b, d, i, j, m, at
+    !> Components `a` to `z`, bounded together by the coefficient in a row of `hot` times the normal impulse.
+    subroutine limit(row, a, z)
+      integer, intent(in) :: row, a, z
+      real(dp) :: squares(lanes)
+      integer :: k
 
-      associate (sub => problem%sub(s), part => self%part(s))
-        do b = 1, sub%n_bodies
-          h(:, 1) = part%motion(:, b)
-          h(:, 2) = sub%v_global(:, b) - sub%v_free(:, b)
-          m = 2
-          if (with_last) then
-            m = 3
-            h(:, 3) = sub%v_global(:, b) - scheme%momentum%part(s)%velocity(:, b)
-          end if
-          do k = 1, n_copies
-            if (.not. (self%taken_at(k) > 0 .and. self%taken_at(k) < iteration)) cycle
-            m = m + 1
-            h(:, m) = sub%v_global(:, b) - part%copy(self%place(k))%velocity(:, b)
+      squares(:) = 0.0_dp
+      do k = a, z
+        squares(:) = squares + (impulse(:, k, g) + correction(:, k, g))**2
+      end do
+      do k = a, z
+        mask(:, k, g) = merge(mask(:, 1, g), 0.0_dp, squares < (within*hot(:, row, g)*normal)**2)
+      end do
+    end subroutine limit
+
+  end subroutine find_mask
+
+  !> The products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j, in groups of bodies that the compiler makes vectors of.
+  subroutine add_products(sub, motion, products)
+    type(subproblem_t), intent(in) :: sub
+    !> H y (nv, n_columns, tests)
+    real(dp), intent(in), contiguous :: motion(:, :, :)
+    !> (tests (tests + 1)/2)
+    real(dp), intent(out), contiguous :: products(:)
+    real(dp) :: h(lanes, size(motion, 1), size(motion, 3)), inverse(lanes, size(motion, 1)), acting(lanes, size(products))
+    integer :: b, d, q, i, j, at, last
+
+    acting(:, :) = 0.0_dp
+    do b = 1, sub%n_bodies, lanes
+      last = min(lanes, sub%n_bodies - b + 1)
+      h(last + 1:, :, :) = 0.0_dp
+      inverse(last + 1:, :) = 0.0_dp
+      do q = 1, last
+        do j = 1, size(motion, 3)
+          do d = 1, size(motion, 1)
+            h(q, d, j) = motion(d, b + q - 1, j)
           end do
-          share = 1.0_dp/sub%multiplicity(b)
-          at = m
-          do j = 1, m
-            do d = 1, size(weighed)
-              inverse = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b)
-              weighed(d) = 0.0_dp
-              if (inverse > 0.0_dp) weighed(d) = share*h(d, j)/inverse
-            end do
-            do i = 1, j
-              at = at + 1
-              do d = 1, size(weighed)
-                sums(at) = sums(at) + weighed(d)*h(d, i)
-              end do
+        end do
+        do d = 1, size(motion, 1)
+          inverse(q, d) = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b + q - 1)/sub%multiplicity(b + q - 1)
+        end do
+      end do
+      at = 0
+      do j = 1, size(motion, 3)
+        do i = 1, j
+          at = at + 1
+          do d = 1, size(motion, 1)
+            do q = 1, lanes
+              acting(q, at) = acting(q, at) + inverse(q, d)*h(q, d, j)*h(q, d, i)
             end do
           end do
         end do
-      end associate
-    end subroutine add_products
+      end do
+    end do
+    products(:) = sum(acting, dim=1)
+  end subroutine add_products
 
-  end subroutine add_tests
+  !> The largest |w|^2 of a contact [m^2/s^2].
+  pure real(dp) function largest_square(violation) result(largest)
+    !> (lanes, nc, blocks)
+    real(dp), intent(in), contiguous :: violation(:, :, :)
+    real(dp) :: squares(lanes), most(lanes)
+    integer :: q, k, g
+
+    most(:) = 0.0_dp
+    do g = 1, size(violation, 3)
+      squares(:) = 0.0_dp
+      do k = 1, size(violation, 2)
+        do q = 1, lanes
+          squares(q) = squares(q) + violation(q, k, g)**2
+        end do
+      end do
+      most(:) = max(most, squares)
+    end do
+    largest = maxval(most)
+  end function largest_square
+
+  !> Sum of a . b over the contacts, lane by lane.
+  pure real(dp) function contact_product(a, b) result(total)
+    !> (lanes, nc, blocks)
+    real(dp), intent(in), contiguous :: a(:, :, :), b(:, :, :)
+    real(dp) :: acting(lanes)
+    integer :: q, k, g
+
+    acting(:) = 0.0_dp
+    do g = 1, size(a, 3)
+      do k = 1, size(a, 2)
+        do q = 1, lanes
+          acting(q) = acting(q) + a(q, k, g)*b(q, k, g)
+        end do
+      end do
+    end do
+    total = sum(acting)
+  end function contact_product
 
   !> L, after `project`. Collective.
   subroutine velocity_error_add_levels(self, problem)
@@ -525,11 +607,14 @@ contains
     end do
   end subroutine search_breadth_first
 
-  !> Depth of body `b` of subdomain `s` of this rank, negative where no way leads to what is prescribed; after `find_depth`.
-  pure integer function velocity_error_depth_of(self, s, b) result(depth)
-    class(velocity_error_t), intent(in) :: self
-    integer, intent(in) :: s, b
-    depth = self%part(s)%depth(b)
-  end function velocity_error_depth_of
+  !> Forget the copies: the iterations begin anew from other impulses.
+  subroutine velocity_error_forget_copies(self, iteration)
+    class(velocity_error_t), intent(inout) :: self
+    !> made so far
+    integer, intent(in) :: iteration
+
+    self%taken_at(:) = 0
+    self%next_copy = iteration + first_copy
+  end subroutine velocity_error_forget_copies
 
 end module gravier_velocity_error

@@ -1,0 +1,507 @@
+!> A start that carries loads across: impulses layer by layer from the free surface to the supports.
+!>
+!> Sweeps carry a load one grain further each, momentum 0.35 diameters each. From a cold start a packing of height H therefore takes
+!> a number of iterations in proportion to H. Here the packing is cut into layers by the way to its supports. Each layer in turn is
+!> solved by sweeps with momentum on what lies below, which stands still; what it presses with is then handed to the next. All
+!> layers together take a number of sweeps over the whole packing that does not depend on H.
+!>
+!>   roots   boundaries against which the load presses: the mean over their contacts of -n . u/|u|, u the load's change of velocity in
+!>           a step, is above `least_pressing`
+!>   way     length of the shortest way from a body to a root over closed contacts, in mean diameters
+!>   layer   `thickness` diameters of way; the first is the farthest. A contact belongs to the layer of its farther body.
+!>   halo    the bodies of the next `halo` diameters below a layer move with it; their impulses are thrown away afterwards.
+!>
+!> Subdomains go through the layers together; a layer is solved by iterations of NSCDD. Results do not depend on ranks. See
+!> doc/theory.md, section 25.
+module gravier_layered_start
+  use gravier_kinds, only: dp
+  use gravier_timers, only: start_timer, stop_timer, phase_sweep
+  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_scheme, only: momentum_t, work_t
+  use gravier_sweep_order, only: group_contacts
+  implicit none
+  private
+  public :: carry_loads
+
+  !> mean of -n . u/|u| over the contacts of a boundary from which on it supports
+  real(dp), parameter :: least_pressing = 0.3_dp
+  !> of a layer and of the halo below it, in mean diameters
+  real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
+  !> sweeps of a layer: where there are few layers; more for each layer above that number; at most
+  integer, parameter :: few_layers = 9, few_sweeps = 30, more_sweeps = 3, most_sweeps = 80
+  !> way of what no way leads to
+  real(dp), parameter :: unreached = huge(1.0_dp)
+
+  !> What one subdomain holds while the layers are gone through.
+  type :: layers_t
+    !> way to a root [mean diameters], layer from 0, the roots and other prescribed bodies in a last one (n_columns)
+    real(dp), allocatable :: way(:)
+    integer, allocatable :: layer(:)
+    !> the longest way of the scene [mean diameters]
+    real(dp) :: longest = 0.0_dp
+    !> contacts by layer, and the first of each layer (layers + 1)
+    integer, allocatable :: contact(:), first(:)
+    !> velocity under the impulses of the layers done (nv, n_columns)
+    real(dp), allocatable :: loaded(:, :)
+    !> work space: velocity and weight in a layer, impulses it hands on (nv or nw, n_columns)
+    real(dp), allocatable :: velocity(:, :), weight(:, :), reaction(:, :)
+    !> bodies of a layer that move, and their velocities one iteration before (nv, size(movable))
+    integer, allocatable :: movable(:)
+    real(dp), allocatable :: previous(:, :)
+    !> contacts of a layer and of its halo, in sweep order; those of the layer alone are marked
+    integer, allocatable :: taken(:)
+    logical, allocatable :: own(:)
+    integer :: n_grouped = 0
+    integer, allocatable :: pair(:, :)
+    real(dp), allocatable :: hot(:, :, :), impulse(:, :, :), last_impulse(:, :, :), start_impulse(:, :, :)
+  end type layers_t
+
+contains
+
+  !> Replace the impulses of the problem by those of a pass over all layers, which starts from them. Nothing changes where no
+  !> boundary supports the load. Collective.
+  subroutine carry_loads(problem, work, sweeps)
+    !> with a uniform load
+    type(contact_problem_t), intent(inout) :: problem
+    !> takes the relaxations
+    type(work_t), intent(inout) :: work
+    !> over all contacts, that relax as many as the pass did; 0 where there are no layers
+    real(dp), intent(out) :: sweeps
+    type(layers_t) :: layers(size(problem%sub))
+    real(dp) :: relaxed(1, size(problem%sub)), sums(1)
+    integer :: n_layers, l, s, inner
+
+    sweeps = 0.0_dp
+    call find_ways(problem, layers)
+    call cut_layers(problem, layers, n_layers)
+    if (n_layers < 2) return
+    call start_timer(phase_sweep)
+    call start_velocities(problem, layers)
+    inner = min(most_sweeps, few_sweeps + more_sweeps*max(0, n_layers - few_layers))
+    relaxed(:, :) = 0.0_dp
+    do l = 0, n_layers - 1
+      do s = 1, size(layers)
+        call take_layer(problem, l, s, layers(s))
+        relaxed(1, s) = relaxed(1, s) + real(inner, dp)*size(layers(s)%taken)
+      end do
+      call solve_layer(problem, inner, layers)
+      call hand_on(problem, layers)
+    end do
+    call stop_timer(phase_sweep)
+    work%relaxations = work%relaxations + nint(sum(relaxed), kind(work%relaxations))
+    call problem%comm%sum_parts(relaxed, sums)
+    sweeps = sums(1)/max(1.0_dp, real(problem%n_contacts, dp))
+  end subroutine carry_loads
+
+  !> The way of every body to the boundaries against which the load presses. Collective.
+  subroutine find_ways(problem, layers)
+    type(contact_problem_t), intent(inout) :: problem
+    type(layers_t), intent(inout) :: layers(:)
+    !> of one subdomain: -n . u and the number of its contacts, by boundary (2 boundaries); radii and number of grains
+    real(dp), allocatable :: parts(:, :), sums(:)
+    real(dp) :: diameter, highest(1)
+    integer :: s, c, n
+
+    n = 0
+    do s = 1, size(layers)
+      if (size(problem%sub(s)%boundary) > 0) n = max(n, maxval(problem%sub(s)%boundary))
+    end do
+    highest(1) = n
+    call problem%comm%highest_of(highest)
+    n = nint(highest(1))
+    allocate (parts(2*n + 2, size(layers)), sums(2*n + 2))
+    parts(:, :) = 0.0_dp
+    do s = 1, size(layers)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          call add_pressing(sub%pair(1, c), -1.0_dp)
+          call add_pressing(sub%pair(2, c), 1.0_dp)
+        end do
+        parts(2*n + 1, s) = sum(sub%radius)
+        parts(2*n + 2, s) = sub%n_grains
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    diameter = 2.0_dp*sums(2*n + 1)/max(1.0_dp, sums(2*n + 2))
+    do s = 1, size(layers)
+      allocate (layers(s)%way(problem%sub(s)%n_columns))
+      layers(s)%way(:) = unreached
+      call start_ways(problem%sub(s), layers(s)%way)
+    end do
+    call spread_ways(problem, diameter, layers)
+
+  contains
+
+    !> A contact with body `b`, towards which its normal points from the grain where `side` is -1.
+    subroutine add_pressing(b, side)
+      integer, intent(in) :: b
+      real(dp), intent(in) :: side
+      integer :: d, k
+
+      associate (sub => problem%sub(s))
+        if (b <= sub%n_bodies) return
+        k = sub%boundary(b)
+        do d = 1, problem%kernels%nd
+          parts(k, s) = parts(k, s) - side*sub%hot(lane_of(c), d, block_of(c))*problem%load(d)
+        end do
+        parts(n + k, s) = parts(n + k, s) + 1.0_dp
+      end associate
+    end subroutine add_pressing
+
+    !> Roots have a way of 0.
+    subroutine start_ways(sub, way)
+      type(subproblem_t), intent(in) :: sub
+      real(dp), intent(inout) :: way(:)
+      integer :: b, k
+
+      do b = sub%n_bodies + 1, sub%n_columns
+        k = sub%boundary(b)
+        if (sums(k) > least_pressing*norm2(problem%load(1:problem%kernels%nd))*sums(n + k)) way(b) = 0.0_dp
+      end do
+    end subroutine start_ways
+
+  end subroutine find_ways
+
+  !> Shortest ways from those that are known, over closed contacts, across subdomains. Collective.
+  subroutine spread_ways(problem, diameter, layers)
+    type(contact_problem_t), intent(inout) :: problem
+    !> unit of ways [m]
+    real(dp), intent(in) :: diameter
+    type(layers_t), intent(inout) :: layers(:)
+    real(dp), allocatable :: field(:, :)
+    integer :: s, j
+    logical :: changed, shares
+
+    shares = .false.
+    do s = 1, size(layers)
+      shares = shares .or. problem%shared%part(s)%n_slots > 0
+      call shorten_ways(problem%sub(s), diameter, layers(s)%way)
+    end do
+    if (.not. problem%comm%any_true(shares)) return
+    do
+      do s = 1, size(layers)
+        allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+        field(1, :) = layers(s)%way
+        call problem%shared%load(s, field)
+        deallocate (field)
+      end do
+      call problem%shared%pass()
+      changed = .false.
+      do s = 1, size(layers)
+        associate (shared => problem%shared%part(s), way => layers(s)%way)
+          shares = .false.
+          do j = 1, shared%n_slots
+            if (.not. shared%recv(1, j) < way(shared%slot_body(j))) cycle
+            way(shared%slot_body(j)) = shared%recv(1, j)
+            shares = .true.
+          end do
+          if (shares) call shorten_ways(problem%sub(s), diameter, way)
+          changed = changed .or. shares
+        end associate
+      end do
+      if (.not. problem%comm%any_true(changed)) exit
+    end do
+  end subroutine spread_ways
+
+  !> Shorten ways over the contacts of a subdomain until none can be shortened: the ways do not depend on the order, because each is
+  !> a sum from the root on. What is prescribed hands on no way but that of a root.
+  subroutine shorten_ways(sub, diameter, way)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(in) :: diameter
+    real(dp), intent(inout), contiguous :: way(:)
+    real(dp) :: length
+    integer :: c, i, j
+    logical :: shortened, forth
+
+    forth = .true.
+    do
+      shortened = .false.
+      ! there and back: contacts lie in memory about as the bodies do in space
+      do c = merge(1, sub%n_contacts, forth), merge(sub%n_contacts, 1, forth), merge(1, -1, forth)
+        if (sub%gap(c) > 0.0_dp .and. .not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+        i = sub%pair(1, c)
+        j = sub%pair(2, c)
+        length = sub%gap(c)
+        if (i <= sub%n_grains) length = length + sub%radius(i)
+        if (j <= sub%n_grains) length = length + sub%radius(j)
+        length = length/diameter
+        if (i <= sub%n_bodies .and. way(j) + length < way(i)) then
+          way(i) = way(j) + length
+          shortened = .true.
+        end if
+        if (j <= sub%n_bodies .and. way(i) + length < way(j)) then
+          way(j) = way(i) + length
+          shortened = .true.
+        end if
+      end do
+      if (.not. shortened) exit
+      forth = .not. forth
+    end do
+  end subroutine shorten_ways
+
+  !> The layer of every body and the contacts of every layer. Collective.
+  subroutine cut_layers(problem, layers, n_layers)
+    type(contact_problem_t), intent(in) :: problem
+    type(layers_t), intent(inout) :: layers(:)
+    !> 0 where no body has a way to a root
+    integer, intent(out) :: n_layers
+    integer, allocatable :: next(:)
+    real(dp) :: longest
+    integer :: s, b, c, l
+
+    longest = 0.0_dp
+    do s = 1, size(layers)
+      do b = 1, problem%sub(s)%n_bodies
+        if (layers(s)%way(b) < unreached) longest = max(longest, layers(s)%way(b))
+      end do
+    end do
+    longest = problem%comm%highest(longest)
+    n_layers = ceiling(longest/thickness)
+    if (n_layers < 2) return
+    do s = 1, size(layers)
+      associate (sub => problem%sub(s), this => layers(s))
+        ! what hangs on nothing comes first
+        this%way(1:sub%n_bodies) = min(this%way(1:sub%n_bodies), longest)
+        this%longest = longest
+        allocate (this%layer(sub%n_columns), source=n_layers)
+        do b = 1, sub%n_bodies
+          this%layer(b) = min(n_layers - 1, floor((longest - this%way(b))/thickness))
+        end do
+        allocate (this%first(0:n_layers), this%contact(sub%n_contacts), next(0:n_layers), source=0)
+        do c = 1, sub%n_contacts
+          l = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c)))
+          next(l) = next(l) + 1
+        end do
+        this%first(0) = 1
+        do l = 1, n_layers
+          this%first(l) = this%first(l - 1) + next(l - 1)
+        end do
+        next(:) = this%first
+        do c = 1, sub%n_contacts
+          l = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c)))
+          this%contact(next(l)) = c
+          next(l) = next(l) + 1
+        end do
+        deallocate (next)
+      end associate
+    end do
+  end subroutine cut_layers
+
+  !> The velocities under the impulses that there are; nothing moves yet but what is prescribed. Collective.
+  subroutine start_velocities(problem, layers)
+    type(contact_problem_t), intent(inout) :: problem
+    type(layers_t), intent(inout) :: layers(:)
+    integer :: s
+
+    call problem%evaluate()
+    do s = 1, size(layers)
+      associate (sub => problem%sub(s), this => layers(s))
+        this%loaded = sub%v_global
+        this%velocity = sub%v_free
+        this%velocity(:, 1:sub%n_bodies) = 0.0_dp
+        allocate (this%weight, mold=sub%weight)
+        this%weight(:, :) = 0.0_dp
+        allocate (this%reaction, mold=sub%reaction)
+        allocate (this%movable(0))
+      end associate
+    end do
+  end subroutine start_velocities
+
+  !> Pack layer `l` with its halo: what moves, and the contacts of that. Masses of shared bodies are divided among their copies.
+  subroutine take_layer(problem, l, s, this)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: l, s
+    type(layers_t), intent(inout) :: this
+    integer, allocatable :: found(:), pair(:, :), order(:)
+    integer :: b, c, k, n, last
+    real(dp) :: lowest
+
+    associate (sub => problem%sub(s))
+      ! what moved in the layer before stands still again
+      do k = 1, size(this%movable)
+        this%weight(:, this%movable(k)) = 0.0_dp
+        this%velocity(:, this%movable(k)) = 0.0_dp
+      end do
+      deallocate (this%movable)
+      last = ubound(this%first, 1)
+      lowest = 0.0_dp
+      if (l < last - 1) lowest = this%longest - thickness*(l + 1) - halo
+      allocate (found(this%first(min(l + 2, last)) - this%first(l)))
+      n = 0
+      do k = this%first(l), this%first(min(l + 2, last)) - 1
+        c = this%contact(k)
+        if (k >= this%first(l + 1)) then
+          if (.not. (moves(sub%pair(1, c)) .or. moves(sub%pair(2, c)))) cycle
+        end if
+        n = n + 1
+        found(n) = c
+      end do
+      call list_movable()
+      if (allocated(this%previous)) deallocate (this%previous)
+      allocate (this%previous(size(this%velocity, 1), size(this%movable)))
+      do k = 1, size(this%movable)
+        this%previous(:, k) = this%velocity(:, this%movable(k))
+      end do
+      allocate (pair(2, n), order(n))
+      do k = 1, n
+        pair(:, k) = sub%pair(:, found(k))
+      end do
+      call group_contacts(pair, sub%n_bodies, order, this%n_grouped)
+      if (allocated(this%taken)) deallocate (this%taken)
+      allocate (this%taken(n))
+      do k = 1, n
+        this%taken(k) = found(order(k))
+      end do
+      call pack_contacts()
+    end associate
+
+  contains
+
+    !> Whether body `b` moves in this layer.
+    pure logical function moves(b)
+      integer, intent(in) :: b
+      moves = this%layer(b) == l .or. (this%layer(b) == l + 1 .and. l + 1 < last .and. this%way(b) >= lowest)
+    end function moves
+
+    !> The bodies of these contacts that move.
+    subroutine list_movable()
+      integer, allocatable :: list(:)
+      integer :: i, m
+
+      associate (sub => problem%sub(s))
+        allocate (list(2*n))
+        m = 0
+        do i = 1, n
+          do k = 1, 2
+            b = sub%pair(k, found(i))
+            if (b > sub%n_bodies) cycle
+            if (.not. moves(b) .or. any(this%weight(:, b) > 0.0_dp)) cycle
+            m = m + 1
+            list(m) = b
+            this%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
+            this%velocity(:, b) = this%loaded(:, b)
+          end do
+        end do
+        this%movable = list(1:m)
+      end associate
+    end subroutine list_movable
+
+    !> Contacts in sweep order, in blocks; the rest of the last block has no effect.
+    subroutine pack_contacts()
+      integer :: q, g, i
+
+      if (allocated(this%pair)) deallocate (this%pair, this%hot, this%impulse, this%own)
+      associate (sub => problem%sub(s))
+        allocate (this%pair(2, lanes*n_blocks(n)), source=1)
+        allocate (this%hot(lanes, size(sub%hot, 2), n_blocks(n)), this%impulse(lanes, size(sub%impulse, 2), n_blocks(n)), &
+          & source=0.0_dp)
+        allocate (this%own(n))
+        do i = 1, n
+          c = this%taken(i)
+          q = lane_of(i)
+          g = block_of(i)
+          this%pair(:, i) = sub%pair(:, c)
+          this%hot(q, :, g) = sub%hot(lane_of(c), :, block_of(c))
+          this%impulse(q, :, g) = sub%impulse(lane_of(c), :, block_of(c))
+          this%own(i) = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c))) == l
+        end do
+        this%last_impulse = this%impulse
+        this%start_impulse = this%impulse
+        if (n == 0) return
+        call set_operators(this%pair, this%hot, this%weight)
+      end associate
+    end subroutine pack_contacts
+
+    subroutine set_operators(pair, hot, weight)
+      integer, intent(in), contiguous :: pair(:, :)
+      real(dp), intent(inout), contiguous :: hot(:, :, :)
+      real(dp), intent(in), contiguous :: weight(:, :)
+      real(dp) :: whole(3)
+
+      whole(:) = 1.0_dp
+      call problem%kernels%set_operators(pair, hot, weight, whole)
+      hot(lane_of(n) + 1:, :, block_of(n)) = 0.0_dp
+    end subroutine set_operators
+
+  end subroutine take_layer
+
+  !> Sweeps with momentum over the contacts taken, and the exchange of NSCDD after each. Collective.
+  subroutine solve_layer(problem, inner, layers)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: inner
+    type(layers_t), intent(inout) :: layers(:)
+    type(momentum_t) :: momentum
+    real(dp) :: parts(2, size(layers)), sums(2), v
+    integer :: k, s, i, d
+
+    do k = 1, inner
+      parts(:, :) = 0.0_dp
+      do s = 1, size(layers)
+        associate (this => layers(s))
+          do i = 1, size(this%movable)
+            do d = 1, size(this%velocity, 1)
+              v = this%velocity(d, this%movable(i))
+              this%velocity(d, this%movable(i)) = v + momentum%beta*(v - this%previous(d, i))
+              this%previous(d, i) = v
+            end do
+          end do
+          if (size(this%taken) > 0) call problem%kernels%sweep_momentum(this%n_grouped, this%pair, this%hot, this%weight, &
+            & this%velocity, this%impulse, parts(:, s), momentum%beta, this%last_impulse)
+          if (problem%n_subdomains > 1) call problem%shared%load(s, this%velocity)
+        end associate
+      end do
+      if (problem%n_subdomains > 1) then
+        call problem%shared%pass()
+        do s = 1, size(layers)
+          call problem%shared%sum_copies(s, layers(s)%velocity, mean=.true.)
+        end do
+      end if
+      call problem%comm%sum_parts(parts, sums)
+      call momentum%steer(sums(1))
+    end do
+  end subroutine solve_layer
+
+  !> Keep the impulses of the layer's own contacts, and load all bodies with what they have changed by. Collective.
+  subroutine hand_on(problem, layers)
+    type(contact_problem_t), intent(inout) :: problem
+    type(layers_t), intent(inout) :: layers(:)
+    integer :: s, i, b, d, q, g
+
+    do s = 1, size(layers)
+      associate (this => layers(s), sub => problem%sub(s))
+        this%impulse(:, :, :) = this%impulse - this%start_impulse
+        do i = 1, size(this%taken)
+          q = lane_of(i)
+          g = block_of(i)
+          if (this%own(i)) then
+            associate (impulse => sub%impulse(lane_of(this%taken(i)), :, block_of(this%taken(i))))
+              impulse(:) = this%start_impulse(q, :, g) + this%impulse(q, :, g)
+            end associate
+          else
+            this%impulse(q, :, g) = 0.0_dp
+          end if
+        end do
+        this%reaction(:, :) = 0.0_dp
+        if (size(this%taken) > 0) call problem%kernels%add_reaction(this%pair, this%hot, this%impulse, this%reaction)
+        if (problem%n_subdomains > 1) call problem%shared%load(s, this%reaction)
+      end associate
+    end do
+    if (problem%n_subdomains > 1) then
+      call problem%shared%pass()
+      do s = 1, size(layers)
+        call problem%shared%sum_copies(s, layers(s)%reaction, mean=.false.)
+      end do
+    end if
+    do s = 1, size(layers)
+      associate (this => layers(s), inverse => problem%sub(s)%inverse_mass)
+        do b = 1, problem%sub(s)%n_bodies
+          do d = 1, size(this%loaded, 1)
+            this%loaded(d, b) = this%loaded(d, b) + inverse(min(d, size(inverse, 1)), b)*this%reaction(d, b)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine hand_on
+
+end module gravier_layered_start
