@@ -12,7 +12,7 @@ module gravier_error_report
   public :: write_rows, print_rows
 
   character(len=*), parameter :: header = "title,method,situation,step,iterations,residual,true_error,estimate,projection,"// &
-    & "levels,bound,depth,velocity_scale,mass,grains,contacts,subdomains,ranks,reference_residual,reference_estimate,"// &
+    & "levels,bound,depth,velocity_scale,mass,grains,contacts,subdomains,ranks,layered,layered_sweeps,reference_residual,reference_estimate,"// &
     & "reference_spread,reference_iterations,machine,compiler,flags,build,version,revision,date"
 
 contains
@@ -48,6 +48,8 @@ contains
         call table%add(row%contacts)
         call table%add(plan%config%decomposition%subdomains)
         call table%add(ranks)
+        call table%add(row%layered)
+        call table%add(row%layered_sweeps)
         call table%add(row%reference%residual)
         call table%add(row%reference%estimate)
         call table%add(row%reference%spread)

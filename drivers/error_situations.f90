@@ -64,6 +64,9 @@ module gravier_error_situations
     !> what the estimate is made of, see gravier_velocity_error; negative where the solver has kept it to itself
     real(dp) :: projection = -1.0_dp, levels = -1.0_dp, bound = -1.0_dp
     integer :: depth = -1
+    !> sweeps of a pass over layers, 0 without one, and whether the solve went on from it; of solves by the program
+    real(dp) :: layered_sweeps = 0.0_dp
+    logical :: layered = .false.
     !> all zero where the exact velocities are known
     type(reference_t) :: reference
     !> velocity that errors are compared with [m/s]; contacts, and mass of the grains in contact [kg]
@@ -332,7 +335,7 @@ contains
           call take_velocities(problem, states(:, n))
           n = n + 1
         end if
-        call velocity%keep_copy(problem, scheme, k)
+        call velocity%keep_copy(problem, k)
       end do
     end associate
     call solve_tightly(plan, simulation, reference, error)
@@ -454,6 +457,7 @@ contains
     control%tolerance = plan%tight
     control%max_iterations = plan%limit
     control%check_every = check_interval
+    control%layered = .false.
     call solve_contacts(simulation%problem, simulation%scheme, control, report, error)
     reference%residual = report%residual
     reference%estimate = report%velocity_error
@@ -493,7 +497,7 @@ contains
             call take_velocities(problem, states(:, n))
           end if
         end if
-        call velocity%keep_copy(problem, scheme, k)
+        call velocity%keep_copy(problem, k)
       end do
       scheme%momentum%on = accelerated
       if (allocated(error)) return
@@ -586,6 +590,8 @@ contains
       row%iterations = report%iterations
       row%residual = report%residual
       row%estimate = report%velocity_error
+      row%layered_sweeps = report%layered_sweeps
+      row%layered = report%layered
       call take_fields(simulation%problem, reached)
       call compare(plan, simulation, reached, row, error)
       if (allocated(error)) return
