@@ -209,7 +209,7 @@ class Packing:
                             "radius_min": 0.4 * DIAMETER, "radius_max": 0.6 * DIAMETER, "friction": self.friction,
                             "alert_distance": 0.15 * DIAMETER},
                   "time": {"step": STEP, "steps": self.steps},
-                  "solver": {"accuracy": 0.3},
+                  "solver": {"criterion": "residual", "tolerance": 1.0e-3},
                   "output": {"directory": ".", "every": 0, "contacts": False, "final_bodies": True}}
         place = directory / ("packing " + self.name)
         run(place, groups)
