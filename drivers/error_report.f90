@@ -13,7 +13,8 @@ module gravier_error_report
 
   character(len=*), parameter :: header = "title,method,situation,step,iterations,residual,true_error,estimate,projection,"// &
     & "levels,bound,depth,velocity_scale,mass,grains,contacts,subdomains,ranks,layered,layered_sweeps,"// &
-    & "reference_residual,reference_estimate,reference_spread,reference_iterations,machine,compiler,flags,build,version,revision,date"
+    & "reference_residual,reference_estimate,reference_spread,reference_iterations,"// &
+    & "machine,compiler,flags,build,version,revision,date"
 
 contains
 
