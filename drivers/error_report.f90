@@ -12,7 +12,7 @@ module gravier_error_report
   public :: write_rows, print_rows
 
   character(len=*), parameter :: header = "title,method,situation,step,iterations,residual,true_error,estimate,projection,"// &
-    & "levels,bound,depth,velocity_scale,mass,grains,contacts,subdomains,ranks,layered,layered_sweeps,"// &
+    & "levels,bound,depth,velocity_scale,mass,grains,contacts,subdomains,ranks,sweeps,seconds,layered,layered_sweeps,"// &
     & "reference_residual,reference_estimate,reference_spread,reference_iterations,"// &
     & "machine,compiler,flags,build,version,revision,date"
 
@@ -49,6 +49,8 @@ contains
         call table%add(row%contacts)
         call table%add(plan%config%decomposition%subdomains)
         call table%add(ranks)
+        call table%add(row%sweeps)
+        call table%add(row%seconds)
         call table%add(row%layered)
         call table%add(row%layered_sweeps)
         call table%add(row%reference%residual)
