@@ -91,6 +91,8 @@ module gravier_error_situations
   integer, parameter :: seed = 20
   !> sweeps between two residuals
   integer, parameter :: check_interval = 100
+  !> solves for a time
+  integer, parameter :: repetitions = 3
   !> states kept of the second half of the sweeps
   integer, parameter :: kept_states = 5
   !> an accuracy that no solve reaches: its limit of iterations ends it
@@ -555,6 +557,24 @@ contains
     if (mass > 0.0_dp) distance = sqrt(sums(1)/mass)
   end function distance
 
+  !> The least seconds of some repetitions of the solve by the program from zero impulses: other work of the machine only adds to
+  !> them. Collective.
+  subroutine time_again(simulation, seconds, error)
+    type(simulation_t), intent(inout) :: simulation
+    !> of the solve made, in; the least, out [s]
+    real(dp), intent(inout) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+    type(solve_report_t) :: report
+    integer :: k
+
+    do k = 1, repetitions
+      call set_impulses(simulation%problem)
+      call solve_contacts(simulation%problem, simulation%scheme, simulation%control, report, error, simulation%column)
+      if (allocated(error)) return
+      seconds = min(seconds, report%seconds)
+    end do
+  end subroutine time_again
+
   subroutine append(rows, row)
     type(row_t), allocatable, intent(inout) :: rows(:)
     type(row_t), intent(in) :: row
@@ -597,6 +617,9 @@ contains
       relaxed = simulation%scheme%work%relaxations
       call solve_contacts(simulation%problem, simulation%scheme, control, report, error, simulation%column)
       if (allocated(error)) return
+      seen(k)%sweeps = real(simulation%scheme%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
+      if (k == size(seen)) call time_again(simulation, report%seconds, error)
+      if (allocated(error)) return
       call take_figures(simulation, seen(k))
       seen(k)%mass = mass_of(simulation%problem)
       seen(k)%iterations = report%iterations
@@ -604,7 +627,6 @@ contains
       seen(k)%estimate = report%velocity_error
       seen(k)%layered_sweeps = report%layered_sweeps
       seen(k)%layered = report%layered
-      seen(k)%sweeps = real(simulation%scheme%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
       seen(k)%seconds = report%seconds
       call take_velocities(simulation%problem, states(:, k))
     end do

@@ -8,8 +8,11 @@ Each scene is solved for one step from several starts, and looked at after 4 to 
 the solution, which is rest or what the same solve finds when it goes on; the estimate knows neither. Both are root mean square
 velocities over the mass of the grains in contact, in units of g h, or of the velocity that loads give in a step.
 
-leaves OUT/error_states.csv (a row a state) and OUT/error.csv (a row a situation). The status is 0 where all bounds hold, 1 where one
-does not."""
+Other parts: columns and a stack that stay at rest, beside an older program if one is given; what cold starts of packings of several
+heights cost; strength and change of volume of three tests beside runs that are ten times as tight.
+
+leaves in out/error or the directory of --out a table a part, and error_states.csv (a row a state, with machine and version). The status
+is 0 where all bounds hold, 1 where one does not."""
 import argparse
 import concurrent.futures
 import csv
@@ -20,8 +23,14 @@ import time
 from pathlib import Path
 
 import numpy as np
-from study_support import BINARIES, gravier, lattice, run, write_csv, write_hdf5
+from error_cost import HEIGHT, study_cost
+from error_rest import study_rest
+from error_strength import study_strength
+from study_support import BINARIES, gravier, run, write_csv, write_hdf5
 
+from gravier.case import ENVIRONMENT
+
+PARTS = ("estimate", "rest", "cost", "strength")
 STEP = 1.0e-3  # s
 GRAVITY = 9.81  # m/s^2
 DIAMETER = 0.01  # m
@@ -290,26 +299,26 @@ def scenes():
 
 # ---- the estimate
 
-def measure(scene, out, by_program):
-    """Rows of a scene as dictionaries of text."""
+def measure(name, place, options):
+    """Rows that gravier_error finds of the case in `place`, as dictionaries of text."""
+    launcher = os.environ.get("MPIEXEC", "mpiexec")
+    done = subprocess.run([launcher, "-n", "1", str((BINARIES / "gravier_error").resolve()), "case.nml", *options], cwd=place,
+                          env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          text=True, check=False)
+    if done.returncode != 0:
+        said = [line for line in done.stdout.splitlines() if line.startswith("gravier_error: error")] or done.stdout.splitlines()[-1:]
+        sys.exit(f"{name}: gravier_error ended with status {done.returncode}: {' '.join(said)}")
+    with open(place / "error.csv", newline="", encoding="ascii") as file:
+        return [{"scene": name, **row} for row in csv.DictReader(file)]
+
+
+def measure_scene(scene, out):
+    """Rows of a scene."""
+    started = time.time()
     place = out / scene.name.replace(",", "").replace(" ", "_")
     place.mkdir(parents=True, exist_ok=True)
     (place / "case.nml").write_text(gravier.namelist(scene.make(place)), encoding="utf-8")
-    options = list(scene.options)
-    if by_program:
-        at = options.index("--situations") + 1
-        options[at] += ",program"
-    launcher = os.environ.get("MPIEXEC", "mpiexec")
-    from gravier.case import ENVIRONMENT
-    started = time.time()
-    done = subprocess.run([launcher, "-n", "1", str((BINARIES / "gravier_error").resolve()), "case.nml", "--iterations",
-                           ",".join(map(str, ITERATIONS)), *options], cwd=place, env={**ENVIRONMENT, **os.environ},
-                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-    if done.returncode != 0:
-        said = [line for line in done.stdout.splitlines() if line.startswith("gravier_error: error")] or done.stdout.splitlines()[-1:]
-        sys.exit(f"{scene.name}: gravier_error ended with status {done.returncode}: {' '.join(said)}")
-    with open(place / "error.csv", newline="", encoding="ascii") as file:
-        rows = [{"scene": scene.name, **row} for row in csv.DictReader(file)]
+    rows = measure(scene.name, place, ["--iterations", ",".join(map(str, ITERATIONS)), *scene.options])
     print(f"  {scene.name}: {rows[0]['grains'] if rows else 0} grains, {time.time() - started:.0f} s", flush=True)
     return rows
 
@@ -394,12 +403,12 @@ def judge_estimate(rows, out):
 
 
 def study_estimate(out, quick, only):
-    """Part 1: situations."""
+    """The bounds that do not hold."""
     chosen = [scene for scene in scenes() if (scene.quick or not quick) and only in scene.name]
     for packing in {id(s.share_of): s.share_of for s in chosen if s.share_of is not None}.values():
         packing.settle(out)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        rows = [row for found in pool.map(lambda scene: measure(scene, out, False), chosen) for row in found]
+        rows = [row for found in pool.map(lambda scene: measure_scene(scene, out), chosen) for row in found]
     with open(out / "error_states.csv", "w", newline="", encoding="ascii") as file:
         table = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
         table.writeheader()
@@ -407,16 +416,39 @@ def study_estimate(out, quick, only):
     return judge_estimate(rows, out)
 
 
+def at_rest(quick):
+    """(name, make) of scenes that stay at rest."""
+    found = [("column of 10", towers((10,))), ("column of 100", towers((100,))), ("columns of 10 to 160", towers((10, 20, 40, 80, 160)))]
+    if quick:
+        return [*found[:2], ("periodic tower 10 x 40", tower(10, 40))]
+    return [*found, ("column of 300", towers((300,))), ("column of 1000", towers((1000,))),
+            ("periodic tower 10 x 200", tower(10, 200))]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/error"))
-    parser.add_argument("--quick", action="store_true", help="small scenes alone")
-    parser.add_argument("--only", metavar="TEXT", default="", help="scenes that have TEXT in their name alone")
+    parser.add_argument("--quick", action="store_true", help="small scenes, few steps, no long runs")
+    parser.add_argument("--parts", metavar="LIST", default="", help=f"some of {','.join(PARTS)}; with --quick the first two, else all")
+    parser.add_argument("--only", metavar="TEXT", default="", help="of the estimate, scenes that have TEXT in their name")
+    parser.add_argument("--beside", metavar="GRAVIER", type=Path, help="an older program to run the scenes at rest with, too")
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
+    parts = options.parts.split(",") if options.parts else PARTS[:2] if options.quick else PARTS
+    if not set(parts) <= set(PARTS):
+        parser.error(f"--parts {options.parts}: expected some of {','.join(PARTS)}")
+    out = options.out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
     started = time.time()
-    failures = study_estimate(options.out, options.quick, options.only)
-    print(f"\n{time.time() - started:.0f} s; written: {options.out}/error.csv, {options.out}/error_states.csv")
+    failures = []
+    if "estimate" in parts:
+        failures += study_estimate(out, options.quick, options.only)
+    if "rest" in parts:
+        failures += study_rest(at_rest(options.quick), out, 100 if options.quick else 500, options.beside)
+    if "cost" in parts:
+        failures += study_cost(out, (4, 8) if options.quick else (13, 26, HEIGHT, 100), 6 if options.quick else 10, DIAMETER, STEP, measure)
+    if "strength" in parts:
+        failures += study_strength(out, 100 if options.quick else 0)
+    print(f"\n{time.time() - started:.0f} s; tables in {options.out}: " + ", ".join(sorted(path.name for path in out.glob("error*.csv"))))
     for failure in failures:
         print(f"NOT HELD: {failure}")
     sys.exit(1 if failures else 0)
