@@ -4,7 +4,10 @@ module gravier_fclib_report
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_csv_writer, only: csv_writer_t
-  use gravier_friction_solver, only: friction_report_t
+  use gravier_text, only: to_text
+  use gravier_delassus, only: most_impulse
+  use gravier_unbounded, only: growth_proven
+  use gravier_friction_solver, only: friction_report_t, verdict_solved, verdict_no_solution
   implicit none
   private
   public :: result_t, print_heading, print_result, open_results, add_result, write_profile
@@ -18,7 +21,8 @@ module gravier_fclib_report
     type(friction_report_t) :: report
   end type result_t
 
-  character(len=*), parameter :: columns = "problem,dimension,contacts,method,sweeps,newton_steps,seconds,e,es,converged"
+  character(len=*), parameter :: columns = &
+    & "problem,dimension,contacts,method,sweeps,newton_steps,seconds,e,es,converged,verdict,proof"
 
 contains
 
@@ -33,9 +37,48 @@ contains
     width = max(46, len(result%problem))
     write (output_unit, "(a, i9, 2x, a8, 2i8, es11.3, 2es9.1, 2x, a)") result%problem//repeat(" ", width - len(result%problem)), &
       & result%contacts, result%method, result%report%sweeps, result%report%newton_steps, result%seconds, &
-      & result%report%literature, result%report%consistent, trim(merge("converged    ", "NOT CONVERGED", result%report%converged))
+      & result%report%literature, result%report%consistent, status_text(result%report)
     flush (output_unit)
   end subroutine print_result
+
+  !> The verdict in words.
+  pure function status_text(report) result(text)
+    type(friction_report_t), intent(in) :: report
+    character(len=:), allocatable :: text
+
+    select case (report%verdict)
+    case (verdict_solved)
+      text = "converged"
+    case (verdict_no_solution)
+      text = "no solution found: loads grow without bound, most at contact "//to_text(report%growth%contact)// &
+        & trim(merge(" (proven)", "         ", is_proven(report)))
+    case default
+      text = "NOT CONVERGED"
+      if (.not. report%impulse <= most_impulse) text = text//": the impulse of contact "//to_text(report%worst(2))// &
+        & " is beyond what loads can make"
+    end select
+  end function status_text
+
+  !> Whether the growth of the impulses proves that there is no solution.
+  pure logical function is_proven(report)
+    type(friction_report_t), intent(in) :: report
+    is_proven = report%verdict == verdict_no_solution .and. report%growth%kind == growth_proven
+  end function is_proven
+
+  !> The verdict in a word, for tables.
+  pure function verdict_name(report) result(name)
+    type(friction_report_t), intent(in) :: report
+    character(len=:), allocatable :: name
+
+    select case (report%verdict)
+    case (verdict_solved)
+      name = "solved"
+    case (verdict_no_solution)
+      name = "no_solution"
+    case default
+      name = "not_converged"
+    end select
+  end function verdict_name
 
   subroutine open_results(table, path, error)
     type(csv_writer_t), intent(inout) :: table
@@ -59,6 +102,8 @@ contains
     call table%add(result%report%literature)
     call table%add(result%report%consistent)
     call table%add(merge(1, 0, result%report%converged))
+    call table%add(verdict_name(result%report))
+    call table%add(merge(1, 0, is_proven(result%report)))
     call table%end_row(error)
   end subroutine add_result
 

@@ -9,7 +9,7 @@ program gravier_fclib
   use gravier_csv_writer, only: csv_writer_t
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
   use gravier_fclib_file, only: write_fclib_local
-  use gravier_friction_solver, only: friction_control_t, friction_methods
+  use gravier_friction_solver, only: friction_control_t, friction_methods, verdict_no_solution
   use gravier_fclib_study, only: problem_t, read_problem, solve_timed
   use gravier_fclib_report, only: result_t, print_heading, print_result, open_results, add_result, write_profile
   implicit none
@@ -28,7 +28,7 @@ program gravier_fclib
     & "  --write DIR          each problem, reduced to its contacts, with the impulses found by the method named last"//nl// &
     & "                       and the multipliers of its bilateral constraints"//nl// &
     & "  --help"//nl// &
-    & "exit status: 0 all solved; 2 bad input or usage; 3 a solve did not reach its tolerance; 4 anything else"
+    & "exit status: 0 all solved; 2 bad input or usage; 3 a solve did not reach its tolerance or found no solution; 4 anything else"
 
   type :: options_t
     logical :: help = .false., warm = .false.
@@ -201,7 +201,7 @@ contains
     type(problem_t) :: problem
     type(result_t), allocatable :: results(:, :)
     type(csv_writer_t) :: table
-    integer :: p, failed
+    integer :: p, failed, unbounded
 
     do p = 1, size(files)
       call read_problem(comm, files(p)%text, problem, error)
@@ -220,12 +220,15 @@ contains
       call solve_problem(options, files(p)%text, problem, results(:, p), table, error)
     end do
     failed = count(.not. results%report%converged)
+    unbounded = count(results%report%verdict == verdict_no_solution)
     if (failed > 0) status = status_unconverged
     if (comm%rank == 0) then
       if (table%is_open()) call table%close(error)
       if (options%profile /= "") call write_profile(options%profile, options%methods, results, error)
       if (failed > 0) write (output_unit, "(a)") "*** "//to_text(failed)//" of "//to_text(size(results))// &
         & " solves did NOT reach the tolerance "//to_text(options%tolerance, 2)
+      if (unbounded > 0) write (output_unit, "(a)") "*** "//to_text(unbounded)//" of "//to_text(size(results))// &
+        & " solves found NO solution: loads grow without bound"
       flush (output_unit)
     end if
     call comm%agree(error)

@@ -220,7 +220,9 @@ contains
     do while (at <= len(options))
       call next_line(options, at, line)
       if (line(1:min(1, len(line))) == "&") fixed = index(fixed_groups//" ", line//" ") > 0
-      if (fixed .and. index(line, "  title = ") /= 1) text = text//line//newline
+      ! starts are over
+      if (index(line, "  title = ") == 1 .or. index(line, "  start_overlap = ") == 1) cycle
+      if (fixed) text = text//line//newline
     end do
     call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
     do b = 1, size(simulation%config%boundaries)

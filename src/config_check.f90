@@ -164,6 +164,7 @@ contains
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
       call expect(report, scene%overlap_allowed > 0.0_dp .or. .not. scene%overlap_given, "scene", "overlap_allowed", error)
+      call expect(report, scene%start_overlap >= 0.0_dp, "scene", "start_overlap", error)
     end associate
   end subroutine check_scene
 
@@ -222,6 +223,8 @@ contains
       call expect(report, solver%acceleration == "none" .or. index(solver%method, "schwarz") == 0 .or. &
                   .not. solver%relaxation_given, "solver", "acceleration", error, &
                   "'none' where relaxation is given: momentum needs a factor that adapts itself")
+      call expect(report, solver%velocity_scale > 0.0_dp .or. .not. solver%velocity_scale_given, "solver", "velocity_scale", &
+                  error)
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
       call expect(report, any(solver%method == ["nlgs   ", "nscdd  ", "schwarz"]) .or. .not. solver%sleeping, "solver", &
                   "sleeping", error, ".false. with this method: sleeping serves 'nlgs', 'nscdd' and 'schwarz'")

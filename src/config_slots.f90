@@ -124,6 +124,7 @@ contains
     case ("skin"); slot%real => config%scene%skin
     case ("overlap_allowed"); slot%real => config%scene%overlap_allowed
     case ("overlap_projection"); slot%logical => config%scene%overlap_projection
+    case ("start_overlap"); slot%real => config%scene%start_overlap
     end select
     select case (name)
     case ("alert_distance"); slot%given => config%scene%alert_given
@@ -270,6 +271,7 @@ contains
     case ("sweeps"); slot%integer => config%solver%sweeps
     case ("relaxation"); slot%real => config%solver%relaxation
     case ("acceleration"); slot%choice => config%solver%acceleration
+    case ("velocity_scale"); slot%real => config%solver%velocity_scale
     case ("check_every"); slot%integer => config%solver%check_every
     case ("warm_start"); slot%logical => config%solver%warm_start
     case ("layered_start"); slot%logical => config%solver%layered_start
@@ -280,6 +282,7 @@ contains
     end select
     if (name == "tolerance") slot%given => config%solver%tolerance_given
     if (name == "relaxation") slot%given => config%solver%relaxation_given
+    if (name == "velocity_scale") slot%given => config%solver%velocity_scale_given
     if (name == "sleep_speed") slot%given => config%solver%sleep_given
   end subroutine solver_slot
 

@@ -142,7 +142,10 @@ module gravier_config_table
            unit="m", note="0.2 of the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
            unit="m", note="0.01 of the mean radius"), &
-     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take overlaps back by moving grains and free boundaries")]
+     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take overlaps back by moving grains and free boundaries"), &
+     key_t("scene", "start_overlap", kind_real, "0.5", ">= 0", &
+           "largest overlap at the start: of two grains, as a share of the smaller radius; of a grain and a boundary, as a "// &
+           "share of the grain's")]
 
   type(key_t), parameter :: boundary_keys(*) = &
     [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
@@ -287,6 +290,8 @@ module gravier_config_table
            "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. Default of "// &
            "`nlgs`, `nscdd` and, on active contacts, `nscdd_ep`", &
            note="by the method"), &
+     key_t("solver", "velocity_scale", kind_real, "-1", "> 0", "velocity against which errors of a solve are compared", &
+           unit="m/s", note="by rule"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "layered_start", kind_logical, ".true.", "", &

@@ -68,6 +68,8 @@ module gravier_config_types
     !> false: the allowed overlap is 0.01 of the mean radius
     logical :: overlap_given = .false.
     logical :: overlap_projection
+    !> largest overlap at the start, as a share of the smaller radius
+    real(dp) :: start_overlap
   end type scene_config_t
 
   !> &time: the steps.
@@ -95,6 +97,10 @@ module gravier_config_types
     real(dp) :: relaxation
     !> false: the factor is automatic
     logical :: relaxation_given = .false.
+    !> m/s: velocity against which errors of a solve are compared; negative when not given
+    real(dp) :: velocity_scale
+    !> false: the velocity is found by rule
+    logical :: velocity_scale_given = .false.
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start

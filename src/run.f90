@@ -13,6 +13,8 @@ module gravier_run
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_scene_scales, only: scene_scales_t
+  use gravier_start_overlap, only: check_start_overlap
   use gravier_checkpoint, only: load_checkpoint, checkpoint_name
   use gravier_run_log, only: run_log_t
   use gravier_run_output, only: run_output_t
@@ -55,6 +57,8 @@ contains
     type(run_log_t) :: log
     type(run_output_t) :: output
     type(interruption_t) :: interruption
+    type(scene_scales_t) :: scales
+    integer :: warnings
 
     status = status_ok
     interruption%start = MPI_Wtime()
@@ -67,6 +71,8 @@ contains
     if (.not. allocated(error)) call prepare_directory(comm, config, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
+    call scales%find(simulation)
+    call log%write_scales(simulation, scales, .false., warnings, error)
     if (restart) call log%write_restart(simulation, error)
     call log%write_head(error)
     call log%open(trim(config%output%directory)//"/run.log", simulation%restarted, error)
@@ -93,6 +99,7 @@ contains
       call load_checkpoint(simulation, path, error)
     else
       call simulation%start(grains, error)
+      call check_start_overlap(simulation, error)
     end if
   end subroutine start
 
@@ -105,16 +112,28 @@ contains
     type(simulation_t) :: simulation
     type(step_figures_t) :: figures
     type(run_log_t) :: log
+    type(scene_scales_t) :: scales
+    integer :: warnings
 
     call log%init(comm)
     call read_config(comm, path, config, error)
     if (.not. allocated(error)) call simulation%init(comm, config, error)
+    call check_start_overlap(simulation, error)
     if (allocated(error)) return
     call log%write_start(simulation, error)
+    call scales%find(simulation)
     call simulation%assemble(figures)
     call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
+    call log%write_scales(simulation, scales, .true., warnings, error)
     call log%write_memory(simulation, error)
-    call log%line("checked     no error found; nothing was run", error)
+    select case (warnings)
+    case (0)
+      call log%line("checked     no error found; nothing was run", error)
+    case (1)
+      call log%line("checked     no error found, 1 warning; nothing was run", error)
+    case default
+      call log%line("checked     no error found, "//to_text(warnings)//" warnings; nothing was run", error)
+    end select
     call simulation%free()
   end subroutine check_case
 

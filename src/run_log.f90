@@ -19,6 +19,8 @@ module gravier_run_log
   use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
   use gravier_progress, only: progress_t, warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, &
     & warn_partition, note_balance
+  use gravier_scene_scales, only: scene_scales_t
+  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line
   use gravier_run_summary, only: converged_text, time_text, halving_text
   implicit none
   private
@@ -51,6 +53,7 @@ module gravier_run_log
     procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
     procedure :: write_interface => run_log_write_interface
+    procedure :: write_scales => run_log_write_scales
     procedure :: write_memory => run_log_write_memory
     procedure :: write_end => run_log_write_end
     procedure :: close => run_log_close
@@ -298,6 +301,22 @@ contains
     write (row, "(f16.1)") value
     text = trim(adjustl(row))
   end function tenths
+
+  !> Warnings where the step or the tolerance cannot hold what the scene is for, and their number; where `lines` are wanted, the
+  !> scales of the scene before them, its first step having been assembled.
+  subroutine run_log_write_scales(self, simulation, scales, lines, warnings, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(scene_scales_t), intent(in) :: scales
+    logical, intent(in) :: lines
+    integer, intent(out) :: warnings
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: text
+
+    if (lines) call write_lines(self, scale_lines(simulation, scales)//error_scale_line(simulation), "", error)
+    call scale_warnings(simulation, scales, text, warnings)
+    call write_lines(self, text, "", error)
+  end subroutine run_log_write_scales
 
   !> What is kept in memory, array by array. Collective.
   subroutine run_log_write_memory(self, simulation, error)

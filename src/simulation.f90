@@ -9,6 +9,7 @@ module gravier_simulation
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
   use gravier_motion, only: predict_position, advance_position
+  use gravier_boundary, only: shape_plane, shape_segment, shape_rectangle
   use gravier_facing_planes, only: find_facing_planes
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_effects, only: effects_t
@@ -25,6 +26,7 @@ module gravier_simulation
   use gravier_physics, only: physics_t
   use gravier_interface, only: interface_figures_t
   use gravier_problem_builder, only: build_problem
+  use gravier_velocity_scale, only: velocity_scale_t
   use gravier_velocity_return, only: take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, carry_glued, set_glued_velocities
   use gravier_overlap_projection, only: project_overlaps
@@ -75,6 +77,8 @@ module gravier_simulation
     type(effects_t) :: effects
     type(time_table_t) :: gravity_table
     type(contact_problem_t) :: problem
+    !> velocity against which errors of the solve of the present step are compared
+    type(velocity_scale_t) :: velocity_scale
     class(scheme_t), allocatable :: scheme
     type(solve_control_t) :: control
     type(column_solution_t) :: column
@@ -124,6 +128,7 @@ module gravier_simulation
     procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: advance => simulation_advance
     procedure :: facing_area => simulation_facing_area
+    procedure :: load_areas => simulation_load_areas
     procedure :: free => simulation_free
   end type simulation_t
 
@@ -179,6 +184,8 @@ contains
     self%decomposition%boundaries = scene%boundaries
     ! one subdomain until it is known that the scene has room for so many
     call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
+    call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
+      & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
   end subroutine simulation_make
@@ -315,7 +322,6 @@ contains
     if (self%config%solver%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
-    self%problem%error_scale = norm2(self%physics%gravity)*self%physics%h
     figures%contacts = self%problem%n_contacts
     figures%asleep = self%problem%n_asleep
     do s = 1, size(self%problem%sub)
@@ -331,7 +337,20 @@ contains
       call self%scheme%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
       call self%scheme%forget_times()
     end if
+    call measure_velocity_scale(self)
   end subroutine simulation_assemble
+
+  !> Find the velocity against which errors of the solve to come are compared. Collective.
+  subroutine measure_velocity_scale(self)
+    class(simulation_t), intent(inout) :: self
+    real(dp) :: area(size(self%decomposition%boundaries))
+
+    call start_timer(phase_setup)
+    call self%load_areas(area)
+    call self%velocity_scale%measure(self%decomposition, self%physics, self%problem, self%time + self%physics%h, area)
+    self%problem%error_scale = self%velocity_scale%value
+    call stop_timer(phase_setup)
+  end subroutine measure_velocity_scale
 
   !> q_m of grains and boundaries; boundaries whose time has come are taken away.
   subroutine move_to_middle(self, listed)
@@ -392,17 +411,24 @@ contains
     end do
   end subroutine drive
 
-  !> Area that a pressure on plane `b` works on: along every other axis, the way between the two planes that face each
-  !> other across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
+  !> Area that a pressure on plane `b` works on [m^2, m in 2D].
   pure real(dp) function simulation_facing_area(self, b) result(area)
     class(simulation_t), intent(in) :: self
     integer, intent(in) :: b
+
+    area = area_across(self, maxloc(abs(self%decomposition%boundaries(b)%axis), dim=1))
+  end function simulation_facing_area
+
+  !> Area of the scene across axis `main`: along every other axis, the way between the two planes that face each other
+  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
+  pure real(dp) function area_across(self, main) result(area)
+    type(simulation_t), intent(in) :: self
+    integer, intent(in) :: main
     real(dp) :: low, high
-    integer :: d, main
+    integer :: d
 
     area = 1.0_dp
     associate (boundaries => self%decomposition%boundaries, length => self%decomposition%period%length)
-      main = maxloc(abs(boundaries(b)%axis), dim=1)
       do d = 1, self%decomposition%nd
         if (d == main) cycle
         call find_facing_planes(boundaries, d, low, high)
@@ -413,7 +439,33 @@ contains
         end if
       end do
     end associate
-  end function simulation_facing_area
+  end function area_across
+
+  !> Areas that the loads on boundaries work on: of a plane that of its pressure, of a segment or rectangle its own, of another
+  !> shape that of the scene across its load.
+  pure subroutine simulation_load_areas(self, area)
+    class(simulation_t), intent(in) :: self
+    !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary
+    real(dp), intent(out) :: area(:)
+    integer :: b
+
+    area(:) = 0.0_dp
+    do b = 1, size(area)
+      associate (boundary => self%decomposition%boundaries(b))
+        if (.not. boundary%is_driven()) cycle
+        select case (boundary%shape)
+        case (shape_plane)
+          area(b) = self%facing_area(b)
+        case (shape_segment)
+          area(b) = norm2(boundary%edge(:, 1))
+        case (shape_rectangle)
+          area(b) = norm2(boundary%edge(:, 1))*norm2(boundary%edge(:, 2))
+        case default
+          area(b) = area_across(self, boundary%load_axis())
+        end select
+      end associate
+    end do
+  end subroutine simulation_load_areas
 
   !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
   subroutine count_fast(self, figures)

@@ -73,6 +73,7 @@ module gravier_boundary
     procedure :: last_velocity_at => boundary_last_velocity_at
     procedure :: prescribe => boundary_prescribe
     procedure :: applied_force => boundary_applied_force
+    procedure :: load_axis => boundary_load_axis
     procedure :: move => boundary_move
     procedure :: carry => boundary_carry
     procedure :: shift => boundary_shift
@@ -351,6 +352,23 @@ contains
         & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*self%axis(d)
     end do
   end subroutine boundary_applied_force
+
+  !> Axis along which forces move the boundary: of a plane that of its normal, else that of the largest given force among
+  !> the free ones.
+  pure integer function boundary_load_axis(self) result(axis)
+    class(boundary_t), intent(in) :: self
+    integer :: d
+
+    if (self%shape == shape_plane) then
+      axis = maxloc(abs(self%axis), dim=1)
+      return
+    end if
+    axis = findloc(self%free, .true., dim=1)
+    do d = axis + 1, 3
+      if (self%free(d) .and. abs(self%given_force(d)) > abs(self%given_force(max(axis, 1)))) axis = d
+    end do
+    axis = max(axis, 1)
+  end function boundary_load_axis
 
   !> Move the boundary with its velocity and spin for a time.
   pure subroutine boundary_move(self, duration)

@@ -97,8 +97,6 @@ contains
     if (allocated(error)) return
     self%momentum%on = .true.
     call self%nscdd_t%start(problem, error)
-    ! Newton's steps leave other velocities
-    self%velocities_are_global = .false.
     self%persists = .true.
     self%matrix%general = .true.
     call self%matrix%start(problem, error)

@@ -24,7 +24,6 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
-    self%velocities_are_global = .true.
     call start_sweeps(self, problem, shared_masses=.true.)
   end subroutine nscdd_start
 

@@ -3,13 +3,14 @@
 module gravier_block_sweeps
   use gravier_kinds, only: dp
   use gravier_delassus, only: delassus_t
+  use gravier_unbounded, only: growth_t, note_growth
   use gravier_local_law, only: solve_law_2d, solve_law_3d, project_on_cone
   implicit none
   private
   public :: sweep_control_t, sweep_blocks, solve_by_sweeps
 
   type :: sweep_control_t
-    !> on the consistent measure of gravier_delassus
+    !> on the figure of gravier_delassus
     real(dp) :: tolerance = 1.0e-8_dp
     integer :: most_sweeps = 100000
     !> extrapolate the impulses between sweeps
@@ -25,20 +26,24 @@ module gravier_block_sweeps
 
 contains
 
-  !> Sweep until the consistent measure of gravier_delassus meets the tolerance, the budget is spent, or patience.
-  subroutine solve_by_sweeps(problem, control, r, sweeps, measure)
+  !> Sweep until the figure of gravier_delassus meets the tolerance, the budget or patience is spent, or impulses grow without
+  !> bound.
+  subroutine solve_by_sweeps(problem, control, r, sweeps, figure, growth)
     type(delassus_t), intent(in) :: problem
     type(sweep_control_t), intent(in) :: control
     !> impulses: start in, result out (dimension, contacts)
     real(dp), intent(inout), contiguous :: r(:, :)
     integer, intent(out) :: sweeps
     !> of the result
-    real(dp), intent(out) :: measure
-    real(dp), allocatable :: v(:, :), previous(:, :)
-    real(dp) :: moved, moved_before, least, least_before, t, ignored
+    real(dp), intent(out) :: figure
+    type(growth_t), intent(out) :: growth
+    !> velocities, results of the sweep before with momentum, and of the one that ended the last window (dimension, contacts)
+    real(dp), allocatable :: v(:, :), previous(:, :), past(:, :)
+    real(dp) :: moved, moved_before, least, least_before, t
 
     allocate (v(size(r, 1), size(r, 2)), previous(size(r, 1), merge(size(r, 2), 0, control%momentum)))
     if (control%momentum) previous(:, :) = r
+    allocate (past, source=r)
     t = 1.0_dp
     moved_before = huge(moved)
     least = huge(least)
@@ -55,7 +60,8 @@ contains
       moved_before = moved
       least = min(least, moved)
       if (mod(sweeps, window) == 0) then
-        if (.not. promising(least_before, least, control)) exit
+        call look_at_growth()
+        if (growth%ends() .or. .not. promising(least_before, least, control)) exit
         least_before = least
         least = huge(least)
       end if
@@ -68,9 +74,21 @@ contains
 
     logical function reached()
       call problem%velocity(r, v)
-      call problem%measure(r, v, ignored, measure)
-      reached = measure <= control%tolerance
+      figure = problem%figure(r, v)
+      reached = figure <= control%tolerance
     end function reached
+
+    !> What the window added to the impulses.
+    subroutine look_at_growth()
+      if (control%momentum) then
+        v(:, :) = previous - past
+        past(:, :) = previous
+      else
+        v(:, :) = r - past
+        past(:, :) = r
+      end if
+      call note_growth(problem, v, growth)
+    end subroutine look_at_growth
 
   end subroutine solve_by_sweeps
 

@@ -27,11 +27,13 @@ module gravier_contact_kernels
   implicit none
   private
   public :: kernels_t, contact_jacobian, global_impulse, global_moment, tangents, local_operator
-  public :: lanes, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors, project_on_cones
+  public :: lanes, n_tests, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors, project_on_cones
   public :: moment_vectors, project_moments, rolling_radius
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
+  !> test impulses of the estimate of the velocity error
+  integer, parameter :: n_tests = 6
 
   ! rows of `hot` that hold 1/W_nn, 1/W_tt and 1/W_rr
   integer, parameter :: operators_2d_frictionless(1) = [4], operators_3d_frictionless(1) = [5]
@@ -46,6 +48,20 @@ module gravier_contact_kernels
   integer, parameter :: own_2d_friction_shift(2) = [1, 2], own_3d_friction_shift(3) = [1, 2, 2]
   integer, parameter :: own_2d_friction_roll(3) = [1, 2, 3], own_3d_friction_roll(6) = [1, 2, 2, 3, 3, 3]
   integer, parameter :: own_2d_friction_full(3) = [1, 2, 3], own_3d_friction_full(6) = [1, 2, 2, 3, 3, 3]
+
+  ! of each component of an impulse, the row of `hot` with the coefficient that bounds it by the normal one, 0 for that
+  integer, parameter :: bound_2d_frictionless(1) = [0], bound_3d_frictionless(1) = [0]
+  integer, parameter :: bound_2d_friction(2) = [0, 8], bound_3d_friction(3) = [0, 9, 9]
+  integer, parameter :: bound_2d_friction_shift(2) = [0, 8], bound_3d_friction_shift(3) = [0, 9, 9]
+  integer, parameter :: bound_2d_friction_roll(3) = [0, 8, 11], bound_3d_friction_roll(6) = [0, 9, 9, 12, 12, 13]
+  integer, parameter :: bound_2d_friction_full(3) = [0, 8, 12], bound_3d_friction_full(6) = [0, 9, 9, 14, 14, 15]
+  ! numbers that the load of a contact on its candidate takes
+  integer, parameter :: loads_2d_frictionless = 2, loads_3d_frictionless = 3, loads_2d_friction = 3, loads_3d_friction = 6
+  integer, parameter :: loads_2d_friction_shift = 3, loads_3d_friction_shift = 6
+  integer, parameter :: loads_2d_friction_roll = 4, loads_3d_friction_roll = 9
+  integer, parameter :: loads_2d_friction_full = 4, loads_3d_friction_full = 9
+  !> share of its limit from which on a component counts as at it
+  real(dp), parameter :: within = 1.0_dp - 1.0e-9_dp
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
@@ -133,15 +149,22 @@ module gravier_contact_kernels
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
       real(dp), intent(out) :: sums(3)
     end subroutine residual_kernel
-    !> correction := P - r and violation := W (P - r), the velocity by which each contact misses its law, with the undivided local
-    !> operator W.
-    pure subroutine violation_kernel(pair, hot, weight, velocity, impulse, correction, violation)
-      import :: dp
+    !> What the estimate of the velocity error needs (gravier_velocity_error): n_tests test impulses y of each contact, added to
+    !> `motion` as H y; sums = (sum of y . w, y by y), w = W (P - r) being the velocity by which a contact misses its law, W its
+    !> undivided local operator; power := r . w. The tests are P - r, r, r - old, and the same again without the components
+    !> that open or are at their limit. `largest` is raised to the largest |w|^2.
+    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, old, power, motion, sums, largest)
+      import :: dp, n_tests
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
-      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-      real(dp), intent(inout), contiguous :: correction(:, :, :), violation(:, :, :)
-    end subroutine violation_kernel
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :), old(:, :, :)
+      !> (lanes, blocks)
+      real(dp), intent(inout), contiguous :: power(:, :)
+      !> (n_tests, nv, n_columns)
+      real(dp), intent(inout), contiguous :: motion(:, :, :)
+      real(dp), intent(out) :: sums(n_tests)
+      real(dp), intent(inout) :: largest
+    end subroutine tests_kernel
   end interface
 
   type :: kernels_t
@@ -159,7 +182,7 @@ module gravier_contact_kernels
     procedure(velocity_kernel), pointer, nopass :: contact_velocity => null()
     procedure(operator_kernel), pointer, nopass :: set_operators => null()
     procedure(residual_kernel), pointer, nopass :: residual => null()
-    procedure(violation_kernel), pointer, nopass :: violation => null()
+    procedure(tests_kernel), pointer, nopass :: make_tests => null()
   contains
     procedure :: choose => kernels_choose
   end type kernels_t
@@ -634,7 +657,81 @@ contains
 #include "contact_loops.inc"
 #undef OF
 
+  !> 1 where a component of an impulse is free to answer a change of velocity, 0 where its contact opens, or where it slides or
+  !> rolls at its limit: what such a component lacks is not known.
+  pure subroutine find_free(bound, hot, solved, free)
+    !> of each component, the row of `hot` with its coefficient, 0 for the normal one
+    integer, intent(in) :: bound(:)
+    !> (lanes, nh), P (lanes, nc)
+    real(dp), intent(in), contiguous :: hot(:, :), solved(:, :)
+    real(dp), intent(out), contiguous :: free(:, :)
+    real(dp) :: squares(lanes)
+    integer :: k, l
+
+    free(:, 1) = merge(1.0_dp, 0.0_dp, solved(:, 1) > 0.0_dp)
+    do k = 2, size(bound)
+      squares(:) = 0.0_dp
+      do l = 2, size(bound)
+        if (bound(l) == bound(k)) squares(:) = squares + solved(:, l)**2
+      end do
+      free(:, k) = merge(free(:, 1), 0.0_dp, squares < (within*hot(:, bound(k))*solved(:, 1))**2)
+    end do
+  end subroutine find_free
+
+  !> Add the loads of the test impulses of a block to those of the bodies.
+  pure subroutine add_motion(nd, pair, hot, load, motion)
+    integer, intent(in) :: nd, pair(2, lanes)
+    !> (lanes, nh); (lanes, n_tests, loads)
+    real(dp), intent(in), contiguous :: hot(:, :), load(:, :, :)
+    real(dp), intent(inout), contiguous :: motion(:, :, :)
+    integer :: q, i, j, d, t, turns
+
+    turns = size(motion, 2) - nd
+    do q = 1, lanes
+      i = pair(1, q)
+      j = pair(2, q)
+      do d = 1, nd
+        do t = 1, n_tests
+          motion(t, d, i) = motion(t, d, i) + load(q, t, d)
+          motion(t, d, j) = motion(t, d, j) - load(q, t, d)
+        end do
+      end do
+      do d = nd + 1, nd + turns
+        do t = 1, n_tests
+          motion(t, d, i) = motion(t, d, i) - hot(q, nd + 4)*load(q, t, d)
+          motion(t, d, j) = motion(t, d, j) - hot(q, nd + 5)*load(q, t, d)
+        end do
+      end do
+      do d = nd + turns + 1, size(load, 3)
+        do t = 1, n_tests
+          motion(t, d - turns, i) = motion(t, d - turns, i) + load(q, t, d)
+          motion(t, d - turns, j) = motion(t, d - turns, j) - load(q, t, d)
+        end do
+      end do
+    end do
+  end subroutine add_motion
+
   ! What the loops of contact_loops.inc do with one block, with the shapes of each law; those with friction are at the end.
+
+  pure subroutine load_2d_frictionless(hot, impulse, load)
+    real(dp), intent(in) :: hot(lanes, 4), impulse(lanes, 1)
+    real(dp), intent(out) :: load(lanes, 2)
+    integer :: d
+
+    do d = 1, 2
+      load(:, d) = impulse(:, 1)*hot(:, d)
+    end do
+  end subroutine load_2d_frictionless
+
+  pure subroutine load_3d_frictionless(hot, impulse, load)
+    real(dp), intent(in) :: hot(lanes, 5), impulse(lanes, 1)
+    real(dp), intent(out) :: load(lanes, 3)
+    integer :: d
+
+    do d = 1, 3
+      load(:, d) = impulse(:, 1)*hot(:, d)
+    end do
+  end subroutine load_3d_frictionless
 
   pure subroutine react_2d_frictionless(pair, hot, impulse, reaction)
     integer, intent(in) :: pair(2, lanes)

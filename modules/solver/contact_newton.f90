@@ -7,11 +7,12 @@ module gravier_contact_newton
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_delassus, only: delassus_t
+  use gravier_unbounded, only: growth_t, note_growth
   use gravier_alart_curnier, only: alart_curnier_t
   use gravier_block_system, only: block_system_t
   implicit none
   private
-  public :: contact_newton_t
+  public :: newton_control_t, contact_newton_t
 
   !> alpha at the start and its bounds
   real(dp), parameter :: alpha_start = 1.0e-3_dp, alpha_least = 1.0e-13_dp, alpha_most = 10.0_dp
@@ -24,6 +25,13 @@ module gravier_contact_newton
   !> the line search compares with the greatest of so many last values, and halves the step so often at most
   integer, parameter :: memory = 5, most_halvings = 8
   real(dp), parameter :: sufficient = 1.0e-4_dp
+
+  type :: newton_control_t
+    !> on the figure of gravier_delassus
+    real(dp) :: tolerance = 1.0e-8_dp
+    !> Newton's steps, each a factorisation
+    integer :: most_steps = 100000
+  end type newton_control_t
 
   !> The method and its work space. It can be called again and goes on with the weight it had.
   type :: contact_newton_t
@@ -67,37 +75,42 @@ contains
     if (allocated(self%x)) deallocate (self%centre, self%x, self%v, self%trial, self%direction)
   end subroutine contact_newton_free
 
-  !> Solve the problem given to `init`, from the impulses given.
-  subroutine contact_newton_solve(self, problem, tolerance, most_steps, r, steps, measure)
+  !> Solve the problem given to `init`, from the impulses given. Ends early where impulses grow without bound, or where rounding hides
+  !> what a step could change.
+  subroutine contact_newton_solve(self, problem, control, r, steps, figure, growth)
     class(contact_newton_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem
-    !> on the consistent measure of gravier_delassus
-    real(dp), intent(in) :: tolerance
-    !> Newton's steps, each a factorisation
-    integer, intent(in) :: most_steps
+    type(newton_control_t), intent(in) :: control
     !> start in, best result out (dimension, contacts)
     real(dp), intent(inout), contiguous :: r(:, :)
     integer, intent(out) :: steps
     !> of the result
-    real(dp), intent(out) :: measure
-    real(dp) :: found, before, ignored
+    real(dp), intent(out) :: figure
+    type(growth_t), intent(inout) :: growth
+    real(dp) :: found, before
     integer :: taken
     logical :: success
 
     steps = 0
     call problem%velocity(r, self%v)
-    call problem%measure(r, self%v, ignored, measure)
-    before = measure
+    figure = problem%figure(r, self%v)
+    before = figure
     self%centre(:, :) = r
-    do while (measure > tolerance .and. steps < most_steps)
+    do while (figure > control%tolerance .and. steps < control%most_steps .and. .not. growth%ends())
       call set_proximal(self, problem)
       self%x(:, :) = self%centre
-      call find_proximal_point(self, norm2(problem%q)*tolerance, min(most_inner_steps, most_steps - steps), taken, success)
+      call find_proximal_point(self, norm2(problem%q)*control%tolerance, &
+        & min(most_inner_steps, control%most_steps - steps), taken, success)
+      if (taken == 0 .and. self%alpha <= alpha_least) exit
       steps = steps + taken
+      if (taken > 0) then
+        self%direction(:, :) = self%x - self%centre
+        call note_growth(problem, self%direction, growth)
+      end if
       call problem%velocity(self%x, self%v)
-      call problem%measure(self%x, self%v, ignored, found)
-      if (found < measure) then
-        measure = found
+      found = problem%figure(self%x, self%v)
+      if (found < figure) then
+        figure = found
         r(:, :) = self%x
       end if
       if (success .or. found < before) self%centre(:, :) = self%x

@@ -97,10 +97,10 @@ module gravier_contact_problem
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
     !> change of velocity in a step by loads that are the same for all grains; 0 where there are none or their like (3) [m/s]
     real(dp) :: load(3) = 0.0_dp
-    !> velocity that errors of a solve are compared with [m/s]
-    real(dp) :: error_scale = 0.0_dp
     !> largest term of a sum R^d [N s], whose roundings no solve gets below: where loads take a momentum away, R^d has nothing else
     real(dp) :: rounded_scale = 0.0_dp
+    !> velocity against which errors of a solve are compared, see gravier_velocity_scale; set by whoever builds the problem [m/s]
+    real(dp) :: error_scale = 0.0_dp
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual

@@ -8,7 +8,12 @@ module gravier_delassus
   use gravier_local_law, only: project_on_cone
   implicit none
   private
-  public :: delassus_t
+  public :: delassus_t, most_impulse
+
+  !> impulses, as velocities s |r| relative to max|q|, beyond this are not what loads can make, and rounding leaves too little of v
+  real(dp), parameter :: most_impulse = 1.0e8_dp
+  !> approach of a contact, relative to max|q|, that the tolerance on the consistent measure allows
+  real(dp), parameter :: approach_of_tolerance = 10.0_dp
 
   type :: delassus_t
     !> of space: 2 or 3, the components (n, t) or (n, t, s) of a contact
@@ -27,6 +32,8 @@ module gravier_delassus
     procedure :: free => delassus_free
     procedure :: velocity => delassus_velocity
     procedure :: measure => delassus_measure
+    procedure :: find_extremes => delassus_find_extremes
+    procedure :: figure => delassus_figure
   end type delassus_t
 
 contains
@@ -228,6 +235,53 @@ contains
     consistent = ratio(sqrt(consistent), scale)
     literature = ratio(sqrt(literature), max(scale, norm2(r), norm2(v)))
   end subroutine delassus_measure
+
+  !> Largest velocity of approach max(-v_n, 0), and largest impulse as a velocity s |r|, both relative to max|q|, with their contacts.
+  pure subroutine delassus_find_extremes(self, r, v, approach, impulse, contacts)
+    class(delassus_t), intent(in) :: self
+    !> impulses and their velocities W r + q (dimension, contacts)
+    real(dp), intent(in), contiguous :: r(:, :), v(:, :)
+    real(dp), intent(out) :: approach, impulse
+    !> that of the approach, that of the impulse; 0 where there is none
+    integer, intent(out) :: contacts(2)
+    real(dp) :: scale, load
+    integer :: a
+
+    approach = 0.0_dp
+    impulse = 0.0_dp
+    contacts = 0
+    scale = 0.0_dp
+    do a = 1, self%n_contacts
+      scale = max(scale, norm2(self%q(:, a)))
+      load = self%stiffness(a)*norm2(r(:, a))
+      ! what is not a number is the largest
+      if (.not. -v(1, a) <= approach) then
+        approach = -v(1, a)
+        contacts(1) = a
+      end if
+      if (.not. load <= impulse) then
+        impulse = load
+        contacts(2) = a
+      end if
+    end do
+    approach = ratio(approach, scale)
+    impulse = ratio(impulse, scale)
+  end subroutine delassus_find_extremes
+
+  !> What a tolerance is compared with: the consistent measure, or a tenth of the largest velocity of approach, relative to max|q|, if
+  !> that is larger. No tolerance is met where an impulse is beyond what loads can make: rounding hides its velocities then.
+  pure real(dp) function delassus_figure(self, r, v) result(figure)
+    class(delassus_t), intent(in) :: self
+    !> impulses and their velocities W r + q (dimension, contacts)
+    real(dp), intent(in), contiguous :: r(:, :), v(:, :)
+    real(dp) :: ignored, approach, impulse
+    integer :: contacts(2)
+
+    call self%measure(r, v, ignored, figure)
+    call self%find_extremes(r, v, approach, impulse, contacts)
+    if (.not. approach <= approach_of_tolerance*figure) figure = approach/approach_of_tolerance
+    if (.not. impulse <= most_impulse .and. any(abs(self%q) > 0.0_dp)) figure = huge(figure)
+  end function delassus_figure
 
   !> A defect relative to its scale; 0 where there is none.
   elemental real(dp) function ratio(defect, scale)

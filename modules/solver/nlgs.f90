@@ -23,7 +23,6 @@ contains
 
     if (allocated(error)) return
     self%work%solves = self%work%solves + 1
-    self%velocities_are_global = .true.
     call start_sweeps(self, problem, shared_masses=.false.)
   end subroutine nlgs_start
 

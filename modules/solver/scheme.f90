@@ -86,8 +86,6 @@ module gravier_scheme
     logical :: check_next = .false.
     !> the method keeps the best impulses of a solve: `conclude` takes them
     logical :: keeps_best = .false.
-    !> after an iteration, `velocity` of every subdomain is that of the undivided bodies under all impulses
-    logical :: velocities_are_global = .false.
     !> the method has other means where its iterations gain nothing, and is not to be stopped there
     logical :: persists = .false.
     !> spent in sweeps of each subdomain of this rank since `forget_times` [s]

@@ -301,15 +301,12 @@ contains
       real(dp) :: limit
 
       limit = control%accuracy*problem%error_scale
-      is_met = .not. (report%residual > 0.0_dp .and. report%velocity_error > limit)
+      is_met = .not. report%residual > 0.0_dp .or. velocity%criterion() <= limit
       if (is_met .or. report%iterations < copies_ready) return
-      call velocity%project(problem, scheme, report%iterations)
-      velocity%levels = 0.0_dp
+      call velocity%project(problem, report%iterations)
+      if (velocity%criterion() <= limit) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
-      if (report%velocity_error > limit) return
-      call velocity%add_levels(problem)
-      report%velocity_error = velocity%estimate()
-      is_met = report%velocity_error <= limit
+      is_met = velocity%criterion() <= limit
     end function velocity_is_met
 
     !> The whole estimate. Where the residual is rounding the velocities are exact. Collective.
@@ -317,7 +314,7 @@ contains
       call velocity%bound(problem)
       report%velocity_error = 0.0_dp
       if (.not. report%residual > 0.0_dp) return
-      call velocity%project(problem, scheme, report%iterations)
+      call velocity%project(problem, report%iterations)
       call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
     end subroutine complete_estimate
@@ -375,7 +372,8 @@ contains
         report%figure = report%error
       case default
         report%figure = report%residual*(control%accuracy/control%tolerance)
-        if (problem%error_scale > 0.0_dp) report%figure = max(report%figure, report%velocity_error/problem%error_scale)
+        if (problem%error_scale > 0.0_dp .and. report%residual > 0.0_dp) &
+          & report%figure = max(report%figure, velocity%criterion()/problem%error_scale)
       end select
     end subroutine take_figure
 
@@ -392,7 +390,7 @@ contains
       end if
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
       call velocity%bound(problem)
-      report%velocity_error = velocity%bound_by_rest
+      report%velocity_error = velocity%estimate()
       if (.not. report%residual > 0.0_dp) report%velocity_error = 0.0_dp
       met = is_met()
       call take_figure()

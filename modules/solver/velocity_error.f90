@@ -10,7 +10,7 @@
 !>      of the violations between two levels over the force that crosses, 0.65 being the mean cosine between a normal and the
 !>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
 !>      L^2 = sum m_l e_l^2.
-!>   E  = sqrt((2 Y)^2 + L^2).
+!>   E  = sqrt((2.4 Y)^2 + L^2).
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
@@ -18,29 +18,30 @@
 module gravier_velocity_error
   use gravier_kinds, only: dp, i8
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
-  use gravier_contact_kernels, only: kernels_t, lanes, lane_of, block_of
+  use gravier_contact_kernels, only: lanes, n_tests, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: scheme_t
   use gravier_dense_direct, only: projected_square
   implicit none
   private
   public :: velocity_error_t, copies_ready
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
-  real(dp), parameter :: weight_of_projection = 2.0_dp, cosine = 0.65_dp
+  real(dp), parameter :: weight_of_projection = 2.4_dp, cosine = 0.65_dp
+  !> share of the error allowed that bodies at rest may move with
+  real(dp), parameter :: share_at_rest = 0.35_dp
   !> share of the largest eigenvalue of G below which it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
   integer, parameter :: n_copies = 2, first_copy = 2
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
-  !> test impulses at most: free are w/W, r, the change of the last iteration, that since the older copy; held the first three
-  integer, parameter :: most_tests = 7
-  !> kinds of test impulses; those since the copies are 1 to n_copies
-  integer, parameter :: test_correction = -2, test_load = -1, test_last = 0, test_none = -3
-  !> share of its limit from which on a component counts as at it
-  real(dp), parameter :: within = 1.0_dp - 1.0e-9_dp
+  !> share of the iterations before which the copy that is used was taken
+  real(dp), parameter :: oldest = 0.8_dp
+  !> products of the velocities that half of the test impulses make
+  integer, parameter :: n_products = (n_tests/2)*(n_tests/2 + 1)/2
   !> share of the largest free speed below which the shift of a closed contact is rounding of places
   real(dp), parameter :: rounded = 1.0e-3_dp
+  !> what is not known; its multiples and those of a weight are numbers still [m/s]
+  real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> no way leads to what moves as prescribed
   integer, parameter :: unreached = -1
   !> iterations before which Y and L are not trusted
@@ -53,12 +54,10 @@ module gravier_velocity_error
 
   !> What the estimate holds for one subdomain.
   type :: error_part_t
-    !> P - r [N s] and w [m/s] of each contact, 1 where a component of its impulse is free, a test impulse [N s] (lanes, nc, blocks)
-    real(dp), allocatable :: correction(:, :, :), violation(:, :, :), mask(:, :, :), test(:, :, :)
-    !> H y of the test impulses, summed over copies of bodies (nv, n_columns, most_tests) [N s, N m s]
+    !> r . w of each contact (lanes, blocks) [J]
+    real(dp), allocatable :: power(:, :)
+    !> H y of the test impulses, summed over copies of bodies (n_tests, nv, n_columns) [N s, N m s]
     real(dp), allocatable :: motion(:, :, :)
-    !> y . w of the test impulses [J]
-    real(dp) :: power(most_tests) = 0.0_dp
     type(copy_t) :: copy(n_copies)
     !> contacts to what moves as prescribed, of each body (n_columns)
     integer, allocatable :: depth(:)
@@ -70,7 +69,7 @@ module gravier_velocity_error
     !> whether rest is admissible, so that C is a bound
     logical :: rest_is_admissible = .false.
     !> by the last `bound` and `measure` [m/s]
-    real(dp) :: bound_by_rest = huge(1.0_dp), projection = 0.0_dp, levels = 0.0_dp
+    real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
     !> largest |w| of a contact, by the last `measure` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest depth; negative while it is not known
@@ -87,6 +86,7 @@ module gravier_velocity_error
     procedure :: project => velocity_error_project
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
+    procedure :: criterion => velocity_error_criterion
     procedure :: find_depth => velocity_error_find_depth
     procedure :: forget_copies => velocity_error_forget_copies
   end type velocity_error_t
@@ -137,15 +137,24 @@ contains
     end do
   end subroutine velocity_error_keep_copy
 
-  !> C, from what `residual` of the problem has summed [m/s].
+  !> C, from what `residual` of the problem has summed; Y and L are not known then [m/s].
   subroutine velocity_error_bound(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
 
-    self%bound_by_rest = huge(1.0_dp)
+    self%bound_by_rest = unknown
+    self%projection = unknown
+    self%levels = 0.0_dp
     if (.not. (self%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
+
+  !> What is compared with the error that is allowed [m/s]: E, or C over the share of it that is. Where the solution is at rest, all
+  !> that moves is error, and creeps on with one sign from step to step: less of it is allowed there.
+  pure real(dp) function velocity_error_criterion(self) result(criterion)
+    class(velocity_error_t), intent(in) :: self
+    criterion = min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, self%levels))
+  end function velocity_error_criterion
 
   !> The smaller of E and C [m/s].
   pure real(dp) function velocity_error_estimate(self) result(estimate)
@@ -154,245 +163,134 @@ contains
   end function velocity_error_estimate
 
   !> Y, with v_global evaluated. Collective.
-  subroutine velocity_error_project(self, problem, scheme, iteration)
+  subroutine velocity_error_project(self, problem, iteration)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
     integer, intent(in) :: iteration
-    !> of each subdomain, and over all: b, then the columns of the upper triangle of G, of the free and of the held test impulses
-    real(dp), allocatable :: parts(:, :), sums(:)
-    real(dp) :: largest(1)
-    integer :: s, n, n_free, n_held, recent
+    !> b of all test impulses, then the columns of the upper triangles of G of the free and of the held ones
+    real(dp) :: parts(n_tests + 2*n_products, size(problem%sub)), sums(n_tests + 2*n_products), largest(1)
+    integer :: s, old
 
-    do s = 1, size(problem%sub)
-      call find_violations(problem, s, self%part(s))
-    end do
-    recent = test_none
-    if (self%taken_at(2) > 0 .and. self%taken_at(2) < iteration) recent = 2
-    if (self%taken_at(1) > 0 .and. recent == test_none) recent = 1
-    if (scheme%momentum%on .and. .not. scheme%momentum%resting .and. iteration > 0) recent = test_last
-    n = 0
-    call add_test(test_correction, .false.)
-    call add_test(test_load, .false.)
-    call add_test(recent, .false.)
-    if (self%taken_at(1) > 0) call add_test(1, .false.)
-    n_free = n
-    call add_test(test_correction, .true.)
-    call add_test(test_load, .true.)
-    call add_test(recent, .true.)
-    n_held = n - n_free
-    allocate (parts(n_sums(n_free) + n_sums(n_held), size(problem%sub)), sums(n_sums(n_free) + n_sums(n_held)))
+    old = 0
+    if (self%taken_at(1) > 0) old = self%place(1)
+    if (self%taken_at(2) > 0 .and. self%taken_at(2) <= oldest*iteration) old = self%place(2)
+    parts(:, :) = 0.0_dp
     largest(1) = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), part => self%part(s), held => n_sums(n_free))
-        parts(1:n_free, s) = part%power(1:n_free)
-        call add_products(sub, part%motion(:, :, 1:n_free), parts(n_free + 1:held, s))
-        parts(held + 1:held + n_held, s) = part%power(n_free + 1:n)
-        call add_products(sub, part%motion(:, :, n_free + 1:n), parts(held + n_held + 1:, s))
-        if (sub%n_contacts > 0) largest(1) = max(largest(1), largest_square(part%violation))
+      associate (sub => problem%sub(s), part => self%part(s))
+        if (.not. allocated(part%motion)) then
+          allocate (part%motion(n_tests, problem%kernels%nv, sub%n_columns), part%power(lanes, size(sub%hot, 3)))
+        end if
+        part%motion(:, :, :) = 0.0_dp
+        if (sub%n_contacts == 0) cycle
+        if (old > 0) then
+          call make_tests(sub, part, part%copy(old)%impulse)
+        else
+          ! without a copy there is a test impulse of 0, which tells nothing
+          call make_tests(sub, part, sub%impulse)
+        end if
       end associate
+    end do
+    call sum_motions(problem, self%part)
+    do s = 1, size(problem%sub)
+      call add_products(problem%sub(s), self%part(s)%motion, parts(n_tests + 1:, s))
     end do
     call start_timer(phase_reduction)
     call problem%comm%sum_parts(parts, sums)
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
     self%largest_violation = sqrt(largest(1))
-    self%projection = sqrt(sqrt(projection_of(n_free, sums(1:n_sums(n_free)))* &
-      & projection_of(n_held, sums(n_sums(n_free) + 1:)))/self%mass)
+    associate (half => n_tests/2, b => sums(1:n_tests), g => sums(n_tests + 1:))
+      self%projection = sqrt(sqrt(projection_of(b(1:half), g(1:n_products))* &
+        & projection_of(b(half + 1:), g(n_products + 1:)))/self%mass)
+    end associate
 
   contains
 
-    !> One more test impulse: its product with w and the velocities that it makes.
-    subroutine add_test(kind, held)
-      integer, intent(in) :: kind
-      !> without what slides or opens
-      logical, intent(in) :: held
+    subroutine make_tests(sub, part, copied)
+      type(subproblem_t), intent(in) :: sub
+      type(error_part_t), intent(inout) :: part
+      real(dp), intent(in), contiguous :: copied(:, :, :)
 
-      if (kind == test_none) return
-      n = n + 1
-      do s = 1, size(problem%sub)
-        associate (sub => problem%sub(s), part => self%part(s))
-          select case (kind)
-          case (test_correction)
-            part%test(:, :, :) = part%correction
-          case (test_load)
-            part%test(:, :, :) = sub%impulse
-          case (test_last)
-            part%test(:, :, :) = sub%impulse - scheme%momentum%part(s)%impulse
-          case default
-            part%test(:, :, :) = sub%impulse - part%copy(self%place(kind))%impulse
-          end select
-          if (held) part%test(:, :, :) = part%mask*part%test
-          part%power(n) = contact_product(part%test, part%violation)
-          part%motion(:, :, n) = 0.0_dp
-          call problem%kernels%add_reaction(sub%pair, sub%hot, part%test, part%motion(:, :, n))
-          call problem%shared%load(s, part%motion(:, :, n))
-        end associate
-      end do
-      call problem%shared%pass()
-      do s = 1, size(problem%sub)
-        call problem%shared%sum_copies(s, self%part(s)%motion(:, :, n), mean=.false.)
-      end do
-    end subroutine add_test
+      call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, copied, part%power, &
+        & part%motion, parts(1:n_tests, s), largest(1))
+    end subroutine make_tests
 
   end subroutine velocity_error_project
 
-  !> Numbers in b and the upper triangle of G of so many test impulses.
-  pure integer function n_sums(n_tests)
-    integer, intent(in) :: n_tests
-    n_sums = n_tests + n_tests*(n_tests + 1)/2
-  end function n_sums
+  !> Sum H y over the copies of bodies, test by test. Collective.
+  subroutine sum_motions(problem, part)
+    type(contact_problem_t), intent(inout) :: problem
+    type(error_part_t), intent(inout) :: part(:)
+    real(dp), allocatable :: field(:, :)
+    integer :: s, t
+
+    if (problem%n_subdomains == 1) return
+    do t = 1, n_tests
+      do s = 1, size(part)
+        field = part(s)%motion(t, :, :)
+        call problem%shared%load(s, field)
+      end do
+      call problem%shared%pass()
+      do s = 1, size(part)
+        field = part(s)%motion(t, :, :)
+        call problem%shared%sum_copies(s, field, mean=.false.)
+        part(s)%motion(t, :, :) = field
+      end do
+    end do
+  end subroutine sum_motions
 
   !> b^T G^+ b [J].
-  real(dp) function projection_of(n, sums) result(square)
-    integer, intent(in) :: n
-    !> b, then the columns of the upper triangle of G
-    real(dp), intent(in), contiguous :: sums(:)
-    real(dp) :: g(n, n)
+  real(dp) function projection_of(b, products) result(square)
+    !> (n_tests/2); columns of the upper triangle of G
+    real(dp), intent(in), contiguous :: b(:), products(:)
+    real(dp) :: g(size(b), size(b))
     integer :: i, j, at
 
-    at = n
-    do j = 1, n
+    at = 0
+    do j = 1, size(b)
       do i = 1, j
         at = at + 1
-        g(i, j) = sums(at)
-        g(j, i) = sums(at)
+        g(i, j) = products(at)
+        g(j, i) = products(at)
       end do
     end do
-    square = projected_square(g, sums(1:n), rank_cut)
+    square = projected_square(g, b, rank_cut)
   end function projection_of
 
-  !> P - r, w and the mask of the contacts of a subdomain.
-  subroutine find_violations(problem, s, part)
-    type(contact_problem_t), intent(in) :: problem
-    integer, intent(in) :: s
-    type(error_part_t), intent(inout) :: part
-
-    associate (sub => problem%sub(s), kernels => problem%kernels)
-      if (.not. allocated(part%correction)) then
-        allocate (part%correction, part%violation, part%mask, part%test, mold=sub%impulse)
-        allocate (part%motion(kernels%nv, sub%n_columns, most_tests))
-      end if
-      call kernels%violation(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, part%correction, part%violation)
-      call find_mask(kernels, sub%hot, sub%impulse, part%correction, part%mask)
-    end associate
-  end subroutine find_violations
-
-  !> 1 where a component of an impulse is free to answer a change of velocity, 0 where its contact opens, or where it slides or
-  !> rolls at its limit: what such a component lacks is not known.
-  subroutine find_mask(kernels, hot, impulse, correction, mask)
-    type(kernels_t), intent(in) :: kernels
-    real(dp), intent(in), contiguous :: hot(:, :, :), impulse(:, :, :), correction(:, :, :)
-    !> (lanes, nc, blocks)
-    real(dp), intent(inout), contiguous :: mask(:, :, :)
-    real(dp) :: normal(lanes)
-    integer :: g
-
-    do g = 1, size(mask, 3)
-      normal(:) = impulse(:, 1, g) + correction(:, 1, g)
-      mask(:, 1, g) = merge(1.0_dp, 0.0_dp, normal > 0.0_dp)
-      if (kernels%nf > 1) call limit(kernels%friction_row, 2, kernels%nf)
-      if (kernels%rolling_row == 0) cycle
-      call limit(kernels%rolling_row + 3, kernels%nf + 1, kernels%nf + kernels%nd - 1)
-      if (kernels%nd == 3) call limit(kernels%rolling_row + 4, 6, 6)
-    end do
-
-  contains
-
-    !> Components `a` to `z`, bounded together by the coefficient in a row of `hot` times the normal impulse.
-    subroutine limit(row, a, z)
-      integer, intent(in) :: row, a, z
-      real(dp) :: squares(lanes)
-      integer :: k
-
-      squares(:) = 0.0_dp
-      do k = a, z
-        squares(:) = squares + (impulse(:, k, g) + correction(:, k, g))**2
-      end do
-      do k = a, z
-        mask(:, k, g) = merge(mask(:, 1, g), 0.0_dp, squares < (within*hot(:, row, g)*normal)**2)
-      end do
-    end subroutine limit
-
-  end subroutine find_mask
-
-  !> The products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j, in groups of bodies that the compiler makes vectors of.
-  subroutine add_products(sub, motion, products)
+  !> The products (h_i, h_j)_M of the velocities h = M^-1 H y of free and of held test impulses, i <= j, a copy of a shared body
+  !> counting with its part.
+  pure subroutine add_products(sub, motion, products)
     type(subproblem_t), intent(in) :: sub
-    !> H y (nv, n_columns, tests)
+    !> H y, summed over copies (n_tests, nv, n_columns)
     real(dp), intent(in), contiguous :: motion(:, :, :)
-    !> (tests (tests + 1)/2)
-    real(dp), intent(out), contiguous :: products(:)
-    real(dp) :: h(lanes, size(motion, 1), size(motion, 3)), inverse(lanes, size(motion, 1)), acting(lanes, size(products))
-    integer :: b, d, q, i, j, at, last
+    !> (2*n_products)
+    real(dp), intent(inout) :: products(:)
+    integer, parameter :: half = n_tests/2
+    real(dp) :: acting(n_tests, half), inverse
+    integer :: b, d, t, j, at
 
     acting(:, :) = 0.0_dp
-    do b = 1, sub%n_bodies, lanes
-      last = min(lanes, sub%n_bodies - b + 1)
-      h(last + 1:, :, :) = 0.0_dp
-      inverse(last + 1:, :) = 0.0_dp
-      do q = 1, last
-        do j = 1, size(motion, 3)
-          do d = 1, size(motion, 1)
-            h(q, d, j) = motion(d, b + q - 1, j)
-          end do
-        end do
-        do d = 1, size(motion, 1)
-          inverse(q, d) = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b + q - 1)/sub%multiplicity(b + q - 1)
-        end do
-      end do
-      at = 0
-      do j = 1, size(motion, 3)
-        do i = 1, j
-          at = at + 1
-          do d = 1, size(motion, 1)
-            do q = 1, lanes
-              acting(q, at) = acting(q, at) + inverse(q, d)*h(q, d, j)*h(q, d, i)
-            end do
+    do b = 1, sub%n_bodies
+      do d = 1, size(motion, 2)
+        inverse = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b)/sub%multiplicity(b)
+        do j = 1, half
+          do t = 1, half
+            acting(t, j) = acting(t, j) + inverse*motion(j, d, b)*motion(t, d, b)
+            acting(half + t, j) = acting(half + t, j) + inverse*motion(half + j, d, b)*motion(half + t, d, b)
           end do
         end do
       end do
     end do
-    products(:) = sum(acting, dim=1)
+    at = 0
+    do j = 1, half
+      do t = 1, j
+        at = at + 1
+        products(at) = acting(t, j)
+        products(n_products + at) = acting(half + t, j)
+      end do
+    end do
   end subroutine add_products
-
-  !> The largest |w|^2 of a contact [m^2/s^2].
-  pure real(dp) function largest_square(violation) result(largest)
-    !> (lanes, nc, blocks)
-    real(dp), intent(in), contiguous :: violation(:, :, :)
-    real(dp) :: squares(lanes), most(lanes)
-    integer :: q, k, g
-
-    most(:) = 0.0_dp
-    do g = 1, size(violation, 3)
-      squares(:) = 0.0_dp
-      do k = 1, size(violation, 2)
-        do q = 1, lanes
-          squares(q) = squares(q) + violation(q, k, g)**2
-        end do
-      end do
-      most(:) = max(most, squares)
-    end do
-    largest = maxval(most)
-  end function largest_square
-
-  !> Sum of a . b over the contacts, lane by lane.
-  pure real(dp) function contact_product(a, b) result(total)
-    !> (lanes, nc, blocks)
-    real(dp), intent(in), contiguous :: a(:, :, :), b(:, :, :)
-    real(dp) :: acting(lanes)
-    integer :: q, k, g
-
-    acting(:) = 0.0_dp
-    do g = 1, size(a, 3)
-      do k = 1, size(a, 2)
-        do q = 1, lanes
-          acting(q) = acting(q) + a(q, k, g)*b(q, k, g)
-        end do
-      end do
-    end do
-    total = sum(acting)
-  end function contact_product
 
   !> L, after `project`. Collective.
   subroutine velocity_error_add_levels(self, problem)
@@ -418,7 +316,7 @@ contains
           l = max(i, j)
           q = lane_of(c)
           g = block_of(c)
-          parts(l, s) = parts(l, s) + sum(sub%impulse(q, :, g)*part%violation(q, :, g))
+          parts(l, s) = parts(l, s) + part%power(q, g)
           parts(n + l, s) = parts(n + l, s) + sub%impulse(q, 1, g)
         end do
         do b = 1, sub%n_grains

@@ -507,7 +507,7 @@ def places():
         Case("overlaps of a fifth, in a box", "the same under gravity, between walls: they gain what lifts them",
              overlapping, box(0.45), {}, steps=100, holds=bounded_energy(12 * 0.7 * G * 0.3)),
         Case("coincident centres", "no direction from one to the other", [Grain([0.0, 0.3]), Grain([0.0, 0.3]), Grain([0.2, 0.1])],
-             [floor()], {"scene": {"friction": 0.3}}, steps=40, subdomains=2,
+             [floor()], {"scene": {"friction": 0.3, "start_overlap": 2.0}}, steps=40, subdomains=2,
              holds=together(bounded_energy(1.5 * weight), overlaps_below(0.02, 0.9))),
         Case("radius ratio 1:100", "a disk of 10^4 kg on disks of 10 g", large, [floor()], {"scene": {"friction": 0.3}}, steps=100),
         Case("steps of 1e-6 s", "changes of velocity that are small beside the velocities", flower(), [],

@@ -40,7 +40,9 @@ def scene(number):
     gravity[:dimension] = rng.normal(size=dimension) * rng.choice([0.0, G])
     step = float(rng.choice([1e-5, 1e-3, 1e-1]))
     cells = np.maximum(np.floor((places.max(0) - places.min(0)) / (2.5 * radii.max())), 1.0).prod()
-    groups = {"scene": {"gravity": [float(g) for g in gravity], "friction": friction, "restitution": restitution},
+    groups = {"scene": {"gravity": [float(g) for g in gravity], "friction": friction, "restitution": restitution,
+                        # small grains lie within large ones
+                        "start_overlap": 1e3},
               "time": {"step": step}, "decomposition": {"kind": str(rng.choice(["dual", "primal"]))},
               "solver": {"max_iterations": 500, "check_every": int(rng.choice([1, 10]))}}
     more = effects(rng, dimension, masses, radii, friction, restitution)

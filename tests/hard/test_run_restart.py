@@ -20,7 +20,8 @@ from killed_runs import Going, compile_shim
 # grains that turn, METIS by schedule and by imbalance
 DRUM = {
     "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "friction": 0.3, "period": [0.504, 0.0, 0.0],
-              "gravity_table": "gravity.csv", "skin": 0.008},
+              # the paddle stands in the grains
+              "gravity_table": "gravity.csv", "skin": 0.008, "start_overlap": 1.0},
     "boundary": [
         {"shape": "plane", "name": "belt", "point": [0.0, -0.01], "normal": [0.0, 1.0], "velocity": [0.3, 0.0]},
         {"shape": "plane", "name": "lid", "point": [0.0, 0.31], "normal": [0.0, -1.0], "free": [False, True], "mass": 2.0,

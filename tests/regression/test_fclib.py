@@ -1,4 +1,5 @@
-"""gravier_fclib: problems in every storage form, local and global, judged again here; statuses, tables and bad input."""
+"""gravier_fclib: problems in every storage form, local and global, judged again here; problems without a solution; statuses, tables and
+bad input."""
 import csv
 import itertools
 import os
@@ -8,6 +9,8 @@ import unittest
 import h5py
 import numpy as np
 
+from fclib_problems import write_local, write_matrix
+import impossible_problems
 from gravier_runs import RunTestCase, gravier
 
 
@@ -39,42 +42,6 @@ def random_problem(dimension, contacts, seed=1):
     random = np.random.default_rng(seed)
     a = random.uniform(-1, 1, (dimension * contacts, dimension * contacts + 4))
     return a @ a.T, random.uniform(-1, 1, dimension * contacts), random.uniform(0, 1, contacts)
-
-
-def write_matrix(group, matrix, form="rows"):
-    """Rows, columns, or triplets in any order, one entry in two parts, with room to spare."""
-    i, j = np.nonzero(matrix)
-    x = matrix[i, j]
-    group["m"], group["n"] = np.array([matrix.shape[0]], "i4"), np.array([matrix.shape[1]], "i4")
-    if form == "triplets":
-        order = np.random.default_rng(0).permutation(len(x))
-        i, j, x = np.append(i[order], i[0]), np.append(j[order], j[0]), np.append(x[order], 0.25 * x[0])
-        x[np.flatnonzero((i == i[-1]) & (j == j[-1]))[0]] -= x[-1]
-        group["nz"], group["i"], group["p"] = np.array([len(x)], "i4"), i.astype("i4"), j.astype("i4")
-        group["nzmax"] = np.array([len(x) + 3], "i4")
-        group["x"] = np.append(x, [7.0, 7.0, 7.0])
-        return
-    if form == "columns":
-        order = np.lexsort((i, j))
-        i, j, x = j[order], i[order], x[order]
-    lines = matrix.shape[1 if form == "columns" else 0]
-    group["nz"] = np.array([-1 if form == "columns" else -2], "i4")
-    group["nzmax"] = np.array([len(x)], "i4")
-    group["p"] = np.searchsorted(i, np.arange(lines + 1)).astype("i4")
-    group["i"], group["x"] = j.astype("i4"), x
-
-
-def write_local(path, w, q, mu, form="rows", dimension=3, constraints=None):
-    """v = W r + V l + q; the constraints V^T r + R l + s = 0 are (V, R, s)."""
-    with h5py.File(path, "w") as file:
-        local = file.create_group("fclib_local")
-        local["spacedim"] = np.array([dimension], "i4")
-        write_matrix(local.create_group("W"), w, form)
-        local["vectors/q"], local["vectors/mu"] = q, mu
-        if constraints:
-            write_matrix(local.create_group("V"), constraints[0], form)
-            write_matrix(local.create_group("R"), constraints[1], form)
-            local["vectors/s"] = constraints[2]
 
 
 def write_global(path, m, h, f, mu, g=None, b=None, w=None, dimension=3):
@@ -328,6 +295,82 @@ class Fclib(RunTestCase):
         self.assertIn("NOT CONVERGED", run.stdout)
         self.assertIn("1 of 1 solves did NOT reach the tolerance", run.stdout)
         self.assertEqual(int(read_table(self.path("results.csv"))["converged"][0]), 0)
+
+    def test_problems_without_a_solution(self):
+        problems = impossible_problems.impossible()
+        self.assertGreaterEqual(len(problems), 24)
+        impossible_problems.write_problems(self.directory)
+        for method in ("auto", "nlgs", "momentum", "newton"):
+            with self.subTest(method):
+                # default limits; plain sweeps would take 1e6 of them on masses of ratio 1e6
+                run = self.solve("impossible", "--method", method, "--csv", "results.csv", "--write", method, status=3)
+                rows = read_table(self.path("results.csv"))
+                verdicts = dict(zip(rows["problem"], rows["verdict"]))
+                creeping = {"chain_2d_masses.h5"} if method == "nlgs" else set()
+                self.assertEqual(set(verdicts), {f"{name}.h5" for name in problems})
+                self.assertEqual({name for name, verdict in verdicts.items() if verdict != "no_solution"}, creeping)
+                self.assertNotIn("1", rows["converged"])
+                self.assertLess(max(map(float, rows["seconds"])), 5)
+                found = len(problems) - len(creeping)
+                self.assertIn(f"*** {found} of {len(problems)} solves found NO solution: loads grow without bound", run.stdout)
+                self.assertEqual(run.stdout.count("no solution found: loads grow without bound, most at contact "), found)
+                # there is no proof by normal impulses alone where friction jams a grain in a wedge
+                proven = {name for name, proof in zip(rows["problem"], rows["proof"]) if proof == "1"}
+                self.assertEqual({name for name in proven if name.startswith("wedge")}, set())
+                if method == "auto":
+                    self.assertEqual({name for name in verdicts if not name.startswith("wedge")}, proven)
+                self.assertEqual(run.stdout.count(" (proven)"), len(proven))
+
+    def test_named_contact_grows(self):
+        # four solvable contacts come first; the squeezed row has contacts 5 to 8, where one impulse grows as the others
+        w, q, mu, dimension = impossible_problems.impossible()["chain_2d_beside"]
+        write_local(self.path("a.h5"), w, q, mu, dimension=dimension)
+        run = self.solve("a.h5", status=3)
+        self.assertRegex(run.stdout, r"no solution found: loads grow without bound, most at contact [5-8] \(proven\)")
+
+    def test_near_neighbours_have_solutions(self):
+        problems = impossible_problems.solvable()
+        impossible_problems.write_problems(self.directory)
+        for method in ("auto", "newton"):
+            self.solve("solvable", "--method", method, "--csv", "results.csv", "--write", method)
+            rows = read_table(self.path("results.csv"))
+            self.assertEqual((set(rows["verdict"]), set(rows["proof"])), ({"solved"}, {"0"}))
+            self.assertEqual(len(rows["verdict"]), len(problems))
+            for name, (w, q, mu, _) in problems.items():
+                r, u = self.impulses(f"{method}/{name}.h5")
+                self.assertLess(measures(w, q, mu, r)[1], 1.01e-8, name)
+                # a tenth of the approach counts; u is rounded as W r is
+                approach = -(w @ r + q).reshape(len(mu), -1)[:, 0].min()
+                rounding = 1e-15 * (np.abs(w) @ np.abs(r)).max()
+                self.assertLessEqual(approach, 1e-7 * np.linalg.norm(q.reshape(len(mu), -1), axis=1).max() + rounding, name)
+        # plain sweeps creep where masses are in a ratio of 1e6, but do not say that there is no solution
+        for method in ("nlgs", "momentum"):
+            self.solve("solvable", "--method", method, "--csv", "results.csv", status=3)
+            rows = read_table(self.path("results.csv"))
+            self.assertEqual({name for name, verdict in zip(rows["problem"], rows["verdict"]) if verdict != "solved"},
+                             {"masses_2d.h5", "masses_3d.h5"})
+            self.assertNotIn("no_solution", rows["verdict"])
+
+    def test_impulses_beyond_loads_end(self):
+        # a wedge so narrow that the grain slides out by impulses of 5e9: a solution, but none that loads can make, and Newton's
+        # method comes to where rounding hides what a step could change
+        w, q, mu = impossible_problems.wedge(2, 0.0, 1e-5).problem()
+        write_local(self.path("a.h5"), w, q, mu, dimension=2)
+        for method in ("newton", "auto"):
+            self.solve("a.h5", "--method", method, "--csv", "results.csv", status=3)
+            self.assertEqual(read_table(self.path("results.csv"))["verdict"], ["not_converged"])
+
+    def test_huge_impulses_are_no_solution(self):
+        # two walls that move alike: the start is in balance, but q is lost beside it
+        w, q, mu = impossible_problems.one_grain(2, 0.5, (1.0, 1.0))[0].problem()
+        write_local(self.path("a.h5"), w, q, mu, dimension=2)
+        with h5py.File(self.path("a.h5"), "a") as file:
+            file["fclib_local/guesses/1/r"] = np.array([1e17, 0, 1e17, 0])
+        run = self.solve("a.h5", "--warm", "--method", "nlgs", "--max-iterations", "1", "--csv", "results.csv", status=3)
+        self.assertRegex(run.stdout, r"NOT CONVERGED: the impulse of contact [12] is beyond what loads can make")
+        rows = read_table(self.path("results.csv"))
+        self.assertLess(float(rows["es"][0]), 1e-8)
+        self.assertEqual((rows["verdict"], rows["converged"]), (["not_converged"], ["0"]))
 
     def test_profile(self):
         for name, problem in {"a": random_problem(3, 8), "b": random_problem(3, 30, 2), "c": local_problem()}.items():

@@ -405,6 +405,65 @@ class BadInput(RunTestCase):
                          ("wall", changed("9,0.0,0.0", "9,0.0,-1e10"), {}, ("boundary 'wall 9'", *words)),
                          ("period", BODIES, {"period": [2.0, 0.0], "period_origin": [1e10, 0.0]}, ("period", *words))], prepare_far)
 
+    def test_start_overlap(self):
+        """Bodies that lie in each other or behind a boundary; in the message are the worst pair and the limit."""
+        def prepare_start(directory, bodies, scene, groups):
+            write(os.path.join(directory, "bodies.csv"), "id,x,y,radius,group\n" + bodies)
+            write(os.path.join(directory, "case.nml"), namelist(merged({
+                "scene": {"bodies": "file", "bodies_file": "bodies.csv", **scene}, "time": CASE["time"], "output": CASE["output"]},
+                groups)))
+            return "case.nml"
+        apart = "5,0,7,0.1,0\n6,3,7,0.1,0\n7,3,0.1,0.1,0\n"
+        floor = {"boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}]}
+        split = {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 4}}
+        limit = ("&scene start_overlap", "expected at most 50.0 %")
+        self.refuse_all([
+            ("two disks", "1,0,1,0.1,0\n2,0.2,1,0.2,0\n" + apart, {}, floor,
+             ("bodies 1 and 2 overlap by 100.0 % of the smaller radius at the start:", *limit)),
+            ("one centre", "1,0,1,0.1,0\n2,0,1,0.1,0\n" + apart, {}, floor, ("bodies 1 and 2 overlap by 200.0 %", *limit)),
+            ("two pairs", "1,0,1,0.1,0\n2,0.05,1,0.1,0\n3,3,2,0.1,0\n4,3,2.1,0.1,0\n" + apart, {}, split,
+             ("bodies 1 and 2 overlap by 150.0 % of the smaller radius at the start, the most of 2 pairs:", *limit)),
+            ("between subdomains", "1,1.46,3.5,0.1,0\n2,1.54,3.5,0.1,0\n" + apart, {}, split, ("bodies 1 and 2 overlap by 120.0 %", *limit)),
+            ("in a floor", "1,0,0.04,0.1,0\n" + apart, {}, floor, ("body 1 overlaps boundary 'floor' by 60.0 % of its radius", *limit)),
+            ("far behind a floor", "1,0,-5,0.1,0\n" + apart, {}, merged(floor, split),
+             ("body 1 overlaps boundary 'floor' by 5100.0 % of its radius", *limit)),
+            ("out of a circle", "1,0,3,0.1,0\n", {}, {"boundary": [{"name": "drum", "shape": "circle", "radius": 2.0}]},
+             ("body 1 overlaps boundary 'drum' by 1100.0 %", *limit)),
+            ("across a period", "1,0.02,1,0.1,0\n2,3.98,1,0.1,0\n" + apart, {"period": [4.0, 0.0]}, split,
+             ("bodies 1 and 2 overlap by 160.0 %", *limit)),
+            ("in glued disks", "1,0,1,0.1,1\n2,0.1,1,0.1,1\n3,0.15,1.1,0.1,0\n" + apart, {},
+             {"boundary": [{"name": "clump", "shape": "grains", "group": 1}]},
+             ("bodies 2 and 3 (glued to boundary 'clump') overlap by 88.2 %", *limit)),
+            ("a limit of its own", "1,0,1,0.1,0\n2,0.18,1,0.1,0\n" + apart, {"start_overlap": 0.1}, floor,
+             ("bodies 1 and 2 overlap by 20.0 %", "expected at most 10.0 %")),
+            ("an overlap that grows in the first step", "1,0,1,0.1,0\n2,0.18,1,0.1,0\n" + apart, {"start_overlap": 0.0}, floor,
+             ("bodies 1 and 2 overlap by 20.0 %", "expected at most 0.0 %")),
+        ], prepare_start)
+
+    def test_starts_that_are_allowed(self):
+        """Up to the limit, glued grains in each other, behind an outlet, in a boundary that is taken away at once; and a run that goes
+        on from a checkpoint, whatever its places."""
+        bodies = "id,x,y,vx,radius,group\n1,0,1,0,0.1,0\n2,0.15,1,0,0.1,0\n3,2,2,0,0.1,1\n4,2.05,2,0,0.1,1\n5,4,-1,0,0.1,0\n"
+        groups = {"scene": {"bodies": "file", "bodies_file": "bodies.csv"}, "time": CASE["time"],
+                  "output": {**CASE["output"], "checkpoint_every": 1},
+                  "boundary": [{"name": "clump", "shape": "grains", "group": 1},
+                               {"name": "outlet", "shape": "outlet", "point": [0.0, -3.0], "normal": [0.0, 1.0]},
+                               {"name": "gate", "shape": "plane", "normal": [0.0, 1.0], "remove_at": 0.0}]}
+        directory = self.here("allowed")
+        os.makedirs(directory)
+        write(os.path.join(directory, "bodies.csv"), bodies)
+        for title, more, words in (("touching", {}, ()), ("one centre", {"start_overlap": 2.0}, ("5,4,-1", "5,0,1")),
+                                   ("no overlap", {"start_overlap": 0.0}, ("2,0.15", "2,0.2"))):
+            with self.subTest(title):
+                write(os.path.join(directory, "bodies.csv"), bodies.replace(*words) if words else bodies)
+                for ranks in (1, 2):
+                    self.assert_status(run_case(merged(groups, {"scene": more}), ranks, directory), 0)
+        # a run that goes on from a checkpoint starts where the one before has ended
+        write(os.path.join(directory, "bodies.csv"), bodies.replace("5,4,-1", "5,0,1"))
+        self.assert_status(run_case(merged(groups, {"scene": {"start_overlap": 2.0}, "time": {"steps": 1}}), 1, directory), 0)
+        self.assert_status(run_case(groups, 2, directory, options=("--restart",)), 0)
+        self.assert_refused(run_case(groups, 2, directory), ("bodies 1 and 5 overlap by 200.0 %",))
+
     def test_csv_bodies(self):
         def prepare_csv(directory, text):
             if text is not None:

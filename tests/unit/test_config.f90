@@ -145,6 +145,7 @@ contains
     call check_close(scene%overlap_allowed, 0.0625_dp, 0.0_dp, "overlap_allowed")
     call check(scene%overlap_given, "overlap_given")
     call check(.not. scene%overlap_projection, "overlap_projection")
+    call check_close(scene%start_overlap, 0.25_dp, 0.0_dp, "start_overlap")
   end subroutine check_whole_effects
 
   subroutine check_vector(vector, expected, name)
@@ -161,10 +162,11 @@ contains
       // "  wall_friction = 0.625, restitution = 0.25, wall_restitution = 0.75, rotation = .false." // newline &
       // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6, gravity_table = 'g.csv'" // newline &
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
+      // "  start_overlap = 0.25" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
-      // "  check_every = 5, warm_start = .false., on_failure = 'stop' /" // newline &
+      // "  velocity_scale = 0.1875, check_every = 5, warm_start = .false., on_failure = 'stop' /" // newline &
       // "&decomposition partition = 'grid', kind = 'primal', grid = 1, 2, 3, subdomains = 6" // newline &
       // "  repartition_every = 9, repartition_imbalance = 1.5 /" // newline &
       // "&enriched direction = 2.5, direction_unit = 'absolute', contacts = 'active', interface = 'cg'" // newline &
@@ -184,6 +186,8 @@ contains
     call check_equal(config%solver%max_iterations, 50, "max_iterations")
     call check_equal(config%solver%sweeps, 3, "sweeps")
     call check_equal(config%solver%check_every, 5, "check_every")
+    call check_close(config%solver%velocity_scale, 0.1875_dp, 0.0_dp, "velocity_scale")
+    call check(config%solver%velocity_scale_given, "velocity_scale_given")
     call check(.not. config%solver%warm_start, "warm_start")
     call check_equal(config%solver%on_failure, "stop", "on_failure")
     call check_equal(config%decomposition%partition, "grid", "partition")
@@ -255,6 +259,7 @@ contains
     call check(.not. scene%skin_given, "default skin_given")
     call check(.not. scene%overlap_given, "default overlap_given")
     call check(scene%overlap_projection, "default overlap_projection")
+    call check_close(scene%start_overlap, 0.5_dp, 0.0_dp, "default start_overlap")
   end subroutine check_default_effects
 
   subroutine check_default_methods(config)
@@ -267,6 +272,7 @@ contains
     call check_equal(config%solver%sweeps, 1, "default sweeps")
     call check_close(config%solver%relaxation, 1.0_dp, 0.0_dp, "default relaxation")
     call check_equal(config%solver%check_every, 10, "default check_every")
+    call check(.not. config%solver%velocity_scale_given, "default velocity_scale is found by rule")
     call check(config%solver%warm_start, "default warm_start")
     call check_equal(config%solver%on_failure, "continue", "default on_failure")
     call check_equal(config%decomposition%partition, "grid", "default partition")
@@ -654,6 +660,7 @@ contains
     call refuse(scene("bodies = 'column' body_force(3) = -1"), "&scene body_force(3) = -1: " // third)
     call refuse(scene("bodies = 'column' skin = -1"), "&scene skin = -1: expected a finite real number >= 0 (m)")
     call refuse(scene("bodies = 'column' overlap_allowed = 0"), "&scene overlap_allowed = 0: " // positive // " (m)")
+    call refuse(scene("bodies = 'column' start_overlap = -1"), "&scene start_overlap = -1: expected a finite real number >= 0")
     call refuse(scene("bodies = 'column' rotation = 0"), "&scene rotation = 0: expected .true. or .false.")
     call refuse(scene("bodies = 'column' column_count = 0"), "&scene column_count = 0: expected an integer >= 1")
     call refuse(scene("bodies = 'column' radius = 0"), "&scene radius = 0: " // positive // " (m)")
@@ -743,6 +750,7 @@ contains
     call refuse(column // "&solver relaxation = 0.0 /", "&solver relaxation = 0.0: expected a finite real number in (0, 1]")
     call refuse(column // "&solver relaxation = 1.5 /", "&solver relaxation = 1.5: expected a finite real number in (0, 1]")
     call refuse(column // "&solver check_every = 0 /", "&solver check_every = 0: expected an integer >= 1")
+    call refuse(column // "&solver velocity_scale = 0 /", "&solver velocity_scale = 0: " // positive // " (m/s)")
   end subroutine test_rules_of_time_and_solver
 
   subroutine test_rules_of_decomposition()

@@ -305,7 +305,7 @@ contains
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :), reaction(:, :)
     real(dp), allocatable, dimension(:, :, :) :: start, v, law_velocity, change
-    real(dp) :: sums(2), changes(2)
+    real(dp) :: sums(3), changes(2)
     integer :: trial, regimes(3), regime, d
 
     regimes(:) = 0
@@ -703,7 +703,7 @@ contains
     type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: start(:, :, :), v(:, :, :)
-    real(dp) :: sums(2), energy, last, hot(20)
+    real(dp) :: sums(3), energy, last, hot(20)
     integer :: trial, k, rolls, closed, nd
 
     nd = dimension
@@ -830,7 +830,7 @@ contains
     type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: expected(:, :), reaction(:, :), v(:, :, :), wanted_v(:, :, :)
-    real(dp) :: sums(2), wanted(2)
+    real(dp) :: sums(3), wanted(2)
     integer :: n
 
     do n = 1, 3*lanes + 1, 5
@@ -907,7 +907,7 @@ contains
     type(case_t) :: problem, other
     type(memory_t) :: memory, fast
     real(dp), allocatable :: before(:, :), v(:, :, :), reaction(:, :), hot(:, :, :)
-    real(dp) :: sums(2), others(2)
+    real(dp) :: sums(3), others(3)
     integer :: n, variant
 
     do n = 1, 2*lanes - 1, 2
@@ -1021,7 +1021,7 @@ contains
     type(effects_t), intent(in) :: effects
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :), start(:, :, :), reaction(:, :)
-    real(dp) :: sums(2)
+    real(dp) :: sums(3)
     integer :: b, d
 
     call make_case(dimension, effects, 30, 71, problem)
@@ -1047,7 +1047,7 @@ contains
   subroutine test_no_contacts()
     type(case_t) :: problem
     real(dp), allocatable :: before(:, :)
-    real(dp) :: sums(2)
+    real(dp) :: sums(3)
     integer :: k
 
     do k = 0, 3

@@ -1,14 +1,16 @@
 !> Packed contact problems with full blocks: evaluation, measures, and every method on a stack of boxes, whose contacts are more
-!> than its bodies can tell apart, and on random problems.
+!> than its bodies can tell apart, and on random problems; problems without a solution.
 program test_friction_solver
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows
   use gravier_random_hash, only: hash_uniform
-  use gravier_delassus, only: delassus_t
+  use gravier_delassus, only: delassus_t, most_impulse
+  use gravier_unbounded, only: growth_t, growth_none, growth_marked, growth_proven, find_growth, note_growth
   use gravier_alart_curnier, only: alart_curnier_t
-  use gravier_friction_solver, only: friction_control_t, friction_methods, friction_report_t, solve_friction
+  use gravier_friction_solver, only: friction_control_t, friction_methods, friction_report_t, solve_friction, &
+    & verdict_solved, verdict_not_converged, verdict_no_solution
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -29,6 +31,11 @@ program test_friction_solver
   call check_random(3, 24)
   ! beyond the order of dense factors
   call check_random(3, 60)
+  call check_growth()
+  call check_marks()
+  call check_no_solution()
+  call check_huge_impulses()
+  call check_approach()
   call check_refusals()
   call finish_checks()
   call MPI_Finalize()
@@ -369,6 +376,153 @@ contains
     call solve_friction(problem, control, r, report, error)
     call check(.not. allocated(error), method//" runs")
   end subroutine solve
+
+  !> A grain of mass 1 that does not turn, between two walls whose normals rise from the x axis by an angle: 0 is a grain between
+  !> parallel walls, more a wedge that is open along y. The walls move along their normals.
+  subroutine make_squeeze(angle, friction, speeds, problem)
+    real(dp), intent(in) :: angle, friction
+    !> of the walls, towards the grain
+    real(dp), intent(in) :: speeds(2)
+    type(delassus_t), intent(inout) :: problem
+    real(dp) :: h(2, 4), w(4, 4), q(4), mu(2)
+
+    h(1, :) = cos(angle)
+    h(2, :) = sin(angle)
+    h(1, 2) = -sin(angle)
+    h(2, 2) = cos(angle)
+    h(1, 3) = -cos(angle)
+    h(1, 4) = -sin(angle)
+    h(2, 4) = -cos(angle)
+    w = matmul(transpose(h), h)
+    q = 0.0_dp
+    q(1) = -speeds(1)
+    q(3) = -speeds(2)
+    mu = friction
+    call pack(2, w, q, mu, problem)
+  end subroutine make_squeeze
+
+  !> Impulses that no solution can have prove that there is none; the bound on impulses of a solution is one.
+  subroutine check_growth()
+    type(delassus_t) :: problem
+    type(growth_t) :: growth
+    type(friction_report_t) :: report
+    real(dp) :: z(2, 2), r(2, 2)
+
+    call make_squeeze(0.0_dp, 0.5_dp, [0.3_dp, 0.2_dp], problem)
+    z = reshape([1.0_dp, 0.0_dp, 1.0_dp, 0.0_dp], [2, 2])
+    call find_growth(problem, z, growth)
+    call check_equal(growth%kind, growth_proven, "closing walls: balanced impulses are a proof")
+    ! W z = 0 up to rounding
+    call check(growth%bound > 1.0e12_dp, "closing walls: no impulses suffice")
+    ! H z = -1, so |W z|/s is 1 for each contact; z.q = -0.3 - 2 0.2, max|q| = 0.3
+    z = reshape([1.0_dp, 0.0_dp, 2.0_dp, 0.0_dp], [2, 2])
+    call find_growth(problem, z, growth)
+    call check_equal(growth%kind, growth_none, "closing walls: impulses out of balance are none")
+    call check_equal(growth%contact, 2, "the contact of the largest impulse")
+    call check_close(growth%bound, 0.7_dp/(2.0_dp*0.3_dp), 1.0e-14_dp, "bound on impulses of a solution")
+    ! one wall follows the other
+    call make_squeeze(0.0_dp, 0.5_dp, [0.3_dp, -0.3_dp], problem)
+    z = reshape([1.0_dp, 0.0_dp, 1.0_dp, 0.0_dp], [2, 2])
+    call find_growth(problem, z, growth)
+    call check_equal(growth%kind, growth_none, "walls that move alike: no growth")
+    ! the grain slides out with speed c/sin(angle), by impulses c/(2 sin(angle)**2)
+    call make_squeeze(0.01_dp, 0.0_dp, [1.0_dp, 1.0_dp], problem)
+    z = reshape([1.0_dp, 0.0_dp, 1.0_dp, 0.0_dp], [2, 2])
+    call find_growth(problem, z, growth)
+    call check_equal(growth%kind, growth_none, "narrow wedge: it has a solution")
+    call solve(problem, "auto", 1.0e-8_dp, r, report)
+    call check_equal(report%verdict, verdict_solved, "narrow wedge: solved")
+    call check_close(r(1, 1), 0.5_dp/sin(0.01_dp)**2, 1.0e-6_dp*r(1, 1), "narrow wedge: impulse")
+    call check(growth%bound > 1.0_dp .and. growth%bound <= report%impulse, "narrow wedge: the bound is below the impulses")
+  end subroutine check_growth
+
+  !> Impulses with friction in them mark growth, and prove nothing; two marks one after the other end an iteration.
+  subroutine check_marks()
+    type(delassus_t) :: problem
+    type(growth_t) :: growth
+    real(dp) :: z(2, 2), along_x(2, 2)
+
+    call make_squeeze(0.2_dp, 0.5_dp, [1.0_dp, 1.0_dp], problem)
+    along_x = reshape([cos(0.2_dp), -sin(0.2_dp), cos(0.2_dp), sin(0.2_dp)], [2, 2])
+    z = along_x
+    call note_growth(problem, z, growth)
+    call check_equal(growth%kind, growth_marked, "wedge: balanced impulses with friction are a mark")
+    call check(.not. growth%ends(), "one mark does not end an iteration")
+    z = along_x
+    call note_growth(problem, z, growth)
+    call check(growth%ends(), "two do")
+    z = -along_x
+    call note_growth(problem, z, growth)
+    call check_equal(growth%marks, 0, "marks count one after the other")
+    call make_squeeze(0.2_dp, 0.1_dp, [1.0_dp, 1.0_dp], problem)
+    z = along_x
+    call note_growth(problem, z, growth)
+    call check_equal(growth%kind, growth_none, "wedge with little friction: such impulses are outside of the cones")
+  end subroutine check_marks
+
+  !> Every method says so, soon, in the smallest cases: parallel walls, and a wedge in which friction jams the grain.
+  subroutine check_no_solution()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    real(dp) :: r(2, 2)
+    integer :: m, k
+
+    do k = 1, 2
+      call make_squeeze(merge(0.0_dp, 0.2_dp, k == 1), 0.5_dp, [1.0_dp, 1.0_dp], problem)
+      do m = 1, size(friction_methods)
+        call solve(problem, trim(friction_methods(m)), 1.0e-8_dp, r, report)
+        call check(.not. report%converged, "no solution: "//trim(friction_methods(m))//" does not converge")
+        call check_equal(report%verdict, verdict_no_solution, "no solution: "//trim(friction_methods(m))//" says so")
+        call check_equal(report%growth%kind, merge(growth_proven, growth_marked, k == 1), "no solution: proof for parallel walls")
+        call check(report%sweeps + report%newton_steps < 1000, "no solution: soon")
+      end do
+    end do
+  end subroutine check_no_solution
+
+  !> Impulses so large that q is lost beside them leave a measure of 0 and are not a solution.
+  subroutine check_huge_impulses()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    type(friction_control_t) :: control
+    type(error_t), allocatable :: error
+    real(dp) :: r(2, 2)
+
+    call make_squeeze(0.0_dp, 0.5_dp, [1.0_dp, -1.0_dp], problem)
+    r = reshape([1.0e17_dp, 0.0_dp, 1.0e17_dp, 0.0_dp], [2, 2])
+    control%method = "newton"
+    control%max_iterations = 1
+    call solve_friction(problem, control, r, report, error)
+    call check(report%consistent <= control%tolerance, "huge impulses: the measure is blind")
+    call check_equal(report%verdict, verdict_not_converged, "huge impulses: not converged")
+    call check(report%impulse > most_impulse .and. report%worst(2) > 0, "huge impulses: named")
+  end subroutine check_huge_impulses
+
+  !> Of 400 contacts one approaches: hardly seen by the measure of all, as 1 by the velocities of approach.
+  subroutine check_approach()
+    integer, parameter :: n = 400
+    type(delassus_t) :: problem
+    type(error_t), allocatable :: error
+    real(dp) :: q(2*n), one(2*n), mu(n), r(2, n), v(2, n), e, es, approach, impulse
+    integer :: i, diagonal(2*n), contacts(2)
+
+    q = 0.0_dp
+    q(1::2) = -1.0_dp
+    mu = 0.3_dp
+    one = 1.0_dp
+    diagonal = [(i, i=1, 2*n)]
+    call problem%init(2, compressed_rows(2*n, 2*n, diagonal, diagonal, one), q, mu, error)
+    call check(.not. allocated(error), "contacts that share no body are packed")
+    r = 0.0_dp
+    r(1, :) = 1.0_dp
+    r(1, 7) = 1.0_dp - 1.0e-6_dp
+    call problem%velocity(r, v)
+    call problem%measure(r, v, e, es)
+    call problem%find_extremes(r, v, approach, impulse, contacts)
+    call check_close(es, 1.0e-6_dp/sqrt(real(n, dp)), 1.0e-14_dp, "measure of one contact of many")
+    call check_close(approach, 1.0e-6_dp, 1.0e-14_dp, "its velocity of approach")
+    call check_equal(contacts(1), 7, "the contact that approaches")
+    call check_close(problem%figure(r, v), 1.0e-7_dp, 1.0e-14_dp, "what a tolerance is compared with")
+  end subroutine check_approach
 
   !> A method that does not exist, a budget too small, a contact that nothing moves.
   subroutine check_refusals()

@@ -1,0 +1,343 @@
+!> The velocity against which errors of a solve are compared. A residual is small against the impulses of a step, whatever
+!> moves; an error of velocities has to be small against what moves: in slow shear against the speed of the wall, in settling
+!> against what loads do in a step, in fast flow against the motion itself.
+!>
+!>     load   what loads do to the mean grain in a step (mass m, diameter d):
+!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, attraction of the laws
+!>     drive  largest difference of imposed velocities
+!>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
+!>     own    root mean square velocity of the bodies in contact at the start of the step
+!>     U      = max(U_q, 0.1 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there
+module gravier_velocity_scale
+  use gravier_kinds, only: dp
+  use gravier_communicator, only: communicator_t
+  use gravier_motion, only: grain_volume
+  use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_grains, shape_outlet
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
+  implicit none
+  private
+  public :: velocity_scale_t, imposed_motion_t
+
+  !> share of the motion that goes on which an error may be compared with
+  real(dp), parameter :: share_of_own = 0.1_dp
+  !> diameters by which grains may drift in the simulated time
+  real(dp), parameter :: drift = 0.01_dp
+
+  !> What boundaries impose on the grains at a time.
+  type :: imposed_motion_t
+    !> largest difference of velocities [m/s]
+    real(dp) :: difference = 0.0_dp
+    !> velocity of all boundaries where they move alike, else 0 [m/s]
+    real(dp) :: common(3) = 0.0_dp
+    !> there is a boundary that grains touch
+    logical :: bounded = .false.
+  end type imposed_motion_t
+
+  type :: velocity_scale_t
+    !> what can be meant by the velocity of a scene, and which velocity counts [m/s]
+    real(dp) :: load = 0.0_dp, drive = 0.0_dp, creep = 0.0_dp, own = 0.0_dp, value = 0.0_dp
+    !> the one that counts
+    character(len=20) :: kind = "none"
+    !> diameter [m] and mass [kg] of the mean grain; 0 without grains
+    real(dp) :: diameter = 0.0_dp, mass = 0.0_dp
+    !> simulated time [s]; 0: none
+    real(dp) :: duration = 0.0_dp
+    !> value that the user gives in the place of all rules; 0: none [m/s]
+    real(dp) :: given = 0.0_dp
+    !> how far from its pivot each boundary reaches grains (boundaries) [m]
+    real(dp), allocatable :: lever(:)
+  contains
+    procedure :: init => velocity_scale_init
+    procedure :: measure => velocity_scale_measure
+    procedure :: load_of => velocity_scale_load_of
+    procedure :: pressure_of => velocity_scale_pressure_of
+    procedure :: imposed => velocity_scale_imposed
+    procedure, private :: choose => velocity_scale_choose
+  end type velocity_scale_t
+
+contains
+
+  !> Take the mean grain and the levers from a scene as it was made: they stay, so that a run that goes on from a checkpoint
+  !> compares with the same velocity. Collective.
+  subroutine velocity_scale_init(self, comm, grains, boundaries, duration, given)
+    class(velocity_scale_t), intent(inout) :: self
+    type(communicator_t), intent(in) :: comm
+    !> of this rank
+    type(body_set_t), intent(in) :: grains
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> simulated time [s], and velocity of the user, 0 for none [m/s]
+    real(dp), intent(in) :: duration, given
+    real(dp), allocatable :: parts(:, :)
+    real(dp) :: sums(3)
+    integer :: k
+
+    allocate (parts(3, grains%n))
+    do k = 1, grains%n
+      parts(1, k) = grains%radius(k)
+      parts(2, k) = grains%mass(k)
+      parts(3, k) = 1.0_dp
+    end do
+    call comm%sum_parts(parts, sums)
+    self%diameter = 0.0_dp
+    self%mass = 0.0_dp
+    if (sums(3) > 0.0_dp) then
+      self%diameter = 2.0_dp*sums(1)/sums(3)
+      self%mass = sums(2)/sums(3)
+    end if
+    self%duration = duration
+    self%given = given
+    if (allocated(self%lever)) deallocate (self%lever)
+    allocate (self%lever(size(boundaries)))
+    call find_levers(grains, boundaries, self%lever)
+    call comm%highest_of(self%lever)
+  end subroutine velocity_scale_init
+
+  !> Distance from its pivot, across the axis that it turns about, up to which each boundary reaches grains: that of its
+  !> farthest point, of the farthest glued grain, or, of a plane, which has no end, of the farthest grain.
+  subroutine find_levers(grains, boundaries, lever)
+    type(body_set_t), intent(in) :: grains
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> (boundaries) [m]
+    real(dp), intent(out) :: lever(:)
+    real(dp) :: place(3)
+    integer :: b, k
+
+    lever(:) = 0.0_dp
+    do b = 1, size(boundaries)
+      associate (boundary => boundaries(b))
+        if (.not. boundary%turns()) cycle
+        select case (boundary%shape)
+        case (shape_plane, shape_grains)
+          do k = 1, grains%n
+            if (boundary%shape == shape_grains .and. grains%glued(k) /= b) cycle
+            place(:) = 0.0_dp
+            place(1:grains%nd) = grains%position(:, k)
+            lever(b) = max(lever(b), arm(boundary, place) + grains%radius(k))
+          end do
+        case (shape_segment, shape_rectangle)
+          do k = 0, 3
+            place(:) = boundary%point + mod(k, 2)*boundary%edge(:, 1) + (k/2)*boundary%edge(:, 2)
+            lever(b) = max(lever(b), arm(boundary, place))
+          end do
+        case default
+          lever(b) = arm(boundary, boundary%point) + boundary%radius
+        end select
+      end associate
+    end do
+  end subroutine find_levers
+
+  !> Distance of a point from the axis through the pivot, or from the pivot where only a table knows the axis [m].
+  pure real(dp) function arm(boundary, place)
+    type(boundary_t), intent(in) :: boundary
+    real(dp), intent(in) :: place(3)
+    real(dp) :: way(3), axis(3)
+
+    way(:) = place - boundary%pivot
+    if (norm2(boundary%given_spin) > 0.0_dp) then
+      axis(:) = boundary%given_spin/norm2(boundary%given_spin)
+      way(:) = way - sum(way*axis)*axis
+    end if
+    arm = norm2(way)
+  end function arm
+
+  !> Find the velocity of a step from its contact problem, whose boundaries hold the velocities of the end of the step as far as
+  !> no contact acts on them. One reduction. Collective.
+  subroutine velocity_scale_measure(self, decomposition, physics, problem, time, area)
+    class(velocity_scale_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(contact_problem_t), intent(in) :: problem
+    !> end of the step [s]
+    real(dp), intent(in) :: time
+    !> that the load on each boundary works on (boundaries) [m^2, m in 2D]
+    real(dp), intent(in) :: area(:)
+    type(imposed_motion_t) :: motion
+    !> squares and number of attractions, mass, twice the energy, momentum
+    real(dp) :: parts(4 + decomposition%nd, size(problem%sub)), sums(4 + decomposition%nd)
+    integer :: s
+
+    motion = self%imposed(decomposition%nd, decomposition%boundaries, physics)
+    self%drive = motion%difference
+    self%load = self%load_of(decomposition%nd, decomposition%boundaries, physics, time, area)
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      if (allocated(problem%sub(s)%attraction)) call add_attraction(problem%sub(s), parts(1:2, s))
+      call add_grains(problem%sub(s), physics, motion%common, parts(3:, s))
+      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(3:, s))
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    if (sums(2) > 0.0_dp .and. self%mass > 0.0_dp) self%load = max(self%load, sqrt(sums(1)/sums(2))/self%mass)
+    self%own = 0.0_dp
+    if (sums(3) > 0.0_dp) then
+      ! nothing holds a scene without boundaries: its mean motion is none
+      if (.not. motion%bounded) sums(4) = max(sums(4) - sum(sums(5:)**2)/sums(3), 0.0_dp)
+      self%own = sqrt(sums(4)/sums(3))
+    end if
+    self%creep = 0.0_dp
+    if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
+    call self%choose()
+  end subroutine velocity_scale_measure
+
+  !> Squares of the impulses of attraction and their number.
+  pure subroutine add_attraction(sub, sums)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: sums(2)
+
+    sums(1) = sum(sub%attraction**2)
+    sums(2) = real(count(sub%attraction > 0.0_dp), dp)
+  end subroutine add_attraction
+
+  !> Mass, twice the energy and momentum of the grains at the start of the step. Loads of the step are taken out of the
+  !> velocities again: at rest under gravity these are h g, which is no motion. A grain that several subdomains share counts
+  !> in equal parts.
+  pure subroutine add_grains(sub, physics, frame, sums)
+    type(subproblem_t), intent(in) :: sub
+    type(physics_t), intent(in) :: physics
+    !> velocity of the observer [m/s]
+    real(dp), intent(in) :: frame(3)
+    !> (2 + nd)
+    real(dp), intent(inout) :: sums(:)
+    real(dp) :: v(size(sums) - 2), m
+    integer :: b, nd
+
+    nd = size(v)
+    do b = 1, sub%n_grains
+      m = 1.0_dp/sub%inverse_mass(1, b)
+      v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*grain_volume(nd, sub%radius(b))/m)
+      if (allocated(sub%pull)) v(:) = v - sub%inverse_mass(1, b)*sub%pull(1:nd, b)
+      v(:) = v - frame(1:nd)
+      m = m/sub%multiplicity(b)
+      sums(1) = sums(1) + m
+      sums(2) = sums(2) + m*sum(v**2)
+      sums(3:) = sums(3:) + m*v
+    end do
+  end subroutine add_grains
+
+  !> The same of boundaries that forces move, along the components that are free.
+  pure subroutine add_driven(sub, boundaries, frame, sums)
+    type(subproblem_t), intent(in) :: sub
+    type(boundary_t), intent(in) :: boundaries(:)
+    real(dp), intent(in) :: frame(3)
+    !> (2 + nd)
+    real(dp), intent(inout) :: sums(:)
+    real(dp) :: v(size(sums) - 2), m
+    integer :: b, nd
+
+    nd = size(v)
+    do b = sub%n_grains + 1, sub%n_bodies
+      associate (boundary => boundaries(sub%boundary(b)))
+        m = boundary%mass/sub%multiplicity(b)
+        v(:) = merge(boundary%last_velocity(1:nd) - frame(1:nd), 0.0_dp, boundary%free(1:nd))
+        sums(1) = sums(1) + m
+        sums(2) = sums(2) + m*sum(v**2)
+        sums(3:) = sums(3:) + m*v
+      end associate
+    end do
+  end subroutine add_driven
+
+  !> What loads but attractions do to the mean grain in a step [m/s]. Gravity and the force on volumes count together, as they act.
+  pure real(dp) function velocity_scale_load_of(self, nd, boundaries, physics, time, area) result(load)
+    class(velocity_scale_t), intent(in) :: self
+    integer, intent(in) :: nd
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    !> at which the loads of boundaries act [s]
+    real(dp), intent(in) :: time
+    !> (boundaries) [m^2, m in 2D]
+    real(dp), intent(in) :: area(:)
+    integer :: b
+
+    load = 0.0_dp
+    if (.not. self%mass > 0.0_dp) return
+    load = physics%h*norm2(physics%gravity(1:nd) + physics%body_force(1:nd)*grain_volume(nd, 0.5_dp*self%diameter)/self%mass)
+    do b = 1, size(boundaries)
+      load = max(load, physics%h*self%pressure_of(nd, boundaries(b), time, area(b))*self%diameter**(nd - 1)/self%mass)
+    end do
+  end function velocity_scale_load_of
+
+  !> Force on a boundary over the area that it works on [Pa, N/m in 2D]; 0 where no force moves it.
+  pure real(dp) function velocity_scale_pressure_of(self, nd, boundary, time, area) result(pressure)
+    class(velocity_scale_t), intent(in) :: self
+    integer, intent(in) :: nd
+    type(boundary_t), intent(in) :: boundary
+    !> [s], [m^2, m in 2D]
+    real(dp), intent(in) :: time, area
+    real(dp) :: force(nd)
+
+    pressure = 0.0_dp
+    if (.not. (boundary%is_driven() .and. boundary%present .and. area > 0.0_dp) .or. self%diameter <= 0.0_dp) return
+    call boundary%applied_force(nd, time, area, force)
+    pressure = norm2(force)/area
+  end function velocity_scale_pressure_of
+
+  !> What boundaries impose with the velocities that they have. Velocities differ by axis, over the boundaries that no force
+  !> moves along it; rest is one of them where a single boundary is prescribed, and where there is gravity, whose direction a
+  !> box that is shaken does not take along.
+  pure type(imposed_motion_t) function velocity_scale_imposed(self, nd, boundaries, physics) result(motion)
+    class(velocity_scale_t), intent(in) :: self
+    integer, intent(in) :: nd
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    real(dp) :: low(nd), high(nd), turning
+    integer :: b, d, n
+
+    low(:) = huge(1.0_dp)
+    high(:) = -huge(1.0_dp)
+    turning = 0.0_dp
+    n = 0
+    do b = 1, size(boundaries)
+      associate (boundary => boundaries(b))
+        if (.not. boundary%present .or. boundary%shape == shape_outlet) cycle
+        motion%bounded = .true.
+        if (.not. all(boundary%free(1:nd))) n = n + 1
+        do d = 1, nd
+          if (boundary%free(d)) cycle
+          low(d) = min(low(d), boundary%velocity(d))
+          high(d) = max(high(d), boundary%velocity(d))
+        end do
+        turning = max(turning, norm2(boundary%spin)*self%lever(b))
+      end associate
+    end do
+    if (n == 0) return
+    do d = 1, nd
+      ! along an axis along which forces move all, nothing is imposed
+      if (low(d) > high(d)) low(d) = 0.0_dp
+      high(d) = max(low(d), high(d))
+    end do
+    if (.not. (turning > 0.0_dp .or. any(high > low))) motion%common(1:nd) = low
+    if (n == 1 .or. any(abs(physics%gravity(1:nd)) > 0.0_dp)) then
+      low(:) = min(low, 0.0_dp)
+      high(:) = max(high, 0.0_dp)
+    end if
+    motion%difference = max(norm2(high - low), turning)
+  end function velocity_scale_imposed
+
+  !> The rule.
+  pure subroutine velocity_scale_choose(self)
+    class(velocity_scale_t), intent(inout) :: self
+    real(dp) :: slow
+
+    if (self%given > 0.0_dp) then
+      self%value = self%given
+      self%kind = "given"
+      return
+    end if
+    self%value = self%load
+    self%kind = "load of a step"
+    if (.not. self%load > 0.0_dp) self%kind = "none"
+    slow = max(self%drive, self%creep)
+    if (self%drive > 0.0_dp .and. (slow < self%load .or. .not. self%load > 0.0_dp)) then
+      self%value = slow
+      self%kind = "drive"
+      if (self%creep > self%drive) self%kind = "creep"
+    end if
+    if (share_of_own*self%own > self%value) then
+      self%value = share_of_own*self%own
+      self%kind = "motion of the bodies"
+    end if
+  end subroutine velocity_scale_choose
+
+end module gravier_velocity_scale

@@ -1,0 +1,131 @@
+!> What the scales of a scene say to a person: lines of --check, and warnings where the step or the tolerance cannot hold what the
+!> scene is for.
+module gravier_scale_report
+  use gravier_kinds, only: dp
+  use gravier_text, only: to_text
+  use gravier_simulation, only: simulation_t
+  use gravier_scene_scales, only: scene_scales_t
+  implicit none
+  private
+  public :: scale_lines, scale_warnings, error_scale_line
+
+  character(len=*), parameter :: newline = new_line("a")
+  !> digits of a figure
+  integer, parameter :: digits = 3
+
+  !> diameters by which loads may move a free grain in a step: that is h sqrt(P/rho)/d = 0.1 at the pressure of one layer of grains
+  real(dp), parameter :: most_by_gravity = 1.0e-2_dp
+  !> radii by which a grain may move in a step, lest it passes through others
+  real(dp), parameter :: most_by_fall = 1.0_dp
+  !> radii of the smallest grain by which a boundary may move in a step
+  real(dp), parameter :: most_by_boundary = 0.1_dp
+  !> h sqrt(P/rho)/d
+  real(dp), parameter :: most_relative_step = 0.1_dp
+  !> share of the speed of a wall that errors may have in slow shear
+  real(dp), parameter :: error_share = 0.05_dp
+
+contains
+
+  !> Lines, each ended by a newline; none without grains.
+  function scale_lines(simulation, scales) result(text)
+    type(simulation_t), intent(in) :: simulation
+    type(scene_scales_t), intent(in) :: scales
+    character(len=:), allocatable :: text
+    real(dp) :: g
+
+    text = ""
+    if (.not. scales%diameter > 0.0_dp) return
+    associate (h => simulation%config%time%step, boundaries => simulation%decomposition%boundaries)
+      g = norm2(scales%acceleration)
+      text = "scales      mean diameter d = "//figure(scales%diameter)//" m"
+      if (g > 0.0_dp) text = text//"; g h = "//figure(g*h)//" m/s, "//figure(g*h**2/scales%diameter)// &
+        & " mean diameters a step; sqrt(g d) = "//figure(sqrt(g*scales%diameter))//" m/s"
+      text = text//newline
+      if (scales%pressure > 0.0_dp) text = text//"            pressure P = "//figure(scales%pressure)// &
+        & pressure_unit(simulation)//" on '"//boundaries(scales%pressed)%name//"'; sqrt(P/rho) = "// &
+        & figure(sqrt(scales%pressure/scales%density))//" m/s, h sqrt(P/rho)/d = "//figure(scales%relative_step(h))//newline
+      if (scales%rate > 0.0_dp) then
+        text = text//"            rate "//figure(scales%rate)//" 1/s by '"//boundaries(scales%driver)%name//"', rate d = "// &
+          & figure(scales%rate*scales%diameter)//" m/s"
+        if (scales%pressure > 0.0_dp) text = text//"; inertial number I = "//figure(scales%inertial_number())
+        text = text//newline
+      end if
+      if (scales%speed > 0.0_dp) text = text//"            fastest boundary '"//boundaries(scales%fastest)%name//"': "// &
+        & figure(scales%speed)//" m/s, "//figure(2.0_dp*scales%speed*h/scales%diameter)//" mean radii a step"//newline
+    end associate
+  end function scale_lines
+
+  !> Of a scene whose first step has been assembled.
+  function error_scale_line(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = "            error of a solve is compared with U = "//figure(simulation%velocity_scale%value)//" m/s ("// &
+      & trim(simulation%velocity_scale%kind)//")"//newline
+  end function error_scale_line
+
+  !> Warnings, each a line ended by a newline, and their number.
+  subroutine scale_warnings(simulation, scales, text, number)
+    type(simulation_t), intent(in) :: simulation
+    type(scene_scales_t), intent(in) :: scales
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: number
+    real(dp) :: g, a, most
+
+    text = ""
+    number = 0
+    if (.not. scales%diameter > 0.0_dp) return
+    associate (h => simulation%config%time%step, solver => simulation%config%solver, d => scales%diameter)
+      g = norm2(scales%acceleration)
+      if (g*h**2 > most_by_gravity*d) call warn_step("loads move a free grain by "//figure(g*h**2/d)// &
+        & " mean diameters in it", sqrt(most_by_gravity*d/g))
+      if (h*sqrt(2.0_dp*g*scales%fall) > most_by_fall*0.5_dp*d) call warn_step("a grain that falls "//figure(scales%fall)// &
+        & " m to the lowest support moves by "//figure(2.0_dp*h*sqrt(2.0_dp*g*scales%fall)/d)// &
+        & " mean radii in it and may pass through others", most_by_fall*0.5_dp*d/sqrt(2.0_dp*g*scales%fall))
+      if (scales%speed*h > most_by_boundary*scales%smallest .and. scales%smallest > 0.0_dp) call warn_step("boundary '"// &
+        & simulation%decomposition%boundaries(scales%fastest)%name//"' moves by "//figure(scales%speed*h/scales%smallest)// &
+        & " radii of the smallest grain in it", most_by_boundary*scales%smallest/scales%speed)
+      a = scales%relative_step(h)
+      if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
+        & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
+      ! error over speed of the wall = 2 tolerance a/I = 2 tolerance load/(rate d), measured
+      if (scales%shear .and. scales%load > 0.0_dp .and. solver%criterion == "residual") then
+        most = error_share*scales%rate*d/(2.0_dp*scales%load)
+        if (solver%tolerance > most) call warn("&solver tolerance = "//figure(solver%tolerance)// &
+          & ": solves leave errors of about "//figure(error_share*solver%tolerance/most)//" of the speed of '"// &
+          & simulation%decomposition%boundaries(scales%driver)%name//"' in shear at I = "//figure(scales%inertial_number())// &
+          & "; at most "//figure(most)//" would do, or a smaller &time step")
+      end if
+    end associate
+
+  contains
+
+    subroutine warn_step(why, most)
+      character(len=*), intent(in) :: why
+      !> [s]
+      real(dp), intent(in) :: most
+      call warn("&time step = "//figure(simulation%config%time%step)//" s: "//why//"; at most "//figure(most)//" s would do")
+    end subroutine warn_step
+
+    subroutine warn(line)
+      character(len=*), intent(in) :: line
+      text = text//"warning     "//line//newline
+      number = number + 1
+    end subroutine warn
+
+  end subroutine scale_warnings
+
+  pure function pressure_unit(simulation) result(unit)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: unit
+    unit = trim(merge(" N/m", " Pa ", simulation%decomposition%nd == 2))
+  end function pressure_unit
+
+  !> A number as people write it where that is short.
+  function figure(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+    text = to_text(value, digits)
+  end function figure
+
+end module gravier_scale_report

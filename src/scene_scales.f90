@@ -1,0 +1,365 @@
+!> The scales of a scene before its first step: grains, loads, speeds and rates, each the largest that time tables bring about.
+module gravier_scene_scales
+  use gravier_kinds, only: dp
+  use gravier_motion, only: grain_volume
+  use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, shape_grains, &
+    & shape_outlet
+  use gravier_physics, only: physics_t
+  use gravier_velocity_scale, only: imposed_motion_t
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: scene_scales_t
+
+  !> least component along an axis of the normal of a plane that faces along it, and of one that carries grains
+  real(dp), parameter :: facing = 0.99_dp, carrying = 0.1_dp
+  real(dp), parameter :: pi = acos(-1.0_dp)
+  !> share of space that grains fill in a square or cubic lattice: a looser scene has room to fall into
+  real(dp), parameter :: loosest(2:3) = [pi/4.0_dp, pi/6.0_dp]
+
+  !> The same on all ranks. What a scene does not have is 0.
+  type :: scene_scales_t
+    !> of the mean grain [m], [kg/m^3, kg/m^2 in 2D]; smallest radius of the grains that are not glued [m]
+    real(dp) :: diameter = 0.0_dp, density = 0.0_dp, smallest = 0.0_dp
+    !> acceleration by gravity and the force on volumes [m/s^2]; height that grains have to fall [m]
+    real(dp) :: acceleration(3) = 0.0_dp, fall = 0.0_dp
+    !> largest pressure on a boundary that forces move [Pa, N/m in 2D], and which
+    real(dp) :: pressure = 0.0_dp
+    integer :: pressed = 0
+    !> what that pressure does to the mean grain in a step [m/s]
+    real(dp) :: load = 0.0_dp
+    !> largest difference of imposed velocities [m/s], and the boundary that moves fastest then
+    real(dp) :: drive = 0.0_dp
+    integer :: driver = 0
+    !> that boundary's speed over its way to the one that faces it [1/s]; it moves along itself
+    real(dp) :: rate = 0.0_dp
+    logical :: shear = .false.
+    !> largest imposed speed of a boundary [m/s], and which
+    real(dp) :: speed = 0.0_dp
+    integer :: fastest = 0
+  contains
+    procedure :: find => scene_scales_find
+    procedure :: inertial_number => scene_scales_inertial_number
+    procedure :: relative_step => scene_scales_relative_step
+  end type scene_scales_t
+
+  !> Where grains are, free ones and those of each boundary.
+  type :: extent_t
+    !> corners of the box of the free grains, radii included [m]
+    real(dp) :: low(3) = 0.0_dp, high(3) = 0.0_dp
+    !> that the free grains fill [m^3, m^2 in 2D]
+    real(dp) :: volume = 0.0_dp
+    !> mean place of the grains that are glued to each boundary, 0 without (3, boundaries) [m]
+    real(dp), allocatable :: middle(:, :)
+    !> there are such grains (boundaries)
+    logical, allocatable :: has_glued(:)
+  end type extent_t
+
+contains
+
+  !> Find the scales of a scene that has been shared out. Collective.
+  subroutine scene_scales_find(self, simulation)
+    class(scene_scales_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(extent_t) :: extent
+    real(dp), allocatable :: times(:)
+
+    self%diameter = simulation%velocity_scale%diameter
+    if (.not. self%diameter > 0.0_dp) return
+    self%density = simulation%velocity_scale%mass/grain_volume(simulation%decomposition%nd, 0.5_dp*self%diameter)
+    call find_extent(simulation, extent, self%smallest)
+    call find_times(simulation, times)
+    call scan(self, simulation, extent, times)
+    call find_fall(self, simulation, extent)
+  end subroutine scene_scales_find
+
+  !> I = rate d sqrt(rho/P); 0 where one of them is not known.
+  pure real(dp) function scene_scales_inertial_number(self) result(inertial)
+    class(scene_scales_t), intent(in) :: self
+
+    inertial = 0.0_dp
+    if (self%pressure > 0.0_dp) inertial = self%rate*self%diameter*sqrt(self%density/self%pressure)
+  end function scene_scales_inertial_number
+
+  !> a = h sqrt(P/rho)/d, the step in units of the time that the pressure gives the grains.
+  pure real(dp) function scene_scales_relative_step(self, h) result(a)
+    class(scene_scales_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: h
+    a = h*sqrt(self%pressure/self%density)/self%diameter
+  end function scene_scales_relative_step
+
+  !> Places of the grains and the smallest radius, in one pass. Collective.
+  subroutine find_extent(simulation, extent, smallest)
+    type(simulation_t), intent(in) :: simulation
+    type(extent_t), intent(out) :: extent
+    !> [m]
+    real(dp), intent(out) :: smallest
+    real(dp), allocatable :: parts(:, :), sums(:)
+    real(dp) :: far(7)
+    integer :: s, k, b, n, nd
+
+    nd = simulation%decomposition%nd
+    n = size(simulation%decomposition%boundaries)
+    allocate (parts(1 + 4*n, size(simulation%decomposition%home)), source=0.0_dp)
+    allocate (sums(1 + 4*n))
+    far(:) = -huge(1.0_dp)
+    do s = 1, size(simulation%decomposition%home)
+      associate (home => simulation%decomposition%home(s))
+        do k = 1, home%n
+          b = home%glued(k)
+          if (b > 0) then
+            parts(4*b - 2, s) = parts(4*b - 2, s) + 1.0_dp
+            parts(4*b - 1:4*b - 2 + nd, s) = parts(4*b - 1:4*b - 2 + nd, s) + home%position(:, k)
+            cycle
+          end if
+          parts(1, s) = parts(1, s) + grain_volume(nd, home%radius(k))
+          far(1:nd) = max(far(1:nd), home%radius(k) - home%position(:, k))
+          far(4:3 + nd) = max(far(4:3 + nd), home%radius(k) + home%position(:, k))
+          far(7) = max(far(7), -home%radius(k))
+        end do
+      end associate
+    end do
+    call simulation%comm%highest_of(far)
+    call simulation%comm%sum_parts(parts, sums)
+    smallest = 0.0_dp
+    if (far(7) < 0.0_dp .and. far(7) > -huge(1.0_dp)) then
+      smallest = -far(7)
+      extent%low(1:nd) = -far(1:nd)
+      extent%high(1:nd) = far(4:3 + nd)
+    end if
+    extent%volume = sums(1)
+    allocate (extent%middle(3, n), source=0.0_dp)
+    allocate (extent%has_glued(n))
+    do b = 1, n
+      extent%has_glued(b) = sums(4*b - 2) > 0.0_dp
+      if (extent%has_glued(b)) extent%middle(1:nd, b) = sums(4*b - 1:4*b - 2 + nd)/sums(4*b - 2)
+    end do
+  end subroutine find_extent
+
+  !> Begin and end of the run, and the rows of all tables between them: what is linear in time is largest at one of these.
+  subroutine find_times(simulation, times)
+    type(simulation_t), intent(in) :: simulation
+    !> in no order [s]
+    real(dp), allocatable, intent(out) :: times(:)
+    real(dp) :: end_time
+    integer :: b, n, room
+
+    end_time = simulation%config%time%steps*simulation%config%time%step
+    room = 2
+    if (allocated(simulation%gravity_table%time)) room = room + size(simulation%gravity_table%time)
+    do b = 1, size(simulation%decomposition%boundaries)
+      associate (table => simulation%decomposition%boundaries(b)%table)
+        if (allocated(table%time)) room = room + size(table%time)
+      end associate
+    end do
+    allocate (times(room), source=0.0_dp)
+    times(2) = end_time
+    n = 2
+    if (allocated(simulation%gravity_table%time)) call add(simulation%gravity_table%time)
+    do b = 1, size(simulation%decomposition%boundaries)
+      associate (table => simulation%decomposition%boundaries(b)%table)
+        if (allocated(table%time)) call add(table%time)
+      end associate
+    end do
+
+  contains
+
+    !> Rows outside the run stand for its begin or its end.
+    subroutine add(rows)
+      real(dp), intent(in) :: rows(:)
+      integer :: k
+
+      do k = 1, size(rows)
+        n = n + 1
+        times(n) = min(max(rows(k), 0.0_dp), end_time)
+      end do
+    end subroutine add
+
+  end subroutine find_times
+
+  !> The largest loads and speeds of the times given.
+  subroutine scan(self, simulation, extent, times)
+    type(scene_scales_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(extent_t), intent(in) :: extent
+    real(dp), intent(in) :: times(:)
+    type(boundary_t) :: boundaries(size(simulation%decomposition%boundaries))
+    type(physics_t) :: physics
+    type(imposed_motion_t) :: motion
+    real(dp) :: area(size(simulation%decomposition%boundaries)), acceleration(3), pressure, speed
+    integer :: k, b, d, nd
+
+    nd = simulation%decomposition%nd
+    boundaries(:) = simulation%decomposition%boundaries
+    physics = simulation%physics
+    call simulation%load_areas(area)
+    do k = 1, size(times)
+      if (allocated(simulation%gravity_table%has)) then
+        do d = 1, nd
+          if (simulation%gravity_table%has(d)) physics%gravity(d) = simulation%gravity_table%at(d, times(k))
+        end do
+      end if
+      acceleration(:) = physics%gravity + physics%body_force/self%density
+      acceleration(nd + 1:) = 0.0_dp
+      if (norm2(acceleration) > norm2(self%acceleration)) self%acceleration(:) = acceleration
+      do b = 1, size(boundaries)
+        call boundaries(b)%prescribe(nd, times(k))
+        if (boundaries(b)%shape == shape_outlet) cycle
+        pressure = simulation%velocity_scale%pressure_of(nd, boundaries(b), times(k), area(b))
+        if (pressure > self%pressure) then
+          self%pressure = pressure
+          self%pressed = b
+        end if
+        speed = imposed_speed(boundaries(b), simulation%velocity_scale%lever(b))
+        if (speed > self%speed) then
+          self%speed = speed
+          self%fastest = b
+        end if
+      end do
+      motion = simulation%velocity_scale%imposed(nd, boundaries, physics)
+      if (motion%difference > self%drive) then
+        self%drive = motion%difference
+        call find_rate(self, boundaries, simulation%velocity_scale%lever, extent)
+      end if
+    end do
+    self%load = simulation%physics%h*self%pressure*self%diameter**(nd - 1)/simulation%velocity_scale%mass
+  end subroutine scan
+
+  !> Speed of the fastest point of a boundary, as far as it is imposed [m/s].
+  pure real(dp) function imposed_speed(boundary, lever) result(speed)
+    type(boundary_t), intent(in) :: boundary
+    !> [m]
+    real(dp), intent(in) :: lever
+    speed = norm2(merge(0.0_dp, boundary%velocity, boundary%free)) + norm2(boundary%spin)*lever
+  end function imposed_speed
+
+  !> The boundary that drives with the velocities that they have, and the rate that it gives the grains between it and the
+  !> farthest one that faces it.
+  subroutine find_rate(self, boundaries, lever, extent)
+    type(scene_scales_t), intent(inout) :: self
+    type(boundary_t), intent(in) :: boundaries(:)
+    real(dp), intent(in) :: lever(:)
+    type(extent_t), intent(in) :: extent
+    real(dp) :: speed, place, other, height, velocity(3)
+    integer :: b, axis
+    logical :: known
+
+    self%driver = 0
+    self%rate = 0.0_dp
+    self%shear = .false.
+    speed = 0.0_dp
+    do b = 1, size(boundaries)
+      if (boundaries(b)%shape == shape_outlet .or. imposed_speed(boundaries(b), lever(b)) <= speed) cycle
+      speed = imposed_speed(boundaries(b), lever(b))
+      self%driver = b
+    end do
+    if (self%driver == 0) return
+    associate (driver => boundaries(self%driver))
+      if (any(abs(driver%spin) > 0.0_dp)) return
+      axis = 0
+      if (self%pressed > 0) axis = boundaries(self%pressed)%load_axis()
+      if (driver%shape == shape_plane .or. driver%is_driven()) axis = driver%load_axis()
+      if (axis == 0) return
+      call find_place(driver, self%driver, axis, extent, place, known)
+      if (.not. known) return
+      height = 0.0_dp
+      do b = 1, size(boundaries)
+        if (b == self%driver) cycle
+        call find_place(boundaries(b), b, axis, extent, other, known)
+        if (known) height = max(height, abs(other - place))
+      end do
+      if (.not. height > 0.0_dp) return
+      self%rate = self%drive/height
+      velocity(:) = merge(0.0_dp, driver%velocity, driver%free)
+      self%shear = norm2(velocity) > 2.0_dp*abs(velocity(axis))
+    end associate
+  end subroutine find_rate
+
+  !> Where a boundary stands along an axis, if it has a place there.
+  pure subroutine find_place(boundary, b, axis, extent, place, known)
+    type(boundary_t), intent(in) :: boundary
+    !> its number
+    integer, intent(in) :: b, axis
+    type(extent_t), intent(in) :: extent
+    !> [m]
+    real(dp), intent(out) :: place
+    logical, intent(out) :: known
+
+    place = 0.0_dp
+    known = .true.
+    select case (boundary%shape)
+    case (shape_plane)
+      place = boundary%point(axis)
+      known = abs(boundary%axis(axis)) > facing
+    case (shape_segment, shape_rectangle)
+      place = boundary%point(axis) + 0.5_dp*sum(boundary%edge(axis, :))
+      known = all(abs(boundary%edge(axis, :)) <= (1.0_dp - facing)*norm2(boundary%edge))
+    case (shape_grains)
+      place = extent%middle(axis, b)
+      known = extent%has_glued(b)
+    case default
+      known = .false.
+    end select
+  end subroutine find_place
+
+  !> Height that the grains have to fall: that of the topmost one above the lowest support, as far as the grains do not fill it.
+  subroutine find_fall(self, simulation, extent)
+    type(scene_scales_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(extent_t), intent(in) :: extent
+    real(dp) :: up, top, support, height, footprint
+    integer :: axis, b, d, nd
+
+    self%fall = 0.0_dp
+    nd = simulation%decomposition%nd
+    if (.not. (norm2(self%acceleration) > 0.0_dp .and. extent%volume > 0.0_dp)) return
+    axis = maxloc(abs(self%acceleration), dim=1)
+    up = -sign(1.0_dp, self%acceleration(axis))
+    top = max(up*extent%low(axis), up*extent%high(axis))
+    support = huge(1.0_dp)
+    do b = 1, size(simulation%decomposition%boundaries)
+      support = min(support, support_of(simulation%decomposition%boundaries(b), b, axis, up, extent))
+    end do
+    if (.not. support < top) return
+    height = top - support
+    footprint = 1.0_dp
+    do d = 1, nd
+      if (d == axis) cycle
+      if (simulation%decomposition%period%length(d) > 0.0_dp) then
+        footprint = footprint*simulation%decomposition%period%length(d)
+      else
+        footprint = footprint*(extent%high(d) - extent%low(d))
+      end if
+    end do
+    self%fall = min(height*(1.0_dp - extent%volume/(footprint*height*loosest(nd))), height - self%diameter)
+    self%fall = max(self%fall, 0.0_dp)
+  end subroutine find_fall
+
+  !> Height of the lowest point of a boundary that carries grains, below the middle of the grains where it is a plane; huge
+  !> where it carries none [m].
+  pure real(dp) function support_of(boundary, b, axis, up, extent) result(support)
+    type(boundary_t), intent(in) :: boundary
+    !> its number; axis of the fall
+    integer, intent(in) :: b, axis
+    !> 1 or -1: sense of the axis that is up
+    real(dp), intent(in) :: up
+    type(extent_t), intent(in) :: extent
+    real(dp) :: middle(3)
+
+    support = huge(1.0_dp)
+    select case (boundary%shape)
+    case (shape_plane)
+      if (up*boundary%axis(axis) < carrying) return
+      middle(:) = 0.5_dp*(extent%low + extent%high)
+      support = up*(middle(axis) + sum(boundary%axis*(boundary%point - middle))/boundary%axis(axis))
+    case (shape_segment, shape_rectangle)
+      support = up*boundary%point(axis) + sum(min(up*boundary%edge(axis, :), 0.0_dp))
+    case (shape_circle, shape_cylinder)
+      if (abs(boundary%axis(axis)) < facing) support = up*boundary%point(axis) - boundary%radius
+    case (shape_grains)
+      if (extent%has_glued(b)) support = up*extent%middle(axis, b)
+    end select
+  end function support_of
+
+end module gravier_scene_scales

@@ -1,0 +1,300 @@
+!> The velocity against which errors of a solve are compared: each of its parts against its formula, the one that rules, the same
+!> bits on any number of ranks, and the factor of a velocity under another choice of units.
+program test_velocity_scale
+  use mpi_f08, only: MPI_COMM_SELF
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_random_hash, only: hash_uniform
+  use gravier_motion, only: grain_mass
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  character(len=*), parameter :: newline = new_line("a")
+  !> of the grains, all equal [m], [kg/m^nd]; step [s] and number of steps; acceleration of gravity [m/s^2]
+  real(dp), parameter :: radius = 0.0625_dp, density = 100.0_dp, step = 0.25_dp, g = 8.0_dp
+  integer, parameter :: steps = 16
+  !> sums of some hundred terms of one size
+  real(dp), parameter :: rounding = 1.0e-13_dp
+
+  !> Factors of the units of length, time and mass.
+  type :: units_t
+    real(dp) :: length = 1.0_dp, time = 1.0_dp, mass = 1.0_dp
+  end type units_t
+
+  !> What a scene has besides a lattice of equal grains in a box, each close to its neighbours.
+  type :: scene_t
+    integer :: nd = 2, subdomains = 4
+    !> along the last axis, downwards [m/s^2]; on volumes, upwards [N/m^nd]
+    real(dp) :: gravity = 0.0_dp, body_force = 0.0_dp
+    !> of a lid: pressure [Pa] and velocity along x [m/s]; 0 and 0: there is no lid
+    real(dp) :: pressure = 0.0_dp, sliding = 0.0_dp
+    !> attraction of all grains [N]; rate of a drum of radius 8 m [rad/s]; velocity that the user gives [m/s]
+    real(dp) :: adhesion = 0.0_dp, spin = 0.0_dp, given = 0.0_dp
+    !> size of the velocities that the grains have, and of one that they have in common [m/s]
+    real(dp) :: motion = 0.0_dp, wind = 0.0_dp
+    !> the box is taken away
+    logical :: open = .false.
+    type(units_t) :: units
+  end type scene_t
+
+  type(communicator_t), target :: comm, alone
+  integer :: nd
+
+  call start_parallel()
+  call comm%init()
+  call alone%init(MPI_COMM_SELF)
+  do nd = 2, 3
+    call test_loads(nd)
+    call test_drives(nd)
+    call test_own(nd)
+    call test_given(nd)
+    call test_ranks(nd)
+    call test_units(nd)
+  end do
+  call finish_checks()
+  call alone%free()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> The scale of the first step of a scene.
+  subroutine assemble(who, scene, sim)
+    type(communicator_t), target, intent(in) :: who
+    type(scene_t), intent(in) :: scene
+    type(simulation_t), intent(inout) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    real(dp) :: speed
+    integer :: s, k, d
+
+    call parse_config("scene", text_of(scene), config, error)
+    call check(.not. allocated(error), "configuration")
+    if (allocated(error)) print "(a)", error%message
+    call sim%init(who, config, error)
+    call check(.not. allocated(error), "scene")
+    if (allocated(error)) print "(a)", error%message
+    if (scene%open) then
+      deallocate (sim%decomposition%boundaries)
+      allocate (sim%decomposition%boundaries(0))
+    end if
+    speed = scene%units%length/scene%units%time
+    do s = 1, size(sim%decomposition%home)
+      associate (home => sim%decomposition%home(s))
+        do k = 1, home%n
+          do d = 1, scene%nd
+            home%velocity(d, k) = scene%motion*speed*(2.0_dp*hash_uniform(5, home%id(k), d) - 1.0_dp)
+          end do
+          home%velocity(1, k) = home%velocity(1, k) + scene%wind*speed
+        end do
+      end associate
+    end do
+    call sim%assemble(figures)
+    call check(figures%contacts > 60, "grains are in contact")
+    call check_close(sim%problem%error_scale, sim%velocity_scale%value, 0.0_dp, "the contact problem has the scale")
+  end subroutine assemble
+
+  !> Input file of a scene, in its units.
+  function text_of(scene) result(text)
+    type(scene_t), intent(in) :: scene
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: zeros, lattice
+    real(dp) :: force
+
+    associate (u => scene%units)
+      zeros = repeat("0, ", scene%nd - 1)
+      lattice = "8, 6"
+      if (scene%nd == 3) lattice = "4, 4, 4"
+      ! kg m/s^2, over the area on which pressures act and the volume
+      force = u%mass*u%length/u%time**2
+      text = "&scene dimension = "//to_text(scene%nd)//", bodies = 'lattice', lattice_count = "//lattice//", gravity = "//zeros// &
+        & number(-scene%gravity*u%length/u%time**2)//", body_force = "//zeros//number(scene%body_force*force/u%length**scene%nd)// &
+        & ", radius_min = "//number(radius*u%length)//", radius_max = "//number(radius*u%length)//", density = "// &
+        & number(density*u%mass/u%length**scene%nd)//", alert_distance = "//number(0.5_dp*radius*u%length)//" /"//newline
+      if (scene%adhesion > 0.0_dp) text = text//"&material name = 'm' / &law materials = 'm', kind = 'adhesive', adhesion = "// &
+        & number(scene%adhesion*force)//", adhesion_range = "//number(0.5_dp*radius*u%length)//" /"//newline
+      if (scene%pressure > 0.0_dp .or. scene%sliding > 0.0_dp) then
+        text = text//"&boundary name = 'lid', shape = 'plane', point = "//zeros//number(4.0_dp*u%length)//", normal = "//zeros// &
+          & "-1, velocity = "//number(scene%sliding*u%length/u%time)
+        if (scene%pressure > 0.0_dp) text = text//", free("//to_text(scene%nd)//") = .true., mass = "//number(64.0_dp*u%mass)// &
+          & ", pressure = "//number(scene%pressure*force/u%length**(scene%nd - 1))
+        text = text//" /"//newline
+      end if
+      if (scene%spin > 0.0_dp) then
+        if (scene%nd == 2) then
+          text = text//"&boundary shape = 'circle', radius = "//number(8.0_dp*u%length)//", rotation = "//number(scene%spin/u%time)
+        else
+          text = text//"&boundary shape = 'cylinder', axis = 0, 2, 0, radius = "//number(8.0_dp*u%length)//", rotation = 0, "// &
+            & number(-scene%spin/u%time)//", 0"
+        end if
+        text = text//" /"//newline
+      end if
+      text = text//"&time step = "//number(step*u%time)//", steps = "//to_text(steps)//", theta = 1 /"//newline// &
+        & "&solver method = 'nscdd'"
+      if (scene%given > 0.0_dp) text = text//", velocity_scale = "//number(scene%given*u%length/u%time)
+      text = text//" /"//newline//"&decomposition subdomains = "//to_text(scene%subdomains)//" /"//newline
+    end associate
+  end function text_of
+
+  !> All bits of a number.
+  function number(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+    text = to_text(value, 17)
+  end function number
+
+  subroutine check_scale(sim, value, kind, name)
+    type(simulation_t), intent(in) :: sim
+    real(dp), intent(in) :: value
+    character(len=*), intent(in) :: kind, name
+
+    call check_close(sim%velocity_scale%value, value, rounding*value, name)
+    call check_equal(trim(sim%velocity_scale%kind), kind, name//": which rules")
+  end subroutine check_scale
+
+  subroutine test_loads(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: sim
+    real(dp) :: mass, creep
+
+    mass = grain_mass(nd, radius, density)
+    creep = 0.01_dp*2.0_dp*radius/(steps*step)
+    scene%nd = nd
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.0_dp, "none", "nothing acts, nothing moves")
+    call check_close(sim%velocity_scale%creep, creep, rounding*creep, "creep")
+    scene%gravity = g
+    call assemble(comm, scene, sim)
+    call check_scale(sim, g*step, "load of a step", "gravity")
+    call check_close(sim%velocity_scale%own, 0.0_dp, 0.0_dp, "at rest under gravity nothing moves")
+    ! half of the weight is borne by the force on volumes
+    scene%body_force = 0.5_dp*g*density
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.5_dp*g*step, "load of a step", "gravity and a force on volumes")
+    scene = scene_t(nd=nd, pressure=1000.0_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, step*1000.0_dp*(2.0_dp*radius)**(nd - 1)/mass, "load of a step", "pressure")
+    scene = scene_t(nd=nd, adhesion=3.0_dp, gravity=1.0e-3_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, step*3.0_dp/mass, "load of a step", "attraction")
+    call check_close(sim%velocity_scale%own, 0.0_dp, rounding*step*3.0_dp/mass, "at rest under attraction nothing moves")
+  end subroutine test_loads
+
+  subroutine test_drives(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: sim
+    real(dp) :: load, creep
+
+    load = step*1000.0_dp*(2.0_dp*radius)**(nd - 1)/grain_mass(nd, radius, density)
+    creep = 0.01_dp*2.0_dp*radius/(steps*step)
+    scene = scene_t(nd=nd, pressure=1000.0_dp, sliding=0.125_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.125_dp, "drive", "slow shear under pressure")
+    scene%sliding = 2.0_dp*load
+    call assemble(comm, scene, sim)
+    call check_scale(sim, load, "load of a step", "fast shear under pressure")
+    scene%sliding = 0.5_dp*creep
+    call assemble(comm, scene, sim)
+    call check_scale(sim, creep, "creep", "shear that nobody would see")
+    scene = scene_t(nd=nd, sliding=100.0_dp*load)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 100.0_dp*load, "drive", "shear without loads")
+    scene = scene_t(nd=nd, gravity=g, sliding=0.25_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.25_dp, "drive", "shear under gravity")
+    scene = scene_t(nd=nd, gravity=g, spin=0.03125_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.25_dp, "drive", "the rim of a drum")
+  end subroutine test_drives
+
+  !> Motion of the bodies: root mean square over all of them, since all are in contact and have one mass. Where no boundary holds
+  !> the scene, a velocity in common does not count: squares of 100 m/s leave roundings of 1e-12 m^2/s^2.
+  subroutine test_own(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: sim
+    real(dp) :: own, own_square, mean(nd), v
+    integer :: k, d, n
+
+    n = merge(48, 64, nd == 2)
+    own_square = 0.0_dp
+    mean(:) = 0.0_dp
+    do k = 1, n
+      do d = 1, nd
+        v = 32.0_dp*(2.0_dp*hash_uniform(5, int(k, kind(sim%n_grains)), d) - 1.0_dp)
+        own_square = own_square + v**2/n
+        mean(d) = mean(d) + v/n
+      end do
+    end do
+    own = sqrt(own_square)
+    scene = scene_t(nd=nd, gravity=g, motion=16.0_dp, adhesion=1.0e-3_dp)
+    call assemble(comm, scene, sim)
+    call check_close(sim%velocity_scale%own, 0.5_dp*own, rounding*own, "root mean square velocity, loads not counted")
+    ! g h = 2 m/s exceeds a tenth of it
+    call check_scale(sim, g*step, "load of a step", "settling")
+    scene = scene_t(nd=nd, motion=32.0_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.1_dp*own, "motion of the bodies", "a gas in a box")
+    scene = scene_t(nd=nd, motion=32.0_dp, wind=128.0_dp, open=.true.)
+    call assemble(comm, scene, sim)
+    own = sqrt(own_square - sum(mean**2))
+    call check_close(sim%velocity_scale%own, own, 1.0e-11_dp*own, "a gas that flies")
+  end subroutine test_own
+
+  subroutine test_given(nd)
+    integer, intent(in) :: nd
+    type(simulation_t) :: sim
+
+    call assemble(comm, scene_t(nd=nd, gravity=g, motion=100.0_dp, sliding=1.0_dp, given=0.375_dp), sim)
+    call check_scale(sim, 0.375_dp, "given", "a velocity of the user replaces all rules")
+  end subroutine test_given
+
+  !> All parts at once, on these ranks and on each of them alone.
+  subroutine test_ranks(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: together, apart
+
+    scene = scene_t(nd=nd, subdomains=7, gravity=g, pressure=1000.0_dp, sliding=0.3_dp, adhesion=3.0_dp, motion=1.0_dp)
+    call assemble(comm, scene, together)
+    call assemble(alone, scene, apart)
+    associate (one => together%velocity_scale, other => apart%velocity_scale)
+      call check(one%own > 0.0_dp .and. one%load > 0.0_dp, "there is something to compare")
+      call check_close(one%load, other%load, 0.0_dp, "load on any number of ranks")
+      call check_close(one%drive, other%drive, 0.0_dp, "drive on any number of ranks")
+      call check_close(one%own, other%own, 0.0_dp, "motion on any number of ranks")
+      call check_close(one%value, other%value, 0.0_dp, "scale on any number of ranks")
+    end associate
+  end subroutine test_ranks
+
+  !> Units that differ by powers of two: every part has the factor of a velocity, bit for bit but for the last place of an exact
+  !> sum over subdomains, which is rounded where its limbs begin.
+  subroutine test_units(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: sim, other
+    real(dp) :: factor
+
+    scene = scene_t(nd=nd, gravity=g, body_force=11.0_dp, pressure=1000.0_dp, sliding=0.3_dp, adhesion=3.0_dp, spin=0.1_dp, &
+      & motion=1.0_dp)
+    call assemble(comm, scene, sim)
+    scene%units = units_t(1024.0_dp, 0.125_dp, 2.0_dp**(-7))
+    factor = scene%units%length/scene%units%time
+    call assemble(comm, scene, other)
+    associate (one => sim%velocity_scale, scaled => other%velocity_scale)
+      call check_close(scaled%load, factor*one%load, 0.0_dp, "units of the load")
+      call check_close(scaled%drive, factor*one%drive, 0.0_dp, "units of the drive")
+      call check_close(scaled%creep, factor*one%creep, 0.0_dp, "units of creep")
+      call check_close(scaled%own, factor*one%own, 2.0_dp*epsilon(1.0_dp)*scaled%own, "units of the motion")
+      call check_close(scaled%value, factor*one%value, 0.0_dp, "units of the scale")
+    end associate
+  end subroutine test_units
+
+end program test_velocity_scale

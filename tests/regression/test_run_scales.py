@@ -1,0 +1,178 @@
+"""What --check says of the scales of a scene, against formulas of its input, and the warnings where the step or the tolerance cannot hold
+what the scene is for: they name the key and a number with which they are gone, and they open the log of a run."""
+import math
+import os
+import re
+import unittest
+
+from gravier_runs import RunTestCase, gravier, merged, namelist, run_case, write
+
+G = 9.81
+DENSITY = 2500.0
+RADIUS = 0.01
+NUMBER = r"([-+0-9.E]+)"
+#: 48 disks in cells of 2.1 radii, over the floor of a box that is 8 cells wide and 6 high
+LATTICE = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [8, 6], "radius_min": RADIUS, "radius_max": RADIUS, "density": DENSITY,
+              "friction": 0.5},
+    "time": {"step": 1e-3, "steps": 2},
+    "output": {"directory": "results"},
+}
+HEIGHT = 6 * 2.1 * RADIUS
+#: pressed by a lid that slides
+SHEAR = merged(LATTICE, {
+    "scene": {"gravity": [0.0, 0.0]},
+    "boundary": [{"name": "lid", "shape": "plane", "point": [0.0, HEIGHT], "normal": [0.0, -1.0], "velocity": [2e-3, 0.0],
+                  "free": [False, True], "pressure": 1000.0, "mass": 10.0}],
+    # grains creep by 0.01 d in that time
+    "time": {"steps": 1000000}, "solver": {"tolerance": 1e-4}})
+
+
+class Scales(RunTestCase):
+
+    def check_case(self, *parts, ranks=1, files=()):
+        """Text of --check of a case, made of parts."""
+        directory = self.here("check")
+        os.makedirs(directory, exist_ok=True)
+        for name, text in dict(files).items():
+            write(os.path.join(directory, name), text)
+        write(os.path.join(directory, "case.nml"), namelist(merged(*parts)))
+        run = gravier("--check", "case.nml", ranks=ranks, directory=directory)
+        self.assert_status(run, 0)
+        return run.stdout
+
+    def figures(self, text, pattern, *expected):
+        """The numbers of a line are those expected, to the three digits that are written."""
+        found = re.search(pattern, text)
+        self.assertTrue(found, f"{pattern} in {text}")
+        for said, value in zip(found.groups(), expected):
+            self.assertLess(abs(float(said) - value), 6e-3 * abs(value), f"{said}, expected {value:.4g} in {found[0]}")
+
+    def warnings(self, text):
+        found = [line for line in text.splitlines() if line.startswith("warning     ")]
+        count = {0: "no error found;", 1: "no error found, 1 warning;"}.get(len(found), f"no error found, {len(found)} warnings;")
+        self.assertIn(f"checked     {count} nothing was run", text)
+        return found
+
+    def assert_heeded(self, case, words, *parts):
+        """There is one warning that has the words, and the number that would do, in the place of that of its key, does."""
+        found = [line for line in self.warnings(self.check_case(case, *parts)) if words in line]
+        self.assertEqual(len(found), 1, found)
+        group, key, most = re.match(r"warning     &(\w+) (\w+) = .* at most ([-+0-9.E]+)(?: s)? would do", found[0]).groups()
+        # three digits are written
+        for factor, remain in ((0.99, 0), (1.02, 1)):
+            again = self.warnings(self.check_case(case, *parts, {group: {key: factor * float(most)}}))
+            self.assertEqual(len([line for line in again if words in line]), remain, again)
+        return found[0]
+
+    def test_gravity(self):
+        text = self.check_case(LATTICE)
+        self.figures(text, rf"scales      mean diameter d = {NUMBER} m; g h = {NUMBER} m/s, {NUMBER} mean diameters a step; sqrt\(g d\) = {NUMBER} m/s",
+                     2 * RADIUS, G * 1e-3, G * 1e-6 / (2 * RADIUS), math.sqrt(2 * G * RADIUS))
+        self.figures(text, rf"error of a solve is compared with U = {NUMBER} m/s \(load of a step\)", G * 1e-3)
+        self.assertEqual(self.warnings(text), [])
+        self.assertEqual(text, self.check_case(LATTICE))
+
+    def test_shear(self):
+        text = self.check_case(SHEAR)
+        speed, rate = math.sqrt(1000.0 / DENSITY), 2e-3 / HEIGHT
+        self.figures(text, rf"pressure P = {NUMBER} N/m on 'lid'; sqrt\(P/rho\) = {NUMBER} m/s, h sqrt\(P/rho\)/d = {NUMBER}",
+                     1000.0, speed, 1e-3 * speed / (2 * RADIUS))
+        self.figures(text, rf"rate {NUMBER} 1/s by 'lid', rate d = {NUMBER} m/s; inertial number I = {NUMBER}",
+                     rate, rate * 2 * RADIUS, rate * 2 * RADIUS / speed)
+        self.figures(text, rf"fastest boundary 'lid': {NUMBER} m/s, {NUMBER} mean radii a step", 2e-3, 2e-3 * 1e-3 / RADIUS)
+        self.figures(text, rf"error of a solve is compared with U = {NUMBER} m/s \(drive\)", 2e-3)
+        self.assertNotIn("g h", text)
+
+    def test_ranks(self):
+        said = [[line for line in self.check_case(SHEAR, {"solver": {"method": "nscdd", "tolerance": 0.1}, "decomposition": {"subdomains": 3}},
+                                                  ranks=ranks).splitlines() if re.match("scales|warning|            ", line)]
+                for ranks in (1, 2)]
+        self.assertEqual(*said)
+        self.assertGreater(len(said[0]), 5)
+
+    def test_glued_walls(self):
+        """Rows of glued disks, one of which a force presses on the other, in a periodic cell: the rate is that of their distance."""
+        rows = "".join(f"{k + 1},{0.02 * (k % 10)!r},{0.2 * (k // 10)!r},0.01,{k // 10 + 1}\n" for k in range(20))
+        grains = "".join(f"{k + 21},{0.02 * (k % 10)!r},{0.03 + 0.02 * (k // 10)!r},0.01,0\n" for k in range(70))
+        case = {"scene": {"dimension": 2, "gravity": [0.0, 0.0], "bodies": "file", "bodies_file": "rows.csv", "density": DENSITY,
+                          "period": [0.2, 0.0]},
+                "boundary": [{"name": "bottom", "shape": "grains", "group": 1},
+                             {"name": "top", "shape": "grains", "group": 2, "velocity": [0.01, 0.0], "free": [False, True],
+                              "force": [0.0, -100.0], "mass": 10.0}], "time": SHEAR["time"]}
+        text = self.check_case(case, files={"rows.csv": "id,x,y,radius,group\n" + rows + grains})
+        self.figures(text, rf"pressure P = {NUMBER} N/m on 'top'", 100.0 / 0.2)
+        self.figures(text, rf"rate {NUMBER} 1/s by 'top', rate d = {NUMBER} m/s; inertial number I = {NUMBER}", 0.05, 0.05 * 0.02,
+                     0.05 * 0.02 * math.sqrt(DENSITY / 500.0))
+        self.figures(text, rf"compared with U = {NUMBER} m/s \(drive\)", 0.01)
+
+    def test_tables(self):
+        """Loads and speeds are the largest of their tables; U is that of the first step."""
+        files = {"lid.csv": "time,vx,pressure\n0,0,1000\n0.5,0.4,4000\n1.0,0,1000\n", "g.csv": "time,gy\n0,-1\n0.5,-4\n1,0\n"}
+        lid = {**SHEAR["boundary"][0], "table": "lid.csv", "velocity": None, "pressure": None}
+        text = self.check_case(SHEAR, {"scene": {"gravity_table": "g.csv"}, "time": {"step": 1e-3},
+                                       "boundary": [{k: v for k, v in lid.items() if v is not None}]}, files=files)
+        self.figures(text, rf"g h = {NUMBER} m/s", 4e-3)
+        self.figures(text, rf"pressure P = {NUMBER} N/m", 4000.0)
+        self.figures(text, rf"fastest boundary 'lid': {NUMBER} m/s", 0.4)
+        self.figures(text, rf"compared with U = {NUMBER} m/s \(drive\)", 0.8 * 1e-3)
+
+    def test_given_scale(self):
+        self.figures(self.check_case(LATTICE, {"solver": {"velocity_scale": 0.125}}), rf"compared with U = {NUMBER} m/s \(given\)", 0.125)
+
+    def test_long_steps(self):
+        """Steps through which grains fall into the floor."""
+        lifted = merged(LATTICE, {"scene": {"period_origin": None}, "time": {"step": 0.1}})
+        line = self.assert_heeded(lifted, "loads move a free grain")
+        self.figures(line, rf"&time step = {NUMBER} s: loads move a free grain by {NUMBER} mean diameters in it", 0.1, G * 0.01 / (2 * RADIUS))
+        bodies = "id,x,y,radius\n" + "".join(f"{k + 1},{0.05 * k!r},2.0,0.01\n" for k in range(4))
+        case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "high.csv"}, "time": LATTICE["time"],
+                "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}]}
+        write(os.path.join(self.here("check"), "high.csv"), bodies)
+        words = "to the lowest support moves by"
+        self.assertEqual(self.warnings(self.check_case(case)), [])
+        line = self.assert_heeded(case, words, {"time": {"step": 2e-3}})
+        # 1.99 m and what the gaps leave: less than 2.01 m, more than 1.95 m
+        self.figures(line, rf"a grain that falls {NUMBER} m to the lowest support moves by {NUMBER} mean radii", 1.99, 0.2 * math.sqrt(2 * G * 1.99))
+        # upside down there is no support
+        up = self.warnings(self.check_case(case, {"scene": {"gravity": [0.0, G]}, "time": {"step": 2e-3}}))
+        self.assertEqual(up, [])
+        column = {"scene": {"bodies": "column", "column_count": 100, "radius": 0.01, "mass": 1.0}, "time": {"step": 4e-3, "steps": 1}}
+        self.assertEqual(self.warnings(self.check_case(column)), [], "a column has nowhere to fall")
+
+    def test_fast_boundaries(self):
+        line = self.assert_heeded(SHEAR, "radii of the smallest grain", {"boundary": [{**SHEAR["boundary"][0], "velocity": [2.0, 0.0]}]})
+        self.figures(line, rf"boundary 'lid' moves by {NUMBER} radii of the smallest grain", 2.0 * 1e-3 / RADIUS)
+        drum = {"boundary": [{"name": "drum", "shape": "circle", "point": [0.08, 0.06], "radius": 0.2, "rotation": [10.0]}]}
+        line = self.assert_heeded(LATTICE, "radii of the smallest grain", drum)
+        self.figures(line, rf"boundary 'drum' moves by {NUMBER} radii", 0.2 * 10.0 * 1e-3 / RADIUS)
+
+    def test_pressure(self):
+        line = self.assert_heeded(SHEAR, "under the pressure on", {"boundary": [{**SHEAR["boundary"][0], "velocity": [0.0, 0.0], "pressure": 1e5}]})
+        self.figures(line, rf"h sqrt\(P/rho\)/d = {NUMBER} under the pressure on 'lid'", 1e-3 * math.sqrt(1e5 / DENSITY) / (2 * RADIUS))
+
+    def test_tolerance_in_slow_shear(self):
+        """An error of 2 tolerance h p d/(m rate d) of the speed of the wall, in 2D; above 0.05 is a warning."""
+        self.assertEqual(self.warnings(self.check_case(SHEAR, {"solver": {"tolerance": 1e-4}})), [])
+        line = self.assert_heeded(SHEAR, "of the speed of", {"solver": {"tolerance": 1e-3}})
+        load = 1e-3 * 1000.0 * 2 * RADIUS / (DENSITY * math.pi * RADIUS**2)
+        motion = 2e-3 / HEIGHT * 2 * RADIUS
+        self.figures(line, rf"&solver tolerance = {NUMBER}: solves leave errors of about {NUMBER} of the speed of 'lid' in shear at I = {NUMBER}; "
+                     rf"at most {NUMBER} would do, or a smaller &time step", 1e-3, 2 * 1e-3 * load / motion,
+                     motion * math.sqrt(DENSITY / 1000.0), 0.05 * motion / (2 * load))
+
+    def test_log_of_a_run(self):
+        """A run says what --check warns of, and the log keeps it; it runs nevertheless."""
+        case = merged(SHEAR, {"solver": {"tolerance": 1e-3}, "time": {"step": 5e-3, "steps": 2}})
+        expected = self.warnings(self.check_case(case))
+        self.assertGreater(len(expected), 0)
+        for ranks in (1, 2):
+            run = run_case(case, ranks, self.here(f"run {ranks}"))
+            self.assert_status(run, 0)
+            with open(run.path("results", "run.log"), encoding="utf-8") as file:
+                before = file.read().split("    step       time")[0]
+            self.assertEqual([line for line in before.splitlines() if line.startswith("warning     &")], expected)
+
+
+if __name__ == "__main__":
+    unittest.main()
