@@ -371,10 +371,10 @@ contains
       call problem%evaluate()
       call problem%residual(row%residual, defect)
       call velocity%bound(problem)
-      row%bound = merge(velocity%bound_by_rest, -1.0_dp, velocity%bound_by_rest < huge(1.0_dp))
+      row%bound = merge(velocity%bound_by_rest, -1.0_dp, velocity%rest_is_admissible)
       row%mass = velocity%mass
       if (.not. row%residual > 0.0_dp) return
-      call velocity%project(problem, simulation%scheme, iterations)
+      call velocity%project(problem, iterations)
       ! a solve finds the depths when it asks for them
       velocity%most_depth = -1
       call velocity%add_levels(problem)
