@@ -1,5 +1,8 @@
 """Part of study_error.py: strength and change of volume of the shipped shear cell, biaxial and triaxial tests, beside runs that are
 ten times as tight."""
+import csv
+
+import numpy as np
 from study_support import BINARIES, SOURCE, gravier, write_csv
 
 #: of the strength, of the change of volume, relative
@@ -7,21 +10,24 @@ STRENGTH, VOLUME = 0.03, 0.10
 TIGHTER = 10.0
 
 
-def shear(history, _case):
-    """Friction of the material, and the way of the top row upwards."""
-    return history["force_x:top"] / history["force_y:top"], history["position_y:top"]
+def shear(history, case):
+    """Force along the flow and across it on the top row, and the height of the cell."""
+    with open(SOURCE / case["scene"][0]["bodies_file"], newline="", encoding="ascii") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    heights = {group: np.mean([float(row["y"]) for row in rows if row["group"] == group]) for group in ("1", "2")}
+    return abs(history["force_x:top"]), abs(history["force_y:top"]), heights["2"] - heights["1"] + history["position_y:top"]
 
 
 def biaxial(history, case):
-    """Pressure on the lid over that on the side, and the area."""
+    """Force on the lid, that of the lateral pressure on it, and the area."""
     wide, high = history["position_x:right"], history["position_y:lid"]
-    return abs(history["force_y:lid"]) / wide / pressure_of(case, "right"), wide * high
+    return abs(history["force_y:lid"]), pressure_of(case, "right") * wide, wide * high
 
 
 def triaxial(history, case):
-    """Pressure on the lid over that on the sides, and the volume."""
+    """Force on the lid, that of the lateral pressure on it, and the volume."""
     wide, deep, high = history["position_x:right"], history["position_y:back"], history["position_z:lid"]
-    return abs(history["force_z:lid"]) / (wide * deep) / pressure_of(case, "right"), wide * deep * high
+    return abs(history["force_z:lid"]), pressure_of(case, "right") * wide * deep, wide * deep * high
 
 
 def pressure_of(case, name):
@@ -44,9 +50,9 @@ def play(name, measure, out, factor, steps):
     place = out / f"{name} {'tight' if factor > 1.0 else 'default'}".replace(" ", "_")
     status = gravier.run(groups, place, 1, (BINARIES / "gravier").resolve())
     history = gravier.read_table(place / "results/history.csv")
-    strength, volume = measure(history, case)
-    half = len(strength) // 2
-    return {"status": status, "strength": strength[half:].mean(), "volume_change": volume[half:].mean() / volume[0] - 1.0,
+    force, other, volume = measure(history, case)
+    half = len(force) // 2
+    return {"status": status, "strength": force[half:].sum() / other[half:].sum(), "volume_change": volume[half:].mean() / volume[0] - 1.0,
             "iterations": history["iterations"].sum(), "seconds": history["solve_seconds"].sum(),
             "missed": int((history["converged"] == 0).sum())}
 

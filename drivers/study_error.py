@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from error_cost import HEIGHT, study_cost
+from error_cost import HEIGHTS, study_cost
 from error_rest import study_rest
 from error_strength import study_strength
 from study_support import BINARIES, gravier, run, write_csv, write_hdf5
@@ -445,7 +445,7 @@ def main():
     if "rest" in parts:
         failures += study_rest(at_rest(options.quick), out, 100 if options.quick else 500, options.beside)
     if "cost" in parts:
-        failures += study_cost(out, (4, 8) if options.quick else (13, 26, HEIGHT, 100), 6 if options.quick else 10, DIAMETER, STEP, measure)
+        failures += study_cost(out, (4, 8) if options.quick else HEIGHTS, 6 if options.quick else 10, DIAMETER, STEP, measure)
     if "strength" in parts:
         failures += study_strength(out, 100 if options.quick else 0)
     print(f"\n{time.time() - started:.0f} s; tables in {options.out}: " + ", ".join(sorted(path.name for path in out.glob("error*.csv"))))
