@@ -112,7 +112,7 @@ contains
     allocate (rows(0))
     call simulation%init(comm, plan%config, error)
     if (.not. allocated(error)) call make_steps(plan, simulation, rows, error)
-    if (.not. allocated(error) .and. size(plan%situations) > 0) then
+    if (.not. allocated(error) .and. (plan%by_program .or. size(plan%situations) > 0)) then
       call simulation%assemble(figures)
       call measure_situations(plan, simulation, rows, error)
     end if
