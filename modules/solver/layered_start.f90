@@ -28,8 +28,10 @@ module gravier_layered_start
   real(dp), parameter :: least_pressing = 0.3_dp
   !> of a layer and of the halo below it, in mean diameters
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
-  !> sweeps of a layer: where there are few layers; more for each layer above that number; at most
-  integer, parameter :: few_layers = 9, few_sweeps = 30, more_sweeps = 3, most_sweeps = 80
+  !> relative change of the impulses of a layer by a sweep at which the layer is done, times the number of layers, which hand errors on;
+  !> layers above whose number it falls with the square; sweeps of a layer at least and at most
+  real(dp), parameter :: change_allowed = 0.012_dp, few_layers = 9.0_dp
+  integer, parameter :: least_sweeps = 20, most_sweeps = 200
   !> share of the largest free speed below which the shift of a closed contact is rounding of places
   real(dp), parameter :: rounded = 1.0e-3_dp
   !> way of what no way leads to
@@ -73,6 +75,7 @@ contains
     type(layers_t) :: layers(size(problem%sub))
     real(dp) :: relaxed(1, size(problem%sub)), sums(1)
     integer :: n_layers, l, s, inner
+    real(dp) :: change
 
     sweeps = 0.0_dp
     call find_ways(problem, layers)
@@ -80,14 +83,16 @@ contains
     if (n_layers < 2) return
     call start_timer(phase_sweep)
     call start_velocities(problem, layers)
-    inner = min(most_sweeps, few_sweeps + more_sweeps*max(0, n_layers - few_layers))
+    change = change_allowed/n_layers*min(1.0_dp, few_layers/n_layers)
     relaxed(:, :) = 0.0_dp
     do l = 0, n_layers - 1
       do s = 1, size(layers)
         call take_layer(problem, l, s, layers(s))
+      end do
+      call solve_layer(problem, change, layers, inner)
+      do s = 1, size(layers)
         relaxed(1, s) = relaxed(1, s) + real(inner, dp)*size(layers(s)%taken)
       end do
-      call solve_layer(problem, inner, layers)
       call hand_on(problem, layers)
     end do
     call stop_timer(phase_sweep)
@@ -434,15 +439,18 @@ contains
   end subroutine take_layer
 
   !> Sweeps with momentum over the contacts taken, and the exchange of NSCDD after each. Collective.
-  subroutine solve_layer(problem, inner, layers)
+  subroutine solve_layer(problem, change, layers, inner)
     type(contact_problem_t), intent(inout) :: problem
-    integer, intent(in) :: inner
+    !> of the impulses by a sweep, relative, at which the layer is done
+    real(dp), intent(in) :: change
     type(layers_t), intent(inout) :: layers(:)
+    !> sweeps made
+    integer, intent(out) :: inner
     type(momentum_t) :: momentum
     real(dp) :: parts(2, size(layers)), sums(2), v
-    integer :: k, s, i, d
+    integer :: s, i, d
 
-    do k = 1, inner
+    do inner = 1, most_sweeps
       parts(:, :) = 0.0_dp
       do s = 1, size(layers)
         associate (this => layers(s))
@@ -465,8 +473,10 @@ contains
         end do
       end if
       call problem%comm%sum_parts(parts, sums)
+      if (inner >= least_sweeps .and. sums(1) <= change**2*sums(2)) return
       call momentum%steer(sums(1))
     end do
+    inner = most_sweeps
   end subroutine solve_layer
 
   !> Keep the impulses of the layer's own contacts, and load all bodies with what they have changed by. Collective.

@@ -43,10 +43,11 @@ module gravier_solve
   integer, parameter :: patience = 500, waves = 6
   !> growth of the impulses since anything was gained that is one without bound
   real(dp), parameter :: unbounded_growth = 1.5_dp
-  !> residual at the start, velocity error over its scale and depth after some iterations from which on a pass over layers is tried;
-  !> iterations after it until it is judged, and what must be left of the error then
-  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp
-  integer, parameter :: deep = 15, trial = 6
+  !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
+  !> depth are above these; later, after a part of the depth, where that is above another; iterations after it until it is judged,
+  !> and what must be left of the error then
+  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp, late = 0.3_dp
+  integer, parameter :: deep = 15, very_deep = 60, trial = 6
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 6
 
@@ -133,7 +134,7 @@ contains
     type(velocity_error_t) :: velocity
     real(dp) :: reference, progress, ratio, began, checking, ignored, best, scale_of_best, last_figure, pause
     integer :: skips, exceeded_at, last_check, best_at, trial_end
-    logical :: measure, done, choosy, wants_layers
+    logical :: measure, done, choosy, may_try_layers, wants_layers, settled
     type(kept_impulses_t) :: kept(size(problem%sub))
     real(dp) :: error_before
 
@@ -166,8 +167,9 @@ contains
     choosy = .not. (control%trace .or. control%criterion == by_error)
     if (choosy .and. scheme%momentum%on) report%descent%first_check = min(early_check, control%check_every)
     call check(done)
-    wants_layers = control%layered .and. control%criterion == by_velocity .and. report%residual > unsettled .and. &
-      & any(abs(problem%load) > 0.0_dp)
+    may_try_layers = control%layered .and. control%criterion == by_velocity .and. any(abs(problem%load) > 0.0_dp)
+    wants_layers = may_try_layers .and. report%residual > unsettled
+    settled = report%residual <= control%tolerance
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = mod(report%iterations, control%check_every) == 0
@@ -175,13 +177,17 @@ contains
       if (choosy .and. (measure .or. (scheme%momentum%on .and. report%iterations >= early_check))) &
         & measure = is_worth_a_check(measure)
       measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations .or. &
-        & (wants_layers .and. report%iterations == copies_ready) .or. report%iterations == trial_end
+        & ((wants_layers .or. (settled .and. control%criterion == by_velocity)) .and. report%iterations == copies_ready) .or. &
+        & report%iterations == trial_end
       call scheme%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) call check(done)
       if (done) exit
-      if (wants_layers .and. report%iterations == copies_ready) call try_layers(error)
       if (report%iterations == trial_end) call judge_layers(error)
+      if (wants_layers .and. report%iterations == copies_ready) call try_layers(much, deep, error)
+      if (measure .and. may_try_layers .and. velocity%most_depth > very_deep .and. &
+        & (report%layered .or. report%iterations > late*velocity%most_depth) .and. report%iterations >= trial_end) &
+        & call try_layers(control%accuracy, very_deep, error)
       if (allocated(error)) return
       call velocity%keep_copy(problem, report%iterations)
     end do
@@ -320,20 +326,26 @@ contains
     end subroutine complete_estimate
 
     !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
-    subroutine try_layers(error)
+    subroutine try_layers(least_error, least_depth, error)
+      !> over its scale, and contacts, above which it is tried
+      real(dp), intent(in) :: least_error
+      integer, intent(in) :: least_depth
       type(error_t), allocatable, intent(inout) :: error
+      real(dp) :: sweeps
       integer :: s
 
       call complete_estimate()
-      if (report%velocity_error <= much*problem%error_scale) return
+      if (velocity%criterion() <= least_error*problem%error_scale) return
       if (velocity%most_depth < 0) call velocity%find_depth(problem)
-      if (velocity%most_depth <= deep) return
+      if (velocity%most_depth <= least_depth) return
+      may_try_layers = .false.
       do s = 1, size(problem%sub)
         kept(s)%value = problem%sub(s)%impulse
       end do
-      error_before = report%velocity_error
-      call carry_loads(problem, scheme%work, report%layered_sweeps)
-      if (.not. report%layered_sweeps > 0.0_dp) return
+      error_before = velocity%criterion()
+      call carry_loads(problem, scheme%work, sweeps)
+      if (.not. sweeps > 0.0_dp) return
+      report%layered_sweeps = report%layered_sweeps + sweeps
       report%layered = .true.
       trial_end = report%iterations + trial
       call begin_anew(error)
@@ -345,7 +357,11 @@ contains
       integer :: s
 
       call complete_estimate()
-      if (report%velocity_error < worth_keeping*error_before) return
+      if (velocity%criterion() < worth_keeping*error_before) then
+        ! what errors of the layers have left, another pass lowers again
+        may_try_layers = velocity%most_depth > very_deep
+        return
+      end if
       report%layered = .false.
       do s = 1, size(problem%sub)
         problem%sub(s)%impulse(:, :, :) = kept(s)%value

@@ -27,8 +27,8 @@ module gravier_velocity_error
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
   real(dp), parameter :: weight_of_projection = 2.4_dp, cosine = 0.65_dp
-  !> share of the error allowed that bodies at rest may move with
-  real(dp), parameter :: share_at_rest = 0.35_dp
+  !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
+  real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 3.0_dp
   !> share of the largest eigenvalue of G below which it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
@@ -68,7 +68,7 @@ module gravier_velocity_error
     real(dp) :: mass = 0.0_dp
     !> whether rest is admissible, so that C is a bound
     logical :: rest_is_admissible = .false.
-    !> by the last `bound` and `measure` [m/s]
+    !> C, Y and L, as far as they are known [m/s]
     real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
     !> largest |w| of a contact, by the last `measure` [m/s]
     real(dp) :: largest_violation = 0.0_dp
@@ -149,11 +149,11 @@ contains
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
-  !> What is compared with the error that is allowed [m/s]: E, or C over the share of it that is. Where the solution is at rest, all
-  !> that moves is error, and creeps on with one sign from step to step: less of it is allowed there.
+  !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
+  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
-    criterion = min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, self%levels))
+    criterion = min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, weight_of_sinking*self%levels))
   end function velocity_error_criterion
 
   !> The smaller of E and C [m/s].

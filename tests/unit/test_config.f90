@@ -166,7 +166,8 @@ contains
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
-      // "  velocity_scale = 0.1875, check_every = 5, warm_start = .false., on_failure = 'stop' /" // newline &
+      // "  velocity_scale = 0.1875, check_every = 5, warm_start = .false., on_failure = 'stop'" // newline &
+      // "  accuracy = 0.375, layered_start = .false. /" // newline &
       // "&decomposition partition = 'grid', kind = 'primal', grid = 1, 2, 3, subdomains = 6" // newline &
       // "  repartition_every = 9, repartition_imbalance = 1.5 /" // newline &
       // "&enriched direction = 2.5, direction_unit = 'absolute', contacts = 'active', interface = 'cg'" // newline &
@@ -182,6 +183,8 @@ contains
 
     call check_equal(config%solver%method, "nscdd_ep", "method")
     call check_equal(config%solver%criterion, "error", "criterion")
+    call check_close(config%solver%accuracy, 0.375_dp, 0.0_dp, "accuracy")
+    call check(.not. config%solver%layered_start, "layered_start")
     call check_close(config%solver%tolerance, 0.03125_dp, 0.0_dp, "tolerance")
     call check_equal(config%solver%max_iterations, 50, "max_iterations")
     call check_equal(config%solver%sweeps, 3, "sweeps")
@@ -266,8 +269,10 @@ contains
     type(config_t), intent(in) :: config
 
     call check_equal(config%solver%method, "nlgs", "default method")
-    call check_equal(config%solver%criterion, "residual", "default criterion")
-    call check_close(config%solver%tolerance, 1.0e-4_dp, 0.0_dp, "default tolerance")
+    call check_equal(config%solver%criterion, "velocity_error", "default criterion")
+    call check_close(config%solver%accuracy, 0.1_dp, 0.0_dp, "default accuracy")
+    call check_close(config%solver%tolerance, 1.0e-2_dp, 0.0_dp, "default tolerance with the velocity error")
+    call check(config%solver%layered_start, "default layered_start")
     call check_equal(config%solver%max_iterations, 10000, "default max_iterations")
     call check_equal(config%solver%sweeps, 1, "default sweeps")
     call check_close(config%solver%relaxation, 1.0_dp, 0.0_dp, "default relaxation")
@@ -362,7 +367,7 @@ contains
   !> Every word of every choice, and any case.
   subroutine test_words_of_choices()
     call accept_words("solver", "method", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton")
-    call accept_words("solver", "criterion", "residual error")
+    call accept_words("solver", "criterion", "velocity_error residual error")
     call accept_words("solver", "on_failure", "continue stop discard")
     call accept_words("decomposition", "partition", "grid metis")
     call accept_words("decomposition", "kind", "dual primal")
@@ -396,7 +401,7 @@ contains
     case ("solver method")
       text = "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd', 'nscdd_ep' or 'newton'"
     case ("solver criterion")
-      text = "'residual' or 'error'"
+      text = "'velocity_error', 'residual' or 'error'"
     case ("solver on_failure")
       text = "'continue', 'stop' or 'discard'"
     case ("decomposition partition")
@@ -745,6 +750,7 @@ contains
       "&solver criterion = 'error': expected 'residual': the exact solution, and so the error, is known for " &
       // "bodies = 'column' only")
     call refuse(column // "&solver tolerance = 0 /", "&solver tolerance = 0: " // positive)
+    call refuse(column // "&solver accuracy = 0 /", "&solver accuracy = 0: " // positive)
     call refuse(column // "&solver max_iterations = 0 /", "&solver max_iterations = 0: expected an integer >= 1")
     call refuse(column // "&solver sweeps = 0 /", "&solver sweeps = 0: expected an integer >= 1")
     call refuse(column // "&solver relaxation = 0.0 /", "&solver relaxation = 0.0: expected a finite real number in (0, 1]")
