@@ -1,6 +1,7 @@
 """Part of study_error.py: what a cold start of packings of several heights costs, by the program and by sweeps with momentum alone."""
+import h5py
 import numpy as np
-from study_support import gravier, lattice, run, write_csv, write_hdf5
+from study_support import gravier, lattice, run, write_hdf5, write_measured
 
 #: true velocity error [g h] that a solve has to reach
 GOAL = 0.1
@@ -17,13 +18,11 @@ def box(wide):
 
 
 #: iterations at which states are looked at
-LOOKS = sorted({int(round(6 * 1.07**k)) for k in range(64)})
+LOOKS = sorted({int(round(6 * 1.07**k)) for k in range(84)})
 
 
 def settle(directory, centres, radii, wide, diameter, step, steps):
     """Let spheres in a box come to rest: centres and radii."""
-    import h5py
-
     directory.mkdir(parents=True, exist_ok=True)
     write_hdf5(directory / "bodies.h5", centres, radii)
     groups = {**case(wide, diameter, step, steps), "output": {"directory": ".", "every": 0, "contacts": False, "final_bodies": True}}
@@ -95,7 +94,7 @@ def study_cost(out, heights, across, diameter, step, measure):
                      float(end["true_error"]) / scale, float(end["estimate"]) / scale, spread))
     names = ("height", "grains", "sweeps_momentum", "sweeps_program", "layered_sweeps", "sweeps_at_end", "all_in_sweeps_at_end",
              "true_error_at_end", "estimate_at_end", "reference_spread")
-    write_csv(out / "error_cost.csv", dict(zip(names, zip(*rows))))
+    write_measured(out / "error_cost.csv", dict(zip(names, zip(*rows))))
     growth = costs[max(heights)][1] / costs[min(heights)][1]
     print(f"\ngrowth from {min(heights)} to {max(heights)} diameters: {growth:.2f} by the program, "
           f"{costs[max(heights)][0] / costs[min(heights)][0]:.2f} by momentum alone")

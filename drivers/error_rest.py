@@ -3,7 +3,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from study_support import BINARIES, gravier, write_csv
+from study_support import BINARIES, gravier, write_measured
 
 #: ground force over the weight less 1; speed over g h
 GROUND, SPEED = 0.05, 0.05
@@ -53,5 +53,5 @@ def study_rest(scenes, out, steps, beside):
                             f"{speed.max():.3f} g h in {int((speed > SPEED).sum())} of {steps} steps beyond {SPEED:g}, and the status is {status}")
     names = ("scene", "steps", "status", "ground_first", "ground_low", "ground_high", "speed_first", "speed_high", "iterations",
              "solve_seconds", "older_solve_seconds", "older_ground_low", "older_ground_high", "older_speed_high")
-    write_csv(out / "error_rest.csv", dict(zip(names, zip(*rows))))
+    write_measured(out / "error_rest.csv", dict(zip(names, zip(*rows))))
     return failures

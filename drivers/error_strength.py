@@ -3,7 +3,7 @@ ten times as tight."""
 import csv
 
 import numpy as np
-from study_support import BINARIES, SOURCE, gravier, write_csv
+from study_support import BINARIES, SOURCE, gravier, write_measured
 
 #: of the strength, of the change of volume, relative
 STRENGTH, VOLUME = 0.03, 0.10
@@ -73,5 +73,5 @@ def study_strength(out, steps=0):
                 failures.append(f"{name}: {key.replace('_', ' ')} {default[key]:.4g} beside {tight[key]:.4g}: {100 * off:.1f} % apart, expected "
                                 f"{100 * bound:.0f} %")
     keys = list(default)
-    write_csv(out / "error_strength.csv", dict(zip(["test", *keys, *["tight_" + key for key in keys]], zip(*rows))))
+    write_measured(out / "error_strength.csv", dict(zip(["test", *keys, *["tight_" + key for key in keys]], zip(*rows))))
     return failures

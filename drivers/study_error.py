@@ -22,13 +22,12 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 from error_cost import HEIGHTS, study_cost
 from error_rest import study_rest
 from error_strength import study_strength
-from study_support import BINARIES, gravier, run, write_csv, write_hdf5
-
-from gravier.case import ENVIRONMENT
+from study_support import BINARIES, ENVIRONMENT, gravier, run, write_hdf5, write_measured
 
 PARTS = ("estimate", "rest", "cost", "strength")
 STEP = 1.0e-3  # s
@@ -64,8 +63,6 @@ def hexagonal(wide, high, jitter=0.0, seed=1):
 
 def write_bodies(path, centres, radii, velocities=None, masses=None, walls=()):
     """A bodies file, with velocities and masses where they are given."""
-    import h5py
-
     write_hdf5(path, centres, radii, walls=walls)
     with h5py.File(path, "a") as file:
         if velocities is not None:
@@ -205,8 +202,9 @@ def wet(packing):
 class Packing:
     """Grains that fall into a box and settle, once; scenes share it."""
 
-    def __init__(self, name, counts, steps, friction=0.5, top=0, width=None):
-        self.name, self.counts, self.steps, self.friction, self.top, self.width = name, counts, steps, friction, top, width
+    def __init__(self, name, counts, steps, friction=0.5, top=0):
+        #: `top` grains are made heavy in scenes of heavy ones on light ones
+        self.name, self.counts, self.steps, self.friction, self.top = name, counts, steps, friction, top
         self.path = None
 
     def settle(self, directory):
@@ -226,8 +224,6 @@ class Packing:
 
     def read(self):
         """Centres, radii, velocities and walls."""
-        import h5py
-
         d = len(self.counts)
         with h5py.File(self.path) as file:
             walls = list(zip(file["walls/point"][:], file["walls/normal"][:]))
@@ -250,7 +246,7 @@ DISKS = Packing("600 disks", (24, 25), 400, top=10)
 SPHERES = Packing("2000 spheres", (12, 12, 14), 400)
 MANY_DISKS = Packing("5000 disks", (50, 100), 700)
 MANY_SPHERES = Packing("20000 spheres", (26, 26, 30), 500)
-SILO = Packing("silo, 8 wide and 100 high", (8, 104), 700, width=8)
+SILO = Packing("silo, 8 wide and 100 high", (8, 104), 700)
 
 
 def scenes():
@@ -286,7 +282,8 @@ def scenes():
               "--situations", "cold,lost:0.05", share_of=SPHERES),
         Scene("600 disks, sweeps alone", DISKS.scene(solver={"solver": {"acceleration": "none"}}), *limited, "--situations", "cold,lost:0.05",
               share_of=DISKS),
-        Scene("5000 disks", MANY_DISKS.scene(), "--limit", "4000", "--sweeps", "20000", "--situations", f"program,cold,lost:0.05,{TURNED}", share_of=MANY_DISKS),
+        Scene("5000 disks", MANY_DISKS.scene(), "--limit", "4000", "--sweeps", "20000", "--situations", f"program,cold,lost:0.05,{TURNED}",
+              share_of=MANY_DISKS),
     ]
     for friction in (0.0, 0.3, 0.5, 0.8, 1.0):
         quick = friction in (0.0, 0.5)
@@ -376,7 +373,7 @@ def judge_estimate(rows, out):
             missed.append((scene, start, kept))
         beyond += [(scene, start, state) for state in kept if state.ratio < LEAST]
     names = ("scene", "situation", "states", "counted", "true_error_low", "true_error_high", "ratio_low", "ratio_high")
-    write_csv(out / "error.csv", dict(zip(names, zip(*table))))
+    write_measured(out / "error.csv", dict(zip(names, zip(*table))))
     counted = sum(1 for row in table if row[3] > 0)
     states = [s for of in situations.values() for s in of if s.counts()]
     within = sum(s.is_usual() for s in states)
