@@ -5,9 +5,8 @@
 !> solved by sweeps with momentum on what lies below, which stands still; what it presses with is then handed to the next. All
 !> layers together take a number of sweeps over the whole packing that does not depend on H.
 !>
-!>   roots   boundaries against which the load presses: the mean over their contacts of -n . u/|u|, u the load's change of velocity in
-!>           a step, is above `least_pressing`
-!>   way     length of the shortest way from a body to a root over closed contacts, in mean diameters
+!>   way     length of the shortest way from a body to a boundary that supports (gravier_supports) over closed contacts, in mean
+!>           diameters
 !>   layer   `thickness` diameters of way; the first is the farthest. A contact belongs to the layer of its farther body.
 !>   halo    the bodies of the next `halo` diameters below a layer move with it; their impulses are thrown away afterwards.
 !>
@@ -20,12 +19,11 @@ module gravier_layered_start
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: momentum_t, work_t
   use gravier_sweep_order, only: group_contacts
+  use gravier_supports, only: supports_t, find_supports
   implicit none
   private
   public :: carry_loads
 
-  !> mean of -n . u/|u| over the contacts of a boundary from which on it supports
-  real(dp), parameter :: least_pressing = 0.3_dp
   !> of a layer and of the halo below it, in mean diameters
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
   !> relative change of the impulses of a layer by a sweep at which the layer is done, times the number of layers, which hand errors on;
@@ -64,10 +62,12 @@ module gravier_layered_start
 contains
 
   !> Replace the impulses of the problem by those of a pass over all layers, which starts from them. Nothing changes where no
-  !> boundary supports the load. Collective.
-  subroutine carry_loads(problem, work, sweeps)
+  !> boundary supports the load, or the longest way is too short. Collective.
+  subroutine carry_loads(problem, least_way, work, sweeps)
     !> with a uniform load
     type(contact_problem_t), intent(inout) :: problem
+    !> longest way from which on it is worth while [mean diameters]
+    real(dp), intent(in) :: least_way
     !> takes the relaxations
     type(work_t), intent(inout) :: work
     !> over all contacts, that relax as many as the pass did; 0 where there are no layers
@@ -79,7 +79,7 @@ contains
 
     sweeps = 0.0_dp
     call find_ways(problem, layers)
-    call cut_layers(problem, layers, n_layers)
+    call cut_layers(problem, least_way, layers, n_layers)
     if (n_layers < 2) return
     call start_timer(phase_sweep)
     call start_velocities(problem, layers)
@@ -101,73 +101,24 @@ contains
     sweeps = sums(1)/max(1.0_dp, real(problem%n_contacts, dp))
   end subroutine carry_loads
 
-  !> The way of every body to the boundaries against which the load presses. Collective.
+  !> The way of every body to the boundaries that support it. Collective.
   subroutine find_ways(problem, layers)
     type(contact_problem_t), intent(inout) :: problem
     type(layers_t), intent(inout) :: layers(:)
-    !> of one subdomain: -n . u and the number of its contacts, by boundary (2 boundaries); radii and number of grains
-    real(dp), allocatable :: parts(:, :), sums(:)
-    real(dp) :: diameter, highest(1)
-    integer :: s, c, n
+    type(supports_t), allocatable :: supports(:)
+    !> radii and number of the grains
+    real(dp) :: parts(2, size(layers)), sums(2)
+    integer :: s
 
-    n = 0
+    call find_supports(problem, supports)
     do s = 1, size(layers)
-      if (size(problem%sub(s)%boundary) > 0) n = max(n, maxval(problem%sub(s)%boundary))
-    end do
-    highest(1) = n
-    call problem%comm%highest_of(highest)
-    n = nint(highest(1))
-    allocate (parts(2*n + 2, size(layers)), sums(2*n + 2))
-    parts(:, :) = 0.0_dp
-    do s = 1, size(layers)
-      associate (sub => problem%sub(s))
-        do c = 1, sub%n_contacts
-          call add_pressing(sub%pair(1, c), -1.0_dp)
-          call add_pressing(sub%pair(2, c), 1.0_dp)
-        end do
-        parts(2*n + 1, s) = sum(sub%radius)
-        parts(2*n + 2, s) = sub%n_grains
-      end associate
+      parts(1, s) = sum(problem%sub(s)%radius)
+      parts(2, s) = problem%sub(s)%n_grains
+      allocate (layers(s)%way(problem%sub(s)%n_columns))
+      layers(s)%way(:) = merge(0.0_dp, unreached, supports(s)%column)
     end do
     call problem%comm%sum_parts(parts, sums)
-    diameter = 2.0_dp*sums(2*n + 1)/max(1.0_dp, sums(2*n + 2))
-    do s = 1, size(layers)
-      allocate (layers(s)%way(problem%sub(s)%n_columns))
-      layers(s)%way(:) = unreached
-      call start_ways(problem%sub(s), layers(s)%way)
-    end do
-    call spread_ways(problem, diameter, layers)
-
-  contains
-
-    !> A contact with body `b`, towards which its normal points from the grain where `side` is -1.
-    subroutine add_pressing(b, side)
-      integer, intent(in) :: b
-      real(dp), intent(in) :: side
-      integer :: d, k
-
-      associate (sub => problem%sub(s))
-        if (b <= sub%n_bodies) return
-        k = sub%boundary(b)
-        do d = 1, problem%kernels%nd
-          parts(k, s) = parts(k, s) - side*sub%hot(lane_of(c), d, block_of(c))*problem%load(d)
-        end do
-        parts(n + k, s) = parts(n + k, s) + 1.0_dp
-      end associate
-    end subroutine add_pressing
-
-    !> Roots have a way of 0.
-    subroutine start_ways(sub, way)
-      type(subproblem_t), intent(in) :: sub
-      real(dp), intent(inout) :: way(:)
-      integer :: b, k
-
-      do b = sub%n_bodies + 1, sub%n_columns
-        k = sub%boundary(b)
-        if (sums(k) > least_pressing*norm2(problem%load(1:problem%kernels%nd))*sums(n + k)) way(b) = 0.0_dp
-      end do
-    end subroutine start_ways
-
+    call spread_ways(problem, 2.0_dp*sums(1)/max(1.0_dp, sums(2)), layers)
   end subroutine find_ways
 
   !> Shortest ways from those that are known, over closed contacts, across subdomains. Collective.
@@ -253,10 +204,12 @@ contains
   end subroutine shorten_ways
 
   !> The layer of every body and the contacts of every layer. Collective.
-  subroutine cut_layers(problem, layers, n_layers)
+  subroutine cut_layers(problem, least_way, layers, n_layers)
     type(contact_problem_t), intent(in) :: problem
+    !> [mean diameters]
+    real(dp), intent(in) :: least_way
     type(layers_t), intent(inout) :: layers(:)
-    !> 0 where no body has a way to a root
+    !> 0 where no body has a way to a support that is so long
     integer, intent(out) :: n_layers
     integer, allocatable :: next(:)
     real(dp) :: longest
@@ -269,6 +222,8 @@ contains
       end do
     end do
     longest = problem%comm%highest(longest)
+    n_layers = 0
+    if (longest < least_way) return
     n_layers = ceiling(longest/thickness)
     if (n_layers < 2) return
     do s = 1, size(layers)

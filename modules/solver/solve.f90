@@ -47,7 +47,8 @@ module gravier_solve
   !> depth are above these; later, after a part of the depth, where that is above another; iterations after it until it is judged,
   !> and what must be left of the error then
   real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp, late = 0.3_dp
-  integer, parameter :: deep = 15, very_deep = 60, trial = 6
+  real(dp), parameter :: deep = 15.0_dp, very_deep = 60.0_dp
+  integer, parameter :: trial = 6
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 6
 
@@ -326,24 +327,21 @@ contains
     end subroutine complete_estimate
 
     !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
-    subroutine try_layers(least_error, least_depth, error)
-      !> over its scale, and contacts, above which it is tried
-      real(dp), intent(in) :: least_error
-      integer, intent(in) :: least_depth
+    subroutine try_layers(least_error, least_way, error)
+      !> error over its scale, and way to supports in mean diameters, above which it is tried
+      real(dp), intent(in) :: least_error, least_way
       type(error_t), allocatable, intent(inout) :: error
       real(dp) :: sweeps
       integer :: s
 
       call complete_estimate()
       if (velocity%criterion() <= least_error*problem%error_scale) return
-      if (velocity%most_depth < 0) call velocity%find_depth(problem)
-      if (velocity%most_depth <= least_depth) return
       may_try_layers = .false.
       do s = 1, size(problem%sub)
         kept(s)%value = problem%sub(s)%impulse
       end do
       error_before = velocity%criterion()
-      call carry_loads(problem, scheme%work, sweeps)
+      call carry_loads(problem, least_way, scheme%work, sweeps)
       if (.not. sweeps > 0.0_dp) return
       report%layered_sweeps = report%layered_sweeps + sweeps
       report%layered = .true.

@@ -6,7 +6,7 @@
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
 !>      The test impulses are w/W (local errors), r (a wrong total load), r less the impulses one iteration before (the wave that
 !>      momentum carries), r less older copies (slower waves behind it).
-!>   L  sum over levels. The depth of a body is the number of contacts to the nearest body that moves as prescribed. The power
+!>   L  sum over levels. The depth of a body is the number of contacts to the nearest boundary that supports it. The power
 !>      of the violations between two levels over the force that crosses, 0.65 being the mean cosine between a normal and the
 !>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
 !>      L^2 = sum m_l e_l^2.
@@ -21,6 +21,7 @@ module gravier_velocity_error
   use gravier_contact_kernels, only: lanes, n_tests, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_dense_direct, only: projected_square
+  use gravier_supports, only: supports_t, find_supports
   implicit none
   private
   public :: velocity_error_t, copies_ready
@@ -42,7 +43,7 @@ module gravier_velocity_error
   real(dp), parameter :: rounded = 1.0e-3_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
-  !> no way leads to what moves as prescribed
+  !> no way leads to a boundary
   integer, parameter :: unreached = -1
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
@@ -59,7 +60,7 @@ module gravier_velocity_error
     !> H y of the test impulses, summed over copies of bodies (n_tests, nv, n_columns) [N s, N m s]
     real(dp), allocatable :: motion(:, :, :)
     type(copy_t) :: copy(n_copies)
-    !> contacts to what moves as prescribed, of each body (n_columns)
+    !> contacts to a support, of each body (n_columns)
     integer, allocatable :: depth(:)
   end type error_part_t
 
@@ -312,7 +313,7 @@ contains
         do c = 1, sub%n_contacts
           i = part%depth(sub%pair(1, c))
           j = part%depth(sub%pair(2, c))
-          if (i == j .or. i == unreached .or. j == unreached) cycle
+          if (abs(i - j) /= 1 .or. i == unreached .or. j == unreached) cycle
           l = max(i, j)
           q = lane_of(c)
           g = block_of(c)
@@ -337,41 +338,35 @@ contains
     self%levels = sqrt(squares/self%mass)
   end subroutine velocity_error_add_levels
 
-  !> Depth of every body: contacts to the nearest body that moves as prescribed, over contacts that press or are closed; in parts
-  !> without one, to the nearest boundary that forces move. It does not depend on subdomains or ranks. Collective.
+  !> Depth of every body: contacts to the nearest boundary that supports, over contacts that press or are closed; in parts without
+  !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks. Collective.
   subroutine velocity_error_find_depth(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    type(supports_t), allocatable :: supports(:)
     real(dp) :: most
     integer :: s, b, round
-    logical :: changed
+    logical :: starts
 
     do s = 1, size(problem%sub)
       if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
       self%part(s)%depth(:) = unreached
     end do
-    do round = 1, 2
-      changed = .false.
+    call find_supports(problem, supports)
+    do round = 1, 3
+      starts = .false.
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s), depth => self%part(s)%depth)
-          if (round == 1) then
-            do b = sub%n_grains + 1, sub%n_columns
-              if (.not. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) depth(b) = 0
-            end do
-          else
-            do b = sub%n_grains + 1, sub%n_bodies
-              if (depth(b) == unreached) then
-                depth(b) = 0
-                changed = .true.
-              end if
-            end do
-          end if
+          do b = sub%n_grains + 1, sub%n_columns
+            if (depth(b) /= unreached) cycle
+            if (round == 1 .and. .not. supports(s)%column(b)) cycle
+            if (round == 2 .and. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) cycle
+            depth(b) = 0
+            starts = .true.
+          end do
         end associate
       end do
-      if (round == 2) then
-        if (.not. problem%comm%any_true(changed)) exit
-      end if
-      call spread_depth(problem, self%part)
+      if (problem%comm%any_true(starts)) call spread_depth(problem, self%part)
     end do
     most = 0.0_dp
     do s = 1, size(problem%sub)
@@ -387,6 +382,8 @@ contains
     !> ways of a subdomain: neighbours of body b are towards(first(b):first(b + 1) - 1)
     type :: ways_t
       integer, allocatable :: first(:), towards(:)
+      !> bodies whose depth may still be found or lowered
+      logical, allocatable :: open(:)
       real(dp), allocatable :: field(:, :)
     end type ways_t
     type(ways_t) :: ways(size(part))
@@ -397,7 +394,9 @@ contains
     do s = 1, size(part)
       call list_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, ways(s)%first, ways(s)%towards)
       shares = shares .or. problem%shared%part(s)%n_slots > 0
-      call search_breadth_first(ways(s)%first, ways(s)%towards, part(s)%depth)
+      ways(s)%open = part(s)%depth == unreached
+      ways(s)%open(problem%sub(s)%n_bodies + 1:) = .false.
+      call search_breadth_first(ways(s)%first, ways(s)%towards, ways(s)%open, part(s)%depth)
     end do
     if (.not. problem%comm%any_true(shares)) return
     do s = 1, size(part)
@@ -416,11 +415,11 @@ contains
           do j = 1, shared%n_slots
             d = nint(shared%recv(1, j))
             b = shared%slot_body(j)
-            if (d == unreached .or. (depth(b) /= unreached .and. depth(b) <= d)) cycle
+            if (d == unreached .or. .not. ways(s)%open(b) .or. (depth(b) /= unreached .and. depth(b) <= d)) cycle
             depth(b) = d
             shares = .true.
           end do
-          if (shares) call search_breadth_first(ways(s)%first, ways(s)%towards, depth)
+          if (shares) call search_breadth_first(ways(s)%first, ways(s)%towards, ways(s)%open, depth)
           changed = changed .or. shares
         end associate
       end do
@@ -468,8 +467,9 @@ contains
   end subroutine list_ways
 
   !> Lower depths to one more than that of the nearest neighbour, until nothing changes.
-  subroutine search_breadth_first(first, towards, depth)
+  subroutine search_breadth_first(first, towards, open, depth)
     integer, intent(in), contiguous :: first(:), towards(:)
+    logical, intent(in), contiguous :: open(:)
     integer, intent(inout), contiguous :: depth(:)
     integer, allocatable :: front(:), next(:)
     integer :: b, d, k, n, m, level, most
@@ -493,7 +493,7 @@ contains
       do k = 1, n
         do d = first(front(k)), first(front(k) + 1) - 1
           b = towards(d)
-          if (depth(b) /= unreached .and. depth(b) <= level + 1) cycle
+          if (.not. open(b) .or. (depth(b) /= unreached .and. depth(b) <= level + 1)) cycle
           depth(b) = level + 1
           m = m + 1
           next(m) = b
