@@ -46,7 +46,7 @@ module gravier_solve
   !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
   !> way to supports are above these; later, after a part of the depth, where that is above another; iterations after it until it is
   !> judged, and what must be left of the error then
-  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp, late = 0.3_dp
+  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.8_dp, late = 0.3_dp
   real(dp), parameter :: deep = 25.0_dp, very_deep = 60.0_dp
   integer, parameter :: trial = 6
   !> figures of a check that a trace keeps
@@ -313,7 +313,7 @@ contains
       else if (report%iterations < copies_ready) then
         return
       end if
-      call velocity%project(problem, report%iterations)
+      call velocity%project(problem, scheme, report%iterations)
       if (velocity%criterion() <= limit) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
       is_met = velocity%criterion() <= limit
@@ -324,7 +324,7 @@ contains
       call velocity%bound(problem)
       report%velocity_error = 0.0_dp
       if (.not. report%residual > 0.0_dp) return
-      call velocity%project(problem, report%iterations)
+      call velocity%project(problem, scheme, report%iterations)
       call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
       report%violation = velocity%largest_violation
@@ -377,7 +377,7 @@ contains
 
       call scheme%start(problem, error)
       scheme%work%solves = scheme%work%solves - 1
-      call velocity%forget_copies(report%iterations)
+      call velocity%forget_copies(report%iterations, report%layered)
       ratio = 0.0_dp
     end subroutine begin_anew
 
