@@ -60,6 +60,30 @@ class LastWords(RunTestCase):
             said.append(re.findall(r"^(?:overlaps|accuracy|finished).*$|^ +(?:U from|projected).*$", run.stdout, re.M))
         self.assertEqual(said[1], said[2])
 
+    def test_shared_grains(self):
+        """Shifts are those of the places in the results, a grain that two subdomains share counting once."""
+        places, x = [], 0.0
+        for overlap in (0.0, 4e-3, 3e-3, 1e-3):
+            x += 2 * RADIUS - overlap if places else 0.0
+            places.append(x)
+        write(self.here("chain.csv"), "id,x,y,radius\n" + "".join(f"{k},{place!r},0,{RADIUS}\n" for k, place in enumerate(places, 1)))
+        for subdomains in (1, 2):
+            run = run_case(merged(PAIR, {"scene": {"bodies_file": "../chain.csv"}, "time": {"steps": 1}, "solver": {"method": "nscdd"},
+                                         "decomposition": {"subdomains": subdomains, "grid": [subdomains, 1]}}), 1, self.here(f"chain {subdomains}"))
+            self.assert_status(run, 0)
+            results = run.results()
+            shift = np.abs(results["/steps/1/bodies/position"] - results["/steps/0/bodies/position"])[:, 0].mean()
+            said = float(re.search(r"shifts of a grain add up to (\S+) m on average", run.stdout)[1])
+            self.assertAlmostEqual(said / shift, 1.0, delta=6e-3)
+            self.assertEqual(run.history()["interface_bodies"][0] > 0, subdomains > 1)
+
+    def test_path(self):
+        """The path that shifts are compared with is that of the velocities: two grains that fly together overlap at the start."""
+        write(self.here("flying.csv"), f"id,x,y,radius,vx,vy\n1,0,0,{RADIUS},3,4\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},3,4\n")
+        run = run_case(merged(PAIR, {"scene": {"bodies_file": "../flying.csv"}}), 1, self.here("flying"))
+        self.assert_status(run, 0)
+        self.assertRegex(run.stdout, r"shifts of a grain add up to 1\.75E-003 m on average, 1\.2E-001 of its path of 1\.50E-002 m\n")
+
     def test_seldom_mended(self):
         run = run_case(merged(PAIR, {"time": {"steps": 20}}), 1, self.here("seldom"))
         self.assertIn("projected in 1 of 20 steps (5 %)", run.stdout)
