@@ -26,7 +26,7 @@ class FailedSolves(RunTestCase):
         cls.case = {
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": packing, "friction": 0.3},
             "time": {"step": 1e-3, "steps": 3},
-            "solver": {"tolerance": 1e-8, "max_iterations": 5000, "warm_start": False},
+            "solver": {"criterion": "residual", "tolerance": 1e-8, "max_iterations": 5000, "warm_start": False},
             "output": {"directory": "results", "trace": True},
         }
 
