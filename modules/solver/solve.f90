@@ -416,7 +416,9 @@ contains
     !> because the method finds none. Collective.
     logical function stagnates()
       stagnates = .false.
-      if (report%figure < gained*best .or. report%iterations == 0) then
+      ! the residual of no impulses is relative to something else
+      if (report%iterations == 0) return
+      if (report%figure < gained*best) then
         best = report%figure
         best_at = report%iterations
         next_look = 2*best_at + patience
