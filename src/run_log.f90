@@ -499,7 +499,8 @@ contains
       text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
       text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
-    else if (solve%velocity_error <= solver%accuracy*solve%velocity_scale .and. solve%violation > solve%violation_allowed) then
+    else if (solve%violation > solve%violation_allowed .and. (solve%status == solve_unbounded .or. &
+        & solve%velocity_error <= solver%accuracy*solve%velocity_scale)) then
       text = "a contact violates its law by "//to_text(solve%violation, 3)//" m/s, above "//to_text(solve%violation_allowed, 3)// &
         & " m/s,"
     else

@@ -431,7 +431,9 @@ contains
     !> because the method finds none. Collective.
     logical function stagnates()
       stagnates = .false.
-      if (report%figure < gained*best .or. report%iterations == 0) then
+      ! the residual of no impulses is relative to something else
+      if (report%iterations == 0) return
+      if (report%figure < gained*best) then
         best = report%figure
         best_at = report%iterations
         next_look = best_at + patience + merge(idle_share, idle_share_of_residual, control%criterion == by_velocity)*best_at

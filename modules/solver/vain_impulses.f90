@@ -23,7 +23,7 @@ module gravier_vain_impulses
   end type kept_impulses_t
 
   !> speed that a solution would need, over the largest speed of the problem, from which on there is none
-  real(dp), parameter :: beyond = 100.0_dp
+  real(dp), parameter :: beyond = 20.0_dp
 
 contains
 
