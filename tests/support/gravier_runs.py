@@ -200,7 +200,7 @@ def settled_disks(directory, steps=400, count=(24, 25)):
         "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": list(count), "radius_min": 0.008, "radius_max": 0.012,
                   "friction": 0.3},
         "time": {"step": 1e-3, "steps": steps},
-        "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 2000},
+        "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 2000},
         "output": {"directory": ".", "every": 0, "final_bodies": True},
     }, directory=directory)
     if run.status != 0:

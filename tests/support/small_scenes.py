@@ -109,7 +109,7 @@ class SmallScene(RunTestCase):
             "scene": {"dimension": dimension, "bodies": "file", "bodies_file": "bodies.csv", "gravity": floats(gravity)},
             "boundary": [dict(keys) for keys in boundaries],
             "time": {"step": self.step, "steps": steps},
-            "solver": {"tolerance": 1e-13, "check_every": 1, "warm_start": False, "max_iterations": 20000},
+            "solver": {"criterion": "residual", "tolerance": 1e-13, "check_every": 1, "warm_start": False, "max_iterations": 20000},
             "output": {"directory": "results"},
         }, groups)
         run = run_case(case, ranks, directory)

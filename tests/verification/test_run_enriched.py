@@ -25,7 +25,7 @@ class Enriched(RunTestCase):
         cls.disks = merged({
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": settled_disks(cls.scratch, count=(16, 16)), "friction": 0.3},
             "time": {"step": 1e-3, "steps": 1},
-            "solver": {"method": "nscdd", "acceleration": "none", "sweeps": 3, "tolerance": 1e-3, "max_iterations": 2000,
+            "solver": {"method": "nscdd", "acceleration": "none", "sweeps": 3, "criterion": "residual", "tolerance": 1e-3, "max_iterations": 2000,
                        "check_every": 1, "warm_start": False},
             "output": {"directory": "results", "trace": True},
         }, PARTS)
@@ -34,7 +34,7 @@ class Enriched(RunTestCase):
                       "friction": 0.3},
             "time": {"step": 1e-3, "steps": 350},
             # settled by plain iterations: with momentum 0.6 of NSCDD's are left here at a friction of 0.3, not half (doc/methods.md)
-            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
+            "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 1000},
             "output": {"directory": ".", "every": 0, "final_bodies": True},
         }, directory=cls.scratch + "/spheres")
         if spheres.status != 0:

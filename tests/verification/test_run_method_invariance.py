@@ -57,7 +57,7 @@ class MethodInvariance(RunTestCase):
         case = merged({
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.packing, "friction": friction},
             "time": {"step": STEP, "steps": 1},
-            "solver": {"tolerance": TOLERANCE, "max_iterations": 160000, "check_every": 10, "warm_start": False},
+            "solver": {"criterion": "residual", "tolerance": TOLERANCE, "max_iterations": 160000, "check_every": 10, "warm_start": False},
             "decomposition": {"subdomains": subdomains, "partition": partition, "kind": kind},
             "output": {"directory": "results"},
         }, method)

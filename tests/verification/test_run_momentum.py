@@ -46,7 +46,7 @@ class Momentum(RunTestCase):
         cls.disks = {
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": cls.packing, "friction": 0.3},
             "time": {"step": 1e-3, "steps": 1},
-            "solver": {"tolerance": TOLERANCES[-1], "max_iterations": 6000, "check_every": CHECK_EVERY},
+            "solver": {"criterion": "residual", "tolerance": TOLERANCES[-1], "max_iterations": 6000, "check_every": CHECK_EVERY},
             "output": {"directory": "results", "trace": True},
         }
         cls.column = merged(cls.disks, {"scene": {"bodies": "column", "bodies_file": None, "column_count": 40, "radius": 0.05,
@@ -60,7 +60,7 @@ class Momentum(RunTestCase):
             "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [edge] * 3, "radius_min": 0.008, "radius_max": 0.012,
                       "friction": 0.3},
             "time": {"step": 1e-3, "steps": steps},
-            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
+            "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 1000},
             "output": {"directory": ".", "every": 0, "final_bodies": True},
         }, directory=f"{cls.scratch}/spheres_{edge}")
         if spheres.status != 0:

@@ -33,7 +33,7 @@ class Newton(RunTestCase):
         cls.disks = {
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": settled_disks(cls.scratch), "friction": 0.3},
             "time": {"step": 1e-3, "steps": 1},
-            "solver": {"method": "newton", "tolerance": TIGHT, "max_iterations": 4000},
+            "solver": {"method": "newton", "criterion": "residual", "tolerance": TIGHT, "max_iterations": 4000},
             "output": {"directory": "results", "trace": True},
         }
 

@@ -320,7 +320,7 @@ class Decomposed(SmallScene):
                     law(("a", "floor"), "adhesive", adhesion=5.0, adhesion_range=0.003, friction=0.4),
                     law(("b", "floor"), "velocity", static_friction=0.5, dynamic_friction=0.2, slip_scale=0.01)],
             "time": {"step": 1e-3, "steps": 60},
-            "solver": {"method": "nscdd", "tolerance": 1e-6},
+            "solver": {"method": "nscdd", "criterion": "residual", "tolerance": 1e-6},
             "decomposition": {"grid": [2, 2], "repartition_every": 7},
             "output": {"every": 20, "energy": True, "structure": True, "stress": True, "directory": "results"},
         }, more)

@@ -30,7 +30,7 @@ class Relaxation(RunTestCase):
         column = {
             "scene": {"dimension": 2, "bodies": "column", "column_count": 40, "radius": 0.05},
             "time": {"step": 1e-3, "steps": 1},
-            "solver": {"tolerance": 1e-6, "max_iterations": 20000, "check_every": 1},
+            "solver": {"criterion": "residual", "tolerance": 1e-6, "max_iterations": 20000, "check_every": 1},
             "output": {"directory": "results", "trace": True},
         }
         cases = {f"{name} in {n}": merged(column, method, {"decomposition": {"subdomains": n}})
@@ -46,7 +46,7 @@ class Relaxation(RunTestCase):
         return merged({
             "scene": {"dimension": dimension, "bodies": "file", "bodies_file": packing, "friction": 0.3},
             "time": {"step": 1e-3, "steps": 1},
-            "solver": {"tolerance": 1e-4, "max_iterations": 3000, "check_every": 5},
+            "solver": {"criterion": "residual", "tolerance": 1e-4, "max_iterations": 3000, "check_every": 5},
             "decomposition": {"subdomains": subdomains, "partition": "metis"},
             "output": {"directory": "results", "trace": True},
         }, *more)
@@ -58,7 +58,7 @@ class Relaxation(RunTestCase):
             "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012,
                       "friction": 0.3},
             "time": {"step": 1e-3, "steps": 350},
-            "solver": {"acceleration": "none", "tolerance": 1e-3, "max_iterations": 1000},
+            "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 1000},
             "output": {"directory": ".", "every": 0, "final_bodies": True},
         }
         spheres = run_case(fall, directory=self.here("spheres"))
