@@ -503,6 +503,9 @@ contains
         & solve%velocity_error <= solver%accuracy*solve%velocity_scale)) then
       text = "a contact violates its law by "//to_text(solve%violation, 3)//" m/s, above "//to_text(solve%violation_allowed, 3)// &
         & " m/s,"
+    else if (solve%velocity_error <= solver%accuracy*solve%velocity_scale) then
+      ! what sinks, and what moves where the solution is at rest, counts more than in the estimate
+      text = "velocity error with its weights "//to_text(solve%figure, 3)//" of U above the accuracy "//to_text(solver%accuracy, 3)
     else
       text = "velocity error "//to_text(solve%velocity_error, 3)//" m/s above "//to_text(solver%accuracy, 3)//" of "// &
         & to_text(solve%velocity_scale, 3)//" m/s"

@@ -91,8 +91,8 @@ contains
         & to_text(simulation%config%solver%tolerance, 2)
       if (simulation%failed > 0) text = "*** "//to_text(simulation%failed)//" of the steps did NOT reach the "// &
         & goal_name(simulation)//": the accuracy of the results is not known"
-      if (tally%worst_error > far_off) text = text//", but velocities were wrong by up to "//plain(tally%worst_error)// &
-        & " of U in "//to_text(tally%far_off)//" of "//steps
+      if (tally%worst_error > far_off) text = text//trim(merge(", but", ";    ", simulation%failed == 0))// &
+        & " velocities were wrong by up to "//plain(tally%worst_error)//" of U in "//to_text(tally%far_off)//" of "//steps
       if (tally%mended_share() > often_mended) text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "// &
         & steps//": the results are not those of the contact law"
       if (simulation%restarted) text = text//"; errors and overlaps are those since the restart"

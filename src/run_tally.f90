@@ -1,5 +1,6 @@
-!> What the closing lines of a run need of its steps, in a record of fixed size: how solves ended, how far their velocities were from
-!> the solution, how much of the geometry was mended. All counts and sums are since this run began or went on from a checkpoint.
+!> What the closing lines of a run need of its steps, in a record of fixed size: how solves ended, how far their velocities were
+!> from the solution, how much of the geometry was mended. All counts and sums are since this run began or went on
+!> from a checkpoint.
 module gravier_run_tally
   use gravier_kinds, only: dp, i8
   use gravier_solve, only: solve_report_t, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded

@@ -104,9 +104,9 @@ contains
     sees = self%unreached(at_tolerance) == 0 .and. decade > 0.0_dp .and. all - decade >= least_share*all
   end function effort_sees_decay
 
-  !> Between how many iterations ten times the tolerance would have taken. At most those made: what a looser tolerance leaves adds up
-  !> from step to step. At least half of those to the first figure that passed it; 0 where no decay is seen. Both are `unknown_effort`
-  !> where a solve did not get down to that.
+  !> Between how many iterations ten times the tolerance would have taken. At most those made: what a looser tolerance leaves adds
+  !> up from step to step. At least half of those to the first figure that passed it; 0 where no decay is seen. Both are
+  !> `unknown_effort` where a solve did not get down to that.
   pure subroutine effort_looser_range(self, least, most)
     class(effort_t), intent(in) :: self
     real(dp), intent(out) :: least, most
@@ -118,10 +118,10 @@ contains
     least = merge(least_looser*least, 0.0_dp, self%sees_decay() .or. self%unreached(at_tolerance) > 0)
   end subroutine effort_looser_range
 
-  !> Between how many iterations a tenth of the tolerance would have taken, if solves get there: at least most of what the last decade
-  !> has taken once more, as where errors decay exponentially, and at most twice what a power law through the last decade, or its
-  !> second half, asks for. Both are `unknown_effort` where a solve missed the tolerance, which would miss a tighter one too, and
-  !> where no decay is seen.
+  !> Between how many iterations a tenth of the tolerance would have taken, if solves get there: at least most of what the last
+  !> decade has taken once more, as where errors decay exponentially, and at most twice what a power law through the last decade,
+  !> or its second half, asks for. Both are `unknown_effort` where a solve missed the tolerance, which would miss a tighter one
+  !> too, and where no decay is seen.
   pure subroutine effort_tighter_range(self, least, most)
     class(effort_t), intent(in) :: self
     real(dp), intent(out) :: least, most
