@@ -256,8 +256,17 @@ def draw_history(runs, columns):
     return figure
 
 
+def velocity_scale(run, step):
+    """U of a step, from history.csv; 0 where it has none."""
+    history = run.history()
+    if "velocity_scale" not in history or step not in history.step:
+        return 0.0
+    return float(history.velocity_scale[history.step == step][0])
+
+
 def draw_convergence(runs, step):
-    """A figure of residual and jump against iterations, a line a run: of one step, that of most iterations unless told."""
+    """A figure of residual, jump and velocity error over its scale against iterations, a line a run: of one step, that of most
+    iterations unless told."""
     figure, axes = plt.subplots(figsize=(6.2, 4.0))
     for k, (run, label) in enumerate(zip(runs, names_of(runs))):
         trace = run.trace()
@@ -267,17 +276,23 @@ def draw_convergence(runs, step):
         drawn = trace.step[numpy.argmax(trace.iteration)] if step is None else step
         chosen = trace.step == drawn
         begin = "" if len(runs) == 1 else f"{label}, step {drawn:.0f}, "
-        for name, style in (("error", "-"), ("residual", "-" if "error" not in trace else "--"), ("jump", ":")):
-            if name not in trace or not (trace[name][chosen] > 0.0).any():
-                continue
-            axes.plot(trace.iteration[chosen], numpy.where(trace[name][chosen] > 0.0, trace[name][chosen], numpy.nan), style,
-                      color=LINES[k % len(LINES)], linewidth=1.2, label=begin + name)
+        curves = {name: trace[name][chosen] for name in ("error", "residual", "jump") if name in trace}
+        scale = velocity_scale(run, drawn)
+        if "velocity_error" in trace and scale > 0.0:
+            # before some iterations the error is not known, and a huge number stands for it
+            ratio = trace.velocity_error[chosen] / scale
+            curves["velocity error / U"] = numpy.where(ratio < 1e6, ratio, numpy.nan)
+        styles = {"error": "-", "residual": "-" if "error" not in trace else "--", "jump": ":", "velocity error / U": "-."}
+        for name, values in curves.items():
+            if (values > 0.0).any():
+                axes.plot(trace.iteration[chosen], numpy.where(values > 0.0, values, numpy.nan), styles[name],
+                          color=LINES[k % len(LINES)], linewidth=1.2, label=begin + name)
         tolerance = run.case.get("solver", [{}])[0].get("tolerance")
         if tolerance is not None:
             axes.axhline(tolerance, color=LINES[k % len(LINES)], linewidth=0.6, label=begin + "tolerance")
     if len(runs) == 1:
         axes.set_title(f"step {drawn:.0f}", fontsize=9, loc="left")
-    axes.set(xlabel="iteration", ylabel="residual, jump", yscale="log")
+    axes.set(xlabel="iteration", ylabel="residual, jump, velocity error / U", yscale="log")
     axes.grid(True, color="0.9", linewidth=0.6)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)

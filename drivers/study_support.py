@@ -1,6 +1,8 @@
 """What the studies and the scenes share: loose grains, bodies files, runs of the program, pictures of disks."""
 import csv
 import os
+import platform
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -12,6 +14,7 @@ try:
     import numpy as np
 
     import gravier
+    from gravier.case import ENVIRONMENT
 except ImportError as missing:
     sys.exit(f"{Path(sys.argv[0]).name}: {missing}; expected a python3 with h5py, numpy and matplotlib")
 matplotlib.use("Agg")
@@ -129,6 +132,18 @@ def write_csv(path, columns):
         table.writerow(names)
         table.writerows([f"{value:.6g}" if isinstance(value, (float, np.floating)) else value for value in row]
                         for row in zip(*[columns[name] for name in names]))
+
+
+def write_measured(path, columns):
+    """The same with the machine and the version of the program in each row."""
+    said = subprocess.run([str((BINARIES / "gravier").resolve()), "--version"], env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL,
+                          stdout=subprocess.PIPE, text=True, check=False).stdout
+    machine = platform.machine()
+    if os.path.exists("/proc/cpuinfo"):
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            machine = next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), machine)
+    rows = len(next(iter(columns.values()), ()))
+    write_csv(path, {**columns, "machine": [machine] * rows, "version": [" ".join(said.split())] * rows})
 
 
 # ---- pictures

@@ -7,11 +7,11 @@ module gravier_progress
   implicit none
   private
   public :: progress_t, duration_text
-  public :: warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, warn_partition, note_balance
+  public :: warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, warn_partition, note_balance, note_scale
 
   integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_momentum = 4, warn_relaxation = 5, &
-    & warn_partition = 6, note_balance = 7
-  integer, parameter :: n_kinds = 7
+    & warn_partition = 6, note_balance = 7, note_scale = 8
+  integer, parameter :: n_kinds = 8
   !> what the closing line calls them; a note is not counted there
   character(len=*), parameter :: kind_names(6) = [character(len=44) :: "solves above the tolerance", &
     & "grains too fast for the step", "search directions lowered", "momentum put off", "relaxation factors lowered", &

@@ -17,6 +17,8 @@ module gravier_run
   use gravier_start_overlap, only: check_start_overlap
   use gravier_checkpoint, only: load_checkpoint, checkpoint_name
   use gravier_run_log, only: run_log_t
+  use gravier_run_summary, only: verdict_text
+  use gravier_accuracy_lines, only: goal_name
   use gravier_run_output, only: run_output_t
   implicit none
   private
@@ -337,7 +339,7 @@ contains
     if (wanted) call output%write_state(simulation, error)
   end subroutine write_step
 
-  !> The last word: did it converge, and where are the results.
+  !> The last word: did it converge, are the results those of the law, and where are they.
   subroutine write_verdict(simulation, log, kept, error)
     type(simulation_t), intent(in) :: simulation
     type(run_log_t), intent(inout) :: log
@@ -349,9 +351,8 @@ contains
       & "radius in a step, and may have passed through others: use a smaller &time step", error)
     if (simulation%largest_overlap/worth_a_warning > simulation%overlap_allowed) call log%line("warning     overlaps of up to "// &
       & to_text(simulation%largest_overlap, 3)//" m, far beyond the overlap_allowed of "//to_text(simulation%overlap_allowed, 3)// &
-      & " m: the solves leave errors that add up; use a smaller &solver tolerance", error)
-    text = "finished    all "//to_text(simulation%step)//" steps reached the tolerance"
-    if (simulation%failed > 0) text = "finished    *** "//to_text(simulation%failed)//" of the steps did NOT reach the tolerance"
+      & " m: the solves leave errors that add up; use a smaller &time step or &solver "//goal_name(simulation), error)
+    text = "finished    "//verdict_text(simulation)
     if (.not. kept) text = text//"; the last one is not in the results"
     call log%line(text//"; results in "//trim(simulation%config%output%directory), error)
   end subroutine write_verdict

@@ -18,10 +18,12 @@ module gravier_run_log
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
   use gravier_progress, only: progress_t, warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, &
-    & warn_partition, note_balance
+    & warn_partition, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line
   use gravier_run_summary, only: converged_text, time_text, halving_text
+  use gravier_run_tally, only: relative_error
+  use gravier_accuracy_lines, only: accuracy_lines, goal_name
   implicit none
   private
   public :: run_log_t, banner_text
@@ -44,6 +46,8 @@ module gravier_run_log
     logical :: live = .false., line_stands = .false.
     !> up to the last step
     type(work_t) :: told
+    !> kind of the velocity scale that was named last
+    character(len=20) :: scale_kind = ""
   contains
     procedure :: init => run_log_init
     procedure :: open => run_log_open
@@ -362,16 +366,10 @@ contains
         call self%line(trim(row), error)
       end if
     end if
+    call note_velocity_scale(self, simulation, error)
     call write_warnings(self, simulation, figures, error)
     if (self%live) call write_live_line(self, simulation, figures)
   end subroutine run_log_write_step
-
-  !> The estimated velocity error over its scale; 0 where nothing is to be expected to move.
-  pure real(dp) function relative_error(solve)
-    type(solve_report_t), intent(in) :: solve
-    relative_error = 0.0_dp
-    if (solve%velocity_scale > 0.0_dp) relative_error = solve%velocity_error/solve%velocity_scale
-  end function relative_error
 
   !> Time left, where the number of steps is known.
   function left_text(self, simulation) result(text)
@@ -404,6 +402,20 @@ contains
     flush (output_unit)
     self%line_stands = .true.
   end subroutine write_live_line
+
+  !> Name the velocity that the error of a solve is compared with, after the first step and where another kind has come to rule.
+  subroutine note_velocity_scale(self, simulation, error)
+    class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (scale => simulation%velocity_scale)
+      if (scale%kind == self%scale_kind) return
+      self%scale_kind = scale%kind
+      call warn(self, note_scale, 1_i8, "scale       from step "//to_text(simulation%step)//" on the error of a solve is "// &
+        & "compared with U = "//to_text(scale%value, 3)//" m/s ("//trim(scale%kind)//")", error)
+    end associate
+  end subroutine note_velocity_scale
 
   !> What a step has to warn of.
   subroutine write_warnings(self, simulation, figures, error)
@@ -487,6 +499,10 @@ contains
       text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
       text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
+    else if (solve%violation > solve%violation_allowed .and. (solve%status == solve_unbounded .or. &
+        & solve%velocity_error <= solver%accuracy*solve%velocity_scale)) then
+      text = "a contact violates its law by "//to_text(solve%violation, 3)//" m/s, above "//to_text(solve%violation_allowed, 3)// &
+        & " m/s,"
     else
       text = "velocity error "//to_text(solve%velocity_error, 3)//" m/s above "//to_text(solver%accuracy, 3)//" of "// &
         & to_text(solve%velocity_scale, 3)//" m/s"
@@ -525,9 +541,14 @@ contains
     real(dp), intent(in) :: phases(n_phases), seconds
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: warnings
-    real(dp) :: looser_seconds
+    real(dp) :: iterations(3), looser_seconds(3)
+    integer :: k
 
-    looser_seconds = self%comm%highest(simulation%effort%seconds_of(simulation%effort%looser()))
+    iterations(1) = simulation%effort%looser()
+    call simulation%effort%looser_range(iterations(2), iterations(3))
+    do k = 1, size(iterations)
+      looser_seconds(k) = self%comm%highest(simulation%effort%seconds_of(iterations(k)))
+    end do
     warnings = self%progress%warnings()
     if (warnings /= "") call self%line("warnings    "//warnings, error)
     if (simulation%effort%solves == 0) return
@@ -579,27 +600,27 @@ contains
     type(simulation_t), intent(in) :: simulation
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
-    real(dp) :: radius, seconds
+    real(dp) :: least, most, seconds
 
-    associate (effort => simulation%effort, solver => simulation%config%solver)
-      radius = simulation%decomposition%rule%mean_radius
-      text = "accuracy    "//trim(solver%criterion)//" at most "//to_text(effort%worst, 3)//" at the end of a solve, tolerance "// &
-        & to_text(solver%tolerance, 3)//"; overlap at most "//to_text(simulation%worst_overlap, 3)//" m"
-      if (radius > 0.0_dp) text = text//", "//to_text(simulation%worst_overlap/radius, 2)//" of the mean radius"
-      call self%line(text, error)
+    associate (effort => simulation%effort)
+      call write_lines(self, accuracy_lines(simulation), "", error)
       call self%line("            "//energy_text(simulation), error)
       seconds = self%comm%highest(effort%seconds)
       call self%line("cost        "//to_text(seconds, 3)//" s in "//to_text(effort%solves)//" solves of "// &
         & to_text(effort%iterations)//" iterations in all", error)
       if (effort%iterations == 0) return
-      text = "            at ten times the tolerance "//estimate_text(self%comm, effort, effort%looser())
+      call effort%looser_range(least, most)
+      text = "            at ten times the "//goal_name(simulation)//" "//estimate_text(self%comm, effort, least, most)
       if (effort%unreached(tenfold) > 0) text = text//": "//to_text(effort%unreached(tenfold))//" solves did not reach that"
       call self%line(text, error)
-      text = "            at a tenth of the tolerance "//estimate_text(self%comm, effort, effort%tighter())
+      call effort%tighter_range(least, most)
+      text = "            at a tenth of the "//goal_name(simulation)//" "//estimate_text(self%comm, effort, least, most)
       if (simulation%failed > 0) then
-        text = text//": "//to_text(simulation%failed)//" solves did not reach the tolerance itself"
-      else if (effort%tighter() < 0.0_dp) then
-        text = text//": most solves end at their first check"
+        text = text//": "//to_text(simulation%failed)//" solves did not reach the "//goal_name(simulation)//" itself"
+      else if (least < 0.0_dp) then
+        text = text//": solves do not show how errors decay"
+      else
+        text = text//", if solves get there"
       end if
       call self%line(text, error)
     end associate
@@ -621,17 +642,19 @@ contains
   end function energy_text
 
   !> What so many iterations would have taken. Collective.
-  function estimate_text(comm, effort, iterations) result(text)
+  function estimate_text(comm, effort, least, most) result(text)
     type(communicator_t), intent(in) :: comm
     type(effort_t), intent(in) :: effort
-    real(dp), intent(in) :: iterations
+    real(dp), intent(in) :: least, most
     character(len=:), allocatable :: text
-    real(dp) :: seconds
+    real(dp) :: seconds(2)
 
     text = "not known"
-    if (iterations < 0.0_dp) return
-    seconds = comm%highest(effort%seconds_of(iterations))
-    text = "about "//to_text(seconds, 2)//" s, "//to_text(nint(iterations, i8))//" iterations (estimated)"
+    if (least < 0.0_dp) return
+    seconds(1) = comm%highest(effort%seconds_of(least))
+    seconds(2) = comm%highest(effort%seconds_of(most))
+    text = to_text(nint(least, i8))//" to "//to_text(nint(most, i8))//" iterations, "//to_text(seconds(1), 2)//" to "// &
+      & to_text(seconds(2), 2)//" s (estimated)"
   end function estimate_text
 
   subroutine run_log_close(self, error)

@@ -7,7 +7,8 @@ module gravier_run_output
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_boundary, only: shape_plane, shape_name
   use gravier_file_system, only: remove_file
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t, &
+    & accuracy_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version
   use gravier_contact_structure, only: bin_width
@@ -210,18 +211,21 @@ contains
     type(contact_rows_t) :: contacts
     type(boundary_rows_t) :: boundaries
     type(figures_t), allocatable :: figures
+    type(accuracy_t), allocatable :: accuracy
 
     if (self%last_written == simulation%step) return
     call start_timer(phase_output)
     call collect_bodies(simulation, bodies)
     call collect_boundaries(simulation, boundaries)
     call collect_figures(simulation%diagnostics, figures)
+    if (simulation%tally%steps > 0) accuracy = accuracy_t(simulation%tally%velocity_error, simulation%tally%velocity_scale)
     if (simulation%config%output%contacts .and. allocated(simulation%problem%sub)) then
       call collect_contacts(simulation, contacts)
-      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, boundaries, figures)
+      call self%results%write_step(simulation%step, simulation%time, bodies, error, contacts, boundaries, figures, &
+        & accuracy)
     else
       call self%results%write_step(simulation%step, simulation%time, bodies, error, boundaries=boundaries, &
-        & figures=figures)
+        & figures=figures, accuracy=accuracy)
     end if
     if (simulation%config%output%vtk) call self%pictures%write_step(simulation, error)
     self%last_written = simulation%step

@@ -6,36 +6,120 @@ module gravier_run_summary
     & phase_interface_solve, phase_reduction, phase_output
   use gravier_descent, only: at_tolerance
   use gravier_progress, only: duration_text
+  use gravier_run_tally, only: far_off, often_mended
+  use gravier_accuracy_lines, only: goal_name, percent, plain
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: converged_text, time_text, halving_text
+  public :: converged_text, time_text, halving_text, verdict_text
 
   !> phases that are named, the dearest first, and the least share that is [%]
   integer, parameter :: named = 4
   real(dp), parameter :: least_share = 3.0_dp
   !> contacts of rank 0 below which more ranks do not pay
   integer(i8), parameter :: contacts_a_rank = 5000
+  !> velocity error over its scale that a looser goal may lead to
+  real(dp), parameter :: loosest = 0.1_dp
 
 contains
 
-  !> How many steps reached the tolerance, and in how many iterations.
+  !> How many steps reached the goal, in how many iterations, and how the others ended.
   function converged_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
     character(len=24) :: mean
 
-    associate (effort => simulation%effort, tolerance => simulation%config%solver%tolerance)
+    associate (effort => simulation%effort, tally => simulation%tally)
       write (mean, "(f24.1)") real(effort%iterations, dp)/real(max(effort%solves, 1_i8), dp)
       if (simulation%failed == 0) then
-        text = "yes: every solve reached the tolerance "//to_text(tolerance, 3)
+        text = "yes: every solve reached the "//goal_text(simulation)
       else
-        text = "NO: "//to_text(simulation%failed)//" of "//to_text(simulation%step)//" solves did not reach the tolerance "// &
-          & to_text(tolerance, 3)//"; at worst "//to_text(effort%worst, 3)
+        text = "NO: "//to_text(simulation%failed)//" of "//to_text(max(int(simulation%step, i8), tally%solves))// &
+          & " solves did not reach the "//goal_text(simulation)//"; at worst "//to_text(effort%worst, 3)
       end if
       text = text//"; "//trim(adjustl(mean))//" iterations a solve"
+      if (simulation%failed > 0) text = text//"; "//misses_text(simulation)
     end associate
   end function converged_text
+
+  !> The goal of a solve with its number.
+  function goal_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = "tolerance "//to_text(simulation%config%solver%tolerance, 3)
+    if (goal_name(simulation) == "accuracy") text = "accuracy "//to_text(simulation%config%solver%accuracy, 3)
+  end function goal_text
+
+  !> How the solves ended that missed their goal.
+  function misses_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (tally => simulation%tally)
+      text = ""
+      if (simulation%failed > tally%missed()) text = ", "//to_text(simulation%failed - tally%missed())//" missed before the restart"
+      call add(tally%stagnated, "stagnated")
+      call add(tally%unbounded, "found no solution")
+      call add(tally%exhausted, "ended at max_iterations")
+      call add(tally%diverged, "diverged")
+    end associate
+    text = text(3:)
+
+  contains
+
+    subroutine add(number, how)
+      integer(i8), intent(in) :: number
+      character(len=*), intent(in) :: how
+      if (number > 0) text = text//", "//to_text(number)//" "//how
+    end subroutine add
+
+  end function misses_text
+
+  !> The last words of a run: whether its steps reached the goal, and what would make that less than it seems.
+  function verdict_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: steps
+
+    associate (tally => simulation%tally)
+      steps = "them"
+      if (simulation%restarted) steps = "the "//to_text(tally%steps)//" steps since the restart"
+      text = "all "//to_text(simulation%step)//" steps reached the "//goal_name(simulation)
+      if (simulation%failed == 0 .and. goal_name(simulation) == "tolerance" .and. tally%worst_error > far_off) &
+        & text = "every solve reached the "//trim(simulation%config%solver%criterion)//" "// &
+        & to_text(simulation%config%solver%tolerance, 2)
+      if (simulation%failed > 0) text = "*** "//to_text(simulation%failed)//" of the steps did NOT reach the "// &
+        & goal_name(simulation)//": the accuracy of the results is not known"
+      if (tally%worst_error > far_off) text = text//", but velocities were wrong by up to "//plain(tally%worst_error)// &
+        & " of U in "//to_text(tally%far_off)//" of "//steps
+      if (tally%mended_share() > often_mended) text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "// &
+        & steps//": the results are not those of the contact law"
+      if (simulation%restarted) text = text//"; errors and overlaps are those since the restart"
+    end associate
+  end function verdict_text
+
+  !> Whether a looser goal or a longer step may be advised: not where results are too loose already.
+  logical function may_loosen(simulation) result(may)
+    type(simulation_t), intent(in) :: simulation
+
+    associate (tally => simulation%tally, solver => simulation%config%solver)
+      may = simulation%failed == 0 .and. .not. tally%mended_share() > often_mended .and. .not. overlaps_grew(simulation)
+      if (goal_name(simulation) == "accuracy") then
+        may = may .and. 10.0_dp*solver%accuracy <= loosest*(1.0_dp + epsilon(1.0_dp))
+      else
+        ! errors of ten times the tolerance are ten times as large, at least
+        may = may .and. 10.0_dp*tally%worst_error <= loosest
+      end if
+    end associate
+  end function may_loosen
+
+  !> Whether overlaps have grown beyond what is allowed; where they are not projected, beyond a hundredth of the mean radius.
+  logical function overlaps_grew(simulation) result(grew)
+    type(simulation_t), intent(in) :: simulation
+    grew = simulation%tally%overlaps_grew(merge(simulation%overlap_allowed, 0.01_dp*simulation%decomposition%rule%mean_radius, &
+      & simulation%overlap_allowed < huge(1.0_dp)))
+  end function overlaps_grew
 
   !> The dearest phases.
   function time_text(phases, seconds, steps) result(text)
@@ -68,33 +152,38 @@ contains
     end do
   end function time_text
 
-  !> What would halve the time of the run, as far as its own figures tell.
+  !> What would halve the time of the run, as far as its own figures tell. What is too loose is never advised to be looser.
   function halving_text(simulation, phases, seconds, looser_seconds) result(text)
     type(simulation_t), intent(in) :: simulation
     !> (n_phases), mean over the ranks [s]
     real(dp), intent(in) :: phases(n_phases)
-    !> of the whole run, of its solves with ten times the tolerance (negative: not known) [s]
-    real(dp), intent(in) :: seconds, looser_seconds
+    !> of the whole run [s]
+    real(dp), intent(in) :: seconds
+    !> of its solves with ten times the goal: expected, at least and at most (negative: not known) [s]
+    real(dp), intent(in) :: looser_seconds(3)
     character(len=:), allocatable :: text
-    real(dp) :: half, shared, lost
+    real(dp) :: half, shared, lost, rest
 
     half = 0.5_dp*seconds
     shared = phases(phase_exchange) + phases(phase_factorise) + phases(phase_interface_solve) + phases(phase_reduction) + &
       & phases(phase_interface)
     associate (effort => simulation%effort, config => simulation%config)
       lost = real(effort%iterations - effort%reached(at_tolerance), dp)/real(max(effort%iterations, 1_i8), dp)
+      rest = seconds - effort%seconds
       if (simulation%comm%size > simulation%decomposition%n_subdomains) then
         text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
           & to_text(simulation%comm%size)//" ranks own no subdomain and wait: as many &decomposition subdomains, now "// &
           & to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
-      else if (phases(phase_output) > half) then
+      else if (phases(phase_output) > half .and. config%output%every > 0) then
         text = "output takes most of it: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
-        text = "solves that give up take most iterations: a &solver tolerance that they reach, now "// &
-          & to_text(config%solver%tolerance, 3)//" and at worst "//to_text(effort%worst, 3)//", or another method; a smaller "// &
-          & "max_iterations, now "//to_text(config%solver%max_iterations)//", leaves larger errors"
-      else if (looser_seconds >= 0.0_dp .and. seconds - effort%seconds + looser_seconds <= half) then
-        text = "ten times the tolerance: about "//duration_text(seconds - effort%seconds + looser_seconds)//" in all (estimated)"
+        text = "solves that give up take most iterations: another &solver method or a smaller &time step may let them reach "// &
+          & "the "//goal_name(simulation)
+      else if (overlaps_grew(simulation)) then
+        text = "nothing yet: overlaps grow, and want a smaller &time step or &solver "//goal_name(simulation)//" first"
+      else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then
+        text = "ten times the "//goal_name(simulation)//": "//duration_text(rest + looser_seconds(2))//" to "// &
+          & duration_text(rest + looser_seconds(3))//" in all (estimated)"
       else if (shared > half .and. simulation%decomposition%n_subdomains > 1) then
         text = "the interface takes most of it: fewer &decomposition subdomains, now "// &
           & to_text(simulation%decomposition%n_subdomains)//", on fewer ranks"
@@ -103,8 +192,10 @@ contains
       else if (contacts_of(simulation) >= contacts_a_rank) then
         text = "twice the ranks, now "//to_text(simulation%comm%size)//", with as many &decomposition subdomains or more, now "// &
           & to_text(simulation%decomposition%n_subdomains)
-      else
+      else if (may_loosen(simulation)) then
         text = "no single key does; a longer &time step makes fewer steps, at the price of accuracy"
+      else
+        text = "no single key does without making the results worse"
       end if
     end associate
   end function halving_text

@@ -17,6 +17,7 @@ module gravier_simulation
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: effort_t
+  use gravier_run_tally, only: run_tally_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged, solve_unbounded, &
     & by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
@@ -45,6 +46,10 @@ module gravier_simulation
   private
   public :: simulation_t, step_figures_t
 
+  !> shifts of all grains by a projection, over the overlap allowed, that are rounding: grains that a projection has left at the
+  !> overlap allowed are projected again where it is exceeded by rounding
+  real(dp), parameter :: rounded_shift = 1.0e-6_dp
+
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
     type(solve_report_t) :: solve
@@ -63,7 +68,8 @@ module gravier_simulation
     logical :: projected = .false.
     !> [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
-    !> after a solve that diverged to NaN or infinity: a contact where it did
+    !> after a solve that diverged to NaN or infinity: a contact where it did; after one whose impulses grow without bound: the
+    !> contact with the largest
     character(len=:), allocatable :: cause
   end type step_figures_t
 
@@ -110,6 +116,8 @@ module gravier_simulation
     !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
     real(dp) :: worst_overlap = 0.0_dp
     type(effort_t) :: effort
+    !> how solves ended and what was mended, since this run began or went on from a checkpoint
+    type(run_tally_t) :: tally
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
@@ -514,11 +522,15 @@ contains
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: shifts, free_grains
 
     if (allocated(error)) return
     call self%assemble(figures)
     call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column)
-    if (.not. allocated(error) .and. figures%solve%status /= solve_converged) self%failed = self%failed + 1
+    if (.not. allocated(error)) then
+      if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
+      call self%tally%add_solve(figures%solve, self%velocity_scale%kind)
+    end if
     self%messages = self%messages + self%problem%shared%messages
     self%values = self%values + self%problem%shared%values
     if (allocated(error)) return
@@ -526,6 +538,7 @@ contains
       call find_cause(self, figures)
       return
     end if
+    if (figures%solve%status == solve_unbounded) call find_largest_impulse(self, figures)
     associate (solve => figures%solve)
       call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
@@ -545,7 +558,11 @@ contains
     call move_to_end(self)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
-    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed)
+    shifts = 0.0_dp
+    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed, shifts)
+    free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
+    call self%tally%add_step(figures%max_overlap, shifts/self%overlap_allowed > rounded_shift, shifts/free_grains, &
+      & self%physics%h*self%balance%speeds/free_grains)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
@@ -580,6 +597,35 @@ contains
     call self%comm%agree(found)
     if (allocated(found)) figures%cause = found%message
   end subroutine find_cause
+
+  !> After a solve whose impulses grow without bound: the contact with the largest one. Collective.
+  subroutine find_largest_impulse(self, figures)
+    class(simulation_t), intent(in) :: self
+    type(step_figures_t), intent(inout) :: figures
+    type(error_t), allocatable :: found
+    real(dp) :: largest, size_of
+    integer :: s, c, k
+
+    largest = -1.0_dp
+    do k = 1, 2
+      do s = 1, size(self%problem%sub)
+        associate (sub => self%problem%sub(s))
+          do c = 1, sub%n_contacts
+            size_of = norm2(sub%impulse(lane_of(c), :, block_of(c)))
+            if (k == 1) then
+              largest = max(largest, size_of)
+            else if (size_of >= largest .and. .not. allocated(found)) then
+              call raise(found, status_unconverged, "largest impulse: contact of bodies "//to_text(sub%id(sub%pair(1, c)))// &
+                & " and "//to_text(sub%id(sub%pair(2, c))))
+            end if
+          end do
+        end associate
+      end do
+      if (k == 1) largest = self%comm%highest(largest)
+    end do
+    call self%comm%agree(found)
+    if (allocated(found)) figures%cause = found%message
+  end subroutine find_largest_impulse
 
   !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
   subroutine check_numbers(self, figures, error)
@@ -667,6 +713,7 @@ contains
     self%restarted = .false.
     self%worst_overlap = 0.0_dp
     self%effort = effort_t()
+    self%tally = run_tally_t()
     self%imbalance = 1.0_dp
     self%reached_imbalance = 0.0_dp
   end subroutine simulation_free

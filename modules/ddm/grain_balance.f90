@@ -22,6 +22,8 @@ module gravier_grain_balance
     real(dp) :: load_work = 0.0_dp, contact_work = 0.0_dp
     !> kinetic energy of grains that were taken out of the scene
     real(dp) :: carried_away = 0.0_dp
+    !> sum of their speeds now [m/s]
+    real(dp) :: speeds = 0.0_dp
     !> sums of m v [kg m/s] and, with a body force, of V v [m^4/s] now
     real(dp), private :: momentum(3) = 0.0_dp, flux(3) = 0.0_dp
   contains
@@ -32,7 +34,7 @@ module gravier_grain_balance
   end type grain_balance_t
 
   !> places among the sums of a step; behind `in_momentum` and `in_flux` come three
-  integer, parameter :: in_kinetic = 1, in_momentum = 1, in_flux = 4, in_contacts = 8, n_sums = 8
+  integer, parameter :: in_kinetic = 1, in_momentum = 1, in_flux = 4, in_contacts = 8, in_speeds = 9, n_sums = 9
 
 contains
 
@@ -102,6 +104,7 @@ contains
     real(dp), intent(in) :: sums(n_sums)
 
     self%kinetic = sums(in_kinetic)
+    self%speeds = sums(in_speeds)
     self%momentum(:) = sums(in_momentum + 1:in_momentum + 3)
     self%flux(:) = sums(in_flux + 1:in_flux + 3)
   end subroutine keep_motion
@@ -124,17 +127,19 @@ contains
     end do
   end subroutine add_grains
 
-  !> Add kinetic energy and momentum of grain `k`.
+  !> Add kinetic energy, speed and momentum of grain `k`.
   pure subroutine add_grain(bodies, k, physics, part)
     type(body_set_t), intent(in) :: bodies
     integer, intent(in) :: k
     type(physics_t), intent(in) :: physics
     real(dp), intent(inout) :: part(n_sums)
-    real(dp) :: volume
+    real(dp) :: volume, square
     integer :: d, nd
 
     nd = bodies%nd
-    part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*sum(bodies%velocity(1:nd, k)**2)
+    square = sum(bodies%velocity(1:nd, k)**2)
+    part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*square
+    part(in_speeds) = part(in_speeds) + sqrt(square)
     if (bodies%nv > nd) part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%inertia(k)*sum(bodies%velocity(nd + 1:, k)**2)
     do d = 1, nd
       part(in_momentum + d) = part(in_momentum + d) + bodies%mass(k)*bodies%velocity(d, k)

@@ -34,13 +34,16 @@ contains
   !> n.(d_i - d_j) + gap + allowed >= 0, in all subdomains with shared masses as in NSCDD; for boundaries, see
   !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
   !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
-  !> The problem comes back as it was but for velocities and masses. Collective.
-  subroutine project_overlaps(decomposition, problem, h, allowed)
+  !> The problem comes back as it was but for velocities and masses, with the lengths of the displacements of all grains summed up:
+  !> the same sum on any number of ranks. Collective.
+  subroutine project_overlaps(decomposition, problem, h, allowed, shifts)
     type(decomposition_t), intent(inout) :: decomposition
     !> of a step that is over; gaps at its q_m, velocities at its end
     type(contact_problem_t), intent(inout) :: problem
     !> [s], [m]
     real(dp), intent(in) :: h, allowed
+    !> sum of the lengths by which grains are moved [m]
+    real(dp), intent(out) :: shifts
     type(borrowed_t) :: borrowed(size(problem%sub))
     real(dp) :: enough, factor, sums(2)
     integer :: s, k
@@ -69,6 +72,7 @@ contains
       problem%sub(s)%v_global(:, :) = factor*problem%sub(s)%velocity
       call give_back(problem, s, borrowed(s))
     end do
+    shifts = lengths(problem)
     call take_displacements(decomposition, problem)
     if (has_driven) call take_boundary_displacements(decomposition, problem)
     call stop_timer(phase_projection)
@@ -110,6 +114,24 @@ contains
     reduction = 1.0_dp
     if (longest > limit) reduction = limit/longest
   end function reduction
+
+  !> Sum of the lengths by which grains are moved, a grain that several subdomains share counting in equal parts [m]. Collective.
+  real(dp) function lengths(problem)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: part(size(problem%sub))
+    integer :: s, b, nd
+
+    nd = problem%kernels%nd
+    part(:) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = 1, sub%n_grains
+          part(s) = part(s) + norm2(sub%v_global(1:nd, b))/sub%multiplicity(b)
+        end do
+      end associate
+    end do
+    lengths = problem%comm%sum_real(part)
+  end function lengths
 
   !> Make a subproblem one of displacements: frictionless, from rest, with the gaps that the next step would find in the
   !> place of velocities.

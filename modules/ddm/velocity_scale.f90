@@ -3,7 +3,8 @@
 !> against what loads do in a step, in fast flow against the motion itself.
 !>
 !>     load   what loads do to the mean grain in a step (mass m, diameter d):
-!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, attraction of the laws
+!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act; attraction of the laws where there is
+!>            no other load, which are internal forces else
 !>     drive  largest difference of imposed velocities
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step
@@ -169,7 +170,8 @@ contains
       call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(3:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
-    if (sums(2) > 0.0_dp .and. self%mass > 0.0_dp) self%load = max(self%load, sqrt(sums(1)/sums(2))/self%mass)
+    ! attractions hold bodies together and move none of them but where there is no other load
+    if (.not. self%load > 0.0_dp .and. sums(2) > 0.0_dp .and. self%mass > 0.0_dp) self%load = sqrt(sums(1)/sums(2))/self%mass
     self%own = 0.0_dp
     if (sums(3) > 0.0_dp) then
       ! nothing holds a scene without boundaries: its mean motion is none

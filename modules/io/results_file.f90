@@ -12,7 +12,7 @@ module gravier_results_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t
+  public :: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t, accuracy_t
 
   !> The bodies of this rank; SI units. Every array but `image` is allocated, without rows where the rank has none.
   type :: body_rows_t
@@ -63,6 +63,11 @@ module gravier_results_file
     integer(i8), allocatable :: histogram(:)
     real(dp) :: bin_width = 0.0_dp
   end type figures_t
+
+  !> How exact the velocities of a step are: the estimated error, and what it was compared with [m/s].
+  type :: accuracy_t
+    real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
+  end type accuracy_t
 
   !> An open results file.
   type :: results_file_t
@@ -228,7 +233,7 @@ contains
 
   !> Write /steps/<step>. Nothing of the step is in the file when this fails, and what was there stays readable.
   !> Failure (status_failure): a number that is not finite, a disk that is full, a step written before. Collective.
-  subroutine results_write_step(self, step, time, bodies, error, contacts, boundaries, figures)
+  subroutine results_write_step(self, step, time, bodies, error, contacts, boundaries, figures, accuracy)
     class(results_file_t), intent(inout) :: self
     integer, intent(in) :: step
     !> s
@@ -239,6 +244,8 @@ contains
     type(contact_rows_t), intent(in), optional :: contacts
     type(boundary_rows_t), intent(in), optional :: boundaries
     type(figures_t), intent(in), optional :: figures
+    !> of a state that a solve has led to
+    type(accuracy_t), intent(in), optional :: accuracy
     type(body_rows_t) :: sorted_bodies
     type(contact_rows_t) :: sorted_contacts
     character(len=:), allocatable :: group
@@ -247,6 +254,10 @@ contains
     if (allocated(error)) return
     group = "/steps/"//to_text(step)
     if (.not. is_finite(time)) call raise_not_finite(self, group//", attribute time", "", error)
+    if (present(accuracy)) then
+      if (.not. (is_finite(accuracy%velocity_error) .and. is_finite(accuracy%velocity_scale))) &
+        & call raise_not_finite(self, group//", attribute velocity_error or velocity_scale", "", error)
+    end if
     call sort_bodies(self, bodies, sorted_bodies)
     call check_bodies(self, group//"/bodies", sorted_bodies, error)
     words = self%comm%total(size(bodies%id, kind=i8))*(2 + 2*size(bodies%position, 1) + size(bodies%velocity, 1))
@@ -266,6 +277,10 @@ contains
     call self%file%begin_group(group, error)
     call self%file%write_attribute(group, "step", step, error)
     call self%file%write_attribute(group, "time", time, error)
+    if (present(accuracy)) then
+      call self%file%write_attribute(group, "velocity_error", accuracy%velocity_error, error)
+      call self%file%write_attribute(group, "velocity_scale", accuracy%velocity_scale, error)
+    end if
     call write_bodies(self%file, group//"/bodies", sorted_bodies, error)
     if (present(boundaries)) call write_boundary_rows(self, group//"/boundaries", boundaries, error)
     if (present(contacts)) call write_contacts(self%file, group//"/contacts", sorted_contacts, error)

@@ -33,7 +33,7 @@ module gravier_contact_kernels
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
   !> test impulses of the estimate of the velocity error
-  integer, parameter :: n_tests = 6
+  integer, parameter :: n_tests = 5
 
   ! rows of `hot` that hold 1/W_nn, 1/W_tt and 1/W_rr
   integer, parameter :: operators_2d_frictionless(1) = [4], operators_3d_frictionless(1) = [5]
@@ -49,19 +49,11 @@ module gravier_contact_kernels
   integer, parameter :: own_2d_friction_roll(3) = [1, 2, 3], own_3d_friction_roll(6) = [1, 2, 2, 3, 3, 3]
   integer, parameter :: own_2d_friction_full(3) = [1, 2, 3], own_3d_friction_full(6) = [1, 2, 2, 3, 3, 3]
 
-  ! of each component of an impulse, the row of `hot` with the coefficient that bounds it by the normal one, 0 for that
-  integer, parameter :: bound_2d_frictionless(1) = [0], bound_3d_frictionless(1) = [0]
-  integer, parameter :: bound_2d_friction(2) = [0, 8], bound_3d_friction(3) = [0, 9, 9]
-  integer, parameter :: bound_2d_friction_shift(2) = [0, 8], bound_3d_friction_shift(3) = [0, 9, 9]
-  integer, parameter :: bound_2d_friction_roll(3) = [0, 8, 11], bound_3d_friction_roll(6) = [0, 9, 9, 12, 12, 13]
-  integer, parameter :: bound_2d_friction_full(3) = [0, 8, 12], bound_3d_friction_full(6) = [0, 9, 9, 14, 14, 15]
   ! numbers that the load of a contact on its candidate takes
   integer, parameter :: loads_2d_frictionless = 2, loads_3d_frictionless = 3, loads_2d_friction = 3, loads_3d_friction = 6
   integer, parameter :: loads_2d_friction_shift = 3, loads_3d_friction_shift = 6
   integer, parameter :: loads_2d_friction_roll = 4, loads_3d_friction_roll = 9
   integer, parameter :: loads_2d_friction_full = 4, loads_3d_friction_full = 9
-  !> share of its limit from which on a component counts as at it
-  real(dp), parameter :: within = 1.0_dp - 1.0e-9_dp
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
@@ -150,14 +142,16 @@ module gravier_contact_kernels
       real(dp), intent(out) :: sums(3)
     end subroutine residual_kernel
     !> What the estimate of the velocity error needs (gravier_velocity_error): n_tests test impulses y of each contact, added to
-    !> `motion` as H y; sums = (sum of y . w, y by y), w = W (P - r) being the velocity by which a contact misses its law, W its
-    !> undivided local operator; power := r . w. The tests are P - r, r, r - old, and the same again without the components
-    !> that open or are at their limit. `largest` is raised to the largest |w|^2.
-    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, old, power, motion, sums, largest)
+    !> `motion` as H y; sums of y . w, y by y, w = W (P - r) being the velocity by which a contact misses its law, W its undivided
+    !> local operator; power := r . w. The tests are P - r, r, and r less three earlier impulses. `largest` is raised to the largest
+    !> |w|^2.
+    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, last, recent, old, power, motion, sums, largest)
       import :: dp, n_tests
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
-      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :), old(:, :, :)
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
+      !> (lanes, nc, blocks)
+      real(dp), intent(in), contiguous :: last(:, :, :), recent(:, :, :), old(:, :, :)
       !> (lanes, blocks)
       real(dp), intent(inout), contiguous :: power(:, :)
       !> (n_tests, nv, n_columns)
@@ -656,27 +650,6 @@ contains
 #define OF(name) name/**/_3d_friction_full
 #include "contact_loops.inc"
 #undef OF
-
-  !> 1 where a component of an impulse is free to answer a change of velocity, 0 where its contact opens, or where it slides or
-  !> rolls at its limit: what such a component lacks is not known.
-  pure subroutine find_free(bound, hot, solved, free)
-    !> of each component, the row of `hot` with its coefficient, 0 for the normal one
-    integer, intent(in) :: bound(:)
-    !> (lanes, nh), P (lanes, nc)
-    real(dp), intent(in), contiguous :: hot(:, :), solved(:, :)
-    real(dp), intent(out), contiguous :: free(:, :)
-    real(dp) :: squares(lanes)
-    integer :: k, l
-
-    free(:, 1) = merge(1.0_dp, 0.0_dp, solved(:, 1) > 0.0_dp)
-    do k = 2, size(bound)
-      squares(:) = 0.0_dp
-      do l = 2, size(bound)
-        if (bound(l) == bound(k)) squares(:) = squares + solved(:, l)**2
-      end do
-      free(:, k) = merge(free(:, 1), 0.0_dp, squares < (within*hot(:, bound(k))*solved(:, 1))**2)
-    end do
-  end subroutine find_free
 
   !> Add the loads of the test impulses of a block to those of the bodies.
   pure subroutine add_motion(nd, pair, hot, load, motion)

@@ -1,5 +1,5 @@
-!> How solves come down to their tolerance, in a record of fixed size, and what ten times looser and tighter tolerances would
-!> have taken.
+!> How solves come down to their goal, the accuracy or the tolerance, in a record of fixed size, and between which numbers of
+!> iterations ten times looser and tighter goals would have taken.
 module gravier_descent
   use gravier_kinds, only: dp, i8
   implicit none
@@ -11,7 +11,10 @@ module gravier_descent
   !> what is not known
   real(dp), parameter :: unknown_effort = -1.0_dp
   !> iterations spent below ten times the tolerance, over all of them: less is too little to judge a decay by
-  real(dp), parameter :: least_share = 0.2_dp
+  real(dp), parameter :: least_share = 0.3_dp
+  !> ends of the intervals, from runs with all three goals (doc/accuracy.md): iterations of a looser goal, over those to the first
+  !> figure that passed it, and of a tighter one over the last decade's and over a power law at least and at most
+  real(dp), parameter :: least_looser = 0.5_dp, least_tighter = 0.8_dp, most_tighter = 2.0_dp
 
   !> One solve.
   type :: descent_t
@@ -37,7 +40,9 @@ module gravier_descent
   contains
     procedure :: add => effort_add
     procedure :: looser => effort_looser
-    procedure :: tighter => effort_tighter
+    procedure :: looser_range => effort_looser_range
+    procedure :: tighter_range => effort_tighter_range
+    procedure :: sees_decay => effort_sees_decay
     procedure :: seconds_of => effort_seconds_of
   end type effort_t
 
@@ -76,7 +81,7 @@ contains
       if (descent%first(k) < 0) then
         self%unreached(k) = self%unreached(k) + 1
       else if (iterations > 0) then
-        self%reached(k) = self%reached(k) + max(descent%first(k), descent%first_check)
+        self%reached(k) = self%reached(k) + max(descent%first(k), min(descent%first_check, iterations))
       end if
     end do
   end subroutine effort_add
@@ -89,21 +94,48 @@ contains
     if (self%unreached(tenfold) == 0) iterations = real(self%reached(tenfold), dp)
   end function effort_looser
 
-  !> Iterations to a tenth of the tolerance, if each decade takes as many times the iterations as the last one did: the
-  !> geometric mean of what the last decade and its second half say. `unknown_effort` where a solve missed the tolerance, or
-  !> where most end at their first check, so that nothing is seen of their decay.
-  pure real(dp) function effort_tighter(self) result(iterations)
+  !> Whether the last decade above the tolerance was seen: a fair share of the iterations lies in it.
+  pure logical function effort_sees_decay(self) result(sees)
     class(effort_t), intent(in) :: self
+    real(dp) :: all, decade
+
+    all = real(self%reached(at_tolerance), dp)
+    decade = real(self%reached(tenfold), dp)
+    sees = self%unreached(at_tolerance) == 0 .and. decade > 0.0_dp .and. all - decade >= least_share*all
+  end function effort_sees_decay
+
+  !> Between how many iterations ten times the tolerance would have taken. At most those made: what a looser tolerance leaves adds up
+  !> from step to step. At least half of those to the first figure that passed it; 0 where no decay is seen. Both are `unknown_effort`
+  !> where a solve did not get down to that.
+  pure subroutine effort_looser_range(self, least, most)
+    class(effort_t), intent(in) :: self
+    real(dp), intent(out) :: least, most
+
+    least = self%looser()
+    most = least
+    if (least < 0.0_dp) return
+    most = real(self%iterations, dp)
+    least = merge(least_looser*least, 0.0_dp, self%sees_decay() .or. self%unreached(at_tolerance) > 0)
+  end subroutine effort_looser_range
+
+  !> Between how many iterations a tenth of the tolerance would have taken, if solves get there: at least most of what the last decade
+  !> has taken once more, as where errors decay exponentially, and at most twice what a power law through the last decade, or its
+  !> second half, asks for. Both are `unknown_effort` where a solve missed the tolerance, which would miss a tighter one too, and
+  !> where no decay is seen.
+  pure subroutine effort_tighter_range(self, least, most)
+    class(effort_t), intent(in) :: self
+    real(dp), intent(out) :: least, most
     real(dp) :: all, decade, half
 
-    iterations = unknown_effort
-    if (self%unreached(at_tolerance) > 0) return
+    least = unknown_effort
+    most = unknown_effort
+    if (.not. self%sees_decay()) return
     all = real(self%reached(at_tolerance), dp)
     half = real(self%reached(half_a_decade), dp)
     decade = real(self%reached(tenfold), dp)
-    if (all - decade < least_share*all .or. .not. decade > 0.0_dp) return
-    iterations = all*sqrt(all/decade)*(all/half)
-  end function effort_tighter
+    least = all + least_tighter*(all - decade)
+    most = most_tighter*all*max(all/decade, (all/half)**2)
+  end subroutine effort_tighter_range
 
   !> Seconds that so many iterations would have taken on this rank; `unknown_effort` for unknown ones.
   pure real(dp) function effort_seconds_of(self, iterations) result(seconds)

@@ -28,8 +28,10 @@ module gravier_layered_start
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
   !> relative change of the impulses of a layer by a sweep at which the layer is done; layers above whose number it falls with the
   !> cube, because each hands its error on; sweeps of a layer at least and at most
-  real(dp), parameter :: change_allowed = 1.5e-3_dp, few_layers = 20.0_dp
+  real(dp), parameter :: change_allowed = 1.5e-3_dp, few_layers = 12.0_dp
   integer, parameter :: least_sweeps = 20, most_sweeps = 200
+  !> share of the largest free speed below which the shift of a closed contact is rounding of places
+  real(dp), parameter :: rounded = 1.0e-3_dp
   !> way of what no way leads to
   real(dp), parameter :: unreached = huge(1.0_dp)
 
@@ -132,7 +134,7 @@ contains
     shares = .false.
     do s = 1, size(layers)
       shares = shares .or. problem%shared%part(s)%n_slots > 0
-      call shorten_ways(problem%sub(s), diameter, layers(s)%way)
+      call shorten_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, diameter, layers(s)%way)
     end do
     if (.not. problem%comm%any_true(shares)) return
     do
@@ -152,7 +154,7 @@ contains
             way(shared%slot_body(j)) = shared%recv(1, j)
             shares = .true.
           end do
-          if (shares) call shorten_ways(problem%sub(s), diameter, way)
+          if (shares) call shorten_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, diameter, way)
           changed = changed .or. shares
         end associate
       end do
@@ -162,8 +164,12 @@ contains
 
   !> Shorten ways over the contacts of a subdomain until none can be shortened: the ways do not depend on the order, because each is
   !> a sum from the root on. What is prescribed hands on no way but that of a root.
-  subroutine shorten_ways(sub, diameter, way)
+  subroutine shorten_ways(sub, at, closed, diameter, way)
     type(subproblem_t), intent(in) :: sub
+    !> row of `hot` that holds the shift
+    integer, intent(in) :: at
+    !> shift below which a contact counts as closed [m/s]
+    real(dp), intent(in) :: closed
     real(dp), intent(in) :: diameter
     real(dp), intent(inout), contiguous :: way(:)
     real(dp) :: length
@@ -175,7 +181,8 @@ contains
       shortened = .false.
       ! there and back: contacts lie in memory about as the bodies do in space
       do c = merge(1, sub%n_contacts, forth), merge(sub%n_contacts, 1, forth), merge(1, -1, forth)
-        if (sub%gap(c) > 0.0_dp .and. .not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+        if (sub%gap(c) > 0.0_dp .and. sub%hot(lane_of(c), at, block_of(c)) > closed .and. &
+          & .not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
         i = sub%pair(1, c)
         j = sub%pair(2, c)
         length = sub%gap(c)

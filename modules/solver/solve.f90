@@ -7,8 +7,9 @@ module gravier_solve
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: descent_t
-  use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_layered_start, only: carry_loads
+  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
@@ -42,12 +43,10 @@ module gravier_solve
   !> are to become small, phases with and without momentum take turns that grow
   real(dp), parameter :: gained = 0.9_dp
   integer, parameter :: patience = 500, waves = 6, idle_share = 1, idle_share_of_residual = 4
-  !> growth of the impulses since anything was gained that is one without bound
-  real(dp), parameter :: unbounded_growth = 1.5_dp
   !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
-  !> depth are above these; later, after a part of the depth, where that is above another; iterations after it until it is judged,
-  !> and what must be left of the error then
-  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.7_dp, late = 0.3_dp
+  !> way to supports are above these; later, after a part of the depth, where that is above another; iterations after it until it is
+  !> judged, and what must be left of the error then
+  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.8_dp, late = 0.3_dp
   real(dp), parameter :: deep = 25.0_dp, very_deep = 60.0_dp
   integer, parameter :: trial = 6
   !> figures of a check that a trace keeps
@@ -68,11 +67,6 @@ module gravier_solve
     !> try a start that carries loads across layers
     logical :: layered = .true.
   end type solve_control_t
-
-  !> Impulses of a subdomain (lanes, nc, blocks) [N s].
-  type :: kept_impulses_t
-    real(dp), allocatable :: value(:, :, :)
-  end type kept_impulses_t
 
   !> The known impulses of a problem, for the criterion 'error'.
   type, abstract :: exact_solution_t
@@ -97,6 +91,8 @@ module gravier_solve
     real(dp) :: residual = 0.0_dp, jump = 0.0_dp
     !> the estimate of gravier_velocity_error, and what it is compared with [m/s]
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
+    !> largest velocity by which a contact violates its law, and what is allowed of it; 0 where it is not known [m/s]
+    real(dp) :: violation = 0.0_dp, violation_allowed = 0.0_dp
     !> the contacts that slept were woken
     logical :: woken = .false.
     !> sweeps over all contacts that a pass over layers took, 0 where there was none; whether the solve went on from it
@@ -107,8 +103,6 @@ module gravier_solve
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
-    !> root mean square of the impulses over that when the solve gained something last; of a solve that has stagnated
-    real(dp) :: growth = 1.0_dp
     !> how the figure came down
     type(descent_t) :: descent
     !> on this rank: the whole solve, and what comes before its first check [s]
@@ -134,8 +128,8 @@ contains
     !> needed where the criterion is by_error
     class(exact_solution_t), intent(in), optional :: exact
     type(velocity_error_t) :: velocity
-    real(dp) :: reference, progress, ratio, began, checking, ignored, best, scale_of_best, last_figure, pause
-    integer :: skips, exceeded_at, last_check, best_at, trial_end
+    real(dp) :: reference, progress, ratio, began, checking, ignored, best, last_figure, pause
+    integer :: skips, exceeded_at, last_check, best_at, trial_end, next_look
     logical :: measure, done, choosy, may_try_layers, wants_layers, settled
     type(kept_impulses_t) :: kept(size(problem%sub))
     real(dp) :: error_before
@@ -153,11 +147,12 @@ contains
     pause = 0.0_dp
     best = huge(1.0_dp)
     best_at = 0
-    scale_of_best = 0.0_dp
+    next_look = 0
     trial_end = 0
     error_before = 0.0_dp
     report%goal = merge(control%accuracy, control%tolerance, control%criterion == by_velocity)
     report%velocity_scale = problem%error_scale
+    report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
     call start_timer(phase_setup)
     call scheme%start(problem, error)
     if (.not. allocated(error)) call velocity%start(problem)
@@ -303,15 +298,22 @@ contains
       end select
     end function is_met
 
-    !> Whether the estimated velocity error is within its limit: the bound by rest tells at once, the projection alone where the
-    !> error is larger, and from zero impulses neither before some iterations. Collective.
+    !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
+    !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
+    !> zero impulses neither before some iterations. Collective.
     logical function velocity_is_met() result(is_met)
       real(dp) :: limit
 
       limit = control%accuracy*problem%error_scale
-      is_met = .not. report%residual > 0.0_dp .or. velocity%criterion() <= limit
-      if (is_met .or. report%iterations < copies_ready) return
-      call velocity%project(problem, report%iterations)
+      is_met = .not. report%residual > 0.0_dp
+      if (is_met) return
+      if (velocity%criterion() <= limit) then
+        is_met = velocity%excludes_violations(problem, limit)
+        if (is_met) return
+      else if (report%iterations < copies_ready) then
+        return
+      end if
+      call velocity%project(problem, scheme, report%iterations)
       if (velocity%criterion() <= limit) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
       is_met = velocity%criterion() <= limit
@@ -322,9 +324,10 @@ contains
       call velocity%bound(problem)
       report%velocity_error = 0.0_dp
       if (.not. report%residual > 0.0_dp) return
-      call velocity%project(problem, report%iterations)
+      call velocity%project(problem, scheme, report%iterations)
       call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
+      report%violation = velocity%largest_violation
     end subroutine complete_estimate
 
     !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
@@ -374,7 +377,7 @@ contains
 
       call scheme%start(problem, error)
       scheme%work%solves = scheme%work%solves - 1
-      call velocity%forget_copies(report%iterations)
+      call velocity%forget_copies(report%iterations, report%layered)
       ratio = 0.0_dp
     end subroutine begin_anew
 
@@ -417,31 +420,48 @@ contains
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
-      else if (stagnates()) then
-        report%status = merge(solve_unbounded, solve_stagnated, report%growth > unbounded_growth)
       else
-        finished = .false.
+        finished = stagnates()
       end if
       if (control%trace .or. (finished .and. .not. (met .and. control%criterion == by_velocity))) call complete_estimate()
       if (control%trace) call take_figure()
     end subroutine judge
 
-    !> Whether nothing was gained in so many iterations that nothing is to be expected of more. Collective.
+    !> Whether nothing was gained in so many iterations that nothing is to be expected of more: because there is no solution, or
+    !> because the method finds none. Collective.
     logical function stagnates()
       stagnates = .false.
-      if (report%figure < gained*best .or. report%iterations == 0) then
+      ! the residual of no impulses is relative to something else
+      if (report%iterations == 0) return
+      if (report%figure < gained*best) then
         best = report%figure
         best_at = report%iterations
-        scale_of_best = problem%impulse_scale
+        next_look = best_at + patience + merge(idle_share, idle_share_of_residual, control%criterion == by_velocity)*best_at
         return
       end if
-      if (scheme%persists .or. report%iterations - best_at < patience + &
-        & merge(idle_share, idle_share_of_residual, control%criterion == by_velocity)*best_at) return
+      if (report%iterations < next_look) return
       if (velocity%most_depth < 0) call velocity%find_depth(problem)
       if (report%iterations < waves*velocity%most_depth) return
-      stagnates = .true.
-      if (scale_of_best > 0.0_dp) report%growth = problem%impulse_scale/scale_of_best
+      next_look = report%iterations + patience
+      if (grow_in_vain()) then
+        stagnates = .true.
+        report%status = solve_unbounded
+      else if (.not. scheme%persists) then
+        stagnates = .true.
+        report%status = solve_stagnated
+      end if
     end function stagnates
+
+    !> Whether impulses have grown in vain since the older copy of them. Collective.
+    logical function grow_in_vain() result(in_vain)
+      type(kept_impulses_t) :: earlier(size(problem%sub))
+      integer :: s
+
+      do s = 1, size(problem%sub)
+        call velocity%copy_of(problem, s, earlier(s)%value)
+      end do
+      in_vain = are_in_vain(problem, earlier)
+    end function grow_in_vain
 
   end subroutine solve_contacts
 

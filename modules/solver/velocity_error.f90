@@ -5,12 +5,13 @@
 !> the set of pressing and sticking contacts known, H^T e = -w there, so that any test impulse y gives y . w = -(M^-1 H y, e)_M.
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
 !>      The test impulses are w/W (local errors), r (a wrong total load), r less the impulses one iteration before (the wave that
-!>      momentum carries), r less older copies (slower waves behind it).
+!>      momentum carries), r less two older copies (slower waves behind it).
 !>   L  sum over levels. The depth of a body is the number of contacts to the nearest boundary that supports it. The power
 !>      of the violations between two levels over the force that crosses, 0.65 being the mean cosine between a normal and the
 !>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
 !>      L^2 = sum m_l e_l^2.
-!>   E  = sqrt((2.4 Y)^2 + L^2).
+!>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
+!>      (gravier_layered_start) long waves are gone, and a = 1.3.
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
@@ -20,25 +21,26 @@ module gravier_velocity_error
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes, n_tests, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_scheme, only: scheme_t
   use gravier_dense_direct, only: projected_square
   use gravier_supports, only: supports_t, find_supports
   implicit none
   private
-  public :: velocity_error_t, copies_ready
+  public :: velocity_error_t, copies_ready, violations_allowed
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
-  real(dp), parameter :: weight_of_projection = 2.4_dp, cosine = 0.65_dp
+  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.3_dp, cosine = 0.65_dp
   !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
-  real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 3.0_dp
+  real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
+  !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
+  real(dp), parameter :: violations_allowed = 5.0_dp
   !> share of the largest eigenvalue of G below which it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
   integer, parameter :: n_copies = 2, first_copy = 2
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
-  !> share of the iterations before which the copy that is used was taken
-  real(dp), parameter :: oldest = 0.8_dp
-  !> products of the velocities that half of the test impulses make
-  integer, parameter :: n_products = (n_tests/2)*(n_tests/2 + 1)/2
+  !> products of the velocities that test impulses make
+  integer, parameter :: n_products = n_tests*(n_tests + 1)/2
   !> share of the largest free speed below which the shift of a closed contact is rounding of places
   real(dp), parameter :: rounded = 1.0e-3_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
@@ -69,9 +71,11 @@ module gravier_velocity_error
     real(dp) :: mass = 0.0_dp
     !> whether rest is admissible, so that C is a bound
     logical :: rest_is_admissible = .false.
-    !> C, Y and L, as far as they are known [m/s]
+    !> C, Y and L, as far as they are known, by the last `bound` and `project` [m/s]
     real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
-    !> largest |w| of a contact, by the last `measure` [m/s]
+    !> weight of Y
+    real(dp) :: weight = weight_of_projection
+    !> largest |w| of a contact, by the last `project`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest depth; negative while it is not known
     integer :: most_depth = -1
@@ -83,11 +87,13 @@ module gravier_velocity_error
   contains
     procedure :: start => velocity_error_start
     procedure :: keep_copy => velocity_error_keep_copy
+    procedure :: copy_of => velocity_error_copy_of
     procedure :: bound => velocity_error_bound
     procedure :: project => velocity_error_project
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
+    procedure :: excludes_violations => velocity_error_excludes_violations
     procedure :: find_depth => velocity_error_find_depth
     procedure :: forget_copies => velocity_error_forget_copies
   end type velocity_error_t
@@ -138,7 +144,22 @@ contains
     end do
   end subroutine velocity_error_keep_copy
 
-  !> C, from what `residual` of the problem has summed; Y and L are not known then [m/s].
+  !> The older copy of the impulses of subdomain `s`, or those that it has now where there is none.
+  pure subroutine velocity_error_copy_of(self, problem, s, impulse)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (lanes, nc, blocks) [N s]
+    real(dp), allocatable, intent(out) :: impulse(:, :, :)
+
+    if (self%taken_at(1) > 0) then
+      impulse = self%part(s)%copy(self%place(1))%impulse
+    else
+      impulse = problem%sub(s)%impulse
+    end if
+  end subroutine velocity_error_copy_of
+
+  !> C, from what `residual` of the problem has summed; Y, L and the largest violation are not known then [m/s].
   subroutine velocity_error_bound(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
@@ -146,35 +167,61 @@ contains
     self%bound_by_rest = unknown
     self%projection = unknown
     self%levels = 0.0_dp
+    self%largest_violation = 0.0_dp
     if (.not. (self%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
+  !> Whether no contact violates its law by more than what is allowed where the error may be `limit`, told by the velocities of the
+  !> bodies alone: where everything prescribed is at rest, a violation is at most twice the largest of them. Collective.
+  logical function velocity_error_excludes_violations(self, problem, limit) result(excludes)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    !> [m/s]
+    real(dp), intent(in) :: limit
+    real(dp) :: fastest, rim
+    integer :: s, b
+
+    fastest = 0.0_dp
+    do s = 1, size(self%part)
+      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+        do b = 1, sub%n_bodies
+          rim = 0.0_dp
+          if (b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_global(nd + 1:, b))
+          fastest = max(fastest, norm2(sub%v_global(1:nd, b)) + rim)
+        end do
+      end associate
+    end do
+    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*limit
+  end function velocity_error_excludes_violations
+
   !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
-  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed.
+  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
-    criterion = min(self%bound_by_rest/share_at_rest, hypot(weight_of_projection*self%projection, weight_of_sinking*self%levels))
+    criterion = max(self%largest_violation/violations_allowed, &
+      & min(self%bound_by_rest/share_at_rest, hypot(self%weight*self%projection, weight_of_sinking*self%levels)))
   end function velocity_error_criterion
 
   !> The smaller of E and C [m/s].
   pure real(dp) function velocity_error_estimate(self) result(estimate)
     class(velocity_error_t), intent(in) :: self
-    estimate = min(self%bound_by_rest, hypot(weight_of_projection*self%projection, self%levels))
+    estimate = min(self%bound_by_rest, hypot(self%weight*self%projection, self%levels))
   end function velocity_error_estimate
 
   !> Y, with v_global evaluated. Collective.
-  subroutine velocity_error_project(self, problem, iteration)
+  subroutine velocity_error_project(self, problem, scheme, iteration)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
     integer, intent(in) :: iteration
-    !> b of all test impulses, then the columns of the upper triangles of G of the free and of the held ones
-    real(dp) :: parts(n_tests + 2*n_products, size(problem%sub)), sums(n_tests + 2*n_products), largest(1)
-    integer :: s, old
+    !> b, then the columns of the upper triangle of G
+    real(dp) :: parts(n_tests + n_products, size(problem%sub)), sums(n_tests + n_products), largest(1)
+    logical :: knows_last, knows(n_copies)
+    integer :: s
 
-    old = 0
-    if (self%taken_at(1) > 0) old = self%place(1)
-    if (self%taken_at(2) > 0 .and. self%taken_at(2) <= oldest*iteration) old = self%place(2)
+    knows_last = scheme%momentum%on .and. .not. scheme%momentum%resting .and. iteration > 0
+    knows(:) = self%taken_at > 0 .and. self%taken_at < iteration
     parts(:, :) = 0.0_dp
     largest(1) = 0.0_dp
     do s = 1, size(problem%sub)
@@ -184,11 +231,15 @@ contains
         end if
         part%motion(:, :, :) = 0.0_dp
         if (sub%n_contacts == 0) cycle
-        if (old > 0) then
-          call make_tests(sub, part, part%copy(old)%impulse)
+        ! what is not known makes a test impulse of 0, or one twice, which tells nothing
+        if (.not. knows(2)) then
+          if (knows_last) call make_tests(sub, part, scheme%momentum%part(s)%impulse, sub%impulse, sub%impulse)
+          if (.not. knows_last) call make_tests(sub, part, sub%impulse, sub%impulse, sub%impulse)
         else
-          ! without a copy there is a test impulse of 0, which tells nothing
-          call make_tests(sub, part, sub%impulse)
+          associate (recent => part%copy(self%place(2))%impulse, old => part%copy(self%place(merge(1, 2, knows(1))))%impulse)
+            if (knows_last) call make_tests(sub, part, scheme%momentum%part(s)%impulse, recent, old)
+            if (.not. knows_last) call make_tests(sub, part, recent, recent, old)
+          end associate
         end if
       end associate
     end do
@@ -201,20 +252,17 @@ contains
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
     self%largest_violation = sqrt(largest(1))
-    associate (half => n_tests/2, b => sums(1:n_tests), g => sums(n_tests + 1:))
-      self%projection = sqrt(sqrt(projection_of(b(1:half), g(1:n_products))* &
-        & projection_of(b(half + 1:), g(n_products + 1:)))/self%mass)
-    end associate
+    self%projection = sqrt(projection_of(sums(1:n_tests), sums(n_tests + 1:))/self%mass)
 
   contains
 
-    subroutine make_tests(sub, part, copied)
+    subroutine make_tests(sub, part, last, recent, old)
       type(subproblem_t), intent(in) :: sub
       type(error_part_t), intent(inout) :: part
-      real(dp), intent(in), contiguous :: copied(:, :, :)
+      real(dp), intent(in), contiguous :: last(:, :, :), recent(:, :, :), old(:, :, :)
 
-      call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, copied, part%power, &
-        & part%motion, parts(1:n_tests, s), largest(1))
+      call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, last, recent, old, &
+        & part%power, part%motion, parts(1:n_tests, s), largest(1))
     end subroutine make_tests
 
   end subroutine velocity_error_project
@@ -243,7 +291,7 @@ contains
 
   !> b^T G^+ b [J].
   real(dp) function projection_of(b, products) result(square)
-    !> (n_tests/2); columns of the upper triangle of G
+    !> (n_tests); columns of the upper triangle of G
     real(dp), intent(in), contiguous :: b(:), products(:)
     real(dp) :: g(size(b), size(b))
     integer :: i, j, at
@@ -259,36 +307,32 @@ contains
     square = projected_square(g, b, rank_cut)
   end function projection_of
 
-  !> The products (h_i, h_j)_M of the velocities h = M^-1 H y of free and of held test impulses, i <= j, a copy of a shared body
-  !> counting with its part.
+  !> The products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j, a copy of a shared body counting with its part.
   pure subroutine add_products(sub, motion, products)
     type(subproblem_t), intent(in) :: sub
     !> H y, summed over copies (n_tests, nv, n_columns)
     real(dp), intent(in), contiguous :: motion(:, :, :)
-    !> (2*n_products)
+    !> (n_products)
     real(dp), intent(inout) :: products(:)
-    integer, parameter :: half = n_tests/2
-    real(dp) :: acting(n_tests, half), inverse
+    real(dp) :: acting(n_tests, n_tests), inverse
     integer :: b, d, t, j, at
 
     acting(:, :) = 0.0_dp
     do b = 1, sub%n_bodies
       do d = 1, size(motion, 2)
         inverse = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b)/sub%multiplicity(b)
-        do j = 1, half
-          do t = 1, half
+        do j = 1, n_tests
+          do t = 1, n_tests
             acting(t, j) = acting(t, j) + inverse*motion(j, d, b)*motion(t, d, b)
-            acting(half + t, j) = acting(half + t, j) + inverse*motion(half + j, d, b)*motion(half + t, d, b)
           end do
         end do
       end do
     end do
     at = 0
-    do j = 1, half
+    do j = 1, n_tests
       do t = 1, j
         at = at + 1
         products(at) = acting(t, j)
-        products(n_products + at) = acting(half + t, j)
       end do
     end do
   end subroutine add_products
@@ -333,6 +377,7 @@ contains
     squares = 0.0_dp
     do l = 1, n
       if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
+      self%largest_violation = max(self%largest_violation, abs(sinking))
       squares = squares + sums(2*n + l)*sinking**2
     end do
     self%levels = sqrt(squares/self%mass)
@@ -506,11 +551,14 @@ contains
   end subroutine search_breadth_first
 
   !> Forget the copies: the iterations begin anew from other impulses.
-  subroutine velocity_error_forget_copies(self, iteration)
+  subroutine velocity_error_forget_copies(self, iteration, layered)
     class(velocity_error_t), intent(inout) :: self
     !> made so far
     integer, intent(in) :: iteration
+    !> those of a pass over layers
+    logical, intent(in) :: layered
 
+    self%weight = merge(weight_after_layers, weight_of_projection, layered)
     self%taken_at(:) = 0
     self%next_copy = iteration + first_copy
   end subroutine velocity_error_forget_copies

@@ -7,7 +7,7 @@ program test_io_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t
+  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, accuracy_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_bodies = 23, n_contacts = 41
@@ -154,7 +154,7 @@ contains
     call empty_step(results, dimension, error)
     call make_images(dimension, bodies)
     deallocate (boundaries%normal)
-    call results%write_step(30, 0.03_dp, bodies, error, boundaries=boundaries)
+    call results%write_step(30, 0.03_dp, bodies, error, boundaries=boundaries, accuracy=accuracy_t(1.0e-3_dp, 2.0e-2_dp))
     call results%close(error)
   end subroutine write_all
 
@@ -226,6 +226,10 @@ contains
     call check_equal(n, 10_i8, "number of the step")
     call file%read_attribute("/steps/10", "time", time, error)
     call check_close(time, 0.01_dp, 0.0_dp, "time of the step")
+    call file%read_attribute("/steps/30", "velocity_error", time, error)
+    call check_close(time, 1.0e-3_dp, 0.0_dp, "velocity error of the step")
+    call file%read_attribute("/steps/30", "velocity_scale", time, error)
+    call check_close(time, 2.0e-2_dp, 0.0_dp, "velocity scale of the step")
     call file%row_count("/steps/20/bodies/position", n, error)
     call check_equal(n, 0_i8, "a step of no bodies")
     call check_unit(file, "/steps/10/bodies/position", "m")
@@ -427,6 +431,9 @@ contains
     call results%write_step(1, nan, bodies, error)
     call expect(error, path//": /steps/1, attribute time: NaN or infinity, but finite numbers were expected; "// &
       & "nothing of it is written", "NaN as time")
+    call results%write_step(1, 0.5_dp, bodies, error, accuracy=accuracy_t(nan, 1.0_dp))
+    call expect(error, path//": /steps/1, attribute velocity_error or velocity_scale: NaN or infinity, but finite numbers were "// &
+      & "expected; nothing of it is written", "NaN as velocity error")
     call results%write_step(1, 0.5_dp, bodies, error)
     call expect_none(error, "a step after refused ones")
     call results%write_step(1, 0.5_dp, bodies, error)

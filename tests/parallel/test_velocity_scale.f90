@@ -180,7 +180,11 @@ contains
     scene = scene_t(nd=nd, pressure=1000.0_dp)
     call assemble(comm, scene, sim)
     call check_scale(sim, step*1000.0_dp*(2.0_dp*radius)**(nd - 1)/mass, "load of a step", "pressure")
+    ! attraction is an internal force where there is another load
     scene = scene_t(nd=nd, adhesion=3.0_dp, gravity=1.0e-3_dp)
+    call assemble(comm, scene, sim)
+    call check_scale(sim, step*1.0e-3_dp, "load of a step", "weight beside attraction")
+    scene%gravity = 0.0_dp
     call assemble(comm, scene, sim)
     call check_scale(sim, step*3.0_dp/mass, "load of a step", "attraction")
     call check_close(sim%velocity_scale%own, 0.0_dp, rounding*step*3.0_dp/mass, "at rest under attraction nothing moves")

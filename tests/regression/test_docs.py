@@ -209,7 +209,7 @@ class Words(unittest.TestCase):
 
     def test_options_of_the_programs_exist(self):
         count = 0
-        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_fclib", "gravier_import", "gravier_sample"):
+        for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_error", "gravier_fclib", "gravier_import", "gravier_sample"):
             interpreter = [sys.executable] if program == "gravier_import" else []
             usage = run([*interpreter, str(PROGRAMS / program), "--help"], ".")[1]
             for page in PAGES:

@@ -1054,7 +1054,7 @@ contains
       call make_case(2 + mod(k, 2), effects_t(friction=k > 1), 0, 1, problem)
       allocate (before(problem%kernels%nv, n_columns), source=problem%velocity)
       call problem%kernels%sweep(0, problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
-      call check_close(maxval(abs(sums)), 0.0_dp, 0.0_dp, "no contacts: no change")
+      call check_close(maxval(abs(sums(1:2))), 0.0_dp, 0.0_dp, "no contacts: no change")
       call problem%kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, sums)
       call check(same_bits(before, problem%velocity), "no contacts: nothing moves")
       call check_close(maxval(abs(sums)), 0.0_dp, 0.0_dp, "no contacts: no residual")

@@ -63,28 +63,48 @@ contains
     end do
   end subroutine add_solves
 
-  !> A decade in 100 iterations: 400 to 1e-4, 300 to 1e-3, and by the fit 400 (4/3)^(1/2) 400/350 to 1e-5.
+  !> A decade in 100 iterations from 0.1 on: 300 to 1e-4, 250 and 200 to half a decade and a decade above it. To 1e-5 it is 400,
+  !> from 300 + 0.8*100 to twice 300*300/200.
   subroutine test_exponential()
     type(effort_t) :: effort
 
     call add_solves(effort, 3, 1, exponential)
-    call check_equal(effort%iterations, 1200_i8, "exponential: iterations")
-    call check_close(effort%looser(), 900.0_dp, rounding, "exponential: looser")
-    call check_close(effort%tighter()/3.0_dp, 400.0_dp*sqrt(4.0_dp/3.0_dp)*400.0_dp/350.0_dp, rounding, "exponential: tighter")
+    call check_equal(effort%iterations, 900_i8, "exponential: iterations")
+    call check_close(effort%looser(), 600.0_dp, rounding, "exponential: looser")
+    call check_range(effort, .true., 300.0_dp, 900.0_dp, "exponential: looser")
+    call check_range(effort, .false., 3.0_dp*380.0_dp, 3.0_dp*900.0_dp, "exponential: tighter")
   end subroutine test_exponential
 
   pure real(dp) function exponential(i)
     integer, intent(in) :: i
-    exponential = 10.0_dp**(-0.01_dp*i)*(1.0_dp + rounding)**(-10)
+    exponential = 0.1_dp*10.0_dp**(-0.01_dp*i)*(1.0_dp + rounding)**(-10)
   end function exponential
 
-  !> Iterations as the inverse of the figure: ten times as many for each decade, which the fit has as it is.
+  !> Check the ends of an interval.
+  subroutine check_range(effort, looser, least, most, what)
+    type(effort_t), intent(in) :: effort
+    logical, intent(in) :: looser
+    real(dp), intent(in) :: least, most
+    character(len=*), intent(in) :: what
+    real(dp) :: found(2)
+
+    if (looser) then
+      call effort%looser_range(found(1), found(2))
+    else
+      call effort%tighter_range(found(1), found(2))
+    end if
+    call check_close(found(1), least, 1.0e-3_dp*abs(least) + rounding, what//", lower end")
+    call check_close(found(2), most, 1.0e-3_dp*abs(most) + rounding, what//", upper end")
+  end subroutine check_range
+
+  !> Iterations as the inverse of the figure: ten times as many for each decade, half of the upper end.
   subroutine test_power_law()
     type(effort_t) :: effort
 
     call add_solves(effort, 2, 1, power_law)
     call check_close(effort%looser(), 2.0_dp*999.0_dp, rounding, "power law: looser")
-    call check_close(effort%tighter()/2.0e5_dp, 1.0_dp, 1.0e-3_dp, "power law: tighter")
+    call check_range(effort, .false., 2.0e4_dp*1.72_dp, 2.0_dp*2.0e5_dp, "power law: tighter")
+    call check_range(effort, .true., 999.0_dp, 2.0_dp*9999.0_dp, "power law: looser")
     call check_close(effort%worst, 1.0e-4_dp, 1.0e-8_dp, "power law: largest figure at the end")
   end subroutine test_power_law
 
@@ -102,6 +122,7 @@ contains
     call check_close(effort%looser(), 50.0_dp, rounding, "warm solves: looser")
     call add_solves(effort, 5, 10, idle)
     call check_close(effort%looser(), 50.0_dp, rounding, "idle solves: looser")
+    call check_range(effort, .true., 25.0_dp, real(effort%iterations, dp), "idle solves: looser")
     call check_equal(effort%solves, 10_i8, "warm and idle solves")
   end subroutine test_warm_solves
 
@@ -121,10 +142,11 @@ contains
 
     call add_solves(effort, 4, 10, exponential)
     call add_solves(effort, 1, 1000, stalls)
-    call check_close(effort%tighter(), unknown_effort, rounding, "one solve failed: tighter")
-    call check_close(effort%looser(), 1200.0_dp + 1000.0_dp, rounding, "one solve failed: looser")
+    call check_range(effort, .false., unknown_effort, unknown_effort, "one solve failed: tighter")
+    call check_close(effort%looser(), 800.0_dp + 1000.0_dp, rounding, "one solve failed: looser")
     call add_solves(effort, 1, 1000, stalls_early)
     call check_close(effort%looser(), unknown_effort, rounding, "a solve that stalls early: looser")
+    call check_range(effort, .true., unknown_effort, unknown_effort, "a solve that stalls early: looser")
     call check_equal(effort%unreached(tenfold), 1_i8, "a solve that stalls early")
   end subroutine test_failed_solves
 
@@ -138,13 +160,15 @@ contains
     stalls_early = max(1.0_dp/(1.0_dp + i), 5.0e-3_dp)
   end function stalls_early
 
-  !> Where all solves end at their first check nothing is seen of a decay; so it is without solves.
+  !> Where all solves end at their first check nothing is seen of a decay: a looser goal takes none of their iterations or all of
+  !> them. Without solves nothing is known.
   subroutine test_first_checks_only()
     type(effort_t) :: effort
 
-    call check_close(effort%tighter(), unknown_effort, rounding, "no solves: tighter")
+    call check_range(effort, .false., unknown_effort, unknown_effort, "no solves: tighter")
     call add_solves(effort, 5, 1000, exponential)
-    call check_close(effort%tighter(), unknown_effort, rounding, "first checks only: tighter")
+    call check_range(effort, .false., unknown_effort, unknown_effort, "first checks only: tighter")
+    call check_range(effort, .true., 0.0_dp, 5000.0_dp, "first checks only: looser")
     call check_close(effort%looser(), 5000.0_dp, rounding, "first checks only: looser")
   end subroutine test_first_checks_only
 
@@ -154,7 +178,7 @@ contains
 
     call add_solves(effort, 2, 1, exponential)
     call check_close(effort%seconds, 2.0_dp, rounding, "seconds")
-    call check_close(effort%seconds_of(600.0_dp), 0.5_dp + 1.5_dp*600.0_dp/800.0_dp, rounding, "seconds of fewer iterations")
+    call check_close(effort%seconds_of(450.0_dp), 0.5_dp + 1.5_dp*450.0_dp/600.0_dp, rounding, "seconds of fewer iterations")
     call check_close(effort%seconds_of(unknown_effort), unknown_effort, rounding, "seconds of unknown iterations")
   end subroutine test_seconds
 

@@ -84,7 +84,8 @@ program test_solve
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_nlgs, only: nlgs_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_exhausted, solve_diverged
+  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_exhausted, solve_diverged, &
+    & solve_stagnated, solve_unbounded, by_velocity, by_error
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use test_solve_schemes, only: growing_t, first_impulse_t
@@ -112,6 +113,10 @@ program test_solve
   call test_work()
   call test_exact_criterion()
   call test_divergence()
+  call test_bound_by_rest()
+  call test_estimate()
+  call test_stagnation()
+  call test_no_solution()
   call test_errors()
   call test_no_contacts()
   call finish_checks()
@@ -358,9 +363,9 @@ contains
     call check(report%start_seconds > 0.0_dp .and. report%seconds > report%start_seconds, "seconds of the solve")
     ! of a check: not before the one before it, and not after the solve
     do k = 2, traced%n_trace
-      if (traced%trace(5, k) < traced%trace(5, k - 1)) exit
+      if (traced%trace(6, k) < traced%trace(6, k - 1)) exit
     end do
-    call check(k > traced%n_trace .and. traced%trace(5, traced%n_trace) <= traced%seconds, "seconds of the checks")
+    call check(k > traced%n_trace .and. traced%trace(6, traced%n_trace) <= traced%seconds, "seconds of the checks")
   end subroutine test_descent
 
   !> Impulses that are right already take no iteration, and a tolerance is met when the residual equals it.
@@ -431,6 +436,7 @@ contains
 
     call make_column(sim, 2, 2, 0.0_dp)
     scheme%factor = 2.0_dp
+    control%criterion = by_error
     control%tolerance = 1.0e-6_dp
     control%check_every = 1
     call solve_contacts(sim%problem, scheme, control, report, error, first_impulse_t(value=16.0_dp))
@@ -476,6 +482,111 @@ contains
     call check(.not. allocated(error), "divergence is not an error")
     call sim%free()
   end subroutine test_divergence
+
+  !> Where rest is admissible, the bound by rest ends a solve. The velocities are the error there.
+  subroutine test_bound_by_rest()
+    type(simulation_t) :: sim
+    type(nlgs_t) :: nlgs
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(error_t), allocatable :: error
+    real(dp) :: speed
+
+    call make_column(sim, 2, 3, 0.0_dp)
+    control = velocity_control()
+    call solve_contacts(sim%problem, nlgs, control, report, error)
+    call check_equal(report%status, solve_converged, "bound by rest: converged")
+    ! the load of a step: h g
+    call check_close(report%velocity_scale, 1.0_dp, rounding, "bound by rest: velocity scale")
+    speed = norm2(sim%problem%sub(1)%v_global(2, 1:3))/sqrt(3.0_dp)
+    call check(speed > 0.0_dp .and. speed <= control%accuracy, "bound by rest: the error is within its limit")
+    call check(report%velocity_error <= speed*(1.0_dp + rounding), "bound by rest: no estimate above the bound")
+    call sim%free()
+  end subroutine test_bound_by_rest
+
+  !> On a ground that rises at speed 1, so that rest is not admissible, the estimate ends a solve: not before 4 iterations, however
+  !> much is allowed, and with velocities whose error is within its limit.
+  subroutine test_estimate()
+    type(simulation_t) :: sim
+    type(nlgs_t) :: nlgs
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(error_t), allocatable :: error
+
+    call make_column(sim, 2, 3, 0.0_dp)
+    sim%problem%sub(1)%v_free(2, 4) = 1.0_dp
+    control = velocity_control()
+    control%accuracy = 1.0e3_dp
+    control%tolerance = 1.0e3_dp
+    call solve_contacts(sim%problem, nlgs, control, report, error)
+    call check_equal(report%status, solve_converged, "estimate: converged")
+    call check_equal(report%iterations, 4, "estimate: iterations before it is trusted")
+    sim%problem%sub(1)%impulse(:, :, :) = 0.0_dp
+    control = velocity_control()
+    call solve_contacts(sim%problem, nlgs, control, report, error)
+    call check_equal(report%status, solve_converged, "estimate: converged to an accuracy")
+    call check(report%iterations > 4, "estimate: an accuracy takes iterations")
+    call check(norm2(sim%problem%sub(1)%v_global(2, 1:3) - 1.0_dp)/sqrt(3.0_dp) <= control%accuracy, &
+      & "estimate: the error is within its limit")
+    call sim%free()
+  end subroutine test_estimate
+
+  !> Iterations that change nothing end a solve 500 of them after twice the first, at which the figure was known last to fall.
+  subroutine test_stagnation()
+    type(simulation_t) :: sim
+    type(growing_t) :: scheme
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(error_t), allocatable :: error
+
+    call make_column(sim, 2, 2, 0.0_dp)
+    call solve_contacts(sim%problem, scheme, velocity_control(), report, error)
+    call check_equal(report%status, solve_stagnated, "stagnation")
+    call check_equal(report%iterations, 502, "stagnation: iterations")
+    ! a method that has other means goes on
+    control = velocity_control()
+    control%max_iterations = 2000
+    scheme%persists = .true.
+    call solve_contacts(sim%problem, scheme, control, report, error)
+    call check_equal(report%status, solve_exhausted, "persistence")
+    call sim%free()
+  end subroutine test_stagnation
+
+  !> A column of two grains of radius 1 under a lid that sinks: no velocities obey the law, and impulses grow for ever.
+  subroutine test_no_solution()
+    type(simulation_t) :: sim
+    type(nlgs_t) :: nlgs
+    type(config_t) :: config
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(step_figures_t) :: figures
+    type(error_t), allocatable :: error
+    integer :: k
+
+    call parse_config("lid", "&scene bodies = 'column', column_count = 2, gravity = 0, -1 /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 4, normal = 0, -1, velocity = 0, -0.1 /"//newline// &
+      & "&time step = 1, steps = 1, theta = 1 /", config, error)
+    call check(.not. allocated(error), "lid: configuration")
+    call sim%init(comm, config, error)
+    do k = 1, 2
+      call sim%assemble(figures)
+      call check_equal(figures%contacts, 3_i8, "lid: contacts")
+      nlgs%momentum%on = k == 2
+      control = velocity_control()
+      call solve_contacts(sim%problem, nlgs, control, report, error)
+      call check_equal(report%status, solve_unbounded, "lid: no solution")
+      call check(report%iterations < 4000, "lid: soon")
+      sim%problem%sub(1)%impulse(:, :, :) = 0.0_dp
+    end do
+    call sim%free()
+  end subroutine test_no_solution
+
+  !> The default criterion of a run, with a check at each iteration.
+  pure type(solve_control_t) function velocity_control() result(control)
+    control%criterion = by_velocity
+    control%tolerance = 1.0e-2_dp
+    control%check_every = 1
+  end function velocity_control
 
   !> An error of the method ends the solve, and an error from before starts none.
   subroutine test_errors()

@@ -1,10 +1,13 @@
-"""What a run says its other tolerances would take, against runs with these tolerances.
+"""What a run says other goals of its solves would take, against runs with these goals.
 
-The band is a factor of 2 on iterations. Packings that settle and packings at rest keep to it; a packing at rest with momentum does
-so between 1e-3 and 1e-4 only, where its iterations settle. What leaves the band is in doc/accuracy.md."""
+The intervals are wide: a solve shows one decade of its descent, and says between which numbers of iterations the next one lies. How
+often they hold is in doc/accuracy.md."""
+import os
 import re
 
-from gravier_runs import RunTestCase, merged, run_case, settled_disks
+from gravier_runs import SOURCE, RunTestCase, merged, run_case, settled_disks
+
+from gravier import parse_namelist
 
 DISKS = {
     "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [16, 16], "radius_min": 0.008, "radius_max": 0.012,
@@ -21,55 +24,89 @@ REST = {
 }
 
 
-def iterations(run):
-    """Of a run, and its estimates at ten times and at a tenth of the tolerance; None for what it does not know."""
+def iterations(run, goal):
+    """Of a run, and the ends of its estimates at ten times and at a tenth of the goal; None for what it does not know."""
     found = {"all": int(re.search(r"solves of (\d+) iterations in all", run.stdout)[1])}
     for name in ("ten times", "a tenth of"):
-        number = re.search(rf"at {name} the tolerance about \S+ s, (\d+) iterations", run.stdout)
-        found[name] = int(number[1]) if number else None
+        ends = re.search(rf"at {name} the {goal} (\d+) to (\d+) iterations, (\S+) to (\S+) s \(estimated\)", run.stdout)
+        found[name] = (int(ends[1]), int(ends[2])) if ends else None
     return found
 
 
 class Estimates(RunTestCase):
 
-    def check(self, title, case, tolerances, **solver):
-        """Estimates of runs at some tolerances, each a tenth of the one before, against each other."""
+    def setUp(self):
+        self.held = []
+
+    def assert_most_hold(self):
+        """An interval is an extrapolation: one in five may fail."""
+        self.assertGreaterEqual(sum(self.held), 0.8 * len(self.held), self.held)
+
+    def check(self, title, case, goals, known, **solver):
+        """Intervals of runs with some goals, each a tenth of the one before, against the iterations of the others: `known` of them are
+        known at least. Whether each one holds is noted."""
         runs = {}
-        for tolerance in tolerances:
-            runs[tolerance] = run_case(merged(case, {"solver": {"tolerance": tolerance, **solver}}),
-                                       directory=self.here(f"{title} {tolerance}"))
-            self.assert_status(runs[tolerance], 0)
-        found = {tolerance: iterations(run) for tolerance, run in runs.items()}
-        for loose, tight in zip(tolerances, tolerances[1:]):
-            self.assertTrue(0.5 <= found[tight]["ten times"] / found[loose]["all"] <= 2.0, f"{title}: {found}")
-            self.assertTrue(0.5 <= found[loose]["a tenth of"] / found[tight]["all"] <= 2.0, f"{title}: {found}")
+        for goal in goals:
+            keys = {"accuracy": goal, "tolerance": 0.1 * goal} if "criterion" not in solver else {"tolerance": goal}
+            runs[goal] = run_case(merged(case, {"solver": {**keys, **solver}}), directory=self.here(f"{title} {goal}"))
+            self.assert_status(runs[goal], 0)
+        found = {goal: iterations(run, "tolerance" if "criterion" in solver else "accuracy") for goal, run in runs.items()}
+        count = 0
+        for loose, tight in zip(goals, goals[1:]):
+            for ends, actual in ((found[tight]["ten times"], found[loose]["all"]), (found[loose]["a tenth of"], found[tight]["all"])):
+                if ends is None:
+                    continue
+                count += 1
+                self.held.append(ends[0] <= actual <= ends[1])
+        self.assertGreaterEqual(count, known, f"{title}: {found}")
         # what the log says is what the history has
-        for tolerance, run in runs.items():
-            self.assertEqual(found[tolerance]["all"], run.history()["iterations"].sum())
+        for goal, run in runs.items():
+            self.assertEqual(found[goal]["all"], run.history()["iterations"].sum())
 
     def test_settling(self):
-        self.check("settling", DISKS, (1e-3, 1e-4, 1e-5), acceleration="none")
-        self.check("settling with momentum", DISKS, (1e-3, 1e-4, 1e-5), acceleration="momentum")
+        for acceleration in ("none", "momentum"):
+            self.check(f"settling {acceleration}", DISKS, (1e-3, 1e-4), 2, acceleration=acceleration, criterion="residual")
+            self.check(f"settling {acceleration} velocity", DISKS, (1.0, 0.1), 2, acceleration=acceleration)
+        self.assert_most_hold()
 
     def test_rest(self):
         settled_disks(self.scratch)
-        self.check("rest", REST, (1e-3, 1e-4, 1e-5), acceleration="none")
-        self.check("rest with momentum", REST, (1e-3, 1e-4), acceleration="momentum")
+        for acceleration in ("none", "momentum"):
+            self.check(f"rest {acceleration}", REST, (1e-2, 1e-3, 1e-4), 3, acceleration=acceleration, criterion="residual")
+            self.check(f"rest {acceleration} velocity", REST, (1.0, 0.1), 1, acceleration=acceleration)
+        self.assert_most_hold()
+
+    def test_shear(self):
+        """Where errors fall fast, most solves show nothing of a decade: that is said, and no number."""
+        with open(os.path.join(SOURCE, "data/scenes/shear.nml"), encoding="utf-8") as file:
+            case = parse_namelist(file.read())
+        case["scene"][0]["bodies_file"] = os.path.join(SOURCE, case["scene"][0]["bodies_file"])
+        case = {group: keys if group == "boundary" else keys[0] for group, keys in case.items()}
+        case = merged(case, {"time": {"steps": 30}, "output": {"directory": "results", "every": 0}})
+        self.check("shear", case, (1.0, 0.1), 1, acceleration="none")
+        self.assert_most_hold()
+        run = run_case(merged(case, {"solver": {"accuracy": 0.1, "tolerance": 0.01, "acceleration": "none"}}), directory=self.here("fast"))
+        self.assertIn("at a tenth of the accuracy not known: solves do not show how errors decay\n", run.stdout)
 
 
 class Lines(RunTestCase):
 
     def test_lines(self):
         """Without and with the terms of the energy balance."""
-        run = run_case(merged(DISKS, {"time": {"steps": 60}}), directory=self.here("plain"))
+        run = run_case(merged(DISKS, {"time": {"steps": 60}, "solver": {"criterion": "residual"}}), directory=self.here("plain"))
         balance = r"energy balance off by (\S+) J, of (\S+) J turned over\n"
         off, turned = re.search(balance, run.stdout).groups()
         self.assertLess(float(off), 1e-12 * float(turned))
-        accuracy = re.search(r"accuracy    residual at most (\S+) at the end of a solve, tolerance (\S+); overlap at most (\S+) m", run.stdout)
+        accuracy = re.search(r"accuracy    residual at most (\S+) at the end of a solve, tolerance ([^ ;]+); "
+                             r"velocity error at most (\S+) of U\n", run.stdout)
         history = run.history()
         self.assertAlmostEqual(float(accuracy[1]) / history["residual"].max(), 1.0, delta=6e-3)
         self.assertEqual(float(accuracy[2]), 1e-4)
-        self.assertAlmostEqual(float(accuracy[3]), history["max_overlap"].max(), delta=6e-3 * history["max_overlap"].max())
+        worst = (history["velocity_error"] / history["velocity_scale"]).max()
+        self.assertAlmostEqual(float(accuracy[3]), worst, delta=6e-3 * worst)
+        start, later = re.search(r"\noverlaps    in the first step at most (\S+) m, later at most (\S+) m, ", run.stdout).groups()
+        self.assertAlmostEqual(float(start), history["max_overlap"][0], delta=6e-3 * history["max_overlap"][0])
+        self.assertAlmostEqual(float(later), history["max_overlap"][1:].max(), delta=6e-3 * history["max_overlap"][1:].max())
         seconds = float(re.search(r"cost        (\S+) s in 60 solves", run.stdout)[1])
         self.assertAlmostEqual(seconds, history["solve_seconds"].sum(), delta=6e-3 * seconds)
         run = run_case(merged(DISKS, {"time": {"steps": 60}, "output": {"energy": True}}), directory=self.here("energy"))
@@ -78,13 +115,13 @@ class Lines(RunTestCase):
 
     def test_not_reached(self):
         """Solves that give up: nothing is said of a tighter tolerance, and of a looser one only if they reached that."""
-        few = {"time": {"steps": 60}, "solver": {"tolerance": 1e-9, "max_iterations": 20}}
+        few = {"time": {"steps": 60}, "solver": {"criterion": "residual", "tolerance": 1e-9, "max_iterations": 20}}
         run = run_case(merged(DISKS, few), directory=self.here("few"))
         self.assert_status(run, 3)
         failed = int((run.history()["converged"] == 0).sum())
         self.assertIn(f"at a tenth of the tolerance not known: {failed} solves did not reach the tolerance itself", run.stdout)
         self.assertRegex(run.stdout, r"at ten times the tolerance not known: \d+ solves did not reach that")
-        self.assertNotIn("tolerance about", run.stdout)
+        self.assertNotIn("(estimated)", run.stdout)
 
     def test_free_flight(self):
         """No iterations, no estimates."""

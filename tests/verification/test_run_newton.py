@@ -100,13 +100,13 @@ class Newton(RunTestCase):
     def test_honest_end(self):
         run = run_case(merged(self.disks, {"solver": {"max_iterations": 320}}), directory=self.here("short"))
         self.assert_status(run, 3)
-        self.assertIn("did NOT reach the tolerance", run.stdout)
+        self.assertRegex(run.stdout, "did NOT reach the (accuracy|tolerance)")
         # what is left are the best impulses of all
         with open(run.path("results", "history.csv"), encoding="utf-8") as file:
             row = list(csv.DictReader(file))[-1]
         self.assertLessEqual(float(row["residual"]), min(run.trace()["residual"]))
         # and the log says so, to three digits
-        said = float(re.search(r"accuracy    residual at most (\S+) at the end of a solve", run.stdout)[1])
+        said = float(re.search(r"^accuracy .*residual at most ([^ ;,]+)", run.stdout, re.M)[1])
         self.assertAlmostEqual(said / float(row["residual"]), 1.0, delta=6e-3)
 
 

@@ -99,6 +99,18 @@ class Run:
         """Time of a step [s]."""
         return float(self.times[self.steps == self.find_step(step)][0])
 
+    def velocity_error(self, step=None):
+        """Estimated error of the velocities of a step [m/s]; NaN at the start, which no solve has led to."""
+        return self._attribute(step, "velocity_error")
+
+    def velocity_scale(self, step=None):
+        """Velocity that the error of a step is compared with [m/s]; NaN at the start."""
+        return self._attribute(step, "velocity_scale")
+
+    def _attribute(self, step, name):
+        with self._open() as file:
+            return float(file[f"steps/{self.find_step(step)}"].attrs.get(name, np.nan))
+
     def bodies(self, step=None):
         """id, position (n, d), velocity (n, d), spin (n, 1 or 3), radius, and image (n, d) in periodic scenes."""
         return self._split(self._group(step, "bodies"))

@@ -1,0 +1,101 @@
+!> Contact problems of a step without a solution, told by what iterations add to the impulses.
+!>
+!> Where walls close on grains, no velocities obey the law. Iterations then add nearly the same impulses z in each window. The free
+!> bodies balance z, P = H z -> 0 there, while the walls, which move as prescribed, work against it: z . H^T V < 0 of theirs. They
+!> push to no avail. Any z >= 0 along the normals gives a bound. A solution has v_n + s >= 0 with the shift s, and so
+!>
+!>     0 <= z . (v + s) = sum over free bodies (P . V) - A,   A = -(sum over prescribed bodies (P . V) + sum z s),
+!>     A <= max|V| sum |P|.
+!>
+!> A solution needs bodies as fast as max|V| >= A/sum|P|. Where that is far beyond the speeds of the problem, there is none. With
+!> friction in z this is a sign and no proof, as in gravier_unbounded, which looks at the matrix of a problem in the same way.
+module gravier_vain_impulses
+  use gravier_kinds, only: dp
+  use gravier_contact_kernels, only: lane_of, block_of, project_on_cones
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  implicit none
+  private
+  public :: kept_impulses_t, are_in_vain
+
+  !> Impulses of a subdomain (lanes, nc, blocks) [N s].
+  type :: kept_impulses_t
+    real(dp), allocatable :: value(:, :, :)
+  end type kept_impulses_t
+
+  !> speed that a solution would need, over the largest speed of the problem, from which on there is none
+  real(dp), parameter :: beyond = 20.0_dp
+
+contains
+
+  !> Whether the impulses have grown in vain since earlier ones: no solution is to be found. Impulses and velocities stay as they
+  !> are. Collective.
+  logical function are_in_vain(problem, earlier) result(in_vain)
+    type(contact_problem_t), intent(inout) :: problem
+    !> of the subdomains of this rank
+    type(kept_impulses_t), intent(in) :: earlier(:)
+    type(kept_impulses_t) :: now(size(problem%sub))
+    !> A and sum |P| (2, subdomains)
+    real(dp) :: parts(2, size(problem%sub)), sums(2), fastest
+    integer :: s
+
+    parts(:, :) = 0.0_dp
+    fastest = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        now(s)%value = sub%impulse
+        sub%impulse(:, :, :) = sub%impulse - earlier(s)%value
+        call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
+        call problem%own_reactions(s)
+        call add_work(problem, sub, parts(1, s))
+        call problem%shared%load(s, sub%reaction)
+      end associate
+    end do
+    call problem%shared%pass()
+    do s = 1, size(problem%sub)
+      call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
+      call add_reactions(problem, problem%sub(s), parts(2, s), fastest)
+      problem%sub(s)%impulse(:, :, :) = now(s)%value
+    end do
+    call problem%evaluate()
+    call problem%comm%sum_parts(parts, sums)
+    fastest = problem%comm%highest(fastest)
+    in_vain = sums(1) > 0.0_dp .and. sums(1) > beyond*fastest*sums(2)
+  end function are_in_vain
+
+  !> A of a subdomain, whose `reaction` is H z of its own contacts [J].
+  pure subroutine add_work(problem, sub, work)
+    type(contact_problem_t), intent(in) :: problem
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: work
+    integer :: b, c
+
+    do b = sub%n_bodies + 1, sub%n_columns
+      work = work - dot_product(sub%reaction(:, b), sub%v_free(:, b))
+    end do
+    do c = 1, sub%n_contacts
+      work = work - sub%impulse(lane_of(c), 1, block_of(c))*sub%hot(lane_of(c), problem%kernels%nd + 1, block_of(c))
+    end do
+  end subroutine add_work
+
+  !> |P| of a subdomain, whose `reaction` is H z of all contacts, a copy of a shared body counting with its part; the moment of a
+  !> grain counts as a force at its rim, and the speed of its rim as one [N s], [m/s].
+  pure subroutine add_reactions(problem, sub, total, fastest)
+    type(contact_problem_t), intent(in) :: problem
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: total, fastest
+    real(dp) :: reaction(problem%kernels%nd), speed
+    integer :: b, nd
+
+    nd = problem%kernels%nd
+    do b = 1, sub%n_columns
+      speed = norm2(sub%v_free(1:nd, b))
+      if (b <= sub%n_grains) speed = speed + sub%radius(b)*norm2(sub%v_free(nd + 1:, b))
+      fastest = max(fastest, speed)
+      if (b > sub%n_bodies) cycle
+      reaction(:) = merge(sub%reaction(1:nd, b), 0.0_dp, sub%inverse_mass(1:nd, b) > 0.0_dp)
+      total = total + norm2(reaction)/sub%multiplicity(b)
+      if (b <= sub%n_grains) total = total + norm2(sub%reaction(nd + 1:, b))/(sub%radius(b)*sub%multiplicity(b))
+    end do
+  end subroutine add_reactions
+
+end module gravier_vain_impulses

@@ -1,0 +1,126 @@
+!> The closing lines of a run about its accuracy: errors of velocities, overlaps and what mended them, passes over layers.
+module gravier_accuracy_lines
+  use gravier_kinds, only: dp
+  use gravier_text, only: to_text
+  use gravier_run_tally, only: run_tally_t
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, goal_name, percent, plain
+
+  character(len=*), parameter :: newline = new_line("a"), indent = "            "
+
+contains
+
+  !> All of them, each ended by a newline.
+  function accuracy_lines(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = error_line(simulation)//scale_range_line(simulation%tally)//overlap_lines(simulation)//layer_line(simulation%tally)
+    if (simulation%restarted) text = text//indent//"these lines are of the "//to_text(simulation%tally%solves)// &
+      & " steps since the restart"//newline
+  end function accuracy_lines
+
+  !> What a solve has to reach, in a word.
+  function goal_name(simulation) result(name)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: name
+
+    name = "tolerance"
+    if (simulation%config%solver%criterion == "velocity_error") name = "accuracy"
+  end function goal_name
+
+  !> What the criterion has left at worst, and what else is known of the error.
+  function error_line(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: error
+
+    associate (solver => simulation%config%solver, tally => simulation%tally)
+      error = "velocity error at most "//to_text(tally%worst_error, 3)//" of U"
+      if (solver%criterion == "velocity_error") then
+        text = error//" at the end of a solve, accuracy "//to_text(solver%accuracy, 3)//"; residual at most "// &
+          & to_text(tally%worst_residual, 3)//", tolerance "//to_text(solver%tolerance, 3)
+      else
+        text = trim(solver%criterion)//" at most "//to_text(simulation%effort%worst, 3)//" at the end of a solve, tolerance "// &
+          & to_text(solver%tolerance, 3)//"; "//error
+      end if
+    end associate
+    text = "accuracy    "//text//newline
+  end function error_line
+
+  !> Which velocities errors were compared with.
+  function scale_range_line(tally) result(text)
+    type(run_tally_t), intent(in) :: tally
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    if (tally%solves == 0) return
+    text = indent//"U from "//to_text(tally%least_scale, 3)//" to "//to_text(tally%most_scale, 3)//" m/s: "
+    do k = 1, tally%n_kinds
+      if (k > 1) text = text//", "
+      text = text//trim(tally%kind(k))//" in "//to_text(tally%of_kind(k))//" solves"
+    end do
+    text = text//newline
+  end function scale_range_line
+
+  !> Overlaps at the start and later, and by how much projections have shifted the grains.
+  function overlap_lines(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (tally => simulation%tally, radius => simulation%decomposition%rule%mean_radius)
+      text = "overlaps    in the first step at most "//to_text(tally%start_overlap, 3)//" m, later at most "// &
+        & to_text(tally%later_overlap, 3)//" m"
+      if (radius > 0.0_dp) text = text//", "//to_text(tally%later_overlap/radius, 2)//" of the mean radius"
+      text = text//newline
+      if (simulation%overlap_allowed >= huge(1.0_dp)) then
+        text = text//indent//"overlaps are not projected"//newline
+      else if (tally%projected == 0) then
+        text = text//indent//"no step projected overlaps"//newline
+      else
+        text = text//indent//"projected in "//to_text(tally%projected)//" of "//to_text(tally%steps)//" steps ("// &
+          & percent(tally%mended_share())//"): shifts of a grain add up to "//to_text(tally%shift, 3)//" m on average"
+        if (tally%path > 0.0_dp) text = text//", "//to_text(tally%shift/tally%path, 2)//" of its path of "// &
+          & to_text(tally%path, 3)//" m"
+        text = text//newline
+      end if
+    end associate
+  end function overlap_lines
+
+  !> A share as people write it; what is not 0 is not written as 0.
+  pure function percent(share) result(text)
+    real(dp), intent(in) :: share
+    character(len=:), allocatable :: text
+
+    text = to_text(nint(100.0_dp*share))//" %"
+    if (share > 0.0_dp .and. nint(100.0_dp*share) == 0) text = "less than 1 %"
+    if (share < 1.0_dp .and. nint(100.0_dp*share) == 100) text = "more than 99 %"
+  end function percent
+
+  !> A number as people write it, with two decimals where it has a few digits before them.
+  pure function plain(value) result(text)
+    real(dp), intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=16) :: row
+
+    text = to_text(value, 2)
+    if (value < 0.05_dp .or. value >= 1000.0_dp) return
+    write (row, "(f8.2)") value
+    text = trim(adjustl(row))
+  end function plain
+
+  !> Whether solves went through a pass over layers; nothing where none did.
+  function layer_line(tally) result(text)
+    type(run_tally_t), intent(in) :: tally
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (tally%tried_layers == 0) return
+    text = "layers      "//to_text(tally%tried_layers)//" solves made a pass over layers, "//to_text(tally%took_layers)// &
+      & " of them went on from it; passes cost as much as "//to_text(nint(tally%layered_sweeps))//" sweeps"//newline
+  end function layer_line
+
+end module gravier_accuracy_lines

@@ -1,0 +1,207 @@
+"""The last words of a run are true: what was mended, how solves ended, how wrong velocities were, and what is not advised."""
+import re
+
+import gravier_runs
+import h5py
+import numpy as np
+from gravier_runs import RunTestCase, merged, run_case, write
+
+import gravier
+
+RADIUS = 0.05  # m
+OVERLAP, ALLOWED = 4e-3, 5e-4  # m
+#: two grains without loads that overlap: one projection moves each by half of what is too much
+PAIR = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../pair.csv", "gravity": [0.0, 0.0], "overlap_allowed": ALLOWED},
+        "time": {"step": 1e-3, "steps": 3}, "output": {"directory": "results", "checkpoint_every": 3}}
+#: disks that fall into a box and come to rest
+DISKS = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [10, 12], "radius_min": 0.008, "radius_max": 0.012,
+                   "friction": 0.3},
+         "time": {"step": 1e-3, "steps": 300},
+         "solver": {"acceleration": "none", "max_iterations": 20000},
+         "output": {"directory": "results", "every": 0, "final_bodies": True}}
+
+
+def line(run, begin):
+    """The last line of a log that begins so."""
+    found = [text for text in run.stdout.splitlines() if text.startswith(begin)]
+    return found[-1] if found else ""
+
+
+class LastWords(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        write(f"{cls.scratch}/pair.csv", f"id,x,y,radius\n1,0,0,{RADIUS}\n2,{2 * RADIUS - OVERLAP},0,{RADIUS}\n")
+        settled = run_case(merged(DISKS, {"solver": {"criterion": "residual", "tolerance": 1e-3}}), directory=f"{cls.scratch}/settled")
+        if settled.status != 0:
+            raise AssertionError(f"the packing was not made: {settled}")
+        cls.rest = merged(DISKS, {"scene": {"bodies": "file", "bodies_file": "../settled/results/final_bodies.h5", "lattice_count": None,
+                                            "radius_min": None, "radius_max": None},
+                                  "time": {"steps": 5}, "output": {"final_bodies": False}})
+
+    def test_mended(self):
+        """Lengths of shifts are those of the formula, and the last line says so in more than a tenth of the steps, on any ranks. In the
+        later steps the overlap exceeds what is allowed by rounding at most, which does not count."""
+        shift = 0.5 * (OVERLAP - ALLOWED)
+        said = []
+        for subdomains, ranks in ((1, 1), (2, 1), (2, 2)):
+            run = run_case(merged(PAIR, {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": subdomains}}), ranks,
+                           self.here(f"pair {subdomains} {ranks}"))
+            self.assert_status(run, 0)
+            found = re.search(r"projected in 1 of 3 steps \(33 %\): shifts of a grain add up to (\S+) m on average\n", run.stdout)
+            self.assertTrue(found, run.stdout)
+            self.assertAlmostEqual(float(found[1]), shift, delta=5e-6)
+            self.assertEqual(line(run, "finished"), "finished    all 3 steps reached the accuracy; overlaps were mended in 33 % of them: "
+                             "the results are not those of the contact law; results in results")
+            start, later = map(float, re.search(r"overlaps    in the first step at most (\S+) m, later at most (\S+) m", run.stdout).groups())
+            self.assertAlmostEqual(start, OVERLAP, delta=5e-6)
+            self.assertAlmostEqual(later, ALLOWED, delta=5e-6)
+            said.append(re.findall(r"^(?:overlaps|accuracy|finished).*$|^ +(?:U from|projected).*$", run.stdout, re.M))
+        self.assertEqual(said[1], said[2])
+
+    def test_shared_grains(self):
+        """Shifts are those of the places in the results, a grain that two subdomains share counting once."""
+        places, x = [], 0.0
+        for overlap in (0.0, 4e-3, 3e-3, 1e-3):
+            x += 2 * RADIUS - overlap if places else 0.0
+            places.append(x)
+        write(self.here("chain.csv"), "id,x,y,radius\n" + "".join(f"{k},{place!r},0,{RADIUS}\n" for k, place in enumerate(places, 1)))
+        for subdomains in (1, 2):
+            run = run_case(merged(PAIR, {"scene": {"bodies_file": "../chain.csv"}, "time": {"steps": 1}, "solver": {"method": "nscdd"},
+                                         "decomposition": {"subdomains": subdomains, "grid": [subdomains, 1]}}), 1, self.here(f"chain {subdomains}"))
+            self.assert_status(run, 0)
+            results = run.results()
+            shift = np.abs(results["/steps/1/bodies/position"] - results["/steps/0/bodies/position"])[:, 0].mean()
+            said = float(re.search(r"shifts of a grain add up to (\S+) m on average", run.stdout)[1])
+            self.assertAlmostEqual(said / shift, 1.0, delta=6e-3)
+            self.assertEqual(run.history()["interface_bodies"][0] > 0, subdomains > 1)
+
+    def test_path(self):
+        """The path that shifts are compared with is that of the velocities: two grains that fly together overlap at the start."""
+        write(self.here("flying.csv"), f"id,x,y,radius,vx,vy\n1,0,0,{RADIUS},3,4\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},3,4\n")
+        run = run_case(merged(PAIR, {"scene": {"bodies_file": "../flying.csv"}}), 1, self.here("flying"))
+        self.assert_status(run, 0)
+        self.assertRegex(run.stdout, r"shifts of a grain add up to 1\.75E-003 m on average, 1\.2E-001 of its path of 1\.50E-002 m\n")
+
+    def test_seldom_mended(self):
+        run = run_case(merged(PAIR, {"time": {"steps": 20}}), 1, self.here("seldom"))
+        self.assertIn("projected in 1 of 20 steps (5 %)", run.stdout)
+        self.assertEqual(line(run, "finished"), "finished    all 20 steps reached the accuracy; results in results")
+        off = run_case(merged(PAIR, {"scene": {"overlap_projection": False, "overlap_allowed": None}}), 1, self.here("off"))
+        self.assertIn("            overlaps are not projected\n", off.stdout)
+
+    def test_restart(self):
+        """What is known of the steps since the restart alone says so."""
+        self.assert_status(run_case(PAIR, 1, self.here("restart")), 0)
+        write(self.here("restart", "case.nml"), gravier.namelist(merged(PAIR, {"time": {"steps": 8}})))
+        again = gravier_runs.gravier("--restart", "case.nml", directory=self.here("restart"))
+        self.assert_status(again, 0)
+        self.assertIn("            these lines are of the 5 steps since the restart\n", again.stdout)
+        self.assertEqual(line(again, "finished"),
+                         "finished    all 8 steps reached the accuracy; errors and overlaps are those since the restart; results in results")
+
+    def test_ways_to_miss(self):
+        """Solves that end at max_iterations, that stagnate at rounding, that have no solution: each is counted, and the status is 3."""
+        write(self.here("grain.csv"), f"id,x,y,radius\n1,0,{RADIUS},{RADIUS}\n")
+        crushed = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../grain.csv", "overlap_projection": False},
+                   "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
+                                {"name": "lid", "shape": "plane", "point": [0.0, 2 * RADIUS], "normal": [0.0, -1.0], "velocity": [0.0, -0.1]}],
+                   "time": {"step": 1e-3, "steps": 2}, "solver": {"acceleration": "none", "max_iterations": 20000},
+                   "output": {"directory": "results"}}
+        cold = {"solver": {"warm_start": False}, "time": {"steps": 2}}
+        for title, case, how in (
+                ("few", merged(self.rest, cold, {"solver": {"max_iterations": 2}}), "2 ended at max_iterations"),
+                ("rounding", merged(self.rest, cold, {"solver": {"criterion": "residual", "tolerance": 1e-16, "max_iterations": 200000}}), "2 stagnated"),
+                ("crushed", crushed, "2 found no solution")):
+            with self.subTest(title):
+                run = run_case(case, 1, self.here(title))
+                self.assert_status(run, 3)
+                goal = "tolerance" if title == "rounding" else "accuracy"
+                self.assertRegex(line(run, "converged"), rf"^converged   NO: 2 of 2 solves did not reach the {goal} .*; {how}$")
+                self.assertIn(f"*** 2 of the steps did NOT reach the {goal}: the accuracy of the results is not known", line(run, "finished"))
+                self.assertRegex(run.stdout, rf"at a tenth of the {goal} not known: 2 solves did not reach the {goal} itself")
+                self.assertNotRegex(line(run, "to halve it"), "ten times|longer|looser|larger &time")
+
+    def test_wrong_velocities(self):
+        """Solves that reach a loose residual with velocities far from the solution: the verdict names the error; history.csv has it."""
+        run = run_case(merged(self.rest, {"solver": {"criterion": "residual", "tolerance": 3e-2, "warm_start": False}}), 1, self.here("wrong"))
+        self.assert_status(run, 0)
+        history = run.history()
+        worst = (history["velocity_error"] / history["velocity_scale"])
+        self.assertGreater(worst.max(), 0.5)
+        self.assertRegex(line(run, "finished"), r"^finished    every solve reached the residual 3\.0E-002, but velocities were wrong by up to "
+                         rf"{worst.max():.2f} of U in {(worst > 0.5).sum()} of them")
+        found = re.search(r"residual at most (\S+) at the end of a solve, tolerance 3\.00E-002; velocity error at most (\S+) of U", run.stdout)
+        self.assertAlmostEqual(float(found[1]) / history["residual"].max(), 1.0, delta=6e-3)
+        self.assertAlmostEqual(float(found[2]) / worst.max(), 1.0, delta=6e-3)
+        self.assertNotRegex(line(run, "to halve it"), "ten times|longer")
+        right = run_case(merged(self.rest, {"solver": {"criterion": "residual", "tolerance": 1e-6}}), 1, self.here("right"))
+        self.assertEqual(line(right, "finished"), "finished    all 5 steps reached the tolerance; results in results")
+
+    def test_advice(self):
+        """A loose accuracy is not advised to be looser, a tight one may be."""
+        for accuracy, may in ((0.3, False), (0.1, False), (1e-2, True)):
+            run = run_case(merged(self.rest, {"time": {"steps": 20}, "solver": {"accuracy": accuracy, "tolerance": 0.1 * accuracy}}), 1,
+                           self.here(f"advice {accuracy}"))
+            with self.subTest(accuracy):
+                self.assert_status(run, 0)
+                self.assertEqual(bool(re.search("ten times the accuracy|longer &time", line(run, "to halve it"))), may, run.stdout)
+
+    def test_growing_overlaps(self):
+        """Grains sink into each other that loose solves do not hold: the advice is a smaller step or accuracy."""
+        run = run_case(merged(self.rest, {"time": {"steps": 200}, "scene": {"overlap_projection": False},
+                                          "solver": {"criterion": "residual", "tolerance": 0.3, "warm_start": False}}), 1, self.here("sinks"))
+        self.assert_status(run, 0)
+        self.assertRegex(line(run, "to halve it"), r"^to halve it nothing yet: overlaps grow, and want a smaller &time step or &solver tolerance first$")
+
+    def test_scales(self):
+        """The log names the velocity scale after the first step and when another kind comes; the end has the range. In free fall loads
+        of a step rule, until the grains are faster than ten times that."""
+        run = run_case({"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [2, 2], "radius_min": 0.01, "radius_max": 0.01,
+                                  "friction": 0.3},
+                        "boundary": {"shape": "plane", "normal": [0.0, 1.0], "velocity": [0.0, 0.0]},
+                        "time": {"step": 1e-3, "steps": 400}, "output": {"directory": "results", "every": 0}}, 1, self.here("scales"))
+        self.assert_status(run, 0)
+        said = re.findall(r"^scale       from step (\d+) on the error of a solve is compared with U = (\S+) m/s \((.*?)\)", run.stdout, re.M)
+        self.assertEqual((said[0][0], said[0][2]), ("1", "load of a step"))
+        self.assertAlmostEqual(float(said[0][1]), 9.81e-3, delta=1e-5)
+        self.assertIn("motion of the bodies", [kind for _, _, kind in said])
+        self.assertGreater(len(said), 1)
+        scale = run.history()["velocity_scale"]
+        found = re.search(r"U from (\S+) to (\S+) m/s: load of a step in (\d+) solves, motion of the bodies in (\d+) solves", run.stdout)
+        self.assertTrue(found, run.stdout)
+        self.assertAlmostEqual(float(found[1]) / scale.min(), 1.0, delta=6e-3)
+        self.assertAlmostEqual(float(found[2]) / scale.max(), 1.0, delta=6e-3)
+        self.assertEqual(int(found[3]) + int(found[4]), 400)
+
+    def test_results(self):
+        """Each state of results.h5 but the start has the error and the scale of its solve, which the Python package reads."""
+        run = run_case(merged(self.rest, {"output": {"every": 2}}), 2, self.here("results"))
+        self.assert_status(run, 0)
+        history, package = run.history(), gravier.Run(run.path("results"))
+        self.assertEqual(list(package.steps), [0, 2, 4, 5])
+        self.assertTrue(np.isnan(package.velocity_error(0)) and np.isnan(package.velocity_scale(0)))
+        with h5py.File(run.path("results", "results.h5")) as file:
+            for step in (2, 4, 5):
+                for name in ("velocity_error", "velocity_scale"):
+                    self.assertAlmostEqual(file[f"steps/{step}"].attrs[name], history[name][step - 1], delta=1e-8 * history[name][step - 1])
+                self.assertEqual(package.velocity_error(step), file[f"steps/{step}"].attrs["velocity_error"])
+                self.assertEqual(package.velocity_scale(step), file[f"steps/{step}"].attrs["velocity_scale"])
+            self.assertGreater(package.velocity_scale(), 0.0)
+
+    def test_layers(self):
+        """Deep cold starts go through layers, and the log says so."""
+        tower = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../tower.csv", "friction": 0.0},
+                 "boundary": {"shape": "plane", "normal": [0.0, 1.0]},
+                 "time": {"step": 1e-3, "steps": 3}, "solver": {"warm_start": False}, "output": {"directory": "results"}}
+        write(self.here("tower.csv"), "id,x,y,radius\n" + "".join(f"{k},0,{0.1 * k - 0.05},0.05\n" for k in range(1, 61)))
+        run = run_case(tower, 1, self.here("layers"))
+        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, [0-3] of them went on from it; passes cost as much as \d+ sweeps\n")
+        none = run_case(merged(tower, {"solver": {"layered_start": False}}), 1, self.here("no layers"))
+        self.assertNotIn("\nlayers  ", none.stdout)
+
+
+if __name__ == "__main__":
+    import unittest
+    unittest.main()
