@@ -122,9 +122,9 @@ class Results(RunTestCase):
         for run in self.runs.values():
             with open(run.path("results", "history.csv"), encoding="ascii") as file:
                 self.assertTrue(file.readline().startswith(
-                    "step,time,contacts,iterations,sweeps,residual,jump,max_overlap,kinetic_energy,wall_seconds"))
+                    "step,time,contacts,iterations,sweeps,residual,velocity_error,velocity_scale,jump,max_overlap,kinetic_energy,wall_seconds"))
             with open(run.path("results", "trace.csv"), encoding="ascii") as file:
-                self.assertEqual(file.readline(), "step,iteration,residual,jump\n")
+                self.assertEqual(file.readline(), "step,iteration,residual,velocity_error,jump\n")
             history, trace = run.history(), run.trace()
             self.assertEqual(list(history["step"]), list(range(1, 41)))
             np.testing.assert_allclose(history["time"], 2e-3 * history["step"], rtol=1e-15)
@@ -144,7 +144,7 @@ class Results(RunTestCase):
                        directory=self.here("column"))
         self.assert_status(run, 0)
         with open(run.path("results", "trace.csv"), encoding="ascii") as file:
-            self.assertEqual(file.readline(), "step,iteration,residual,jump,error\n")
+            self.assertEqual(file.readline(), "step,iteration,residual,velocity_error,jump,error\n")
         self.assertLessEqual(run.trace()["error"][-1], 1e-6)
         # before the first sweep no impulse is right
         self.assertEqual(run.trace()["error"][0], 1.0)

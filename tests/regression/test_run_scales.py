@@ -25,7 +25,7 @@ SHEAR = merged(LATTICE, {
     "boundary": [{"name": "lid", "shape": "plane", "point": [0.0, HEIGHT], "normal": [0.0, -1.0], "velocity": [2e-3, 0.0],
                   "free": [False, True], "pressure": 1000.0, "mass": 10.0}],
     # grains creep by 0.01 d in that time
-    "time": {"steps": 1000000}, "solver": {"tolerance": 1e-4}})
+    "time": {"steps": 1000000}, "solver": {"criterion": "residual", "tolerance": 1e-4}})
 
 
 class Scales(RunTestCase):

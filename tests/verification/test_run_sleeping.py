@@ -44,7 +44,7 @@ class Sleeping(RunTestCase):
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": bodies, "friction": 0.3},
             "boundary": [plane([0, 0], [0, 1]), plane([0, 0], [1, 0]), plane([2 * HALF, 0], [-1, 0]), wall],
             "time": {"step": 1e-3, "steps": STEPS},
-            "solver": {"method": "nscdd", "tolerance": TOLERANCE, "max_iterations": 5000},
+            "solver": {"method": "nscdd", "criterion": "residual", "tolerance": TOLERANCE, "max_iterations": 5000},
             "decomposition": {"subdomains": 4, "repartition_every": 200},
             "output": {"directory": "results", "every": 10, "checkpoint_every": 100},
         }
