@@ -374,7 +374,7 @@ contains
       row%bound = merge(velocity%bound_by_rest, -1.0_dp, velocity%rest_is_admissible)
       row%mass = velocity%mass
       if (.not. row%residual > 0.0_dp) return
-      call velocity%project(problem, iterations)
+      call velocity%project(problem, simulation%scheme, iterations)
       ! a solve finds the depths when it asks for them
       velocity%most_depth = -1
       call velocity%add_levels(problem)
