@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The four decomposition methods side by side: iterations and seconds of one step of settled packings, and on columns.
+"""The four decomposition methods side by side: iterations to a residual and seconds of one step of settled packings, and on columns.
 
     python3 drivers/study_methods.py [--out DIR] [--quick | --large] [--redraw]
 
@@ -40,7 +40,7 @@ def settle(directory, packing):
         run(place, {"scene": {"dimension": dimension, "bodies": "lattice", "lattice_count": count, "radius_min": 0.008,
                               "radius_max": 0.012, "friction": 0.3},
                     "time": {"step": 1e-3, "steps": steps},
-                    "solver": {"tolerance": 1e-3, "max_iterations": 300, "acceleration": "momentum"},
+                    "solver": {"criterion": "residual", "tolerance": 1e-3, "max_iterations": 300, "acceleration": "momentum"},
                     "output": {"directory": ".", "every": 0, "contacts": False, "final_bodies": True}})
     return place / "final_bodies.h5"
 
@@ -60,7 +60,7 @@ def solve(directory, bodies, case, iterations):
         "scene": {"dimension": PACKINGS[case["packing"]][0], "bodies": "file", "bodies_file": str(bodies.resolve()),
                   "friction": case["friction"]},
         "time": {"step": 1e-3, "steps": 1},
-        "solver": {"method": case["method"], "sweeps": case["sweeps"], "tolerance": TOLERANCES[-1], "check_every": 1,
+        "solver": {"method": case["method"], "sweeps": case["sweeps"], "criterion": "residual", "tolerance": TOLERANCES[-1], "check_every": 1,
                    "max_iterations": iterations, "acceleration": "momentum" if case["momentum"] else "none",
                    "warm_start": False},
         "decomposition": {"subdomains": case["subdomains"], "partition": "metis" if case["subdomains"] > 1 else "grid"},
