@@ -142,8 +142,8 @@ module gravier_contact_kernels
       real(dp), intent(out) :: sums(3)
     end subroutine residual_kernel
     !> What the estimate of the velocity error needs (gravier_velocity_error): n_tests test impulses y of each contact, added to
-    !> `motion` as H y; sums of y . w, y by y, w = W (P - r) being the velocity by which a contact misses its law, W its undivided
-    !> local operator; power := r . w. The tests are P - r, r, and r less three earlier impulses. `largest` is raised to the largest
+    !> `motion` as H y; sums of y . w, y by y, then of r_n |w|^2 and of r_n, w = W (P - r) being the velocity by which a contact misses
+    !> its law, W its undivided local operator; power := r . w. The tests are P - r, r, and r less three earlier impulses. `largest` is raised to the largest
     !> |w|^2.
     pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, last, recent, old, power, motion, sums, largest)
       import :: dp, n_tests
@@ -156,7 +156,7 @@ module gravier_contact_kernels
       real(dp), intent(inout), contiguous :: power(:, :)
       !> (n_tests, nv, n_columns)
       real(dp), intent(inout), contiguous :: motion(:, :, :)
-      real(dp), intent(out) :: sums(n_tests)
+      real(dp), intent(out) :: sums(n_tests + 2)
       real(dp), intent(inout) :: largest
     end subroutine tests_kernel
   end interface

@@ -38,12 +38,11 @@ module gravier_solve
   real(dp), parameter :: falling = 0.85_dp
   !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
-  !> what is left of the figure where a solve has gained something; a solve that has gained nothing for so many times the iterations
-  !> until then has stagnated, if it has had so many more, with momentum or without, and so many times those that a wave takes from end
-  !> to end; where residuals
-  !> are to become small, phases with and without momentum take turns that grow
+  !> what is left of the figure where a solve has gained something. A solve has stagnated that has gained nothing for so many iterations,
+  !> with momentum or without, and for so many times those until then, and that has had so many times those that a wave takes from end
+  !> to end. Where residuals are to become small, phases with and without momentum take turns that grow.
   real(dp), parameter :: gained = 0.9_dp
-  integer, parameter :: patience = 500, plain_patience = 4000, waves = 6, idle_share = 1, idle_share_of_residual = 4
+  integer, parameter :: patience = 1000, plain_patience = 2000, waves = 6, idle_share = 1, idle_share_of_residual = 4
   !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
   !> way to supports are above these; later, after a part of the depth, where that is above another; iterations after it until it is
   !> judged, and what must be left of the error then

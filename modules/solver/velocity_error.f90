@@ -12,6 +12,8 @@
 !>      L^2 = sum m_l e_l^2.
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
 !>      (gravier_layered_start) long waves are gone, and a = 1.3.
+!>      Where groups of contacts creep, test impulses of little motion make E too large. The mean violation, each contact weighed by
+!>      r_n, over as many contacts as the depth D is long is more than any wave can be: E is at most 2 D sqrt(sum r_n |w|^2/sum r_n).
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
@@ -41,6 +43,11 @@ module gravier_velocity_error
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
   !> products of the velocities that test impulses make
   integer, parameter :: n_products = n_tests*(n_tests + 1)/2
+  !> numbers before them
+  integer, parameter :: n_powers = n_tests + 2
+  !> times the depth and the mean violation, what the estimate is at most; iterations before which it is not asked for
+  real(dp), parameter :: most_waves = 2.0_dp
+  integer, parameter :: settled = 20
   !> share of the largest free speed below which the shift of a closed contact is rounding of places
   real(dp), parameter :: rounded = 1.0e-3_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
@@ -75,6 +82,8 @@ module gravier_velocity_error
     real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
     !> weight of Y
     real(dp) :: weight = weight_of_projection
+    !> root mean square of w, weighed by r_n, by the last `project` [m/s]
+    real(dp) :: mean_violation = 0.0_dp
     !> largest |w| of a contact, by the last `project`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest depth; negative while it is not known
@@ -93,6 +102,7 @@ module gravier_velocity_error
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
+    procedure, private :: wave => velocity_error_wave
     procedure :: excludes_violations => velocity_error_excludes_violations
     procedure :: find_depth => velocity_error_find_depth
     procedure :: forget_copies => velocity_error_forget_copies
@@ -200,13 +210,23 @@ contains
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
     criterion = max(self%largest_violation/violations_allowed, &
-      & min(self%bound_by_rest/share_at_rest, hypot(self%weight*self%projection, weight_of_sinking*self%levels)))
+      & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
   end function velocity_error_criterion
+
+  !> E with a weight on L, and at most D times the mean violation, so many times, where the depth D is known [m/s].
+  pure real(dp) function velocity_error_wave(self, weight_of_levels) result(wave)
+    class(velocity_error_t), intent(in) :: self
+    real(dp), intent(in) :: weight_of_levels
+
+    wave = hypot(self%weight*self%projection, weight_of_levels*self%levels)
+    if (self%most_depth > 0 .and. self%projection < unknown) wave = min(wave, &
+      & weight_of_levels*most_waves*self%most_depth*self%mean_violation)
+  end function velocity_error_wave
 
   !> The smaller of E and C [m/s].
   pure real(dp) function velocity_error_estimate(self) result(estimate)
     class(velocity_error_t), intent(in) :: self
-    estimate = min(self%bound_by_rest, hypot(self%weight*self%projection, self%levels))
+    estimate = min(self%bound_by_rest, self%wave(1.0_dp))
   end function velocity_error_estimate
 
   !> Y, with v_global evaluated. Collective.
@@ -215,8 +235,8 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     class(scheme_t), intent(in) :: scheme
     integer, intent(in) :: iteration
-    !> b, then the columns of the upper triangle of G
-    real(dp) :: parts(n_tests + n_products, size(problem%sub)), sums(n_tests + n_products), largest(1)
+    !> b, sums of r_n |w|^2 and of r_n, then the columns of the upper triangle of G
+    real(dp) :: parts(n_powers + n_products, size(problem%sub)), sums(n_powers + n_products), largest(1)
     logical :: knows_last, knows(n_copies)
     integer :: s
 
@@ -245,14 +265,17 @@ contains
     end do
     call sum_motions(problem, self%part)
     do s = 1, size(problem%sub)
-      call add_products(problem%sub(s), self%part(s)%motion, parts(n_tests + 1:, s))
+      call add_products(problem%sub(s), self%part(s)%motion, parts(n_powers + 1:, s))
     end do
     call start_timer(phase_reduction)
     call problem%comm%sum_parts(parts, sums)
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
     self%largest_violation = sqrt(largest(1))
-    self%projection = sqrt(projection_of(sums(1:n_tests), sums(n_tests + 1:))/self%mass)
+    if (iteration >= settled .and. self%most_depth < 0) call self%find_depth(problem)
+    self%projection = sqrt(projection_of(sums(1:n_tests), sums(n_powers + 1:))/self%mass)
+    self%mean_violation = 0.0_dp
+    if (sums(n_powers) > 0.0_dp) self%mean_violation = sqrt(max(0.0_dp, sums(n_tests + 1))/sums(n_powers))
 
   contains
 
@@ -262,7 +285,7 @@ contains
       real(dp), intent(in), contiguous :: last(:, :, :), recent(:, :, :), old(:, :, :)
 
       call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, last, recent, old, &
-        & part%power, part%motion, parts(1:n_tests, s), largest(1))
+        & part%power, part%motion, parts(1:n_powers, s), largest(1))
     end subroutine make_tests
 
   end subroutine velocity_error_project
