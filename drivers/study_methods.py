@@ -60,7 +60,7 @@ def solve(directory, bodies, case, iterations):
         "scene": {"dimension": PACKINGS[case["packing"]][0], "bodies": "file", "bodies_file": str(bodies.resolve()),
                   "friction": case["friction"]},
         "time": {"step": 1e-3, "steps": 1},
-        "solver": {"method": case["method"], "sweeps": case["sweeps"], "tolerance": TOLERANCES[-1], "check_every": 1,
+        "solver": {"method": case["method"], "sweeps": case["sweeps"], "criterion": "residual", "tolerance": TOLERANCES[-1], "check_every": 1,
                    "max_iterations": iterations, "acceleration": "momentum" if case["momentum"] else "none",
                    "warm_start": False},
         "decomposition": {"subdomains": case["subdomains"], "partition": "metis" if case["subdomains"] > 1 else "grid"},
