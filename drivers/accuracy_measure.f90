@@ -230,7 +230,7 @@ contains
         associate (of => cases(v))
           if (r == 1) call say(comm, study%variants(v)%name, "", of%run)
           if (r == 1) allocate (of%seconds(of%report%n_trace, study%repeats))
-          of%seconds(:, r) = of%report%trace(5, 1:of%report%n_trace)
+          of%seconds(:, r) = of%report%trace(6, 1:of%report%n_trace)
         end associate
       end do
     end do

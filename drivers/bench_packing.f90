@@ -146,8 +146,8 @@ contains
     text = text//", radius_min = "//to_text(smallest*radius)//", radius_max = "//to_text(radius)//", alert_distance = "// &
       & to_text(alert(packing%nd)*radius)//", friction = "//merge("0.5", "0.0", packing%friction)// &
       & ", overlap_projection = .false. / &time step = "//to_text(step)//", steps = 1 / "// &
-      & "&solver method = '"//trim(packing%method)//"', acceleration = 'none', tolerance = 1e-30, max_iterations = "// &
-      & to_text(packing%iterations)//" / "
+      & "&solver method = '"//trim(packing%method)//"', acceleration = 'none', criterion = 'residual', tolerance = 1e-30, "// &
+      & "max_iterations = "//to_text(packing%iterations)//" / "
     if (packing%method /= "nlgs") text = text//"&decomposition subdomains = "//to_text(packing%subdomains)//" / "
     if (packing%method == "nscdd_ep") text = text//"&enriched direction = 0.3, interface = '"//trim(packing%interface)//"' / "
   end function case_text

@@ -21,7 +21,7 @@ STEP = 1.0e-3  # s, to compact
 # are pressed into each other, and taken apart by projections, step by step: they creep and bear less.
 SLOW_STEP = 1.0e-2  # s, to come to rest and to compress
 LAYER = 6.0 * SMALLEST  # m, along the walls, where disks lie less densely
-SOLVER = {"acceleration": "none", "tolerance": 1.0e-3, "max_iterations": 400, "check_every": 10}
+SOLVER = {"acceleration": "none", "criterion": "residual", "tolerance": 1.0e-3, "max_iterations": 400, "check_every": 10}
 
 
 def walls(size, mass, lid):

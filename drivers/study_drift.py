@@ -47,7 +47,7 @@ def groups(dimension, bodies, steps, tolerance, projection, every):
         "scene": {"dimension": dimension, "bodies": "file", "bodies_file": bodies, "density": DENSITY, "friction": FRICTION,
                   "overlap_allowed": ALLOWED, "overlap_projection": projection},
         "time": {"step": STEP, "steps": steps},
-        "solver": {"acceleration": "none", "tolerance": tolerance, "max_iterations": 500, "check_every": 5},
+        "solver": {"acceleration": "none", "criterion": "residual", "tolerance": tolerance, "max_iterations": 500, "check_every": 5},
         "output": {"directory": ".", "every": every, "contacts": False, "final_bodies": True, "energy": True, "structure": True,
                    "boundary_forces": True}}
 

@@ -19,7 +19,7 @@ class Progress(RunTestCase):
         packing = settled_disks(cls.scratch, count=(14, 12))
         cls.case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": packing, "friction": 0.3},
                     "time": {"step": 1e-3, "steps": 1},
-                    "solver": {"tolerance": 1e-4, "max_iterations": 20000, "check_every": 10, "warm_start": False},
+                    "solver": {"criterion": "residual", "tolerance": 1e-4, "max_iterations": 20000, "check_every": 10, "warm_start": False},
                     "output": {"directory": "results"}}
 
     def test_checks_left_out(self):

@@ -7,12 +7,12 @@ FEW = {"solver": {"tolerance": 3e-3}, "time": {"steps": 2}}
 METHODS = {
     # so many sweeps that the relaxation has to be lowered
     "schwarz": {"solver": {"method": "schwarz", "sweeps": 10}},
-    "schwarz, momentum": {"solver": {"method": "schwarz", "acceleration": "momentum", "tolerance": 1e-5}},
+    "schwarz, momentum": {"solver": {"method": "schwarz", "acceleration": "momentum", "criterion": "residual", "tolerance": 1e-5}},
     # a direction of 1 on all contacts does not converge on every packing (user guide, choosing a method)
     "schwarz_ec": merged(FEW, {"solver": {"method": "schwarz_ec"}, "enriched": {"direction": 0.3}}),
     "nscdd": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "none"}},
     # a tolerance at which it steers for many iterations
-    "nscdd, momentum": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "momentum", "tolerance": 1e-5}},
+    "nscdd, momentum": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "momentum", "criterion": "residual", "tolerance": 1e-5}},
     # a direction on active contacts only: the matrices change from one iteration to the next
     "nscdd_ep, mumps": merged(FEW, {"solver": {"method": "nscdd_ep", "sweeps": 30},
                                     "enriched": {"direction": 30.0, "contacts": "active"}}),
