@@ -8,7 +8,8 @@ Packings of disks and spheres settle in a box. One step of each is solved from z
 at after every iteration (plain sweeps after every tenth), and by the program as it is. A tolerance of the residual is met with the
 first iteration at or below it, a velocity error with the first iteration from which on the estimate stays at or below it, as far as
 the run goes. The estimate
-is that of doc/theory.md, section 24, over the velocity scale. Warm starts are runs of many steps, each of which ends by its own criterion.
+is that of doc/theory.md, section 24, over the velocity scale. Warm starts are runs of many steps, each of which ends by its own criterion. The heights have the true error too, that to the solution
+of the same step.
 
 leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them."""
 import argparse
@@ -16,6 +17,7 @@ import csv
 import re
 from pathlib import Path
 
+from study_error import measure
 from study_support import SOURCE, gravier, read_history, run, write_measured
 
 PARTS = ("momentum", "heights", "subdomains", "methods", "warm")
@@ -23,7 +25,7 @@ RESIDUALS = (1e-3, 1e-4)
 ERRORS = (0.1, 0.03)
 #: name: dimension, grains along each axis of the lattice that falls, steps of settling
 PACKINGS = {"1000 disks": (2, [32, 31], 700), "1000 spheres": (3, [10, 10, 10], 650), "10^4 spheres": (3, [21, 21, 23], 700)}
-HEIGHTS = (10, 20, 40, 80)
+HEIGHTS = (10, 20, 40)
 #: iterations with momentum, of plain ones three times as many; residual at which a run ends before
 MOST, TIGHT = 1500, 1e-6
 
@@ -120,9 +122,31 @@ def study_heights(out):
     rows = []
     for high in HEIGHTS:
         bodies = settle(out, 3, [10, 10, high], 600 + 5 * high, wall_friction=0.0)
-        rows += [{"high": high, **row} for row in both(out, f"high {high}", on_file(3, bodies, wall_friction=0.0))]
+        groups = on_file(3, bodies, wall_friction=0.0)
+        rows += [{"high": high, **row} for row in both(out, f"high {high}", groups)]
+        rows[-1].update(by_true_error(out / "runs" / f"high_{high}" / "true", groups))
         show(rows[-2:])
     return rows
+
+
+def by_true_error(place, groups):
+    """Sweeps to the true velocity error by momentum alone and by the program, and the true error where the program ends."""
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "case.nml").write_text(gravier.namelist({**groups, "time": {"step": 1e-3, "steps": 1}}), encoding="utf-8")
+    looks = ",".join(str(k) for k in sorted({round(5 * 1.1**k) for k in range(54)}))
+    rows = measure(str(place), place, ["--iterations", looks, "--situations", "cold,program", "--limit", "2500", "--sweeps", "4000"])
+    found = {}
+    for name, ending in (("momentum", "zero impulses"), ("program", "by the program"), ("end", "ends it")):
+        kept = [row for row in rows if row["situation"].endswith(ending)]
+        errors = [float(row["true_error"]) / float(row["velocity_scale"]) for row in kept]
+        if name == "end":
+            found["true error at the end"] = errors[-1]
+            continue
+        for bound in ERRORS:
+            late = [k for k, error in enumerate(errors) if error > bound]
+            after = late[-1] + 1 if late else 0
+            found[f"{name}: sweeps to true error {bound:g}"] = round(float(kept[after]["sweeps"])) if after < len(kept) else "-"
+    return found
 
 
 def study_subdomains(out):
