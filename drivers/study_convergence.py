@@ -7,9 +7,8 @@
 Packings of disks and spheres settle in a box. One step of each is solved from zero impulses by sweeps without a layered start, looked
 at after every iteration (plain sweeps after every tenth), and by the program as it is. A tolerance of the residual is met with the
 first iteration at or below it, a velocity error with the first iteration from which on the estimate stays at or below it, as far as
-the run goes. The estimate
-is that of doc/theory.md, section 24, over the velocity scale. Warm starts are runs of many steps, each of which ends by its own criterion. The heights have the true error too, that to the solution
-of the same step.
+the run goes. The estimate is that of doc/theory.md, section 24, over the velocity scale. The heights have the true error too, that to
+the solution of the same step. Warm starts are runs of many steps, each of which ends by its own criterion.
 
 leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them."""
 import argparse
@@ -181,22 +180,22 @@ def study_methods(out):
 def study_warm(out):
     """Runs of many steps, ended by a residual and by the velocity error."""
     rows = []
-    for name, steps, changes in (("shear", 100, {}), ("triaxial", 30, {})):
+    for name, steps in (("shear", 100), ("triaxial", 30)):
         for momentum in (False, True):
             for criterion in ({"criterion": "residual", "tolerance": 1e-3}, {"criterion": "residual", "tolerance": 1e-4},
                               {"accuracy": 0.1}, {"accuracy": 0.03}):
                 place = out / "runs" / f"{name}_{momentum}_{'_'.join(map(str, criterion.values()))}"
                 groups, boundaries = scene(name)
                 groups["time"]["steps"] = steps
-                groups["solver"] = {**groups.get("solver", {}), **changes, "acceleration": "momentum" if momentum else "none"}
+                groups["solver"] = {**groups.get("solver", {}), "acceleration": "momentum" if momentum else "none"}
                 groups["solver"].pop("tolerance", None)
                 groups["solver"].update(criterion)
                 groups["output"] = {"directory": "results", "every": 0, "contacts": False}
                 run(place, groups, boundaries)
                 history = read_history(place / "results")
                 errors = history["velocity_error"] / history["velocity_scale"]
-                rows.append({"scene": name, "steps": steps, "by": "momentum" if momentum else "plain",
-                             "ends by": " ".join(map(str, criterion.values())) if "criterion" in criterion else f"error {criterion['accuracy']}",
+                ends_by = " ".join(map(str, criterion.values())) if "criterion" in criterion else f"error {criterion['accuracy']}"
+                rows.append({"scene": name, "steps": steps, "by": "momentum" if momentum else "plain", "ends by": ends_by,
                              "iterations": int(history["iterations"].sum()), "mean error": float(errors.mean()),
                              "largest error": float(errors.max())})
                 show(rows[-1:])
@@ -214,7 +213,8 @@ def scene(name):
 
 def show(rows):
     for row in rows:
-        print("  " + " | ".join(f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()), flush=True)
+        told = (f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items())
+        print("  " + " | ".join(told), flush=True)
 
 
 def main():
