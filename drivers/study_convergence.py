@@ -24,7 +24,7 @@ RESIDUALS = (1e-3, 1e-4)
 ERRORS = (0.1, 0.03)
 #: name: dimension, grains along each axis of the lattice that falls, steps of settling
 PACKINGS = {"1000 disks": (2, [32, 31], 700), "1000 spheres": (3, [10, 10, 10], 650), "10^4 spheres": (3, [21, 21, 23], 700)}
-HEIGHTS = (10, 20, 40)
+HEIGHTS = (10, 20, 40, 80)
 #: iterations with momentum, of plain ones three times as many; residual at which a run ends before
 MOST, TIGHT = 1500, 1e-6
 
