@@ -7,8 +7,8 @@
 Packings of disks and spheres settle in a box. One step of each is solved from zero impulses by sweeps without a layered start, looked
 at after every iteration (plain sweeps after every tenth), and by the program as it is. A tolerance of the residual is met with the
 first iteration at or below it, a velocity error with the first iteration from which on the estimate stays at or below it, as far as
-the run goes. The estimate
-is that of doc/theory.md, section 24, over the velocity scale. Warm starts are runs of many steps, each of which ends by its own criterion.
+the run goes. The estimate is that of doc/theory.md, section 24, over the velocity scale. The heights have the true error too, that to
+the solution of the same step. Warm starts are runs of many steps, each of which ends by its own criterion.
 
 leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them."""
 import argparse
@@ -16,6 +16,7 @@ import csv
 import re
 from pathlib import Path
 
+from study_error import measure
 from study_support import SOURCE, gravier, read_history, run, write_measured
 
 PARTS = ("momentum", "heights", "subdomains", "methods", "warm")
@@ -120,9 +121,31 @@ def study_heights(out):
     rows = []
     for high in HEIGHTS:
         bodies = settle(out, 3, [10, 10, high], 600 + 5 * high, wall_friction=0.0)
-        rows += [{"high": high, **row} for row in both(out, f"high {high}", on_file(3, bodies, wall_friction=0.0))]
+        groups = on_file(3, bodies, wall_friction=0.0)
+        rows += [{"high": high, **row} for row in both(out, f"high {high}", groups)]
+        rows[-1].update(by_true_error(out / "runs" / f"high_{high}" / "true", groups))
         show(rows[-2:])
     return rows
+
+
+def by_true_error(place, groups):
+    """Sweeps to the true velocity error by momentum alone and by the program, and the true error where the program ends."""
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "case.nml").write_text(gravier.namelist({**groups, "time": {"step": 1e-3, "steps": 1}}), encoding="utf-8")
+    looks = ",".join(str(k) for k in sorted({round(5 * 1.1**k) for k in range(54)}))
+    rows = measure(str(place), place, ["--iterations", looks, "--situations", "cold,program", "--limit", "2500", "--sweeps", "4000"])
+    found = {}
+    for name, ending in (("momentum", "zero impulses"), ("program", "by the program"), ("end", "ends it")):
+        kept = [row for row in rows if row["situation"].endswith(ending)]
+        errors = [float(row["true_error"]) / float(row["velocity_scale"]) for row in kept]
+        if name == "end":
+            found["true error at the end"] = errors[-1]
+            continue
+        for bound in ERRORS:
+            late = [k for k, error in enumerate(errors) if error > bound]
+            after = late[-1] + 1 if late else 0
+            found[f"{name}: sweeps to true error {bound:g}"] = round(float(kept[after]["sweeps"])) if after < len(kept) else "-"
+    return found
 
 
 def study_subdomains(out):
@@ -157,22 +180,22 @@ def study_methods(out):
 def study_warm(out):
     """Runs of many steps, ended by a residual and by the velocity error."""
     rows = []
-    for name, steps, changes in (("shear", 100, {}), ("triaxial", 30, {})):
+    for name, steps in (("shear", 100), ("triaxial", 30)):
         for momentum in (False, True):
             for criterion in ({"criterion": "residual", "tolerance": 1e-3}, {"criterion": "residual", "tolerance": 1e-4},
                               {"accuracy": 0.1}, {"accuracy": 0.03}):
                 place = out / "runs" / f"{name}_{momentum}_{'_'.join(map(str, criterion.values()))}"
                 groups, boundaries = scene(name)
                 groups["time"]["steps"] = steps
-                groups["solver"] = {**groups.get("solver", {}), **changes, "acceleration": "momentum" if momentum else "none"}
+                groups["solver"] = {**groups.get("solver", {}), "acceleration": "momentum" if momentum else "none"}
                 groups["solver"].pop("tolerance", None)
                 groups["solver"].update(criterion)
                 groups["output"] = {"directory": "results", "every": 0, "contacts": False}
                 run(place, groups, boundaries)
                 history = read_history(place / "results")
                 errors = history["velocity_error"] / history["velocity_scale"]
-                rows.append({"scene": name, "steps": steps, "by": "momentum" if momentum else "plain",
-                             "ends by": " ".join(map(str, criterion.values())) if "criterion" in criterion else f"error {criterion['accuracy']}",
+                ends_by = " ".join(map(str, criterion.values())) if "criterion" in criterion else f"error {criterion['accuracy']}"
+                rows.append({"scene": name, "steps": steps, "by": "momentum" if momentum else "plain", "ends by": ends_by,
                              "iterations": int(history["iterations"].sum()), "mean error": float(errors.mean()),
                              "largest error": float(errors.max())})
                 show(rows[-1:])
@@ -190,7 +213,8 @@ def scene(name):
 
 def show(rows):
     for row in rows:
-        print("  " + " | ".join(f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()), flush=True)
+        told = (f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items())
+        print("  " + " | ".join(told), flush=True)
 
 
 def main():
