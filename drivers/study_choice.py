@@ -5,9 +5,9 @@
     python3 drivers/study_choice.py OUT --only shear drum   these alone
 
 leaves OUT/study_choice.csv, a row for each quantity of each run, and prints the tables of doc/choosing.md. Each scene is one of data/ with a shorter
-time or with fewer grains. The run with the smallest step and the tightest accuracy is the reference. Further runs begin from places of the
-grains that differ by a millionth of a diameter (the lattice of the settling: from other radii); twice the standard deviation among them is the
-scatter. A value is right where it deviates by no more than 2 %, or than the scatter where that is larger. Seconds are processor seconds of a run on
+time or with fewer grains. Further runs with the second step and 0.1, and with the smallest step and 0.03, begin from places of the grains that
+differ by a millionth of a diameter (the lattice of the settling: from other radii). The mean of those with the smallest step is the reference;
+twice the standard deviation in either group, the root mean square of both, is the scatter. A value is right where it deviates by no more than 2 %, or than the scatter where that is larger. Seconds are processor seconds of a run on
 one rank; cost is seconds over those of the cheapest run that is right."""
 import argparse
 import resource
@@ -48,7 +48,7 @@ def compressed(directory, groups):
     points = {boundary["name"]: boundary["point"] for boundary in groups["boundary"] if boundary["name"] in ("right", "lid")}
     late = 1.0 - height / points["lid"][1] > 0.01
     ratio = abs(history["force_y:lid"][late] / width[late]).mean() / abs(history["force_x:right"][late] / height[late]).mean()
-    return {"strength": ratio, "volume": width[-1] * height[-1] / (points["right"][0] * points["lid"][1])}
+    return {"strength": ratio, "volume change": width[-1] * height[-1] / (points["right"][0] * points["lid"][1]) - 1.0}
 
 
 def discharged(directory, _):
@@ -129,24 +129,29 @@ def run_one(job):
     return found
 
 
+def repeated(name):
+    """Step and accuracy of the runs that are made several times; those of the reference come last."""
+    return (SCENES[name].steps[1], 0.1), (SCENES[name].steps[-1], ACCURACIES[-1])
+
+
 def jobs_of(options):
     """All runs, the long ones first."""
     jobs = [(name, step, accuracy, 0) for name in options.only for step in SCENES[name].steps for accuracy in ACCURACIES]
-    jobs += [(name, SCENES[name].steps[1], 0.1, k) for name in options.only for k in range(1, options.realisations + 1)]
+    jobs += [(name, *kind, k) for name in options.only for kind in repeated(name) for k in range(1, options.realisations + 1)]
     return [(options.out, options.measure, *job) for job in sorted(jobs, key=lambda job: job[1] * job[2])]
 
 
 def compare(runs):
     """Rows of the table of one scene: each quantity of each run against the reference."""
     main = sorted((one for one in runs if one.realisation == 0), key=lambda one: (-one.step, -one.accuracy))
-    reference, middle = main[-1], SCENES[main[0].name].steps[1]
     rows, right = [], {}
-    for quantity in reference.values:
-        again = [one.values[quantity] for one in runs if one.step == middle and one.accuracy == 0.1]
-        scatter = 2.0 * np.std(again, ddof=1) / abs(reference.values[quantity]) if len(again) > 1 else np.nan
+    for quantity in main[0].values:
+        again = [[one.values[quantity] for one in runs if (one.step, one.accuracy) == kind] for kind in repeated(main[0].name)]
+        reference = np.mean(again[-1])
+        scatter = 2.0 * np.sqrt(np.mean([np.var(values, ddof=1) if len(values) > 1 else 0.0 for values in again])) / abs(reference)
         for one in main:
-            deviation = one.values[quantity] / reference.values[quantity] - 1.0
-            is_right = abs(deviation) <= np.fmax(RIGHT, scatter)
+            deviation = one.values[quantity] / reference - 1.0
+            is_right = abs(deviation) <= max(RIGHT, scatter)
             right[id(one)] = right.get(id(one), True) and is_right
             rows.append([one, quantity, deviation, scatter, is_right])
     cheapest = min(one.seconds for one in main if right[id(one)])
