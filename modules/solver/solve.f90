@@ -46,7 +46,7 @@ module gravier_solve
   !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
   !> way to supports are above these; later, after a part of the depth, where that is above another; iterations after it until it is
   !> judged, and what must be left of the error then
-  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.8_dp, late = 0.3_dp
+  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, worth_keeping = 0.8_dp, late = 0.3_dp, nearly = 0.7_dp
   real(dp), parameter :: deep = 25.0_dp, very_deep = 60.0_dp
   integer, parameter :: trial = 6
   !> figures of a check that a trace keeps
@@ -338,6 +338,12 @@ contains
       real(dp) :: sweeps
       integer :: s
 
+      ! there are at least as many contacts on the way as mean diameters, or nearly so
+      if (velocity%most_depth < 0) call velocity%find_depth(problem)
+      if (velocity%most_depth < nearly*least_way) then
+        may_try_layers = .false.
+        return
+      end if
       call complete_estimate()
       if (velocity%criterion() <= least_error*problem%error_scale) return
       may_try_layers = .false.
