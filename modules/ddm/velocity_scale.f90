@@ -8,7 +8,7 @@
 !>     drive  largest difference of imposed velocities
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step
-!>     U      = max(U_q, 0.1 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there
+!>     U      = max(U_q, 0.3 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there
 module gravier_velocity_scale
   use gravier_kinds, only: dp
   use gravier_communicator, only: communicator_t
@@ -23,7 +23,7 @@ module gravier_velocity_scale
   public :: velocity_scale_t, imposed_motion_t
 
   !> share of the motion that goes on which an error may be compared with
-  real(dp), parameter :: share_of_own = 0.1_dp
+  real(dp), parameter :: share_of_own = 0.3_dp
   !> diameters by which grains may drift in the simulated time
   real(dp), parameter :: drift = 0.01_dp
 
