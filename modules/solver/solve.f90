@@ -39,10 +39,10 @@ module gravier_solve
   !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
   real(dp), parameter :: first_ratio = 0.5_dp
   !> what is left of the figure where a solve has gained something. A solve has stagnated that has gained nothing for so many iterations,
-  !> with momentum or without, and for so many times those until then, and that has had so many times those that a wave takes from end
-  !> to end. Where residuals are to become small, phases with and without momentum take turns that grow.
-  real(dp), parameter :: gained = 0.9_dp
-  integer, parameter :: patience = 1000, plain_patience = 2000, waves = 6, idle_share = 1, idle_share_of_residual = 4
+  !> with momentum or without, and for as many as until then, and that has had so many times those that a wave takes from end to end;
+  !> where a residual that is small already is what is missing, so many times that
+  real(dp), parameter :: gained = 0.9_dp, small_residual = 1.0e-3_dp
+  integer, parameter :: patience = 1000, plain_patience = 2000, waves = 6, residual_patience = 4
   !> where a pass over layers is tried: after the first iterations, if residual at the start, velocity error over its scale and
   !> way to supports are above these; later, after a part of the depth, where that is above another; iterations after it until it is
   !> judged, and what must be left of the error then
@@ -442,8 +442,10 @@ contains
       if (report%figure < gained*best) then
         best = report%figure
         best_at = report%iterations
-        next_look = best_at + merge(patience, plain_patience, scheme%momentum%on) + &
-          & merge(idle_share, idle_share_of_residual, control%criterion == by_velocity)*best_at
+        next_look = best_at + merge(patience, plain_patience, scheme%momentum%on) + best_at
+        ! residuals that are to become small fall in phases with and without momentum, which grow
+        if (report%residual > control%tolerance .and. report%residual < small_residual) &
+          & next_look = best_at + residual_patience*(plain_patience + best_at)
         return
       end if
       if (report%iterations < next_look) return
