@@ -31,10 +31,12 @@ contains
     n = 0
     do s = 1, size(supports)
       allocate (supports(s)%column(problem%sub(s)%n_columns), source=.false.)
-      if (size(problem%sub(s)%boundary) > 0) n = max(n, maxval(problem%sub(s)%boundary))
     end do
     load = norm2(problem%load(1:problem%kernels%nd))
     if (.not. load > 0.0_dp) return
+    do s = 1, size(supports)
+      if (size(problem%sub(s)%boundary) > 0) n = max(n, maxval(problem%sub(s)%boundary))
+    end do
     n = nint(problem%comm%highest(real(n, dp)))
     allocate (parts(2*n, size(supports)), sums(2*n))
     parts(:, :) = 0.0_dp

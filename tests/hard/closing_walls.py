@@ -41,6 +41,12 @@ def scene(grains, boundaries, dimension=2, friction=0.0, gravity=0.0, steps=20, 
     }
 
 
+def judged_by(velocity, made):
+    """The scene with a velocity scale of its own [m/s]."""
+    grains, groups = made
+    return grains, {**groups, "solver": {"velocity_scale": velocity}}
+
+
 def floor(dimension=2):
     return plane([0.0] * dimension, [0.0] * (dimension - 1) + [1.0])
 
@@ -67,7 +73,8 @@ def impossible():
         "one disk": scene(row(1), walls(d), subdomains=2),
         "one disk, friction 0.3": scene(row(1), walls(d), friction=0.3, subdomains=2),
         "one disk, friction 1, gravity": scene(row(1), [*walls(d), floor()], friction=1.0, gravity=G, subdomains=2),
-        "one disk, slow walls, gravity": scene(row(1), [*walls(d, speed=1e-4), floor()], gravity=G, subdomains=2),
+        # walls that close by 2 % of g h in a step are within the accuracy, unless the user says what counts
+        "one disk, slow walls, gravity": judged_by(1e-4, scene(row(1), [*walls(d, speed=1e-4), floor()], gravity=G, subdomains=2)),
         "one sphere": scene(row(1, 3), walls(d, 3), 3, subdomains=2),
         "one sphere, friction 0.5, gravity": scene(row(1, 3), [*walls(d, 3), floor(3)], 3, 0.5, G, subdomains=2),
         "chain of 3": scene(row(3), walls(3 * d), friction=0.3),

@@ -18,7 +18,7 @@ CASE = {
     "scene": {"dimension": 2, "bodies": "file", "friction": 0.3, "density": DENSITY, "overlap_allowed": ALLOWED},
     "time": {"step": 1e-3, "steps": 2000},
     # what a loose solve leaves is that of plain iterations
-    "solver": {"acceleration": "none", "tolerance": 1e-2, "max_iterations": 500},
+    "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-2, "max_iterations": 500},
     "output": {"directory": "results", "every": 0, "contacts": False, "final_bodies": True, "energy": True},
 }
 WITHOUT = {"scene": {"overlap_projection": False}}

@@ -32,7 +32,7 @@ DRUM = {
         {"shape": "outlet", "name": "hole", "point": [0.0, 0.27], "normal": [0.0, -1.0]},
     ],
     "time": {"step": 2e-3, "steps": 60},
-    "solver": {"tolerance": 2e-2, "method": "nscdd", "max_iterations": 1000},
+    "solver": {"criterion": "residual", "tolerance": 2e-2, "method": "nscdd", "max_iterations": 1000},
     "decomposition": {"partition": "metis", "subdomains": 6, "repartition_every": 13, "repartition_imbalance": 1.3},
     "output": {"every": 6, "trace": True, "checkpoint_every": 1},
 }
