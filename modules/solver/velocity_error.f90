@@ -74,7 +74,7 @@ module gravier_velocity_error
   end type error_part_t
 
   type :: velocity_error_t
-    !> mass of the grains in contact [kg]
+    !> mass of the grains in contact, or of all that can move where there are none [kg]
     real(dp) :: mass = 0.0_dp
     !> whether rest is admissible, so that C is a bound
     logical :: rest_is_admissible = .false.
@@ -114,7 +114,8 @@ contains
   subroutine velocity_error_start(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp) :: parts(1, size(problem%sub)), sums(1)
+    !> mass of the grains, of all bodies that can move
+    real(dp) :: parts(2, size(problem%sub)), sums(2), heavy
     logical :: moves
     integer :: s, b
 
@@ -123,8 +124,11 @@ contains
     moves = .false.
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), nd => problem%kernels%nd)
-        do b = 1, sub%n_grains
-          parts(1, s) = parts(1, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+        do b = 1, sub%n_bodies
+          if (.not. any(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
+          heavy = 1.0_dp/(maxval(sub%inverse_mass(1:nd, b))*sub%multiplicity(b))
+          if (b <= sub%n_grains) parts(1, s) = parts(1, s) + heavy
+          parts(2, s) = parts(2, s) + heavy
         end do
         moves = moves .or. any(abs(sub%v_free(:, sub%n_bodies + 1:)) > 0.0_dp)
         if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
@@ -133,7 +137,7 @@ contains
       end associate
     end do
     call problem%comm%sum_parts(parts, sums)
-    self%mass = sums(1)
+    self%mass = merge(sums(1), sums(2), sums(1) > 0.0_dp)
     self%rest_is_admissible = .not. problem%comm%any_true(moves)
   end subroutine velocity_error_start
 
@@ -273,7 +277,8 @@ contains
     call stop_timer(phase_reduction)
     self%largest_violation = sqrt(largest(1))
     if (iteration >= settled .and. self%most_depth < 0) call self%find_depth(problem)
-    self%projection = sqrt(projection_of(sums(1:n_tests), sums(n_powers + 1:))/self%mass)
+    self%projection = 0.0_dp
+    if (self%mass > 0.0_dp) self%projection = sqrt(projection_of(sums(1:n_tests), sums(n_powers + 1:))/self%mass)
     self%mean_violation = 0.0_dp
     if (sums(n_powers) > 0.0_dp) self%mean_violation = sqrt(max(0.0_dp, sums(n_tests + 1))/sums(n_powers))
 
@@ -403,7 +408,7 @@ contains
       self%largest_violation = max(self%largest_violation, abs(sinking))
       squares = squares + sums(2*n + l)*sinking**2
     end do
-    self%levels = sqrt(squares/self%mass)
+    if (self%mass > 0.0_dp) self%levels = sqrt(squares/self%mass)
   end subroutine velocity_error_add_levels
 
   !> Depth of every body: contacts to the nearest boundary that supports, over contacts that press or are closed; in parts without
