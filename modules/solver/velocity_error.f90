@@ -19,7 +19,7 @@
 !>      at rest. The estimate is the smaller of E and C.
 !> All are divided by the root of the mass. See doc/theory.md, section 24.
 module gravier_velocity_error
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes, n_tests, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -45,7 +45,7 @@ module gravier_velocity_error
   integer, parameter :: n_products = n_tests*(n_tests + 1)/2
   !> numbers before them
   integer, parameter :: n_powers = n_tests + 2
-  !> times the depth and the mean violation, what the estimate is at most; iterations before which it is not asked for
+  !> the estimate is at most so many times the depth and the mean violation; the iteration from which on the depth is found for that
   real(dp), parameter :: most_waves = 2.0_dp
   integer, parameter :: settled = 20
   !> share of the largest free speed below which the shift of a closed contact is rounding of places
