@@ -29,7 +29,7 @@ module gravier_layered_start
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
   !> relative change of the impulses of a layer by a sweep at which the layer is done; layers above whose number it falls with the
   !> cube, because each hands its error on; sweeps of a layer at least and at most
-  real(dp), parameter :: change_allowed = 1.5e-3_dp, few_layers = 12.0_dp
+  real(dp), parameter :: change_allowed = 9.0e-4_dp, few_layers = 12.0_dp
   integer, parameter :: least_sweeps = 20, most_sweeps = 200
 
   !> What one subdomain holds while the layers are gone through.
