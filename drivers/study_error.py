@@ -444,7 +444,7 @@ def main():
     if "rest" in parts:
         failures += study_rest(at_rest(options.quick), out, 100 if options.quick else 500, options.beside)
     if "cost" in parts:
-        failures += study_cost(out, (4, 8) if options.quick else HEIGHTS, 6 if options.quick else 10, DIAMETER, STEP, measure)
+        failures += study_cost(out, (4, 8) if options.quick else HEIGHTS, 6 if options.quick else 14, DIAMETER, STEP, measure)
     if "strength" in parts:
         failures += study_strength(out, 100 if options.quick else 0)
     print(f"\n{time.time() - started:.0f} s; tables in {options.out}: " + ", ".join(sorted(path.name for path in out.glob("error*.csv"))))

@@ -11,7 +11,7 @@
 !>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
 !>      L^2 = sum m_l e_l^2.
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
-!>      (gravier_layered_start) long waves are gone, and a = 1.3.
+!>      (gravier_layered_start) long waves are gone, and a = 1.7.
 !>      Where groups of contacts creep, test impulses of little motion make E too large. The mean violation, each contact weighed by
 !>      r_n, over as many contacts as the depth D is long is more than any wave can be: E is at most 2 D sqrt(sum r_n |w|^2/sum r_n).
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
@@ -31,7 +31,7 @@ module gravier_velocity_error
   public :: velocity_error_t, copies_ready, violations_allowed
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
-  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.3_dp, cosine = 0.65_dp
+  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp, cosine = 0.65_dp
   !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
