@@ -65,6 +65,7 @@ contains
   subroutine report_failure()
     if (.not. allocated(error)) return
     if (comm%rank == 0) write (error_unit, "(a)") "gravier_columns: error: "//error%message
+    flush (error_unit)
     status = error%status
   end subroutine report_failure
 

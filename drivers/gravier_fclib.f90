@@ -60,6 +60,7 @@ program gravier_fclib
   end if
   if (allocated(error)) then
     if (comm%rank == 0) write (error_unit, "(a)") "gravier_fclib: error: "//error%message
+    flush (error_unit)
     status = error%status
   end if
   call comm%free()
