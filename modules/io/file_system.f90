@@ -13,7 +13,7 @@ module gravier_file_system
   implicit none
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file, directory_of, on_terminal, host_name
+  public :: extend_file, replace_file, on_terminal, host_name
   public :: path_t, add_path, list_files
   public :: identity_t, identity_of, identity_of_open, is_device
 
@@ -323,7 +323,6 @@ contains
     if (.not. allocated(error)) number = sync_to_disk(directory_of(to))
   end subroutine replace_file
 
-  !> The directory that a path names a file in, with a slash at its end where the path has one.
   pure function directory_of(path) result(directory)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: directory
