@@ -36,6 +36,8 @@ module gravier_velocity_error
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
   real(dp), parameter :: violations_allowed = 5.0_dp
+  !> times the error allowed by which what lies above a level may sink
+  real(dp), parameter :: sinking_allowed = 0.25_dp
   !> share of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> without momentum, ratio between the iterations at which impulses are copied, and the first of them
@@ -82,6 +84,8 @@ module gravier_velocity_error
     real(dp) :: mean_violation = 0.0_dp
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
+    !> largest |e_l| of a level, by the last `add_levels`; 0 since `bound` [m/s]
+    real(dp) :: fastest_level = 0.0_dp
     !> largest depth; negative while it is not known
     integer :: most_depth = -1
     !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
@@ -162,6 +166,7 @@ contains
     self%projection = unknown
     self%levels = 0.0_dp
     self%largest_violation = 0.0_dp
+    self%fastest_level = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
@@ -193,7 +198,7 @@ contains
   !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
-    criterion = max(self%largest_violation/violations_allowed, &
+    criterion = max(self%largest_violation/violations_allowed, self%fastest_level/sinking_allowed, &
       & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
   end function velocity_error_criterion
 
@@ -446,7 +451,7 @@ contains
     squares = 0.0_dp
     do l = 1, n
       if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
-      self%largest_violation = max(self%largest_violation, abs(sinking))
+      self%fastest_level = max(self%fastest_level, abs(sinking))
       squares = squares + sums(2*n + l)*sinking**2
     end do
     if (self%mass > 0.0_dp) self%levels = sqrt(squares/self%mass)
