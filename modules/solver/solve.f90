@@ -126,7 +126,7 @@ contains
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
     call start_timer(phase_setup)
     call scheme%start(problem, error)
-    if (.not. allocated(error)) call velocity%start(problem)
+    if (.not. allocated(error)) call velocity%start(problem, control%accuracy*problem%error_scale)
     call stop_timer(phase_setup)
     if (allocated(error)) return
     report%start_seconds = clock() - began
@@ -223,15 +223,15 @@ contains
       is_met = .not. report%residual > 0.0_dp
       if (is_met) return
       if (.not. velocity%is_assessed) then
-        if (velocity%rests(limit)) then
-          is_met = velocity%excludes_violations(problem, limit)
+        if (velocity%rests()) then
+          is_met = velocity%excludes_violations(problem)
           if (is_met) return
         else if (report%iterations < copies_ready) then
           return
         end if
         call velocity%assess(problem, scheme, report%iterations, report%residual, defect)
       end if
-      if (velocity%criterion() <= limit .and. .not. velocity%rests(limit)) call velocity%add_levels(problem)
+      if (velocity%criterion() <= limit .and. .not. velocity%rests()) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
       is_met = velocity%criterion() <= limit
     end function velocity_is_met

@@ -36,8 +36,8 @@ module gravier_velocity_error
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
   real(dp), parameter :: violations_allowed = 5.0_dp
-  !> times the error allowed by which what lies above a level may sink
-  real(dp), parameter :: sinking_allowed = 0.25_dp
+  !> times the error allowed by which what lies above a level may sink where what moves is at most so many times the error allowed
+  real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
   !> share of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> without momentum, ratio between the iterations at which impulses are copied, and the first of them
@@ -74,6 +74,8 @@ module gravier_velocity_error
   type :: velocity_error_t
     !> mass of the grains in contact, or of all that can move where there are none [kg]
     real(dp) :: mass = 0.0_dp
+    !> error allowed [m/s]
+    real(dp), private :: allowed = 0.0_dp
     !> whether Y, the mean and the largest violation are known
     logical :: is_assessed = .false.
     !> C, Y and L, as far as they are known, by the last `bound` or `assess` and `add_levels` [m/s]
@@ -110,14 +112,17 @@ module gravier_velocity_error
 contains
 
   !> Make ready for a solve. Collective.
-  subroutine velocity_error_start(self, problem)
+  subroutine velocity_error_start(self, problem, allowed)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    !> error [m/s]
+    real(dp), intent(in) :: allowed
     !> mass of the grains, of all bodies that can move
     real(dp) :: parts(2, size(problem%sub)), sums(2), heavy
     logical :: moves
     integer :: s, b
 
+    self%allowed = allowed
     allocate (self%part(size(problem%sub)))
     parts(:, :) = 0.0_dp
     moves = .false.
@@ -171,13 +176,11 @@ contains
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
-  !> Whether no contact violates its law by more than what is allowed where the error may be `limit`, told by the velocities of the
+  !> Whether no contact violates its law by more than what is allowed, told by the velocities of the
   !> bodies alone: where everything prescribed is at rest, a violation is at most twice the largest of them. Collective.
-  logical function velocity_error_excludes_violations(self, problem, limit) result(excludes)
+  logical function velocity_error_excludes_violations(self, problem) result(excludes)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    !> [m/s]
-    real(dp), intent(in) :: limit
     real(dp) :: fastest, rim
     integer :: s, b
 
@@ -191,15 +194,16 @@ contains
         end do
       end associate
     end do
-    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*limit
+    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*self%allowed
   end function velocity_error_excludes_violations
 
   !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
   !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
-    criterion = max(self%largest_violation/violations_allowed, self%fastest_level/sinking_allowed, &
+    criterion = max(self%largest_violation/violations_allowed, &
       & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
+    if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%fastest_level/sinking_allowed)
   end function velocity_error_criterion
 
   !> E with a weight on L, and at most D times the mean violation, so many times, where the depth D is known [m/s].
@@ -213,11 +217,9 @@ contains
   end function velocity_error_wave
 
   !> Whether C alone says that what moves is no more than what may where all could rest.
-  pure logical function velocity_error_rests(self, limit) result(rests)
+  pure logical function velocity_error_rests(self) result(rests)
     class(velocity_error_t), intent(in) :: self
-    !> error allowed [m/s]
-    real(dp), intent(in) :: limit
-    rests = self%bound_by_rest <= share_at_rest*limit
+    rests = self%bound_by_rest <= share_at_rest*self%allowed
   end function velocity_error_rests
 
   !> The smaller of E and C [m/s].

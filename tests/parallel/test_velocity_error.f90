@@ -120,7 +120,7 @@ contains
     real(dp) :: residual, defect, alone, alone_defect
 
     call make(count, n_subdomains, sim)
-    call velocity%start(sim%problem)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
     call check(sim%problem%rest_is_admissible, "rest is admissible on a ground at rest")
     call check_close(velocity%mass, count*mass, 1e-12_dp*count*mass, "mass")
     call set_impulses(sim%problem, count, 0.9_dp)
@@ -149,7 +149,7 @@ contains
     real(dp) :: residual, defect
 
     call make(count, 4, sim)
-    call velocity%start(sim%problem)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
     call set_impulses(sim%problem, count, 1.0_dp)
     call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
     call velocity%add_levels(sim%problem)
@@ -167,7 +167,7 @@ contains
     real(dp) :: residual, defect, sweeps
 
     call make(count, n_subdomains, sim)
-    call velocity%start(sim%problem)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
     call carry_loads(sim%problem, 25.0_dp, sim%scheme%work, sweeps)
     call check(sweeps >= 20.0_dp .and. sweeps <= 1.5_dp*200.0_dp, "sweeps of a pass: "//to_text(sweeps, 3))
     call sim%problem%evaluate()
