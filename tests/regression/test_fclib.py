@@ -359,6 +359,12 @@ class Fclib(RunTestCase):
         for method in ("newton", "auto"):
             self.solve("a.h5", "--method", method, "--csv", "results.csv", status=3)
             self.assertEqual(read_table(self.path("results.csv"))["verdict"], ["not_converged"])
+        # proximal points that are found at once count: the limit holds wherever the steps end
+        self.solve("a.h5", "--method", "newton", "--csv", "results.csv", status=3)
+        steps = int(read_table(self.path("results.csv"))["newton_steps"][0])
+        for limit in range(1, steps):
+            self.solve("a.h5", "--method", "newton", "--max-iterations", str(limit), "--csv", "results.csv", status=3)
+            self.assertEqual(read_table(self.path("results.csv"))["newton_steps"], [str(limit)])
 
     def test_huge_impulses_are_no_solution(self):
         # two walls that move alike: the start is in balance, but q is lost beside it
