@@ -16,6 +16,8 @@ module gravier_fclib_study
     type(fclib_local_t), allocatable :: local
     type(delassus_t) :: packed
     type(multipliers_t) :: multipliers
+    !> W is that of the file, entry by entry
+    logical :: same_matrix = .false.
   end type problem_t
 
   !> solves shorter than this are repeated for so long, and the median of their times is taken [s]
@@ -38,7 +40,10 @@ contains
     if (allocated(global)) then
       allocate (problem%local)
       call condense(global, problem%local, problem%multipliers, reason)
+      if (allocated(global%r)) problem%local%r = global%r
+      problem%local%remark = global%remark
     else
+      problem%same_matrix = problem%local%remark == "" .and. size(problem%local%s) == 0
       call eliminate_constraints(problem%local, problem%multipliers, reason)
     end if
     associate (local => problem%local)

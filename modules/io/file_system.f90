@@ -9,8 +9,20 @@ module gravier_file_system
   implicit none
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file, on_terminal
+  public :: extend_file, replace_file, on_terminal, place_t, place_of
   public :: path_t, add_path, list_files, text_file_t, text_at
+
+  !> Where a path leads, whatever it is spelled like: two places are equal (==) where the paths lead to one file.
+  type :: place_t
+    private
+    !> of the file, or of the nearest directory above it that is there
+    integer(i8) :: device = 0, inode = 0
+    !> the way on from there, to what is not there yet
+    character(len=:), allocatable :: rest
+  contains
+    procedure, private :: equals => place_equals
+    generic :: operator(==) => equals
+  end type place_t
 
   !> A path of any length.
   type :: path_t
@@ -44,6 +56,10 @@ module gravier_file_system
   integer, parameter :: glob_words = 16
   !> processes between a rank and its launcher, at most
   integer, parameter :: highest_ancestor = 16
+  !> of the C library's statx: paths from the working directory on; what is asked for; more words than its struct has, on every
+  !> processor the same, and those of the inode and of the device
+  integer(c_int), parameter :: at_fdcwd = -100, statx_ino = 256
+  integer, parameter :: statx_words = 64, inode_word = 5, device_word = 18
   !> permissions before the user's umask
   integer(c_int), parameter :: file_mode = int(o"666", c_int), directory_mode = int(o"777", c_int)
 
@@ -134,6 +150,14 @@ module gravier_file_system
       integer(c_int), value :: descriptor
       integer(c_int64_t), intent(inout) :: status(*)
     end function c_fstatvfs
+
+    integer(c_int) function c_statx(directory, path, flags, mask, status) bind(C, name="statx")
+      import :: c_int, c_int64_t, c_char
+      implicit none
+      integer(c_int), value :: directory, flags, mask
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t), intent(inout) :: status(*)
+    end function c_statx
 
     integer(c_int) function c_glob(pattern, flags, on_error, found) bind(C, name="glob")
       import :: c_int, c_int64_t, c_char, c_ptr
@@ -366,6 +390,42 @@ contains
     if (stat == 0) read (row(index(row, ")", back=.true.) + 1:), *, iostat=stat) state, parent
     if (stat /= 0) parent = 0
   end function parent_of
+
+  !> Where a path leads: the file by its device and inode, links followed; for a file that is not there yet, the nearest directory
+  !> above it and the names on the way.
+  function place_of(path) result(place)
+    character(len=*), intent(in) :: path
+    type(place_t) :: place
+    character(len=:), allocatable :: here, name
+    integer(c_int64_t) :: status(statx_words)
+    integer :: cut
+
+    here = path
+    place%rest = ""
+    do
+      status(:) = 0
+      if (c_statx(at_fdcwd, c_text(here), 0_c_int, statx_ino, status) == 0) exit
+      if (here == "." .or. here == "/" .or. here == "") exit
+      cut = index(here, "/", back=.true.)
+      name = here(cut + 1:)
+      if (name /= "" .and. name /= ".") place%rest = "/"//name//place%rest
+      if (cut == 0) then
+        here = "."
+      else
+        here = here(1:max(1, cut - 1))
+      end if
+    end do
+    place%device = int(status(device_word), i8)
+    place%inode = int(status(inode_word), i8)
+  end function place_of
+
+  pure logical function place_equals(self, other) result(equal)
+    class(place_t), intent(in) :: self
+    type(place_t), intent(in) :: other
+
+    equal = self%inode == other%inode .and. self%device == other%device
+    if (equal) equal = self%rest == other%rest
+  end function place_equals
 
   !> Length of a file in bytes, 0 when there is none.
   integer(i8) function file_length(path) result(length)
