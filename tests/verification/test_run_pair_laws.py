@@ -64,6 +64,11 @@ class Materials(SmallScene):
                        directory=self.here("unknown"))
         self.assert_status(run, 2)
         self.assertIn("three.csv: id 8: material 3: expected 1 to 2, the number of a &material of case.nml", run.stderr)
+        for options in ((), ("--check",)):
+            run = run_case({"scene": {"bodies": "file", "bodies_file": path}, "time": {"step": 1e-3, "steps": 1}},
+                           directory=self.here("none"), options=options)
+            self.assert_status(run, 2)
+            self.assertEqual(run.stderr, f"gravier: error: {path}: id 8: material 3: expected 1, since case.nml has no &material\n")
 
 
 class SlipDependentFriction(SmallScene):
