@@ -401,11 +401,12 @@ contains
     integer :: cut
 
     here = path
+    if (here == "") here = "."
     place%rest = ""
     do
       status(:) = 0
       if (c_statx(at_fdcwd, c_text(here), 0_c_int, statx_ino, status) == 0) exit
-      if (here == "." .or. here == "/" .or. here == "") exit
+      if (here == "." .or. here == "/") exit
       cut = index(here, "/", back=.true.)
       name = here(cut + 1:)
       if (name /= "" .and. name /= ".") place%rest = "/"//name//place%rest

@@ -4,7 +4,7 @@ program test_io_file_system
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, status_input, status_failure
   use gravier_file_system, only: make_directory, remove_directory, rename_file, replace_file, remove_file, check_readable, &
-    & check_creatable, reserve_space, extend_file, text_file_t
+    & check_creatable, reserve_space, extend_file, text_file_t, place_t, place_of
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=:), allocatable :: here
@@ -14,6 +14,7 @@ program test_io_file_system
   call test_directories()
   call test_text_files()
   call test_renames()
+  call test_places()
   call test_removing_directories()
   call test_replacing()
   call test_reservation()
@@ -58,6 +59,27 @@ contains
       call check(.true., name)
     end if
   end subroutine expect_none
+
+  !> A file is where its device and inode are, whatever the path; what is not there yet is where it would be.
+  subroutine test_places()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+    type(place_t) :: place
+
+    call make_directory(here//"/places/deep", error)
+    call file%create(here//"/places/file", error)
+    call file%close(error)
+    call expect_none(error, "a file to find")
+    place = place_of(here//"/places/file")
+    call check(place == place_of(here//"//places/./deep/../file"), "another spelling of a file")
+    call check(.not. place == place_of(here//"/places/deep"), "a file and a directory")
+    call check(.not. place == place_of(here//"/places/new"), "a file and one that is not there")
+    place = place_of(here//"/places/new/file")
+    call check(place == place_of(here//"/places/deep/../new/./file"), "another spelling of a file that is not there")
+    call check(.not. place == place_of(here//"/places/deep/new/file"), "two directories that are not there")
+    call check(place_of("new") == place_of("./new"), "from the working directory on")
+    call check(place_of("") == place_of("."), "no path")
+  end subroutine test_places
 
   subroutine test_directories()
     type(error_t), allocatable :: error

@@ -249,7 +249,7 @@ class Bonds(SmallScene):
 
     def test_broken_for_good(self):
         """A disk is torn from a ceiling and thrown back at it: the bond does not form again."""
-        record = self.play("torn", [Grain((0, -RADIUS))], [plane((0, 0), (0, -1), material="b")], (0, 0), 200,
+        record = self.play("torn", [Grain((0, -RADIUS))], [plane((0, 0), (0, -1), material="b")], None, 200,
                            scene={"gravity_table": "g.csv"}, files={"g.csv": "time,gx,gy\n0,0,-9\n0.05,0,-9\n0.0501,0,9\n0.3,0,9\n0.301,0,-5\n1,0,-5\n"},
                            material=named("a", "b"),
                            law=[law(("a", "b"), "bonded", bond_strength=8.0 * MASS, bond_friction=0.5, bond_distance=1e-6)])
