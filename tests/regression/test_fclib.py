@@ -623,6 +623,8 @@ class Fclib(RunTestCase):
             (("a.h5", "--method", "simplex"), "--method 'simplex': expected auto, nlgs, momentum, newton, or all"),
             (("a.h5", "--method", "nlgs,"), "--method 'nlgs,': expected auto"),
             (("a.h5", "--tolerance", "0"), "--tolerance '0': expected a finite real number > 0"),
+            (("a.h5", "--tolerance", "1-1"), "--tolerance '1-1': expected a finite real number > 0"),
+            (("a.h5", "--max-iterations", "2147483648"), "--max-iterations '2147483648': expected an integer >= 1"),
             (("a.h5", "--max-iterations", "-1"), "--max-iterations '-1': expected an integer >= 1"),
             (("a.h5", "--csv"), "--csv '': expected a path"),
             (("a.h5", "--write", "."), "--write '.': expected another directory than that of a.h5"),
