@@ -9,6 +9,7 @@ module gravier_fclib_file
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns, half_of, mirrored
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
+  use gravier_magnitude, only: is_bounded
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
@@ -251,8 +252,22 @@ contains
     values(:) = 0.0_dp
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
-    if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
+    call check_numbers(source, dataset, values, error)
   end subroutine read_vector
+
+  !> Refuse numbers that are not finite, or beyond what products of a few of them survive.
+  subroutine check_numbers(source, dataset, values, error)
+    type(source_t), intent(in) :: source
+    character(len=*), intent(in) :: dataset
+    real(dp), intent(in), contiguous :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. all(is_finite(values))) then
+      call source%refuse(dataset//": expected finite numbers", error)
+    else if (.not. all(is_bounded(values))) then
+      call source%refuse(dataset//": expected numbers of at most 1e30 in size", error)
+    end if
+  end subroutine check_numbers
 
   !> A vector of at least n integers, of which the first n are kept, each in [lowest, highest].
   subroutine read_indices(source, dataset, n, lowest, highest, values, error)
@@ -386,7 +401,7 @@ contains
     values(:) = 0.0_dp
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
-    if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
+    call check_numbers(source, dataset, values, error)
   end subroutine read_entries
 
   !> Write a local problem without constraints, W by compressed rows, and its solution if there is one. Collective, the same on all

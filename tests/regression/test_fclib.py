@@ -522,6 +522,11 @@ class Fclib(RunTestCase):
             (replace("W/x", None), "/fclib_local/W/x: missing"),
             (replace("W/x", np.full(144, np.inf)), "/fclib_local/W/x: expected finite numbers"),
             (replace("W/x", np.ones(100)), "/fclib_local/W/x"),
+            # what these are measured by is lost beside 0 or overflows
+            (replace("W/x", w.ravel() * 1e200), "/fclib_local/W/x: expected numbers of at most 1e30 in size"),
+            (replace("W/x", w.ravel() * 1e-200), "contact 1: mean diagonal of W is "),
+            (replace("vectors/q", q * 1e200), "/fclib_local/vectors/q: expected numbers of at most 1e30 in size"),
+            (replace("vectors/q", q * 1e-200), "velocities without impulses of at most "),
             (replace("W/m", np.array([11])), "/fclib_local/W: a matrix of 11 rows and 12 columns: expected 12 and 12"),
             (replace("W/nz", np.array([-3])), "/fclib_local/W/nz = -3: expected -2 (rows), -1 (columns)"),
             (replace("W/i", np.full(144, 12)), "/fclib_local/W/i: expected numbers from 0 to 11"),
