@@ -345,7 +345,7 @@ contains
           call take_velocities(problem, states(:, n))
           n = n + 1
         end if
-        call velocity%keep_copy(problem, k)
+        call velocity%keep_copy(problem, scheme, k)
       end do
     end associate
     call solve_tightly(plan, simulation, reference, error)
@@ -369,12 +369,10 @@ contains
     row%iterations = iterations
     associate (problem => simulation%problem)
       call problem%evaluate()
-      call problem%residual(row%residual, defect)
-      call velocity%bound(problem)
-      row%bound = merge(velocity%bound_by_rest, -1.0_dp, velocity%rest_is_admissible)
+      call velocity%assess(problem, simulation%scheme, iterations, row%residual, defect)
+      row%bound = merge(velocity%bound_by_rest, -1.0_dp, problem%rest_is_admissible)
       row%mass = velocity%mass
       if (.not. row%residual > 0.0_dp) return
-      call velocity%project(problem, simulation%scheme, iterations)
       ! a solve finds the depths when it asks for them
       velocity%most_depth = -1
       call velocity%add_levels(problem)
@@ -507,7 +505,7 @@ contains
             call take_velocities(problem, states(:, n))
           end if
         end if
-        call velocity%keep_copy(problem, k)
+        call velocity%keep_copy(problem, scheme, k)
       end do
       scheme%momentum%on = accelerated
       if (allocated(error)) return

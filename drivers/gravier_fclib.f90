@@ -6,6 +6,8 @@ program gravier_fclib
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: path_t, add_path, list_files, make_directory
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
   use gravier_fclib_file, only: write_fclib_local, name_of_solution, name_of_guess
@@ -59,6 +61,7 @@ program gravier_fclib
   end if
   if (allocated(error)) then
     if (comm%rank == 0) write (error_unit, "(a)") "gravier_fclib: error: "//error%message
+    flush (error_unit)
     status = error%status
   end if
   call comm%free()
@@ -179,17 +182,16 @@ contains
     if (size(files) == before) call raise(error, status_input, path//": expected a directory with files *.hdf5 or *.h5")
   end subroutine add_files
 
-  !> Solve every problem by every method. All files are read before the first is solved. Collective.
+  !> Read every problem, take the places that are written to, then solve. Collective.
   subroutine run_study(options, files, status, error)
     type(options_t), intent(in) :: options
     type(path_t), intent(in) :: files(:)
     integer, intent(inout) :: status
     type(error_t), allocatable, intent(inout) :: error
     type(problem_t) :: problem
-    type(result_t), allocatable :: results(:, :)
-    type(csv_writer_t) :: table
+    type(output_lock_t) :: directory_lock, csv_lock, profile_lock
     character(len=:), allocatable :: notes
-    integer :: p, failed, unbounded
+    integer :: p
 
     if (comm%rank == 0) call check_outputs(files, options%csv, options%profile, options%directory, error)
     call comm%agree(error)
@@ -199,9 +201,32 @@ contains
       if (allocated(error)) return
       notes = notes//notes_on(options, files(p)%text, problem)
     end do
+    if (comm%rank == 0) write (error_unit, "(a)", advance="no") notes
+    if (options%directory /= "") then
+      if (comm%rank == 0) call make_directory(options%directory, error)
+      call comm%agree(error)
+      call directory_lock%take_directory(comm, options%directory, "gravier_fclib", error)
+    end if
+    if (options%csv /= "") call csv_lock%take_file(comm, options%csv, "gravier_fclib", error)
+    if (options%profile /= "") call profile_lock%take_file(comm, options%profile, "gravier_fclib", error)
+    if (.not. allocated(error)) call solve_all(options, files, status, error)
+    call directory_lock%release()
+    call csv_lock%release()
+    call profile_lock%release()
+  end subroutine run_study
+
+  !> Solve every problem by every method, and write what was asked for. Collective.
+  subroutine solve_all(options, files, status, error)
+    type(options_t), intent(in) :: options
+    type(path_t), intent(in) :: files(:)
+    integer, intent(inout) :: status
+    type(error_t), allocatable, intent(inout) :: error
+    type(problem_t) :: problem
+    type(result_t), allocatable :: results(:, :)
+    type(csv_writer_t) :: table
+    integer :: p, failed, unbounded
+
     if (comm%rank == 0) then
-      write (error_unit, "(a)", advance="no") notes
-      if (options%directory /= "") call make_directory(options%directory, error)
       if (options%csv /= "") call open_results(table, options%csv, error)
       if (.not. allocated(error)) call print_heading()
     end if
@@ -218,6 +243,7 @@ contains
     if (comm%rank == 0) then
       if (table%is_open()) call table%close(error)
       if (options%profile /= "") call write_profile(options%profile, options%methods, results, error)
+      call check_own_files(error)
       if (failed > 0) write (output_unit, "(a)") "*** "//to_text(failed)//" of "//to_text(size(results))// &
         & " solves did NOT reach the tolerance "//to_text(options%tolerance, 2)
       if (unbounded > 0) write (output_unit, "(a)") "*** "//to_text(unbounded)//" of "//to_text(size(results))// &
@@ -225,7 +251,7 @@ contains
       flush (output_unit)
     end if
     call comm%agree(error)
-  end subroutine run_study
+  end subroutine solve_all
 
   !> Lines to say of a problem once all files are read: what was read otherwise than it stands, and that --warm has nothing to start from.
   function notes_on(options, path, problem) result(notes)

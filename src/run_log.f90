@@ -6,7 +6,8 @@ module gravier_run_log
   use gravier_text, only: to_text, growing_text_t
   use gravier_communicator, only: communicator_t, mpi_library
   use gravier_timers, only: gather_timers, phase_names, n_phases
-  use gravier_file_system, only: text_file_t, on_terminal
+  use gravier_file_system, only: on_terminal
+  use gravier_text_file, only: text_file_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
@@ -85,10 +86,10 @@ contains
     if (self%comm%rank /= 0) return
     if (continued) then
       call self%file%continue(path, error)
+      call self%file%append(self%early%get(), error)
     else
-      call self%file%create(path, error)
+      call self%file%create(path, self%early%get(), error)
     end if
-    call self%file%append(self%early%get(), error)
     self%early = growing_text_t()
   end subroutine run_log_open
 
@@ -497,6 +498,8 @@ contains
 
     if (solver%criterion == "error") then
       text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
+    else if (solver%criterion == "residual" .and. solve%status == solve_unbounded .and. solve%residual <= solver%tolerance) then
+      text = "impulses larger than any loads can make"
     else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
       text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solve%violation > solve%violation_allowed .and. (solve%status == solve_unbounded .or. &

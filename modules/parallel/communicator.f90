@@ -2,6 +2,7 @@
 !> real sums are exact, and maxima and integer sums are exact by nature.
 module gravier_communicator
   use, intrinsic :: iso_c_binding, only: c_int
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, MPI_Finalize, &
     & MPI_Comm_rank, MPI_Comm_size, MPI_Comm_dup, MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, &
     & MPI_Ibarrier, MPI_Test, MPI_Get_library_version, MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, &
@@ -182,6 +183,14 @@ contains
     integer(i8), allocatable :: words(:, :), total(:, :)
     integer :: i, s
 
+    if (self%size == 1 .and. size(parts, 2) == 1) then
+      ! one term is its own sum
+      do i = 1, size(sums)
+        sums(i) = parts(i, 1)
+        if (.not. ieee_is_finite(sums(i))) sums(i) = ieee_value(sums(i), ieee_quiet_nan)
+      end do
+      return
+    end if
     allocate (words(exact_sum_words, size(sums)), source=0_i8)
     allocate (total(exact_sum_words, size(sums)))
     do s = 1, size(parts, 2)

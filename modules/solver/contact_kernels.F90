@@ -27,13 +27,11 @@ module gravier_contact_kernels
   implicit none
   private
   public :: kernels_t, contact_jacobian, global_impulse, global_moment, tangents, local_operator
-  public :: lanes, n_tests, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors, project_on_cones
+  public :: lanes, n_blocks, block_of, lane_of, contact_tangents, project_tangential, tangential_vectors, project_on_cones
   public :: moment_vectors, project_moments, rolling_radius
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
-  !> test impulses of the estimate of the velocity error
-  integer, parameter :: n_tests = 5
 
   ! rows of `hot` that hold 1/W_nn, 1/W_tt and 1/W_rr
   integer, parameter :: operators_2d_frictionless(1) = [4], operators_3d_frictionless(1) = [5]
@@ -48,12 +46,6 @@ module gravier_contact_kernels
   integer, parameter :: own_2d_friction_shift(2) = [1, 2], own_3d_friction_shift(3) = [1, 2, 2]
   integer, parameter :: own_2d_friction_roll(3) = [1, 2, 3], own_3d_friction_roll(6) = [1, 2, 2, 3, 3, 3]
   integer, parameter :: own_2d_friction_full(3) = [1, 2, 3], own_3d_friction_full(6) = [1, 2, 2, 3, 3, 3]
-
-  ! numbers that the load of a contact on its candidate takes
-  integer, parameter :: loads_2d_frictionless = 2, loads_3d_frictionless = 3, loads_2d_friction = 3, loads_3d_friction = 6
-  integer, parameter :: loads_2d_friction_shift = 3, loads_3d_friction_shift = 6
-  integer, parameter :: loads_2d_friction_roll = 4, loads_3d_friction_roll = 9
-  integer, parameter :: loads_2d_friction_full = 4, loads_3d_friction_full = 9
 
   abstract interface
     !> One Gauss-Seidel sweep: updates velocity and impulse; sums = (sum of |r - y|^2, sum of |r|^2) over the contacts, y being
@@ -141,22 +133,21 @@ module gravier_contact_kernels
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
       real(dp), intent(out) :: sums(3)
     end subroutine residual_kernel
-    !> What the estimate of the velocity error needs (gravier_velocity_error): n_tests test impulses y of each contact, added to
-    !> `motion` as H y; sums of y . w, y by y, then of r_n |w|^2 and of r_n, w = W (P - r) being the velocity by which a contact misses
-    !> its law, W its undivided local operator; power := r . w. The tests are P - r, r, and r less three earlier impulses. `largest` is raised to the largest
-    !> |w|^2.
-    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, last, recent, old, power, motion, sums, largest)
-      import :: dp, n_tests
+    !> What the estimate of the velocity error needs (gravier_velocity_error), w = W (P - r) being the velocity by which a contact
+    !> misses its law and W its undivided local operator: r . w of each contact, H y of the test impulses P - r and r - previous,
+    !> added to `local` and `recent`, and sums. `largest` is raised to the largest |w|^2.
+    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, previous, power, local, recent, sums, largest)
+      import :: dp
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
-      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :)
-      !> (lanes, nc, blocks)
-      real(dp), intent(in), contiguous :: last(:, :, :), recent(:, :, :), old(:, :, :)
-      !> (lanes, blocks)
+      !> previous: impulses of an earlier iteration (lanes, nc, blocks) [N s]
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :), previous(:, :, :)
+      !> (lanes, blocks) [J]
       real(dp), intent(inout), contiguous :: power(:, :)
-      !> (n_tests, nv, n_columns)
-      real(dp), intent(inout), contiguous :: motion(:, :, :)
-      real(dp), intent(out) :: sums(n_tests + 2)
+      !> (nv, n_columns) [N s, N m s]
+      real(dp), intent(inout), contiguous :: local(:, :), recent(:, :)
+      !> the three of a residual; of y . w with the tests P - r, r and r - previous; of r_n |w|^2 and of r_n
+      real(dp), intent(out) :: sums(8)
       real(dp), intent(inout) :: largest
     end subroutine tests_kernel
   end interface
@@ -651,60 +642,7 @@ contains
 #include "contact_loops.inc"
 #undef OF
 
-  !> Add the loads of the test impulses of a block to those of the bodies.
-  pure subroutine add_motion(nd, pair, hot, load, motion)
-    integer, intent(in) :: nd, pair(2, lanes)
-    !> (lanes, nh); (lanes, n_tests, loads)
-    real(dp), intent(in), contiguous :: hot(:, :), load(:, :, :)
-    real(dp), intent(inout), contiguous :: motion(:, :, :)
-    integer :: q, i, j, d, t, turns
-
-    turns = size(motion, 2) - nd
-    do q = 1, lanes
-      i = pair(1, q)
-      j = pair(2, q)
-      do d = 1, nd
-        do t = 1, n_tests
-          motion(t, d, i) = motion(t, d, i) + load(q, t, d)
-          motion(t, d, j) = motion(t, d, j) - load(q, t, d)
-        end do
-      end do
-      do d = nd + 1, nd + turns
-        do t = 1, n_tests
-          motion(t, d, i) = motion(t, d, i) - hot(q, nd + 4)*load(q, t, d)
-          motion(t, d, j) = motion(t, d, j) - hot(q, nd + 5)*load(q, t, d)
-        end do
-      end do
-      do d = nd + turns + 1, size(load, 3)
-        do t = 1, n_tests
-          motion(t, d - turns, i) = motion(t, d - turns, i) + load(q, t, d)
-          motion(t, d - turns, j) = motion(t, d - turns, j) - load(q, t, d)
-        end do
-      end do
-    end do
-  end subroutine add_motion
-
   ! What the loops of contact_loops.inc do with one block, with the shapes of each law; those with friction are at the end.
-
-  pure subroutine load_2d_frictionless(hot, impulse, load)
-    real(dp), intent(in) :: hot(lanes, 4), impulse(lanes, 1)
-    real(dp), intent(out) :: load(lanes, 2)
-    integer :: d
-
-    do d = 1, 2
-      load(:, d) = impulse(:, 1)*hot(:, d)
-    end do
-  end subroutine load_2d_frictionless
-
-  pure subroutine load_3d_frictionless(hot, impulse, load)
-    real(dp), intent(in) :: hot(lanes, 5), impulse(lanes, 1)
-    real(dp), intent(out) :: load(lanes, 3)
-    integer :: d
-
-    do d = 1, 3
-      load(:, d) = impulse(:, 1)*hot(:, d)
-    end do
-  end subroutine load_3d_frictionless
 
   pure subroutine react_2d_frictionless(pair, hot, impulse, reaction)
     integer, intent(in) :: pair(2, lanes)

@@ -8,7 +8,10 @@ module gravier_contact_problem
   use gravier_contact_kernels, only: kernels_t, local_operator, lanes, n_blocks, lane_of, block_of
   implicit none
   private
-  public :: subproblem_t, contact_problem_t
+  public :: subproblem_t, contact_problem_t, n_residual_sums
+
+  !> sums that a residual is made of, see `take_residual`
+  integer, parameter :: n_residual_sums = 7
 
   !> a defect of so many roundings of the largest term of R^d, a contact, is none
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
@@ -66,7 +69,6 @@ module gravier_contact_problem
     procedure :: local_operator => subproblem_local_operator
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
-    procedure :: find_masses => subproblem_find_masses
     procedure :: product_of => subproblem_product_of
     procedure :: held_impulse => subproblem_held_impulse
   end type subproblem_t
@@ -91,7 +93,10 @@ module gravier_contact_problem
     real(dp) :: impulse_scale = 0.0_dp
     !> share of the squared defect that lies in contacts that sleep, by the last `residual`
     real(dp) :: asleep_share = 0.0_dp
-    !> sum of r_n times the shift, and |V|_M^2 of the bodies in contact, by the last `residual` [J]
+    !> whether everything prescribed is at rest and no contact sends velocities back, so that rest obeys all laws; set by
+    !> gravier_velocity_error
+    logical :: rest_is_admissible = .false.
+    !> sum of r_n times the shift and, where rest is admissible, |V|_M^2 of the bodies in contact, by the last `residual` [J]
     real(dp) :: shift_power = 0.0_dp, kinetic = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors
     real(dp) :: force_scale = 0.0_dp, velocity_scale = 0.0_dp
@@ -104,6 +109,8 @@ module gravier_contact_problem
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
+    procedure :: awake_blocks => contact_problem_awake_blocks
+    procedure :: take_residual => contact_problem_take_residual
     procedure :: wake => contact_problem_wake
     procedure :: rounded_defect => contact_problem_rounded_defect
     procedure :: sum_progress => contact_problem_sum_progress
@@ -198,41 +205,28 @@ contains
     end do
   end subroutine subproblem_multiply_mass
 
-  !> Masses of the components of body `b`, 0 for what cannot move: a copy of a shared body counts with its part.
-  pure subroutine subproblem_find_masses(self, b, masses)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: b
-    !> (nv) [kg, kg m^2]
-    real(dp), intent(out) :: masses(:)
-    real(dp) :: inverse
-    integer :: d, nw
-
-    nw = size(self%inverse_mass, 1)
-    do d = 1, size(masses)
-      if (d > nw) then
-        masses(d) = masses(nw)
-        cycle
-      end if
-      inverse = self%inverse_mass(d, b)
-      masses(d) = 0.0_dp
-      if (inverse > 0.0_dp) masses(d) = 1.0_dp/(inverse*self%multiplicity(b))
-    end do
-  end subroutine subproblem_find_masses
-
   !> (a, b)_M of two velocities of the bodies that can move, a copy of a shared body counting with its part [J].
   pure real(dp) function subproblem_product_of(self, a, b) result(total)
     class(subproblem_t), intent(in) :: self
     !> (nv, n_columns)
     real(dp), intent(in), contiguous :: a(:, :), b(:, :)
-    real(dp) :: masses(size(a, 1))
-    integer :: k, d
+    real(dp) :: part, last
+    integer :: k, d, nw
 
     total = 0.0_dp
+    nw = size(self%inverse_mass, 1)
     do k = 1, self%n_bodies
-      call self%find_masses(k, masses)
-      do d = 1, size(a, 1)
-        total = total + masses(d)*a(d, k)*b(d, k)
+      part = 0.0_dp
+      do d = 1, nw - 1
+        if (self%inverse_mass(d, k) > 0.0_dp) part = part + a(d, k)*b(d, k)/self%inverse_mass(d, k)
       end do
+      ! the last row holds for all components from there on
+      last = 0.0_dp
+      do d = nw, size(a, 1)
+        last = last + a(d, k)*b(d, k)
+      end do
+      if (self%inverse_mass(nw, k) > 0.0_dp) part = part + last/self%inverse_mass(nw, k)
+      total = total + part/self%multiplicity(k)
     end do
   end function subproblem_product_of
 
@@ -338,33 +332,50 @@ contains
     real(dp), intent(out) :: residual
     !> the same, not divided by the norm of the impulses [N s]
     real(dp), intent(out) :: defect
-    real(dp), allocatable :: parts(:, :)
-    real(dp) :: all_sums(merge(7, 4, self%n_asleep > 0)), sums(3)
+    real(dp) :: parts(n_residual_sums, size(self%sub)), sums(n_residual_sums)
     integer :: s
 
-    allocate (parts(size(all_sums), size(self%sub)), source=0.0_dp)
+    parts(:, :) = 0.0_dp
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s), g => n_blocks(merge(self%sub(s)%n_awake, self%sub(s)%n_contacts, self%n_asleep > 0)))
+      associate (sub => self%sub(s), g => self%awake_blocks(s))
         call self%kernels%residual(sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%inverse_mass, sub%v_global, &
           & sub%impulse(:, :, 1:g), parts(1:3, s))
-        parts(4, s) = sub%product_of(sub%v_global, sub%v_global)
         if (g < size(sub%hot, 3)) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
-          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(5:7, s))
+          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(4:6, s))
+        if (self%rest_is_admissible) parts(7, s) = sub%product_of(sub%v_global, sub%v_global)
       end associate
     end do
     call start_timer(phase_reduction)
-    call self%comm%sum_parts(parts, all_sums)
+    call self%comm%sum_parts(parts, sums)
     call stop_timer(phase_reduction)
-    sums(:) = all_sums(1:3)
-    if (self%n_asleep > 0) sums(:) = sums + all_sums(5:7)
+    call self%take_residual(sums, residual, defect)
+  end subroutine contact_problem_residual
+
+  !> Blocks of contacts of subdomain `s` of this rank that do not sleep, the first ones.
+  pure integer function contact_problem_awake_blocks(self, s) result(blocks)
+    class(contact_problem_t), intent(in) :: self
+    integer, intent(in) :: s
+    blocks = n_blocks(merge(self%sub(s)%n_awake, self%sub(s)%n_contacts, self%n_asleep > 0))
+  end function contact_problem_awake_blocks
+
+  !> The residual by its sums over all subdomains, as `residual` returns it.
+  subroutine contact_problem_take_residual(self, all_sums, residual, defect)
+    class(contact_problem_t), intent(inout) :: self
+    !> of the squared defect, of the squared impulses and of r_n times the shift, of contacts that are awake and of those that sleep;
+    !> |V|_M^2 where rest is admissible
+    real(dp), intent(in) :: all_sums(n_residual_sums)
+    real(dp), intent(out) :: residual, defect
+    real(dp) :: sums(3)
+
+    sums(:) = all_sums(1:3) + all_sums(4:6)
     self%shift_power = sums(3)
-    self%kinetic = all_sums(4)
+    self%kinetic = all_sums(7)
     if (.not. all(ieee_is_finite(sums(1:2)))) then
       residual = ieee_value(residual, ieee_quiet_nan)
       defect = residual
       return
     end if
-    if (self%n_asleep > 0) self%asleep_share = all_sums(5)/max(sums(1), tiny(1.0_dp))
+    if (self%n_asleep > 0) self%asleep_share = all_sums(4)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
     self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
     if (defect <= self%rounded_defect()) then
@@ -378,7 +389,7 @@ contains
     else
       residual = 0.0_dp
     end if
-  end subroutine contact_problem_residual
+  end subroutine contact_problem_take_residual
 
   !> A defect that is rounding [N s].
   pure real(dp) function contact_problem_rounded_defect(self) result(defect)

@@ -16,10 +16,11 @@ module gravier_layered_start
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_sweep
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: momentum_t, work_t
   use gravier_sweep_order, only: group_contacts
   use gravier_supports, only: supports_t, find_supports
+  use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   implicit none
   private
   public :: carry_loads
@@ -28,12 +29,8 @@ module gravier_layered_start
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
   !> relative change of the impulses of a layer by a sweep at which the layer is done; layers above whose number it falls with the
   !> cube, because each hands its error on; sweeps of a layer at least and at most
-  real(dp), parameter :: change_allowed = 1.5e-3_dp, few_layers = 12.0_dp
+  real(dp), parameter :: change_allowed = 9.0e-4_dp, few_layers = 12.0_dp
   integer, parameter :: least_sweeps = 20, most_sweeps = 200
-  !> share of the largest free speed below which the shift of a closed contact is rounding of places
-  real(dp), parameter :: rounded = 1.0e-3_dp
-  !> way of what no way leads to
-  real(dp), parameter :: unreached = huge(1.0_dp)
 
   !> What one subdomain holds while the layers are gone through.
   type :: layers_t
@@ -106,6 +103,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     type(layers_t), intent(inout) :: layers(:)
     type(supports_t), allocatable :: supports(:)
+    type(ways_t) :: ways(size(layers))
     !> radii and number of the grains
     real(dp) :: parts(2, size(layers)), sums(2)
     integer :: s
@@ -114,94 +112,17 @@ contains
     do s = 1, size(layers)
       parts(1, s) = sum(problem%sub(s)%radius)
       parts(2, s) = problem%sub(s)%n_grains
-      allocate (layers(s)%way(problem%sub(s)%n_columns))
-      layers(s)%way(:) = merge(0.0_dp, unreached, supports(s)%column)
     end do
     call problem%comm%sum_parts(parts, sums)
-    call spread_ways(problem, 2.0_dp*sums(1)/max(1.0_dp, sums(2)), layers)
-  end subroutine find_ways
-
-  !> Shortest ways from those that are known, over closed contacts, across subdomains. Collective.
-  subroutine spread_ways(problem, diameter, layers)
-    type(contact_problem_t), intent(inout) :: problem
-    !> unit of ways [m]
-    real(dp), intent(in) :: diameter
-    type(layers_t), intent(inout) :: layers(:)
-    real(dp), allocatable :: field(:, :)
-    integer :: s, j
-    logical :: changed, shares
-
-    shares = .false.
+    call list_closed(problem, ways, unit=2.0_dp*sums(1)/max(1.0_dp, sums(2)))
     do s = 1, size(layers)
-      shares = shares .or. problem%shared%part(s)%n_slots > 0
-      call shorten_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, diameter, layers(s)%way)
+      where (supports(s)%column) ways(s)%length = 0.0_dp
     end do
-    if (.not. problem%comm%any_true(shares)) return
-    do
-      do s = 1, size(layers)
-        allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
-        field(1, :) = layers(s)%way
-        call problem%shared%load(s, field)
-        deallocate (field)
-      end do
-      call problem%shared%pass()
-      changed = .false.
-      do s = 1, size(layers)
-        associate (shared => problem%shared%part(s), way => layers(s)%way)
-          shares = .false.
-          do j = 1, shared%n_slots
-            if (.not. shared%recv(1, j) < way(shared%slot_body(j))) cycle
-            way(shared%slot_body(j)) = shared%recv(1, j)
-            shares = .true.
-          end do
-          if (shares) call shorten_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, diameter, way)
-          changed = changed .or. shares
-        end associate
-      end do
-      if (.not. problem%comm%any_true(changed)) exit
+    call shorten_ways(problem, ways)
+    do s = 1, size(layers)
+      call move_alloc(ways(s)%length, layers(s)%way)
     end do
-  end subroutine spread_ways
-
-  !> Shorten ways over the contacts of a subdomain until none can be shortened: the ways do not depend on the order, because each is
-  !> a sum from the root on. What is prescribed hands on no way but that of a root.
-  subroutine shorten_ways(sub, at, closed, diameter, way)
-    type(subproblem_t), intent(in) :: sub
-    !> row of `hot` that holds the shift
-    integer, intent(in) :: at
-    !> shift below which a contact counts as closed [m/s]
-    real(dp), intent(in) :: closed
-    real(dp), intent(in) :: diameter
-    real(dp), intent(inout), contiguous :: way(:)
-    real(dp) :: length
-    integer :: c, i, j
-    logical :: shortened, forth
-
-    forth = .true.
-    do
-      shortened = .false.
-      ! there and back: contacts lie in memory about as the bodies do in space
-      do c = merge(1, sub%n_contacts, forth), merge(sub%n_contacts, 1, forth), merge(1, -1, forth)
-        if (sub%gap(c) > 0.0_dp .and. sub%hot(lane_of(c), at, block_of(c)) > closed .and. &
-          & .not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
-        i = sub%pair(1, c)
-        j = sub%pair(2, c)
-        length = sub%gap(c)
-        if (i <= sub%n_grains) length = length + sub%radius(i)
-        if (j <= sub%n_grains) length = length + sub%radius(j)
-        length = length/diameter
-        if (i <= sub%n_bodies .and. way(j) + length < way(i)) then
-          way(i) = way(j) + length
-          shortened = .true.
-        end if
-        if (j <= sub%n_bodies .and. way(i) + length < way(j)) then
-          way(j) = way(i) + length
-          shortened = .true.
-        end if
-      end do
-      if (.not. shortened) exit
-      forth = .not. forth
-    end do
-  end subroutine shorten_ways
+  end subroutine find_ways
 
   !> The layer of every body and the contacts of every layer. Collective.
   subroutine cut_layers(problem, least_way, layers, n_layers)

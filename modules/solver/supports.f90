@@ -1,7 +1,7 @@
 !> The boundaries that support the bodies of a contact problem: those against which the load presses.
 module gravier_supports
   use gravier_kinds, only: dp
-  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_kernels, only: lanes
   use gravier_contact_problem, only: contact_problem_t
   implicit none
   private
@@ -24,8 +24,8 @@ contains
     type(supports_t), allocatable, intent(out) :: supports(:)
     !> of one subdomain: -n . u and the number of its contacts, by boundary (2 boundaries)
     real(dp), allocatable :: parts(:, :), sums(:)
-    real(dp) :: load
-    integer :: s, b, c, n
+    real(dp) :: load, pressing
+    integer :: s, b, g, q, n
 
     allocate (supports(size(problem%sub)))
     n = 0
@@ -41,10 +41,16 @@ contains
     allocate (parts(2*n, size(supports)), sums(2*n))
     parts(:, :) = 0.0_dp
     do s = 1, size(supports)
-      do c = 1, problem%sub(s)%n_contacts
-        call add_pressing(problem%sub(s)%pair(1, c), -1.0_dp)
-        call add_pressing(problem%sub(s)%pair(2, c), 1.0_dp)
-      end do
+      associate (sub => problem%sub(s))
+        do g = 1, size(sub%hot, 3)
+          do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
+            if (maxval(sub%pair(:, (g - 1)*lanes + q)) <= sub%n_bodies) cycle
+            pressing = dot_product(sub%hot(q, 1:problem%kernels%nd, g), problem%load(1:problem%kernels%nd))
+            call add_pressing(sub%pair(1, (g - 1)*lanes + q), pressing)
+            call add_pressing(sub%pair(2, (g - 1)*lanes + q), -pressing)
+          end do
+        end do
+      end associate
     end do
     call problem%comm%sum_parts(parts, sums)
     do s = 1, size(supports)
@@ -57,18 +63,14 @@ contains
 
   contains
 
-    !> A contact with body `b`, from which its normal points where `side` is 1.
-    subroutine add_pressing(b, side)
+    !> A contact of body `b` against which a load presses, where `b` moves as prescribed.
+    subroutine add_pressing(b, pressing)
       integer, intent(in) :: b
-      real(dp), intent(in) :: side
-      integer :: d, k
+      real(dp), intent(in) :: pressing
 
-      associate (sub => problem%sub(s))
-        if (b <= sub%n_bodies) return
-        k = sub%boundary(b)
-        do d = 1, problem%kernels%nd
-          parts(k, s) = parts(k, s) - side*sub%hot(lane_of(c), d, block_of(c))*problem%load(d)
-        end do
+      if (b <= problem%sub(s)%n_bodies) return
+      associate (k => problem%sub(s)%boundary(b))
+        parts(k, s) = parts(k, s) + pressing
         parts(n + k, s) = parts(n + k, s) + 1.0_dp
       end associate
     end subroutine add_pressing

@@ -4,14 +4,14 @@
 !> What is looked at is the velocity by which a contact violates its law, w = W (P(r - (v + s n)/W) - r). With e = V - V* and
 !> the set of pressing and sticking contacts known, H^T e = -w there, so that any test impulse y gives y . w = -(M^-1 H y, e)_M.
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
-!>      The test impulses are w/W (local errors), r (a wrong total load), r less the impulses one iteration before (the wave that
-!>      momentum carries), r less two older copies (slower waves behind it).
+!>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those one
+!>      iteration before with momentum, which keeps them; else those of some iterations before.
 !>   L  sum over levels. The depth of a body is the number of contacts to the nearest boundary that supports it. The power
 !>      of the violations between two levels over the force that crosses, 0.65 being the mean cosine between a normal and the
 !>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
 !>      L^2 = sum m_l e_l^2.
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
-!>      (gravier_layered_start) long waves are gone, and a = 1.3.
+!>      (gravier_layered_start) long waves are gone, and a = 1.7.
 !>      Where groups of contacts creep, test impulses of little motion make E too large. The mean violation, each contact weighed by
 !>      r_n, over as many contacts as the depth D is long is more than any wave can be: E is at most 2 D sqrt(sum r_n |w|^2/sum r_n).
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
@@ -21,54 +21,50 @@
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
-  use gravier_contact_kernels, only: lanes, n_tests, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_kernels, only: lanes
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
   use gravier_scheme, only: scheme_t
-  use gravier_dense_direct, only: projected_square
   use gravier_supports, only: supports_t, find_supports
+  use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   implicit none
   private
   public :: velocity_error_t, copies_ready, violations_allowed
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
-  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.3_dp, cosine = 0.65_dp
+  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp, cosine = 0.65_dp
   !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
   real(dp), parameter :: violations_allowed = 5.0_dp
-  !> share of the largest eigenvalue of G below which it counts as 0
+  !> share of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
-  !> copies of impulses kept; ratio between the iterations they are taken at; the first of them
-  integer, parameter :: n_copies = 2, first_copy = 2
+  !> without momentum, ratio between the iterations at which impulses are copied, and the first of them
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
-  !> products of the velocities that test impulses make
-  integer, parameter :: n_products = n_tests*(n_tests + 1)/2
-  !> numbers before them
-  integer, parameter :: n_powers = n_tests + 2
+  integer, parameter :: first_copy = 2
+  !> test impulses; places of the sums of an assessment, the first of which make the residual: the powers y . w, the sums of r_n |w|^2
+  !> and of r_n, the products of the velocities that test impulses make
+  integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_means = at_powers + n_tests, at_products = at_means + 2, &
+    & n_sums = at_products + n_tests*(n_tests + 1)/2
   !> the estimate is at most so many times the depth and the mean violation; the iteration from which on the depth is found for that
   real(dp), parameter :: most_waves = 2.0_dp
   integer, parameter :: settled = 20
-  !> share of the largest free speed below which the shift of a closed contact is rounding of places
-  real(dp), parameter :: rounded = 1.0e-3_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
-  !> no way leads to a boundary
-  integer, parameter :: unreached = -1
+  !> rows that take turns in sums by level
+  integer, parameter :: turns = 4
+  !> depth of what no way leads to a boundary from
+  integer, parameter :: afloat = -1
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
-
-  !> The impulses of one subdomain some iterations ago (lanes, nc, blocks) [N s].
-  type :: copy_t
-    real(dp), allocatable :: impulse(:, :, :)
-  end type copy_t
 
   !> What the estimate holds for one subdomain.
   type :: error_part_t
     !> r . w of each contact (lanes, blocks) [J]
     real(dp), allocatable :: power(:, :)
-    !> H y of the test impulses, summed over copies of bodies (n_tests, nv, n_columns) [N s, N m s]
-    real(dp), allocatable :: motion(:, :, :)
-    type(copy_t) :: copy(n_copies)
+    !> H y of the tests w/W and r less earlier impulses, summed over copies of bodies (nv, n_columns) [N s, N m s]
+    real(dp), allocatable :: local(:, :), recent(:, :)
+    !> earlier impulses where the method keeps none (lanes, nc, blocks) [N s]
+    real(dp), allocatable :: previous(:, :, :)
     !> contacts to a support, of each body (n_columns)
     integer, allocatable :: depth(:)
   end type error_part_t
@@ -76,36 +72,35 @@ module gravier_velocity_error
   type :: velocity_error_t
     !> mass of the grains in contact, or of all that can move where there are none [kg]
     real(dp) :: mass = 0.0_dp
-    !> whether rest is admissible, so that C is a bound
-    logical :: rest_is_admissible = .false.
-    !> C, Y and L, as far as they are known, by the last `bound` and `project` [m/s]
+    !> whether Y, the mean and the largest violation are known
+    logical :: is_assessed = .false.
+    !> C, Y and L, as far as they are known, by the last `bound` or `assess` and `add_levels` [m/s]
     real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
     !> weight of Y
     real(dp) :: weight = weight_of_projection
-    !> root mean square of w, weighed by r_n, by the last `project` [m/s]
+    !> root mean square of w, weighed by r_n, by the last `assess` [m/s]
     real(dp) :: mean_violation = 0.0_dp
-    !> largest |w| of a contact, by the last `project`; 0 since `bound` [m/s]
+    !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest depth; negative while it is not known
     integer :: most_depth = -1
-    !> iterations at which the copies were taken, the older one first, 0 for none; the next one
-    integer, private :: taken_at(n_copies) = 0, next_copy = first_copy
-    !> places of the copies in the parts, the older one first
-    integer, private :: place(n_copies) = [1, 2]
+    !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
+    integer, private :: taken_at = 0, next_copy = first_copy
     type(error_part_t), allocatable, private :: part(:)
   contains
     procedure :: start => velocity_error_start
     procedure :: keep_copy => velocity_error_keep_copy
-    procedure :: copy_of => velocity_error_copy_of
     procedure :: bound => velocity_error_bound
-    procedure :: project => velocity_error_project
+    procedure :: assess => velocity_error_assess
+    procedure :: rests => velocity_error_rests
+    procedure :: complete => velocity_error_complete
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
     procedure, private :: wave => velocity_error_wave
     procedure :: excludes_violations => velocity_error_excludes_violations
     procedure :: find_depth => velocity_error_find_depth
-    procedure :: forget_copies => velocity_error_forget_copies
+    procedure :: begin_anew => velocity_error_begin_anew
   end type velocity_error_t
 
 contains
@@ -113,7 +108,7 @@ contains
   !> Make ready for a solve. Collective.
   subroutine velocity_error_start(self, problem)
     class(velocity_error_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
+    type(contact_problem_t), intent(inout) :: problem
     !> mass of the grains, of all bodies that can move
     real(dp) :: parts(2, size(problem%sub)), sums(2), heavy
     logical :: moves
@@ -138,51 +133,36 @@ contains
     end do
     call problem%comm%sum_parts(parts, sums)
     self%mass = merge(sums(1), sums(2), sums(1) > 0.0_dp)
-    self%rest_is_admissible = .not. problem%comm%any_true(moves)
+    problem%rest_is_admissible = .not. problem%comm%any_true(moves)
   end subroutine velocity_error_start
 
-  !> Keep a copy of the impulses after an iteration, where one is due.
-  subroutine velocity_error_keep_copy(self, problem, iteration)
+  !> Keep a copy of the impulses after an iteration, where one is due and the method keeps none.
+  subroutine velocity_error_keep_copy(self, problem, scheme, iteration)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
+    class(scheme_t), intent(in) :: scheme
     integer, intent(in) :: iteration
     integer :: s
 
-    if (iteration < self%next_copy) return
+    if (scheme%momentum%on .or. iteration < self%next_copy) return
     self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
-    self%place(:) = n_copies + 1 - self%place
-    self%taken_at(1) = self%taken_at(2)
-    self%taken_at(2) = iteration
+    self%taken_at = iteration
     do s = 1, size(self%part)
-      self%part(s)%copy(self%place(2))%impulse = problem%sub(s)%impulse
+      self%part(s)%previous = problem%sub(s)%impulse
     end do
   end subroutine velocity_error_keep_copy
 
-  !> The older copy of the impulses of subdomain `s`, or those that it has now where there is none.
-  pure subroutine velocity_error_copy_of(self, problem, s, impulse)
-    class(velocity_error_t), intent(in) :: self
-    type(contact_problem_t), intent(in) :: problem
-    integer, intent(in) :: s
-    !> (lanes, nc, blocks) [N s]
-    real(dp), allocatable, intent(out) :: impulse(:, :, :)
-
-    if (self%taken_at(1) > 0) then
-      impulse = self%part(s)%copy(self%place(1))%impulse
-    else
-      impulse = problem%sub(s)%impulse
-    end if
-  end subroutine velocity_error_copy_of
-
-  !> C, from what `residual` of the problem has summed; Y, L and the largest violation are not known then [m/s].
+  !> C, from what `residual` of the problem has summed; nothing else is known then [m/s].
   subroutine velocity_error_bound(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
 
+    self%is_assessed = .false.
     self%bound_by_rest = unknown
     self%projection = unknown
     self%levels = 0.0_dp
     self%largest_violation = 0.0_dp
-    if (.not. (self%rest_is_admissible .and. self%mass > 0.0_dp)) return
+    if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
@@ -223,9 +203,17 @@ contains
     real(dp), intent(in) :: weight_of_levels
 
     wave = hypot(self%weight*self%projection, weight_of_levels*self%levels)
-    if (self%most_depth > 0 .and. self%projection < unknown) wave = min(wave, &
+    if (self%most_depth > 0 .and. self%is_assessed) wave = min(wave, &
       & weight_of_levels*most_waves*self%most_depth*self%mean_violation)
   end function velocity_error_wave
+
+  !> Whether C alone says that what moves is no more than what may where all could rest.
+  pure logical function velocity_error_rests(self, limit) result(rests)
+    class(velocity_error_t), intent(in) :: self
+    !> error allowed [m/s]
+    real(dp), intent(in) :: limit
+    rests = self%bound_by_rest <= share_at_rest*limit
+  end function velocity_error_rests
 
   !> The smaller of E and C [m/s].
   pure real(dp) function velocity_error_estimate(self) result(estimate)
@@ -233,165 +221,218 @@ contains
     estimate = min(self%bound_by_rest, self%wave(1.0_dp))
   end function velocity_error_estimate
 
-  !> Y, with v_global evaluated. Collective.
-  subroutine velocity_error_project(self, problem, scheme, iteration)
+  !> C, Y, the mean and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
+  !> the contacts and one reduction. Collective.
+  subroutine velocity_error_assess(self, problem, scheme, iteration, residual, defect)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(scheme_t), intent(in) :: scheme
     integer, intent(in) :: iteration
-    !> b, sums of r_n |w|^2 and of r_n, then the columns of the upper triangle of G
-    real(dp) :: parts(n_powers + n_products, size(problem%sub)), sums(n_powers + n_products), largest(1)
-    logical :: knows_last, knows(n_copies)
+    !> as `residual` of the problem returns them
+    real(dp), intent(out) :: residual, defect
+    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums), largest(1)
     integer :: s
 
-    knows_last = scheme%momentum%on .and. .not. scheme%momentum%resting .and. iteration > 0
-    knows(:) = self%taken_at > 0 .and. self%taken_at < iteration
     parts(:, :) = 0.0_dp
     largest(1) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), part => self%part(s))
-        if (.not. allocated(part%motion)) then
-          allocate (part%motion(n_tests, problem%kernels%nv, sub%n_columns), part%power(lanes, size(sub%hot, 3)))
+        if (.not. allocated(part%local)) then
+          allocate (part%local(problem%kernels%nv, sub%n_columns), part%recent(problem%kernels%nv, sub%n_columns))
+          allocate (part%power(lanes, size(sub%hot, 3)))
         end if
-        part%motion(:, :, :) = 0.0_dp
+        part%local(:, :) = 0.0_dp
+        part%recent(:, :) = 0.0_dp
         if (sub%n_contacts == 0) cycle
-        ! what is not known makes a test impulse of 0, or one twice, which tells nothing
-        if (.not. knows(2)) then
-          if (knows_last) call make_tests(sub, part, scheme%momentum%part(s)%impulse, sub%impulse, sub%impulse)
-          if (.not. knows_last) call make_tests(sub, part, sub%impulse, sub%impulse, sub%impulse)
+        ! without earlier impulses the third test impulse is 0, which tells nothing
+        if (scheme%momentum%on .and. iteration > 0) then
+          call test(sub, part, scheme%momentum%part(s)%impulse)
+        else if (self%taken_at > 0 .and. self%taken_at < iteration) then
+          call test(sub, part, part%previous)
         else
-          associate (recent => part%copy(self%place(2))%impulse, old => part%copy(self%place(merge(1, 2, knows(1))))%impulse)
-            if (knows_last) call make_tests(sub, part, scheme%momentum%part(s)%impulse, recent, old)
-            if (.not. knows_last) call make_tests(sub, part, recent, recent, old)
-          end associate
+          call test(sub, part, sub%impulse)
         end if
+        if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
       end associate
     end do
-    call sum_motions(problem, self%part)
+    if (problem%n_subdomains > 1) call sum_motions(problem, self%part)
     do s = 1, size(problem%sub)
-      call add_products(problem%sub(s), self%part(s)%motion, parts(n_powers + 1:, s))
+      call add_products(problem%sub(s), self%part(s), parts(at_products + 1:, s))
     end do
     call start_timer(phase_reduction)
     call problem%comm%sum_parts(parts, sums)
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
-    self%largest_violation = sqrt(largest(1))
+    call problem%take_residual(sums(1:n_residual_sums), residual, defect)
+    call self%bound(problem)
     if (iteration >= settled .and. self%most_depth < 0) call self%find_depth(problem)
+    self%is_assessed = .true.
+    self%largest_violation = sqrt(largest(1))
     self%projection = 0.0_dp
-    if (self%mass > 0.0_dp) self%projection = sqrt(projection_of(sums(1:n_tests), sums(n_powers + 1:))/self%mass)
+    if (self%mass > 0.0_dp) self%projection = &
+      & sqrt(projection_of(sums(at_powers + 1:at_means), sums(at_products + 1:))/self%mass)
     self%mean_violation = 0.0_dp
-    if (sums(n_powers) > 0.0_dp) self%mean_violation = sqrt(max(0.0_dp, sums(n_tests + 1))/sums(n_powers))
+    if (sums(at_means + 2) > 0.0_dp) self%mean_violation = sqrt(max(0.0_dp, sums(at_means + 1))/sums(at_means + 2))
 
   contains
 
-    subroutine make_tests(sub, part, last, recent, old)
+    !> The contacts that are awake, then those that sleep.
+    subroutine test(sub, part, previous)
       type(subproblem_t), intent(in) :: sub
       type(error_part_t), intent(inout) :: part
-      real(dp), intent(in), contiguous :: last(:, :, :), recent(:, :, :), old(:, :, :)
+      real(dp), intent(in), contiguous :: previous(:, :, :)
+      integer :: awake
 
-      call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, last, recent, old, &
-        & part%power, part%motion, parts(1:n_powers, s), largest(1))
-    end subroutine make_tests
+      awake = problem%awake_blocks(s)
+      call test_blocks(sub, part, previous, 1, awake, 0)
+      if (awake < size(sub%hot, 3)) call test_blocks(sub, part, previous, awake + 1, size(sub%hot, 3), 3)
+    end subroutine test
 
-  end subroutine velocity_error_project
+    !> Blocks `a` to `z`, whose part of the residual goes into the places after `at`.
+    subroutine test_blocks(sub, part, previous, a, z, at)
+      type(subproblem_t), intent(in) :: sub
+      type(error_part_t), intent(inout) :: part
+      real(dp), intent(in), contiguous :: previous(:, :, :)
+      integer, intent(in) :: a, z, at
+      real(dp) :: found(n_tests + 5)
 
-  !> Sum H y over the copies of bodies, test by test. Collective.
+      call problem%kernels%make_tests(sub%pair(:, (a - 1)*lanes + 1:z*lanes), sub%hot(:, :, a:z), sub%inverse_mass, &
+        & sub%v_global, sub%impulse(:, :, a:z), previous(:, :, a:z), part%power(:, a:z), part%local, part%recent, found, largest(1))
+      parts(at + 1:at + 3, s) = found(1:3)
+      parts(at_powers + 1:at_products, s) = parts(at_powers + 1:at_products, s) + found(4:)
+    end subroutine test_blocks
+
+  end subroutine velocity_error_assess
+
+  !> Sum H y over the copies of bodies; that of the impulses themselves is the reaction, which is summed. Collective.
   subroutine sum_motions(problem, part)
     type(contact_problem_t), intent(inout) :: problem
     type(error_part_t), intent(inout) :: part(:)
-    real(dp), allocatable :: field(:, :)
-    integer :: s, t
+    integer :: s
 
-    if (problem%n_subdomains == 1) return
-    do t = 1, n_tests
-      do s = 1, size(part)
-        field = part(s)%motion(t, :, :)
-        call problem%shared%load(s, field)
-      end do
-      call problem%shared%pass()
-      do s = 1, size(part)
-        field = part(s)%motion(t, :, :)
-        call problem%shared%sum_copies(s, field, mean=.false.)
-        part(s)%motion(t, :, :) = field
-      end do
+    do s = 1, size(part)
+      call problem%shared%load(s, part(s)%local)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(part)
+      call problem%shared%sum_copies(s, part(s)%local, mean=.false.)
+      call problem%shared%load(s, part(s)%recent)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(part)
+      call problem%shared%sum_copies(s, part(s)%recent, mean=.false.)
     end do
   end subroutine sum_motions
 
-  !> b^T G^+ b [J].
-  real(dp) function projection_of(b, products) result(square)
+  !> b^T G^+ b [J]: the tests are taken one after the other, next the one of which those taken have left most, as in a Cholesky
+  !> factorisation with pivots. What little is left of a test that is nearly a sum of others counts as none.
+  pure real(dp) function projection_of(b, products) result(square)
     !> (n_tests); columns of the upper triangle of G
     real(dp), intent(in), contiguous :: b(:), products(:)
-    real(dp) :: g(size(b), size(b))
-    integer :: i, j, at
+    real(dp) :: left(n_tests, n_tests), power(n_tests), share(n_tests)
+    integer :: i, j, k, at
 
     at = 0
-    do j = 1, size(b)
+    do j = 1, n_tests
       do i = 1, j
         at = at + 1
-        g(i, j) = products(at)
-        g(j, i) = products(at)
+        left(i, j) = products(at)
+        left(j, i) = products(at)
       end do
     end do
-    square = projected_square(g, b, rank_cut)
+    power(:) = b
+    share(:) = 0.0_dp
+    do i = 1, n_tests
+      if (left(i, i) > 0.0_dp) share(i) = 1.0_dp/left(i, i)
+    end do
+    square = 0.0_dp
+    do k = 1, n_tests
+      i = 1
+      do j = 2, n_tests
+        if (left(j, j)*share(j) > left(i, i)*share(i)) i = j
+      end do
+      if (.not. left(i, i)*share(i) > rank_cut) return
+      square = square + power(i)**2/left(i, i)
+      power(:) = power - left(:, i)*(power(i)/left(i, i))
+      do j = 1, n_tests
+        if (j /= i) left(:, j) = left(:, j) - left(:, i)*(left(i, j)/left(i, i))
+      end do
+      share(i) = 0.0_dp
+      left(:, i) = 0.0_dp
+      left(i, :) = 0.0_dp
+    end do
   end function projection_of
 
   !> The products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j, a copy of a shared body counting with its part.
-  pure subroutine add_products(sub, motion, products)
+  subroutine add_products(sub, part, products)
     type(subproblem_t), intent(in) :: sub
-    !> H y, summed over copies (n_tests, nv, n_columns)
-    real(dp), intent(in), contiguous :: motion(:, :, :)
-    !> (n_products)
-    real(dp), intent(inout) :: products(:)
-    real(dp) :: acting(n_tests, n_tests), inverse
-    integer :: b, d, t, j, at
+    type(error_part_t), intent(in) :: part
+    !> (6)
+    real(dp), intent(out) :: products(:)
+    real(dp) :: share, sums(6)
+    integer :: b, d, nw
 
-    acting(:, :) = 0.0_dp
+    nw = size(sub%inverse_mass, 1)
+    sums(:) = 0.0_dp
     do b = 1, sub%n_bodies
-      do d = 1, size(motion, 2)
-        inverse = sub%inverse_mass(min(d, size(sub%inverse_mass, 1)), b)/sub%multiplicity(b)
-        do j = 1, n_tests
-          do t = 1, n_tests
-            acting(t, j) = acting(t, j) + inverse*motion(j, d, b)*motion(t, d, b)
-          end do
-        end do
+      share = 1.0_dp/sub%multiplicity(b)
+      do d = 1, nw - 1
+        call add(share*sub%inverse_mass(d, b), part%local(d, b), sub%reaction(d, b), part%recent(d, b))
+      end do
+      ! the last row holds for all components from there on
+      do d = nw, size(part%local, 1)
+        call add(share*sub%inverse_mass(nw, b), part%local(d, b), sub%reaction(d, b), part%recent(d, b))
       end do
     end do
-    at = 0
-    do j = 1, n_tests
-      do t = 1, j
-        at = at + 1
-        products(at) = acting(t, j)
-      end do
-    end do
+    products(:) = sums
+
+  contains
+
+    subroutine add(inverse, x, y, z)
+      real(dp), intent(in) :: inverse, x, y, z
+
+      sums(1) = sums(1) + inverse*x*x
+      sums(2) = sums(2) + inverse*x*y
+      sums(3) = sums(3) + inverse*y*y
+      sums(4) = sums(4) + inverse*x*z
+      sums(5) = sums(5) + inverse*y*z
+      sums(6) = sums(6) + inverse*z*z
+    end subroutine add
+
   end subroutine add_products
 
-  !> L, after `project`. Collective.
+  !> L, after `assess`. Collective.
   subroutine velocity_error_add_levels(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     !> of each level: power r . w, force sum r_n, mass of its bodies (3 levels, subdomains)
     real(dp), allocatable :: parts(:, :), sums(:)
+    !> power and force of the levels from 0, for what lies in none, in rows that take turns: additions do not wait for each other
+    real(dp), allocatable :: crossing(:, :, :)
     real(dp) :: sinking, squares
-    integer :: s, c, b, l, n, i, j, q, g
+    integer :: s, b, l, n, i, j, q, g, turn
 
     if (self%most_depth < 0) call self%find_depth(problem)
     self%levels = 0.0_dp
     n = self%most_depth
     if (n < 1) return
-    allocate (parts(3*n, size(problem%sub)), sums(3*n))
+    allocate (parts(3*n, size(problem%sub)), sums(3*n), crossing(2, turns, 0:n))
     parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
+      crossing(:, :, :) = 0.0_dp
       associate (sub => problem%sub(s), part => self%part(s))
-        do c = 1, sub%n_contacts
-          i = part%depth(sub%pair(1, c))
-          j = part%depth(sub%pair(2, c))
-          if (abs(i - j) /= 1 .or. i == unreached .or. j == unreached) cycle
-          l = max(i, j)
-          q = lane_of(c)
-          g = block_of(c)
-          parts(l, s) = parts(l, s) + part%power(q, g)
-          parts(n + l, s) = parts(n + l, s) + sub%impulse(q, 1, g)
+        do g = 1, size(sub%hot, 3)
+          do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
+            i = part%depth(sub%pair(1, (g - 1)*lanes + q))
+            j = part%depth(sub%pair(2, (g - 1)*lanes + q))
+            l = merge(max(i, j), 0, abs(i - j) == 1 .and. min(i, j) /= afloat)
+            turn = mod(q, turns) + 1
+            crossing(1, turn, l) = crossing(1, turn, l) + part%power(q, g)
+            crossing(2, turn, l) = crossing(2, turn, l) + sub%impulse(q, 1, g)
+          end do
         end do
+        parts(1:n, s) = sum(crossing(1, :, 1:), dim=1)
+        parts(n + 1:2*n, s) = sum(crossing(2, :, 1:), dim=1)
         do b = 1, sub%n_grains
           l = part%depth(b)
           if (l > 0) parts(2*n + l, s) = parts(2*n + l, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
@@ -411,175 +452,61 @@ contains
     if (self%mass > 0.0_dp) self%levels = sqrt(squares/self%mass)
   end subroutine velocity_error_add_levels
 
+  !> The whole estimate, with v_global and the reactions evaluated. Collective.
+  subroutine velocity_error_complete(self, problem, scheme, iteration)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: iteration
+    real(dp) :: residual, defect
+
+    if (.not. self%is_assessed) call self%assess(problem, scheme, iteration, residual, defect)
+    call self%add_levels(problem)
+  end subroutine velocity_error_complete
+
   !> Depth of every body: contacts to the nearest boundary that supports, over contacts that press or are closed; in parts without
   !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks. Collective.
   subroutine velocity_error_find_depth(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     type(supports_t), allocatable :: supports(:)
+    type(ways_t) :: ways(size(self%part))
     real(dp) :: most
     integer :: s, b, round
     logical :: starts
 
-    do s = 1, size(problem%sub)
-      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
-      self%part(s)%depth(:) = unreached
-    end do
     call find_supports(problem, supports)
+    call list_closed(problem, ways)
     do round = 1, 3
       starts = .false.
-      do s = 1, size(problem%sub)
-        associate (sub => problem%sub(s), depth => self%part(s)%depth)
+      do s = 1, size(ways)
+        associate (sub => problem%sub(s), length => ways(s)%length)
           do b = sub%n_grains + 1, sub%n_columns
-            if (depth(b) /= unreached) cycle
+            if (length(b) < unreached) cycle
             if (round == 1 .and. .not. supports(s)%column(b)) cycle
             if (round == 2 .and. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) cycle
-            depth(b) = 0
+            length(b) = 0.0_dp
             starts = .true.
           end do
         end associate
       end do
-      if (problem%comm%any_true(starts)) call spread_depth(problem, self%part)
+      if (problem%comm%any_true(starts)) call shorten_ways(problem, ways)
     end do
     most = 0.0_dp
-    do s = 1, size(problem%sub)
-      if (size(self%part(s)%depth) > 0) most = max(most, real(maxval(self%part(s)%depth), dp))
+    do s = 1, size(ways)
+      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
+      do b = 1, size(ways(s)%length)
+        self%part(s)%depth(b) = afloat
+        if (.not. ways(s)%length(b) < unreached) cycle
+        self%part(s)%depth(b) = nint(ways(s)%length(b))
+        most = max(most, ways(s)%length(b))
+      end do
     end do
     self%most_depth = nint(problem%comm%highest(most))
   end subroutine velocity_error_find_depth
 
-  !> Depths from those that are known, across subdomains. Collective.
-  subroutine spread_depth(problem, part)
-    type(contact_problem_t), intent(inout) :: problem
-    type(error_part_t), intent(inout) :: part(:)
-    !> ways of a subdomain: neighbours of body b are towards(first(b):first(b + 1) - 1)
-    type :: ways_t
-      integer, allocatable :: first(:), towards(:)
-      !> bodies whose depth may still be found or lowered
-      logical, allocatable :: open(:)
-      real(dp), allocatable :: field(:, :)
-    end type ways_t
-    type(ways_t) :: ways(size(part))
-    integer :: s, b, j, d
-    logical :: changed, shares
-
-    shares = .false.
-    do s = 1, size(part)
-      call list_ways(problem%sub(s), problem%kernels%nd + 1, rounded*problem%velocity_scale, ways(s)%first, ways(s)%towards)
-      shares = shares .or. problem%shared%part(s)%n_slots > 0
-      ways(s)%open = part(s)%depth == unreached
-      ways(s)%open(problem%sub(s)%n_bodies + 1:) = .false.
-      call search_breadth_first(ways(s)%first, ways(s)%towards, ways(s)%open, part(s)%depth)
-    end do
-    if (.not. problem%comm%any_true(shares)) return
-    do s = 1, size(part)
-      allocate (ways(s)%field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
-    end do
-    do
-      do s = 1, size(part)
-        ways(s)%field(1, :) = real(part(s)%depth, dp)
-        call problem%shared%load(s, ways(s)%field)
-      end do
-      call problem%shared%pass()
-      changed = .false.
-      do s = 1, size(part)
-        associate (shared => problem%shared%part(s), depth => part(s)%depth)
-          shares = .false.
-          do j = 1, shared%n_slots
-            d = nint(shared%recv(1, j))
-            b = shared%slot_body(j)
-            if (d == unreached .or. .not. ways(s)%open(b) .or. (depth(b) /= unreached .and. depth(b) <= d)) cycle
-            depth(b) = d
-            shares = .true.
-          end do
-          if (shares) call search_breadth_first(ways(s)%first, ways(s)%towards, ways(s)%open, depth)
-          changed = changed .or. shares
-        end associate
-      end do
-      if (.not. problem%comm%any_true(changed)) exit
-    end do
-  end subroutine spread_depth
-
-  !> The contacts that press or are closed, as lists of neighbours.
-  subroutine list_ways(sub, at, closed, first, towards)
-    type(subproblem_t), intent(in) :: sub
-    !> row of `hot` that holds the shift
-    integer, intent(in) :: at
-    !> shift below which a contact counts as closed [m/s]
-    real(dp), intent(in) :: closed
-    integer, allocatable, intent(out) :: first(:), towards(:)
-    integer, allocatable :: next(:)
-    logical :: counts
-    integer :: c, k, round
-
-    allocate (first(sub%n_columns + 1), next(sub%n_columns + 1), source=0)
-    do round = 1, 2
-      do c = 1, sub%n_contacts
-        counts = sub%gap(c) <= 0.0_dp .or. sub%hot(lane_of(c), at, block_of(c)) <= closed .or. &
-          & sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp
-        if (.not. counts) cycle
-        do k = 1, 2
-          associate (b => sub%pair(k, c))
-            if (round == 1) then
-              next(b) = next(b) + 1
-            else
-              towards(next(b)) = sub%pair(3 - k, c)
-              next(b) = next(b) + 1
-            end if
-          end associate
-        end do
-      end do
-      if (round == 2) exit
-      first(1) = 1
-      do k = 1, sub%n_columns
-        first(k + 1) = first(k) + next(k)
-      end do
-      allocate (towards(first(sub%n_columns + 1) - 1))
-      next(:) = first
-    end do
-  end subroutine list_ways
-
-  !> Lower depths to one more than that of the nearest neighbour, until nothing changes.
-  subroutine search_breadth_first(first, towards, open, depth)
-    integer, intent(in), contiguous :: first(:), towards(:)
-    logical, intent(in), contiguous :: open(:)
-    integer, intent(inout), contiguous :: depth(:)
-    integer, allocatable :: front(:), next(:)
-    integer :: b, d, k, n, m, level, most
-
-    allocate (front(size(depth)), next(size(depth)))
-    most = maxval(depth)
-    level = -1
-    n = 0
-    do
-      level = level + 1
-      ! bodies that start at this level join those just reached
-      if (level <= most) then
-        do b = 1, size(depth)
-          if (depth(b) /= level) cycle
-          n = n + 1
-          front(n) = b
-        end do
-      end if
-      if (n == 0 .and. level > most) exit
-      m = 0
-      do k = 1, n
-        do d = first(front(k)), first(front(k) + 1) - 1
-          b = towards(d)
-          if (.not. open(b) .or. (depth(b) /= unreached .and. depth(b) <= level + 1)) cycle
-          depth(b) = level + 1
-          m = m + 1
-          next(m) = b
-        end do
-      end do
-      n = m
-      front(1:n) = next(1:n)
-      if (level < most) n = 0
-    end do
-  end subroutine search_breadth_first
-
-  !> Forget the copies: the iterations begin anew from other impulses.
-  subroutine velocity_error_forget_copies(self, iteration, layered)
+  !> The iterations begin anew from other impulses.
+  subroutine velocity_error_begin_anew(self, iteration, layered)
     class(velocity_error_t), intent(inout) :: self
     !> made so far
     integer, intent(in) :: iteration
@@ -587,8 +514,8 @@ contains
     logical, intent(in) :: layered
 
     self%weight = merge(weight_after_layers, weight_of_projection, layered)
-    self%taken_at(:) = 0
+    self%taken_at = 0
     self%next_copy = iteration + first_copy
-  end subroutine velocity_error_forget_copies
+  end subroutine velocity_error_begin_anew
 
 end module gravier_velocity_error

@@ -1,0 +1,29 @@
+"""Files that are written aside and take their name when they are whole: whatever happens meanwhile, an older one stays."""
+import contextlib
+import os
+import sys
+from pathlib import Path
+
+
+@contextlib.contextmanager
+def whole_file(path):
+    """A path beside `path`, with the same ending, to write to: what is there at the end takes the name; after an error it is removed."""
+    path = Path(path)
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    try:
+        yield part
+        with open(part, "rb") as file:
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def save_figure(figure, path, **options):
+    """Save a figure of matplotlib, or end the program with one line that says why not."""
+    try:
+        with whole_file(path) as part:
+            figure.savefig(part, **options)
+    except OSError as what:
+        sys.exit(f"{Path(sys.argv[0]).name}: error: {path}: {what.strerror or what}")

@@ -1,0 +1,141 @@
+!> When the state of a solve is checked.
+!>
+!> A residual costs as much as two sweeps, the estimate of the velocity error as much again. What sweeps move impulses by goes with
+!> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from the
+!> goal; with momentum, whose sums are there after each iteration, it comes as soon as they speak for one.
+module gravier_check_schedule
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use gravier_kinds, only: dp
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t
+  use gravier_descent, only: descent_t
+  implicit none
+  private
+  public :: check_schedule_t, growth_limit
+
+  !> growth of the defect, relative to that at the start or to the largest |R^d| of a body, taken for divergence
+  real(dp), parameter :: growth_limit = 1.0e4_dp
+  !> checks that may be left out one after the other, and times the goal: an expected figure that is worth a check
+  integer, parameter :: most_skips = 9
+  real(dp), parameter :: worth_a_check = 1.2_dp
+  !> the first iteration that sweeps with momentum may have checked before it is due
+  integer, parameter :: early_check = 2
+  !> iterations between two checks, over those made: at least where they are not due, and at most
+  real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
+  !> what is left of the figure since the last check where the next one need not wait twice as long
+  real(dp), parameter :: falling = 0.85_dp
+  !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
+  real(dp), parameter :: first_ratio = 0.5_dp
+
+  type :: check_schedule_t
+    !> iterations between two regular checks
+    integer :: check_every = 10
+    !> regular checks may be left out and others come before them: not for a trace or the error, which are of all regular ones alone
+    logical :: chooses = .false.
+    !> no pause is longer than a part of the iterations made
+    logical :: short_pauses = .false.
+    !> figure at the last check over what the sweeps before it moved impulses by, relative to them; 0 where it is not known
+    real(dp), private :: ratio = 0.0_dp, progress = 0.0_dp
+    real(dp), private :: last_figure = huge(1.0_dp), pause = 0.0_dp
+    integer, private :: skips = 0, last_check = 0
+  contains
+    procedure :: first_check => check_schedule_first_check
+    procedure :: calls => check_schedule_calls
+    procedure :: note_check => check_schedule_note_check
+    procedure :: forget_ratio => check_schedule_forget_ratio
+  end type check_schedule_t
+
+contains
+
+  !> The first iteration that may be followed by a check.
+  pure integer function check_schedule_first_check(self, scheme) result(first)
+    class(check_schedule_t), intent(in) :: self
+    class(scheme_t), intent(in) :: scheme
+
+    first = self%check_every
+    if (self%chooses .and. scheme%momentum%on) first = min(early_check, self%check_every)
+  end function check_schedule_first_check
+
+  !> Whether a check comes after an iteration that is about to be made. Collective.
+  logical function check_schedule_calls(self, problem, scheme, iteration, goal, reference, descent) result(calls)
+    class(check_schedule_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: iteration
+    !> what the figure is compared with, and what a growing defect is
+    real(dp), intent(in) :: goal, reference
+    !> takes the figures that are expected
+    type(descent_t), intent(inout) :: descent
+
+    calls = mod(iteration, self%check_every) == 0
+    ! sums of the iterations before are there with momentum
+    if (self%chooses .and. (calls .or. (scheme%momentum%on .and. iteration >= early_check))) &
+      & calls = is_worth_a_check(self, problem, scheme, iteration, calls, goal, reference, descent)
+  end function check_schedule_calls
+
+  !> Whether the sweeps of the iteration before speak for a check. Collective.
+  logical function is_worth_a_check(self, problem, scheme, iteration, regular, goal, reference, descent) result(is_worth)
+    class(check_schedule_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
+    integer, intent(in) :: iteration
+    !> whether check_every asks for one
+    logical, intent(in) :: regular
+    real(dp), intent(in) :: goal, reference
+    type(descent_t), intent(inout) :: descent
+    real(dp) :: sums(2), expected, enough
+    logical :: due
+
+    call problem%sum_progress(sums)
+    self%progress = 0.0_dp
+    is_worth = regular
+    expected = 0.0_dp
+    due = self%skips >= most_skips
+    if (self%short_pauses) due = due .or. iteration - self%last_check >= most_pause*iteration
+    if (all(ieee_is_finite(sums))) then
+      if (sums(2) > 0.0_dp) self%progress = sqrt(sums(1)/sums(2))
+      expected = self%ratio*self%progress
+      enough = worth_a_check
+      if (scheme%momentum%on) then
+        if (.not. self%ratio > 0.0_dp) expected = first_ratio*self%progress
+        enough = 1.0_dp
+      end if
+      if (expected > 0.0_dp) is_worth = (expected <= enough*goal .and. &
+        & (regular .or. iteration - self%last_check > max(self%pause, least_pause*iteration))) .or. &
+        & (regular .and. (.not. self%ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth(scheme)*reference))
+    end if
+    if (is_worth) then
+      self%skips = 0
+    else
+      if (regular) self%skips = self%skips + 1
+      if (regular .or. self%ratio > 0.0_dp) call descent%note(iteration, expected, goal)
+    end if
+  end function is_worth_a_check
+
+  !> Growth of the changes that is worth a check: methods that lower what makes them grow are left to do so.
+  pure real(dp) function watched_growth(scheme) result(growth)
+    class(scheme_t), intent(in) :: scheme
+    growth = merge(growth_limit, 1.0_dp, scheme%mends_growth())
+  end function watched_growth
+
+  !> A check was made after an iteration, and found this figure.
+  pure subroutine check_schedule_note_check(self, iteration, figure)
+    class(check_schedule_t), intent(inout) :: self
+    integer, intent(in) :: iteration
+    real(dp), intent(in) :: figure
+
+    if (iteration > 0) then
+      if (self%progress > 0.0_dp) self%ratio = figure/self%progress
+      self%pause = merge(0.0_dp, min(2.0_dp*max(self%pause, 1.0_dp), most_pause*iteration), figure < falling*self%last_figure)
+    end if
+    self%last_figure = figure
+    self%last_check = iteration
+  end subroutine check_schedule_note_check
+
+  !> Changes to come are other changes than those before.
+  pure subroutine check_schedule_forget_ratio(self)
+    class(check_schedule_t), intent(inout) :: self
+    self%ratio = 0.0_dp
+  end subroutine check_schedule_forget_ratio
+
+end module gravier_check_schedule

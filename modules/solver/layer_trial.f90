@@ -1,0 +1,161 @@
+!> Passes over layers (gravier_layered_start) tried in the course of a solve: where there is much to carry and a long way to carry it,
+!> and kept only where they have brought something.
+module gravier_layer_trial
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t
+  use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_layered_start, only: carry_loads
+  use gravier_vain_impulses, only: kept_impulses_t
+  implicit none
+  private
+  public :: layer_trial_t
+
+  !> a pass is tried after the first iterations if the residual at the start, the velocity error over its scale and the way to supports
+  !> are above these [1, 1, mean diameters]
+  real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, deep = 25.0_dp
+  !> and after a part of the depth, where the way is above another [mean diameters]
+  real(dp), parameter :: late = 0.3_dp, very_deep = 60.0_dp
+  !> there are at least so many contacts on the way as mean diameters
+  real(dp), parameter :: nearly = 0.7_dp
+  !> iterations after a pass until it is judged, and what must be left of the error then
+  integer, parameter :: trial = 6
+  real(dp), parameter :: worth_keeping = 0.8_dp
+
+  type :: layer_trial_t
+    !> sweeps over all contacts that passes took; whether the solve goes on from one
+    real(dp) :: sweeps = 0.0_dp
+    logical :: layered = .false.
+    !> a pass may be tried; after the first iterations
+    logical, private :: may_try = .false., wants_first = .false.
+    !> the iteration after which a pass is judged
+    integer, private :: ends = 0
+    !> what is compared, and the impulses, before the pass [m/s]
+    real(dp), private :: error_before = 0.0_dp
+    type(kept_impulses_t), allocatable, private :: before(:)
+  contains
+    procedure :: start => layer_trial_start
+    procedure :: calls => layer_trial_calls
+    procedure :: advance => layer_trial_advance
+  end type layer_trial_t
+
+contains
+
+  !> Say what a solve starts with, whose control allows passes.
+  subroutine layer_trial_start(self, problem, residual)
+    class(layer_trial_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(in) :: residual
+
+    self%may_try = any(abs(problem%load) > 0.0_dp)
+    self%wants_first = self%may_try .and. residual > unsettled
+  end subroutine layer_trial_start
+
+  !> Whether an iteration has to be followed by a check.
+  pure logical function layer_trial_calls(self, iteration) result(calls)
+    class(layer_trial_t), intent(in) :: self
+    integer, intent(in) :: iteration
+    calls = (self%wants_first .and. iteration == copies_ready) .or. iteration == self%ends
+  end function layer_trial_calls
+
+  !> After a check that did not end the solve: judge a pass or try one, where it is time. Collective.
+  subroutine layer_trial_advance(self, problem, scheme, velocity, iteration, allowed, anew, error)
+    class(layer_trial_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(velocity_error_t), intent(inout) :: velocity
+    integer, intent(in) :: iteration
+    !> velocity error over its scale
+    real(dp), intent(in) :: allowed
+    !> the iterations go on from other impulses
+    logical, intent(out) :: anew
+    type(error_t), allocatable, intent(inout) :: error
+
+    anew = .false.
+    if (iteration == self%ends) call judge(self, problem, scheme, velocity, iteration, anew, error)
+    if (allocated(error)) return
+    if (self%wants_first .and. iteration == copies_ready) &
+      & call try(self, problem, scheme, velocity, iteration, much, deep, anew, error)
+    if (allocated(error)) return
+    if (self%may_try .and. velocity%most_depth > very_deep .and. iteration >= self%ends .and. &
+      & (self%layered .or. iteration > late*velocity%most_depth)) &
+      & call try(self, problem, scheme, velocity, iteration, allowed, very_deep, anew, error)
+  end subroutine layer_trial_advance
+
+  !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
+  subroutine try(self, problem, scheme, velocity, iteration, least_error, least_way, anew, error)
+    type(layer_trial_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(velocity_error_t), intent(inout) :: velocity
+    integer, intent(in) :: iteration
+    !> error over its scale, and way to supports in mean diameters, above which it is tried
+    real(dp), intent(in) :: least_error, least_way
+    logical, intent(inout) :: anew
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: sweeps
+    integer :: s
+
+    if (velocity%most_depth < 0) call velocity%find_depth(problem)
+    if (velocity%most_depth < nearly*least_way) then
+      self%may_try = .false.
+      return
+    end if
+    call velocity%complete(problem, scheme, iteration)
+    if (velocity%criterion() <= least_error*problem%error_scale) return
+    self%may_try = .false.
+    if (.not. allocated(self%before)) allocate (self%before(size(problem%sub)))
+    do s = 1, size(problem%sub)
+      self%before(s)%value = problem%sub(s)%impulse
+    end do
+    self%error_before = velocity%criterion()
+    call carry_loads(problem, least_way, scheme%work, sweeps)
+    if (.not. sweeps > 0.0_dp) return
+    self%sweeps = self%sweeps + sweeps
+    self%layered = .true.
+    self%ends = iteration + trial
+    call begin_anew(self, problem, scheme, velocity, iteration, error)
+    anew = .true.
+  end subroutine try
+
+  !> Go on from the pass where it has brought something, else from the impulses before it. Collective.
+  subroutine judge(self, problem, scheme, velocity, iteration, anew, error)
+    type(layer_trial_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(velocity_error_t), intent(inout) :: velocity
+    integer, intent(in) :: iteration
+    logical, intent(inout) :: anew
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
+    call velocity%complete(problem, scheme, iteration)
+    if (velocity%criterion() < worth_keeping*self%error_before) then
+      ! what errors of the layers have left, another pass lowers again
+      self%may_try = velocity%most_depth > very_deep
+      return
+    end if
+    self%layered = .false.
+    do s = 1, size(problem%sub)
+      problem%sub(s)%impulse(:, :, :) = self%before(s)%value
+    end do
+    call begin_anew(self, problem, scheme, velocity, iteration, error)
+    anew = .true.
+  end subroutine judge
+
+  !> The method starts anew from the impulses that the problem holds now. Collective.
+  subroutine begin_anew(self, problem, scheme, velocity, iteration, error)
+    type(layer_trial_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(velocity_error_t), intent(inout) :: velocity
+    integer, intent(in) :: iteration
+    type(error_t), allocatable, intent(inout) :: error
+
+    call scheme%start(problem, error)
+    scheme%work%solves = scheme%work%solves - 1
+    call velocity%begin_anew(iteration, self%layered)
+  end subroutine begin_anew
+
+end module gravier_layer_trial

@@ -1,0 +1,95 @@
+!> Whether a solve gains anything yet.
+!>
+!> A solve has stagnated where its figure has not fallen by a tenth for so many iterations, with momentum or without, and for as many
+!> as it has had until then, and where it has had enough iterations for a wave to run from end to end and back. Either its method finds
+!> no solution, or there is none: then the impulses grow in vain (gravier_vain_impulses).
+module gravier_stagnation
+  use gravier_kinds, only: dp
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain
+  implicit none
+  private
+  public :: stagnation_t
+
+  !> what is left of the figure where a solve has gained something
+  real(dp), parameter :: gained = 0.9_dp
+  !> iterations without gain, with momentum and without; before the end of which impulses are kept, to see whether they grow in vain
+  integer, parameter :: patience = 1000, plain_patience = 2000, watch = 500
+  !> times the plain patience where a residual that is small already is what is missing: it falls in phases with and without momentum,
+  !> which grow
+  integer, parameter :: residual_patience = 4
+  real(dp), parameter :: small_residual = 1.0e-3_dp
+  !> times the depth: iterations that every solve has
+  integer, parameter :: waves = 6
+
+  type :: stagnation_t
+    !> lowest figure and the iteration it was found at; iteration from which on the solve is looked at
+    real(dp), private :: best = huge(1.0_dp)
+    integer, private :: best_at = 0, next_look = 0
+    !> impulses after the iteration `kept_at`, of the subdomains of this rank; 0 where there are none
+    integer, private :: kept_at = 0
+    type(kept_impulses_t), allocatable, private :: kept(:)
+  contains
+    procedure :: note => stagnation_note
+    procedure :: judge => stagnation_judge
+  end type stagnation_t
+
+contains
+
+  !> A check after an iteration found this figure: whether nothing was gained for too long.
+  subroutine stagnation_note(self, problem, iteration, figure, with_momentum, missing_residual, due)
+    class(stagnation_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: iteration
+    real(dp), intent(in) :: figure
+    logical, intent(in) :: with_momentum
+    !> the residual where it is above its tolerance, else 0
+    real(dp), intent(in) :: missing_residual
+    logical, intent(out) :: due
+
+    due = .false.
+    if (figure < gained*self%best) then
+      self%best = figure
+      self%best_at = iteration
+      self%next_look = 2*iteration + merge(patience, plain_patience, with_momentum)
+      if (missing_residual > 0.0_dp .and. missing_residual < small_residual) &
+        & self%next_look = iteration + residual_patience*(plain_patience + iteration)
+      self%kept_at = 0
+      return
+    end if
+    if (self%kept_at == 0 .and. iteration >= self%next_look - watch) call keep_impulses(self, problem, iteration)
+    due = iteration >= self%next_look .and. self%kept_at > 0 .and. iteration - self%kept_at >= watch
+  end subroutine stagnation_note
+
+  subroutine keep_impulses(self, problem, iteration)
+    type(stagnation_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: iteration
+    integer :: s
+
+    if (.not. allocated(self%kept)) allocate (self%kept(size(problem%sub)))
+    do s = 1, size(problem%sub)
+      self%kept(s)%value = problem%sub(s)%impulse
+    end do
+    self%kept_at = iteration
+  end subroutine keep_impulses
+
+  !> Where stagnation is due, look whether the solve has really stagnated, because no solution is to be found or because the method
+  !> finds none; else it is looked at again later. Collective.
+  subroutine stagnation_judge(self, problem, iteration, depth, stagnates, in_vain)
+    class(stagnation_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: iteration
+    !> of the problem, in contacts
+    integer, intent(in) :: depth
+    logical, intent(out) :: stagnates, in_vain
+
+    in_vain = .false.
+    stagnates = iteration >= waves*depth
+    if (.not. stagnates) return
+    in_vain = are_in_vain(problem, self%kept)
+    self%next_look = iteration + patience
+    call keep_impulses(self, problem, iteration)
+  end subroutine stagnation_judge
+
+end module gravier_stagnation

@@ -1,0 +1,155 @@
+!> Shortest ways from bodies to others over closed contacts, counted in contacts or in lengths, across subdomains.
+!>
+!> Ways are shortened contact by contact, there and back through the list of contacts, until none can be shortened. The result does
+!> not depend on the order, because each way is a sum from its root on; nor on subdomains or ranks. What is prescribed hands on no
+!> way but its own.
+module gravier_ways
+  use gravier_kinds, only: dp
+  use gravier_contact_kernels, only: lanes
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  implicit none
+  private
+  public :: ways_t, list_closed, shorten_ways, unreached
+
+  !> length of the way of what none leads to
+  real(dp), parameter :: unreached = huge(1.0_dp)
+  !> share of the largest free speed below which the shift of a closed contact is rounding of places
+  real(dp), parameter :: rounded = 1.0e-3_dp
+
+  !> Of one subdomain.
+  type :: ways_t
+    !> length of the way of each body, `unreached` where none is known (n_columns)
+    real(dp), allocatable :: length(:)
+    !> the contacts that press or are closed: their bodies and lengths
+    integer :: n_closed = 0
+    integer, allocatable, private :: pair(:, :)
+    real(dp), allocatable, private :: step(:)
+    !> bodies whose way may be shortened (n_columns)
+    logical, allocatable, private :: open(:)
+  end type ways_t
+
+contains
+
+  !> List the contacts that press or are closed; no way is known yet.
+  subroutine list_closed(problem, ways, unit)
+    type(contact_problem_t), intent(in) :: problem
+    !> of the subdomains of this rank
+    type(ways_t), intent(out) :: ways(:)
+    !> of lengths [m]; absent, each contact counts 1
+    real(dp), intent(in), optional :: unit
+    integer :: s
+
+    do s = 1, size(ways)
+      associate (sub => problem%sub(s))
+        allocate (ways(s)%length(sub%n_columns), source=unreached)
+        allocate (ways(s)%open(sub%n_columns), source=.false.)
+        allocate (ways(s)%pair(2, sub%n_contacts), ways(s)%step(sub%n_contacts))
+        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, rounded*problem%velocity_scale, ways(s), unit)
+      end associate
+    end do
+  end subroutine list_closed
+
+  subroutine take_closed(sub, at, closed, ways, unit)
+    type(subproblem_t), intent(in) :: sub
+    !> row of `hot` that holds the shift
+    integer, intent(in) :: at
+    !> shift below which a contact counts as closed [m/s]
+    real(dp), intent(in) :: closed
+    type(ways_t), intent(inout) :: ways
+    real(dp), intent(in), optional :: unit
+    real(dp) :: step
+    integer :: g, q, c, n, k
+
+    n = 0
+    do g = 1, size(sub%hot, 3)
+      do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
+        c = (g - 1)*lanes + q
+        if (sub%gap(c) > 0.0_dp .and. sub%hot(q, at, g) > closed .and. .not. sub%impulse(q, 1, g) > 0.0_dp) cycle
+        n = n + 1
+        ways%pair(:, n) = sub%pair(:, c)
+        ways%step(n) = 1.0_dp
+        if (.not. present(unit)) cycle
+        step = sub%gap(c)
+        do k = 1, 2
+          if (sub%pair(k, c) <= sub%n_grains) step = step + sub%radius(sub%pair(k, c))
+        end do
+        ways%step(n) = max(0.0_dp, step/unit)
+      end do
+    end do
+    ways%n_closed = n
+  end subroutine take_closed
+
+  !> Find the ways of all bodies that have none yet, from those whose length is known. Collective.
+  subroutine shorten_ways(problem, ways)
+    type(contact_problem_t), intent(inout) :: problem
+    type(ways_t), intent(inout) :: ways(:)
+    real(dp), allocatable :: field(:, :)
+    integer :: s, j, b
+    logical :: changed, shares
+
+    shares = .false.
+    do s = 1, size(ways)
+      ways(s)%open(:) = ways(s)%length >= unreached
+      ways(s)%open(problem%sub(s)%n_bodies + 1:) = .false.
+      shares = shares .or. problem%shared%part(s)%n_slots > 0
+      call shorten_own(ways(s)%n_closed, ways(s)%pair, ways(s)%step, ways(s)%open, ways(s)%length)
+    end do
+    if (.not. problem%comm%any_true(shares)) return
+    do
+      do s = 1, size(ways)
+        allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+        field(1, :) = ways(s)%length
+        call problem%shared%load(s, field)
+        deallocate (field)
+      end do
+      call problem%shared%pass()
+      changed = .false.
+      do s = 1, size(ways)
+        associate (shared => problem%shared%part(s), this => ways(s))
+          shares = .false.
+          do j = 1, shared%n_slots
+            b = shared%slot_body(j)
+            if (.not. (this%open(b) .and. shared%recv(1, j) < this%length(b))) cycle
+            this%length(b) = shared%recv(1, j)
+            shares = .true.
+          end do
+          if (shares) call shorten_own(this%n_closed, this%pair, this%step, this%open, this%length)
+          changed = changed .or. shares
+        end associate
+      end do
+      if (.not. problem%comm%any_true(changed)) exit
+    end do
+  end subroutine shorten_ways
+
+  !> Shorten ways over the contacts of a subdomain until none can be shortened. Contacts lie in memory about as the bodies do in
+  !> space.
+  pure subroutine shorten_own(n, pair, step, open, length)
+    integer, intent(in) :: n
+    integer, intent(in), contiguous :: pair(:, :)
+    real(dp), intent(in), contiguous :: step(:)
+    logical, intent(in), contiguous :: open(:)
+    real(dp), intent(inout), contiguous :: length(:)
+    integer :: c, i, j
+    logical :: shortened, forth
+
+    forth = .true.
+    do
+      shortened = .false.
+      do c = merge(1, n, forth), merge(n, 1, forth), merge(1, -1, forth)
+        i = pair(1, c)
+        j = pair(2, c)
+        if (length(j) + step(c) < length(i) .and. open(i)) then
+          length(i) = length(j) + step(c)
+          shortened = .true.
+        end if
+        if (length(i) + step(c) < length(j) .and. open(j)) then
+          length(j) = length(i) + step(c)
+          shortened = .true.
+        end if
+      end do
+      if (.not. shortened) return
+      forth = .not. forth
+    end do
+  end subroutine shorten_own
+
+end module gravier_ways
