@@ -10,6 +10,7 @@ module gravier_fclib_file
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
   use gravier_magnitude, only: is_bounded
+  use gravier_file_system, only: file_length
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
@@ -420,12 +421,17 @@ contains
     character(len=*), intent(in), optional :: origin
     logical, intent(in), optional :: same_matrix
     type(h5_file_t) :: file
+    integer(i8) :: bytes
     logical :: mine
 
     if (allocated(error)) return
     mine = comm%rank == 0
     call file%create(comm, path, error)
-    call file%reserve(16_i8*size(local%w%value) + 32_i8*size(local%q) + 65536_i8, error)
+    bytes = 16_i8*size(local%w%value) + 40_i8*size(local%q) + 65536_i8
+    if (present(multipliers)) bytes = bytes + 8_i8*size(multipliers)
+    ! what is kept of a file is not longer than the file
+    if (present(origin)) bytes = bytes + file_length(origin)
+    call file%reserve(bytes, error)
     call write_integer("/fclib_local/spacedim", local%dimension)
     call write_integer("/fclib_local/W/m", local%w%n_rows)
     call write_integer("/fclib_local/W/n", local%w%n_columns)
