@@ -24,6 +24,8 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
+from whole_file import give_names
+
 LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
 #: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
 OLDER = {"dfric": "dyfr", "dfrc": "dyfr", "sfric": "stfr", "sfrc": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "Weth": "Wthk",
@@ -655,8 +657,8 @@ def write_files(case, stem, options, contacts):
         made = texts_of(case, stem, options, contacts)
         Path(draft, name + ".nml").write_text(made[".nml"], encoding="utf-8")
         made = [".h5", *made]
-        for ending in made:
-            os.replace(os.path.join(draft, name + ending), stem + ending)
+        # the case comes last: where it is there, so is what it names
+        give_names({stem + ending: os.path.join(draft, name + ending) for ending in sorted(made, key=".nml".__eq__)})
     return [stem + ending for ending in made]
 
 
