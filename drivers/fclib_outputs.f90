@@ -2,6 +2,7 @@
 module gravier_fclib_outputs
   use gravier_errors, only: error_t, raise, status_input
   use gravier_file_system, only: path_t, place_t, place_of
+  use gravier_own_files, only: part_of
   implicit none
   private
   public :: written_path, check_outputs
@@ -22,7 +23,7 @@ contains
     !> values of --csv, --profile and --write; empty where not given
     character(len=*), intent(in) :: csv, profile, directory
     type(error_t), allocatable, intent(inout) :: error
-    type(place_t) :: inputs(size(files)), outputs(size(files) + 2)
+    type(place_t) :: inputs(size(files)), outputs(size(files) + 2), parts(size(files) + 2)
     type(path_t) :: paths(size(files) + 2)
     integer :: i, k, n
 
@@ -41,6 +42,8 @@ contains
     if (profile /= "") call add(profile)
     do k = 1, n
       do i = 1, size(files)
+        if (parts(k) == inputs(i)) call raise(error, status_input, files(i)%text// &
+          & ": expected a problem elsewhere than where "//paths(k)%text//" is written until it is whole")
         if (.not. outputs(k) == inputs(i)) cycle
         if (k <= size(files) .and. directory /= "") call raise(error, status_input, "--write '"//directory// &
           & "': expected another directory than that of "//files(i)%text//", which "//paths(k)%text//" would replace")
@@ -60,6 +63,7 @@ contains
       n = n + 1
       paths(n)%text = path
       outputs(n) = place_of(path)
+      parts(n) = place_of(part_of(path))
     end subroutine add
 
   end subroutine check_outputs

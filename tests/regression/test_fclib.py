@@ -611,6 +611,9 @@ class Fclib(RunTestCase):
                 self.assertEqual(run.stderr, f"gravier_fclib: error: --write '{directory}': {message}\n")
                 self.assertFalse(os.path.exists(self.path("new")))
                 self.assertEqual(self.bytes_of(*before), before)
+        write_local(self.path("t.csv.part"), *random_problem(3, 4))
+        run = self.solve("t.csv.part", "--csv", "t.csv", status=2)
+        self.assertEqual(run.stderr, "gravier_fclib: error: t.csv.part: expected a problem elsewhere than where t.csv is written until it is whole\n")
         # the directory of another input is none of its files
         self.solve("same/a.h5", "other/a.h5", "--csv", "t.csv")
         self.solve("same/b.h5", "--write", "other/new", "--csv", "other/new/b.csv")
