@@ -12,12 +12,19 @@ def whole_file(path):
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
         yield part
-        with open(part, "rb") as file:
-            os.fsync(file.fileno())
-        os.replace(part, path)
+        give_names({path: part})
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+def give_names(parts):
+    """Give files that were written aside, as {path: where it is}, their names in this order, once all of them are on the disk."""
+    for part in parts.values():
+        with open(part, "rb") as file:
+            os.fsync(file.fileno())
+    for path, part in parts.items():
+        os.replace(part, path)
 
 
 def save_figure(figure, path, **options):

@@ -127,10 +127,12 @@ def what_is_said(run, allowed=(0, 4)):
 # ---------------------------------------------------------------------------------------------- full disks
 
 def write_fclib(directory):
-    """A problem of two contacts, and its name."""
+    """A problem of two contacts with a long description, which is copied, and its name."""
     import numpy as np
     from fclib_problems import write_local
     write_local(os.path.join(directory, "problem.hdf5"), np.eye(6) + 0.1, np.array([-1.0, 0.2, 0.1, -2.0, 0.3, 0.0]), np.array([0.3, 0.4]))
+    with h5py.File(os.path.join(directory, "problem.hdf5"), "a") as file:
+        file["fclib_local/info/description"] = np.bytes_("two contacts " * 20000)
     return "problem.hdf5"
 
 
