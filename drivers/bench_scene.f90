@@ -10,7 +10,8 @@ module gravier_bench_scene
   use gravier_nscdd, only: average_copies
   use gravier_scheme, only: work_t
   use gravier_solve, only: solve_report_t, solve_contacts
-  use gravier_file_system, only: make_directory, remove_file, remove_directory
+  use gravier_file_system, only: make_directory, remove_directory
+  use gravier_own_files, only: remove_own
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_output, only: run_output_t
   use gravier_bench_packing, only: packing_t, make_simulation, reset_grains
@@ -170,8 +171,8 @@ contains
     seconds = MPI_Wtime() - start
     call output%finish(self%simulation, .false., error)
     if (self%simulation%comm%rank == 0) then
-      call remove_file(directory//"/results.h5")
-      call remove_file(directory//"/history.csv")
+      call remove_own(directory//"/results.h5")
+      call remove_own(directory//"/history.csv")
       call remove_directory(directory)
     end if
     call record%note(self%of, "write_state", "s", seconds)

@@ -5,6 +5,8 @@ program gravier_accuracy
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_command_line, only: argument, leave
   use gravier_run_log, only: banner_text
   use gravier_drawing, only: draw_figure
@@ -75,13 +77,18 @@ contains
     type(case_solve_t), allocatable :: solves(:)
     type(case_run_t) :: reference
     type(summary_t) :: summary
+    type(output_lock_t) :: lock
     integer :: missed
 
     missed = 0
     call read_study(comm, path, study, error)
     if (.not. allocated(error) .and. study%kind == "run") call check_scenes(comm, study, error)
     if (.not. allocated(error)) call prepare_directory()
-    if (allocated(error)) return
+    call lock%take_directory(comm, study%directory, "gravier_accuracy "//path, error)
+    if (allocated(error)) then
+      call lock%release()
+      return
+    end if
     if (comm%rank == 0) write (output_unit, "(a)") trim(study%file//"  "//study%title)
     if (study%kind == "run") then
       call measure_runs(comm, study, runs, reference, error)
@@ -96,6 +103,7 @@ contains
     end if
     if (comm%rank == 0 .and. .not. allocated(error)) call finish(summary, missed)
     call comm%agree(error)
+    call lock%release()
     draws = .not. allocated(error)
     if (missed > 0) status = status_unconverged
   end subroutine make_study
@@ -106,6 +114,8 @@ contains
     integer, intent(in) :: missed
 
     call summary%write(study%directory//"/accuracy_summary.csv", error)
+    call check_own_files(error)
+    if (allocated(error)) return
     if (missed > 0) write (output_unit, "(a)") "*** "//to_text(missed)//" of the solves did NOT reach their tolerance"
     write (output_unit, "(a)") "written:", "  "//study%directory//"/accuracy.csv", "  "//study%directory//"/accuracy_summary.csv"
     flush (output_unit)

@@ -7,7 +7,9 @@ program gravier_bench
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_command_line, only: leave
-  use gravier_file_system, only: check_creatable
+  use gravier_file_system, only: check_creatable, remove_file
+  use gravier_own_files, only: check_own_files, part_of
+  use gravier_output_lock, only: output_lock_t
   use gravier_bench_groups, only: measure_exchange, measure_interface, measure_steps, measure_scaling
   use gravier_bench_kernels, only: kernel_problem_t, kernel_names, make_kernels, measure_kernels, sweep_kernel, &
     & make_effects, measure_effects
@@ -63,13 +65,21 @@ contains
   !> All groups, one after the other, and the table. Collective.
   subroutine run_all()
     type(error_t), allocatable :: reason
+    type(output_lock_t) :: lock
 
     if (world%rank == 0) then
-      call check_creatable(options%csv, reason)
+      call check_creatable(part_of(options%csv), reason)
       if (allocated(reason)) call raise(error, status_input, "--csv '"//options%csv//"': "//reason%message)
+      call remove_file(part_of(options%csv))
     end if
     call world%agree(error)
-    if (allocated(error)) return
+    call lock%take_file(world, options%csv, "gravier_bench", error)
+    if (.not. allocated(error)) call measure_all()
+    call lock%release()
+  end subroutine run_all
+
+  !> Measure and write. Collective.
+  subroutine measure_all()
     call sweep_and_triad()
     if (.not. allocated(error)) call measure_exchange(world, alone, options, record, error)
     call say("exchange")
@@ -83,10 +93,11 @@ contains
     if (allocated(error)) return
     if (world%rank == 0) then
       call record%write(options%csv, error)
+      call check_own_files(error)
       if (.not. allocated(error)) write (output_unit, "(a)") "written: "//options%csv
     end if
     call world%agree(error)
-  end subroutine run_all
+  end subroutine measure_all
 
   !> Rounds of the triad, on one core and on all at once, and of all kernels on one core. Collective.
   subroutine sweep_and_triad()

@@ -6,6 +6,8 @@ program gravier_columns
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_solve, only: solve_report_t, solve_converged
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
   use gravier_drawing, only: draw_figure
@@ -63,6 +65,7 @@ contains
   subroutine report_failure()
     if (.not. allocated(error)) return
     if (comm%rank == 0) write (error_unit, "(a)") "gravier_columns: error: "//error%message
+    flush (error_unit)
     status = error%status
   end subroutine report_failure
 
@@ -123,25 +126,32 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(column_t), allocatable :: columns(:)
     type(solve_report_t), allocatable :: reports(:, :, :)
+    type(output_lock_t) :: lock
     integer :: failed
 
     allocate (columns(merge(1, size(paper_columns), options%count > 0)))
     columns(:) = paper_columns(1:size(columns))
     if (options%count > 0) columns(1) = column_t(0, options%count, options%subdomains)
     call prepare_directory(options%directory, error)
+    call lock%take_directory(comm, options%directory, "gravier_columns", error)
     if (.not. allocated(error)) call solve_columns(comm, columns, options%tolerance, reports, error)
-    if (allocated(error)) return
+    if (allocated(error)) then
+      call lock%release()
+      return
+    end if
     failed = count(reports%status /= solve_converged)
     if (failed > 0) status = status_unconverged
     if (comm%rank == 0) then
       call write_table(output_unit, columns, options%tolerance, reports)
       if (failed > 0) write (output_unit, "(a)") "*** "//to_text(failed)//" of the solves did NOT reach the tolerance"
       call write_csv(options%directory, columns, reports, error)
+      call check_own_files(error)
       if (.not. allocated(error)) write (output_unit, "(a)") "written:", "  "//options%directory//"/columns_table.csv", &
         & "  "//options%directory//"/columns_error.csv"
       flush (output_unit)
     end if
     call comm%agree(error)
+    call lock%release()
   end subroutine run_study
 
   !> Make the output directory, or say why it cannot be used. Collective.

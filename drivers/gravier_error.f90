@@ -5,6 +5,8 @@ program gravier_error
   use gravier_errors, only: error_t, raise, status_ok, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_config, only: parse_config
   use gravier_run, only: read_input
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
@@ -64,19 +66,23 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(row_t), allocatable :: rows(:)
     character(len=:), allocatable :: text
+    type(output_lock_t) :: lock
 
     call read_input(comm, file, text, error)
     if (.not. allocated(error)) call parse_config(file, text, plan%config, error)
+    call comm%agree(error)
+    call lock%take_file(comm, table, "gravier_error "//file, error)
     if (.not. allocated(error)) call measure_case(comm, plan, rows, error)
     call comm%agree(error)
-    if (allocated(error)) return
-    if (comm%rank == 0) then
+    if (comm%rank == 0 .and. .not. allocated(error)) then
       call print_rows(output_unit, rows)
       call write_rows(table, plan, rows, comm%size, error)
+      call check_own_files(error)
       if (.not. allocated(error)) write (output_unit, "(a)") "written: "//table
       flush (output_unit)
     end if
     call comm%agree(error)
+    call lock%release()
   end subroutine make_table
 
   !> Read the command line; the same on all ranks.

@@ -6,6 +6,8 @@ program gravier_fclib
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: path_t, add_path, list_files, make_directory
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
   use gravier_fclib_file, only: write_fclib_local
@@ -58,6 +60,7 @@ program gravier_fclib
   end if
   if (allocated(error)) then
     if (comm%rank == 0) write (error_unit, "(a)") "gravier_fclib: error: "//error%message
+    flush (error_unit)
     status = error%status
   end if
   call comm%free()
@@ -192,8 +195,35 @@ contains
     if (size(files) == before) call raise(error, status_input, path//": expected a directory with files *.hdf5 or *.h5")
   end subroutine add_files
 
-  !> Solve every problem by every method. All files are read before the first is solved. Collective.
+  !> Read every problem, take the places that are written to, then solve. Collective.
   subroutine run_study(options, files, status, error)
+    type(options_t), intent(in) :: options
+    type(path_t), intent(in) :: files(:)
+    integer, intent(inout) :: status
+    type(error_t), allocatable, intent(inout) :: error
+    type(problem_t) :: problem
+    type(output_lock_t) :: directory_lock, csv_lock, profile_lock
+    integer :: p
+
+    do p = 1, size(files)
+      call read_problem(comm, files(p)%text, problem, error)
+    end do
+    if (allocated(error)) return
+    if (options%directory /= "") then
+      if (comm%rank == 0) call make_directory(options%directory, error)
+      call comm%agree(error)
+      call directory_lock%take_directory(comm, options%directory, "gravier_fclib", error)
+    end if
+    if (options%csv /= "") call csv_lock%take_file(comm, options%csv, "gravier_fclib", error)
+    if (options%profile /= "") call profile_lock%take_file(comm, options%profile, "gravier_fclib", error)
+    if (.not. allocated(error)) call solve_all(options, files, status, error)
+    call directory_lock%release()
+    call csv_lock%release()
+    call profile_lock%release()
+  end subroutine run_study
+
+  !> Solve every problem by every method, and write what was asked for. Collective.
+  subroutine solve_all(options, files, status, error)
     type(options_t), intent(in) :: options
     type(path_t), intent(in) :: files(:)
     integer, intent(inout) :: status
@@ -203,12 +233,7 @@ contains
     type(csv_writer_t) :: table
     integer :: p, failed, unbounded
 
-    do p = 1, size(files)
-      call read_problem(comm, files(p)%text, problem, error)
-    end do
-    if (allocated(error)) return
     if (comm%rank == 0) then
-      if (options%directory /= "") call make_directory(options%directory, error)
       if (options%csv /= "") call open_results(table, options%csv, error)
       if (.not. allocated(error)) call print_heading()
     end if
@@ -225,6 +250,7 @@ contains
     if (comm%rank == 0) then
       if (table%is_open()) call table%close(error)
       if (options%profile /= "") call write_profile(options%profile, options%methods, results, error)
+      call check_own_files(error)
       if (failed > 0) write (output_unit, "(a)") "*** "//to_text(failed)//" of "//to_text(size(results))// &
         & " solves did NOT reach the tolerance "//to_text(options%tolerance, 2)
       if (unbounded > 0) write (output_unit, "(a)") "*** "//to_text(unbounded)//" of "//to_text(size(results))// &
@@ -232,7 +258,7 @@ contains
       flush (output_unit)
     end if
     call comm%agree(error)
-  end subroutine run_study
+  end subroutine solve_all
 
   !> One problem by every method. Collective.
   subroutine solve_problem(options, path, problem, results, table, error)

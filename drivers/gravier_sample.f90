@@ -6,6 +6,8 @@ program gravier_sample
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_timers, only: reset_timers
   use gravier_file_system, only: make_directory
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_bodies_data, only: bodies_data_t
   use gravier_bodies_hdf5, only: write_bodies_hdf5
   use gravier_command_line, only: argument, leave
@@ -63,6 +65,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(run_log_t) :: log
+    type(output_lock_t) :: lock
 
     status = status_ok
     call reset_timers()
@@ -74,14 +77,17 @@ contains
       return
     end if
     call prepare_directory(config, error)
-    if (allocated(error)) return
-    if (config%sample%preparation == "none") then
-      call write_unprepared(config, log, error)
-    else
-      call prepare_sample(comm, config, log, status, error)
+    call lock%take_file(comm, trim(config%sample%file), "gravier_sample "//path, error)
+    if (.not. allocated(error)) then
+      if (config%sample%preparation == "none") then
+        call write_unprepared(config, log, error)
+      else
+        call prepare_sample(comm, config, log, status, error)
+      end if
     end if
     call log%close(error)
     call comm%agree(error)
+    call lock%release()
   end subroutine write_sample
 
   !> Write the sample as it is generated. Collective.
@@ -95,6 +101,8 @@ contains
     if (allocated(error)) return
     call open_log(config, log, error)
     call write_bodies_hdf5(comm, trim(config%sample%file), data, error)
+    call check_own_files(error)
+    call comm%agree(error)
     if (.not. allocated(error)) call log%line("finished    "//to_text(data%total)//" grains, "//to_text(data%n_walls)// &
       & " planes; written to "//trim(config%sample%file), error)
   end subroutine write_unprepared

@@ -12,6 +12,7 @@ module gravier_sample_preparation
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_log, only: run_log_t
   use gravier_sample_rest, only: rest_t
+  use gravier_own_files, only: check_own_files
   use gravier_final_bodies, only: write_final_bodies
   implicit none
   private
@@ -65,6 +66,8 @@ contains
       if (rest%reached()) call stop_grains(simulation)
       call write_final_bodies(simulation, trim(config%sample%file), error)
     end if
+    call check_own_files(error)
+    call comm%agree(error)
     if (.not. rest%reached()) status = status_unconverged
     if (.not. allocated(error)) call write_verdict(simulation, log, rest, keep, error)
     call comm%agree(error)

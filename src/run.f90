@@ -10,6 +10,8 @@ module gravier_run
   use gravier_timers, only: reset_timers
   use gravier_body_store, only: body_set_t
   use gravier_file_system, only: make_directory, check_readable
+  use gravier_own_files, only: check_own_files
+  use gravier_output_lock, only: output_lock_t
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -59,8 +61,7 @@ contains
     type(run_log_t) :: log
     type(run_output_t) :: output
     type(interruption_t) :: interruption
-    type(scene_scales_t) :: scales
-    integer :: warnings
+    type(output_lock_t) :: lock
 
     status = status_ok
     interruption%start = MPI_Wtime()
@@ -69,21 +70,46 @@ contains
     call log%init(comm)
     call read_config(comm, path, config, error)
     if (.not. allocated(error)) call simulation%make(comm, config, grains, error)
+    ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
+    if (restart) call claim_directory(comm, config, command, lock, error)
     if (.not. allocated(error)) call start(simulation, grains, restart, error)
-    if (.not. allocated(error)) call prepare_directory(comm, config, error)
-    if (allocated(error)) return
+    if (.not. restart) call claim_directory(comm, config, command, lock, error)
+    if (.not. allocated(error)) then
+      call write_beginning(simulation, log, restart, lock%unknown, error)
+      call output%open(simulation, command, error)
+      if (allocated(error)) then
+        call output%finish(simulation, .false., error)
+      else
+        call run_steps(simulation, log, output, interruption, status, error)
+      end if
+      call log%close(error)
+      call simulation%free()
+    end if
+    call lock%release()
+  end subroutine run_case
+
+  !> What the log begins with, and the file that it goes to. Collective.
+  subroutine write_beginning(simulation, log, restart, unlocked, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(run_log_t), intent(inout) :: log
+    !> whether this was asked for; whether nothing keeps others out of the directory
+    logical, intent(in) :: restart, unlocked
+    type(error_t), allocatable, intent(inout) :: error
+    type(scene_scales_t) :: scales
+    character(len=:), allocatable :: directory
+    integer :: warnings
+
+    directory = trim(simulation%config%output%directory)
     call log%write_start(simulation, error)
     call scales%find(simulation)
     call log%write_scales(simulation, scales, .false., warnings, error)
+    if (unlocked) call log%line("warning     the file system of "//directory// &
+      & " keeps no locks: a second run there is not refused", error)
     if (restart) call log%write_restart(simulation, error)
     call log%write_head(error)
-    call log%open(trim(config%output%directory)//"/run.log", simulation%restarted, error)
-    call comm%agree(error)
-    call output%open(simulation, command, error)
-    if (.not. allocated(error)) call run_steps(simulation, log, output, interruption, status, error)
-    call log%close(error)
-    call simulation%free()
-  end subroutine run_case
+    call log%open(directory//"/run.log", simulation%restarted, error)
+    call simulation%comm%agree(error)
+  end subroutine write_beginning
 
   !> Share the grains of the scene out, or take the state of the checkpoint that the output directory holds. Collective.
   subroutine start(simulation, grains, restart, error)
@@ -187,20 +213,24 @@ contains
     if (stat /= 0) call raise(error, status_input, path//": cannot read this file; expected a text file of namelist groups")
   end subroutine read_text
 
-  !> Make the output directory, or say why it cannot be used. Collective.
-  subroutine prepare_directory(comm, config, error)
+  !> Make the output directory and take its lock, or say why it cannot be used. Collective.
+  subroutine claim_directory(comm, config, command, lock, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: command
+    type(output_lock_t), intent(inout) :: lock
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: reason
 
+    if (allocated(error)) return
     if (comm%rank == 0) then
       call make_directory(trim(config%output%directory), reason)
       if (allocated(reason)) call raise(error, status_input, config%file//": &output directory = '"// &
         & trim(config%output%directory)//"': expected a directory that can be written to: "//reason%message)
     end if
     call comm%agree(error)
-  end subroutine prepare_directory
+    call lock%take_directory(comm, trim(config%output%directory), command, error)
+  end subroutine claim_directory
 
   !> The time loop. Collective.
   subroutine run_steps(simulation, log, output, interruption, status, error)
@@ -242,6 +272,13 @@ contains
     if (allocated(error)) then
       call log%line("stopped     *** by an error after "//to_text(simulation%step)//" steps; results until then in "// &
         & trim(simulation%config%output%directory), unsaid)
+      return
+    end if
+    if (simulation%comm%rank == 0) call check_own_files(error)
+    call simulation%comm%agree(error)
+    if (allocated(error)) then
+      call log%line("lost        *** files of this run in "//trim(simulation%config%output%directory)// &
+        & " were replaced or removed", unsaid)
       return
     end if
     if (figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, &

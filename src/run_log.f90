@@ -6,7 +6,8 @@ module gravier_run_log
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, mpi_library
   use gravier_timers, only: gather_timers, phase_names, n_phases
-  use gravier_file_system, only: text_file_t, on_terminal
+  use gravier_file_system, only: on_terminal
+  use gravier_text_file, only: text_file_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
@@ -85,10 +86,10 @@ contains
     if (self%comm%rank /= 0) return
     if (continued) then
       call self%file%continue(path, error)
+      call self%file%append(self%early, error)
     else
-      call self%file%create(path, error)
+      call self%file%create(path, self%early, error)
     end if
-    call self%file%append(self%early, error)
     self%early = ""
   end subroutine run_log_open
 

@@ -7,7 +7,6 @@ module gravier_bodies_hdf5
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
-  use gravier_file_system, only: rename_file, remove_file
   use gravier_hdf5_file, only: h5_file_t
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit
@@ -358,17 +357,11 @@ contains
     call sort_by_id(comm, bodies, sorted)
     call refuse_bad_numbers(comm, path, sorted, error)
     if (allocated(error)) return
-    call file%create(comm, path//".part", error)
+    call file%create(comm, path, error)
     call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(5 + 4*sorted%dimension) + &
       & sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
     call write_groups(comm, file, sorted, error)
-    call file%flush(error)
     call file%close(error)
-    if (comm%rank == 0) then
-      call rename_file(path//".part", path, error)
-      if (allocated(error)) call remove_file(path//".part")
-    end if
-    call comm%agree(error)
   end subroutine write_bodies_hdf5
 
   subroutine write_groups(comm, file, bodies, error)

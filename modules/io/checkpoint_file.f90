@@ -5,7 +5,6 @@ module gravier_checkpoint_file
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: replace_file, remove_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
@@ -61,7 +60,7 @@ contains
     if (allocated(error)) return
     self%comm = comm
     self%path = path
-    call self%file%create(comm, path//".part", error)
+    call self%file%create(comm, path, error)
     call self%file%reserve(bytes_of_headers, error)
     call self%file%make_group("/format", error)
     call self%file%write_attribute("/format", "name", format_name, error)
@@ -71,7 +70,7 @@ contains
     call self%file%make_group("/arrays", error)
     call self%file%make_group("/tables", error)
     ! files of no checkpoint are not left behind
-    if (allocated(error)) call checkpoint_abandon(self)
+    if (allocated(error)) call self%file%discard()
   end subroutine checkpoint_create
 
   !> Put what was written in the place of an older checkpoint. To be called also when something failed before: the part
@@ -80,28 +79,8 @@ contains
     class(checkpoint_file_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
 
-    if (.not. self%file%is_open()) return
-    call self%file%flush(error)
-    if (allocated(error)) then
-      call checkpoint_abandon(self)
-      return
-    end if
     call self%file%close(error)
-    if (self%comm%rank == 0) then
-      call replace_file(self%path//".part", self%path, error)
-      if (allocated(error)) call remove_file(self%path//".part")
-    end if
-    call self%comm%agree(error)
   end subroutine checkpoint_commit
-
-  !> Close and remove the part.
-  subroutine checkpoint_abandon(self)
-    type(checkpoint_file_t), intent(inout) :: self
-    type(error_t), allocatable :: ignored
-
-    call self%file%close(ignored)
-    if (self%comm%rank == 0) call remove_file(self%path//".part")
-  end subroutine checkpoint_abandon
 
   subroutine checkpoint_write_integer(self, name, value, error)
     class(checkpoint_file_t), intent(inout) :: self

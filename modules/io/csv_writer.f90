@@ -5,7 +5,8 @@ module gravier_csv_writer
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_finite, only: is_finite
-  use gravier_file_system, only: text_file_t, check_readable, file_length, remove_file
+  use gravier_file_system, only: check_readable, file_length
+  use gravier_text_file, only: text_file_t
   implicit none
   private
   public :: csv_writer_t
@@ -37,7 +38,7 @@ module gravier_csv_writer
 
 contains
 
-  !> Create the table, replacing an older one, and write its first line. Failure: status_failure.
+  !> Create the table with its first line, replacing an older one. Failure: status_failure; an older table is as it was.
   subroutine csv_open(self, path, header, error)
     class(csv_writer_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -47,8 +48,7 @@ contains
 
     if (allocated(error)) return
     call begin(self, path, header)
-    call self%file%create(path, error)
-    call self%file%append(header//new_line("a"), error)
+    call self%file%create(path, header//new_line("a"), error)
   end subroutine csv_open
 
   !> Go on with a table whose first column counts steps: keep its rows up to step `last_step`, without a last line that
@@ -70,15 +70,10 @@ contains
     kept = 0
     inquire (file=path, exist=exists)
     if (exists) call find_kept(path, header//new_line("a"), last_step, kept, error)
-    call self%file%create(path//".part", error)
+    call self%file%begin(path, error)
     if (kept == 0) call self%file%append(header//new_line("a"), error)
     call copy(path, kept, self%file, error)
-    call self%file%replace(path, error)
-    if (.not. allocated(error)) return
-    if (self%file%is_open()) then
-      call self%file%close(error)
-      call remove_file(path//".part")
-    end if
+    call self%file%show(path, error)
   end subroutine csv_resume
 
   !> No cells yet, and as many columns as the header has.

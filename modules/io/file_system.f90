@@ -1,192 +1,37 @@
-!> What Fortran leaves to the operating system: directories, atomic renames, reserved disk space, text files whose every
-!> write is checked, and whether the standard output is a terminal. The only file with bindings to the C library.
+!> What Fortran leaves to the operating system: directories, atomic renames, which file a name leads to, reserved disk space, and
+!> whether the standard output is a terminal.
 module gravier_file_system
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
-    & c_f_pointer, c_associated, c_loc
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, c_f_pointer, c_loc
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
+  use gravier_system_calls, only: c_close, c_creat, c_fallocate, c_fstat, c_fstatvfs, c_fsync, c_ftruncate, c_getpid, &
+    & c_gethostname, c_glob, c_globfree, c_isatty, c_lseek, c_mkdir, c_open, c_readlink, c_rename, c_rmdir, c_stat, c_unlink, &
+    & c_write, c_text, text_at, last_error, reason, o_rdonly, o_wronly, o_nonblock, file_mode, directory_mode, &
+    & falloc_fl_keep_size, falloc_fl_punch_hole, seek_end, eintr, eexist, enodev, espipe, enospc, enosys, eopnotsupp, &
+    & statvfs_words, stat_words, glob_words
   implicit none
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file, on_terminal
-  public :: path_t, add_path, list_files, text_file_t, text_at
+  public :: extend_file, replace_file, directory_of, on_terminal, host_name
+  public :: path_t, add_path, list_files
+  public :: identity_t, identity_of, identity_of_open, is_device
 
   !> A path of any length.
   type :: path_t
     character(len=:), allocatable :: text
   end type path_t
 
-  !> A text file written piece by piece; after a failed write it ends with the last complete piece.
-  type :: text_file_t
-    private
-    integer(c_int) :: descriptor = -1
-    !> bytes written so far
-    integer(c_int64_t) :: length = 0
-    character(len=:), allocatable :: path
+  !> Which file it is, whatever its name; zeros where there is none.
+  type :: identity_t
+    integer(i8) :: device = 0, inode = 0
   contains
-    procedure :: create => text_file_create
-    procedure :: continue => text_file_continue
-    procedure :: append => text_file_append
-    procedure :: replace => text_file_replace
-    procedure :: close => text_file_close
-    procedure :: is_open => text_file_is_open
-  end type text_file_t
+    procedure, private :: identity_equals
+    generic :: operator(==) => identity_equals
+  end type identity_t
 
-  ! Linux values of the constants of <fcntl.h>, <errno.h> and <unistd.h>
-  integer(c_int), parameter :: o_rdonly = 0, o_wronly = 1
-  integer(c_int), parameter :: falloc_fl_keep_size = 1
-  integer(c_int), parameter :: seek_set = 0, seek_end = 2
-  integer(c_int), parameter :: eintr = 4, eexist = 17, enospc = 28, enosys = 38, eopnotsupp = 95, edquot = 122
-  !> more than the length of struct statvfs of 64-bit Linux
-  integer, parameter :: statvfs_words = 32
-  !> more than the length of struct glob_t of 64-bit Linux, which begins with the number of paths and their address
-  integer, parameter :: glob_words = 16
   !> processes between a rank and its launcher, at most
   integer, parameter :: highest_ancestor = 16
-  !> permissions before the user's umask
-  integer(c_int), parameter :: file_mode = int(o"666", c_int), directory_mode = int(o"777", c_int)
-
-  interface
-    integer(c_int) function c_mkdir(path, mode) bind(C, name="mkdir")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: mode
-    end function c_mkdir
-
-    integer(c_int) function c_rename(from, to) bind(C, name="rename")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: from(*), to(*)
-    end function c_rename
-
-    integer(c_int) function c_unlink(path) bind(C, name="unlink")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_unlink
-    integer(c_int) function c_rmdir(path) bind(C, name="rmdir")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_rmdir
-
-    integer(c_int) function c_open(path, flags) bind(C, name="open")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: flags
-    end function c_open
-
-    integer(c_int) function c_creat(path, mode) bind(C, name="creat")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: mode
-    end function c_creat
-
-    integer(c_int) function c_close(descriptor) bind(C, name="close")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: descriptor
-    end function c_close
-
-    integer(c_int64_t) function c_write(descriptor, buffer, count) bind(C, name="write")
-      import :: c_int, c_int64_t, c_size_t, c_char
-      implicit none
-      integer(c_int), value :: descriptor
-      character(kind=c_char), intent(in) :: buffer(*)
-      integer(c_size_t), value :: count
-    end function c_write
-
-    integer(c_int64_t) function c_lseek(descriptor, offset, whence) bind(C, name="lseek")
-      import :: c_int, c_int64_t
-      implicit none
-      integer(c_int), value :: descriptor
-      integer(c_int64_t), value :: offset
-      integer(c_int), value :: whence
-    end function c_lseek
-
-    integer(c_int) function c_fsync(descriptor) bind(C, name="fsync")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: descriptor
-    end function c_fsync
-
-    integer(c_int) function c_ftruncate(descriptor, length) bind(C, name="ftruncate")
-      import :: c_int, c_int64_t
-      implicit none
-      integer(c_int), value :: descriptor
-      integer(c_int64_t), value :: length
-    end function c_ftruncate
-
-    integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name="fallocate")
-      import :: c_int, c_int64_t
-      implicit none
-      integer(c_int), value :: descriptor, mode
-      integer(c_int64_t), value :: offset, length
-    end function c_fallocate
-
-    integer(c_int) function c_fstatvfs(descriptor, status) bind(C, name="fstatvfs")
-      import :: c_int, c_int64_t
-      implicit none
-      integer(c_int), value :: descriptor
-      integer(c_int64_t), intent(inout) :: status(*)
-    end function c_fstatvfs
-
-    integer(c_int) function c_glob(pattern, flags, on_error, found) bind(C, name="glob")
-      import :: c_int, c_int64_t, c_char, c_ptr
-      implicit none
-      character(kind=c_char), intent(in) :: pattern(*)
-      integer(c_int), value :: flags
-      type(c_ptr), value :: on_error
-      integer(c_int64_t), intent(inout) :: found(*)
-    end function c_glob
-
-    subroutine c_globfree(found) bind(C, name="globfree")
-      import :: c_int64_t
-      implicit none
-      integer(c_int64_t), intent(inout) :: found(*)
-    end subroutine c_globfree
-
-    integer(c_int) function c_getpid() bind(C, name="getpid")
-      import :: c_int
-      implicit none
-    end function c_getpid
-
-    integer(c_int) function c_isatty(descriptor) bind(C, name="isatty")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: descriptor
-    end function c_isatty
-
-    integer(c_int64_t) function c_readlink(path, target, room) bind(C, name="readlink")
-      import :: c_int64_t, c_size_t, c_char, c_ptr
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      type(c_ptr), value :: target
-      integer(c_size_t), value :: room
-    end function c_readlink
-
-    type(c_ptr) function c_errno_location() bind(C, name="__errno_location")
-      import :: c_ptr
-      implicit none
-    end function c_errno_location
-
-    type(c_ptr) function c_strerror(number) bind(C, name="strerror")
-      import :: c_ptr, c_int
-      implicit none
-      integer(c_int), value :: number
-    end function c_strerror
-
-    integer(c_size_t) function c_strlen(text) bind(C, name="strlen")
-      import :: c_ptr, c_size_t
-      implicit none
-      type(c_ptr), value :: text
-    end function c_strlen
-  end interface
-
 contains
 
   !> Make a directory and those above it, and check that a file can be written there. Not collective: call on one
@@ -221,18 +66,21 @@ contains
   subroutine probe_directory(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
-    type(text_file_t) :: probe
-    type(error_t), allocatable :: failure
+    character(len=*), parameter :: text = "probe"
     character(len=:), allocatable :: name
+    integer(c_int) :: descriptor, number
 
     name = ".gravier-probe-"//to_text(int(c_getpid(), i8))
     if (len(path) > 0) name = path//"/"//name
-    call probe%create(name, failure)
-    call probe%append("probe", failure)
-    call probe%close(failure)
-    if (allocated(failure)) then
-      call raise(error, status_failure, path//": this directory cannot be written to: "//failure%message)
+    number = 0
+    descriptor = c_creat(c_text(name), file_mode)
+    if (descriptor < 0) then
+      number = last_error()
+    else
+      if (c_write(descriptor, text, len(text, c_size_t)) /= len(text)) number = last_error()
+      if (c_close(descriptor) /= 0 .and. number == 0) number = last_error()
     end if
+    if (number /= 0) call raise(error, status_failure, path//": this directory cannot be written to: "//name//": "//reason(number))
     call remove_file(name)
   end subroutine probe_directory
 
@@ -268,7 +116,7 @@ contains
     integer(c_int) :: descriptor, ignored
 
     if (allocated(error)) return
-    descriptor = c_open(c_text(path), o_rdonly)
+    descriptor = c_open(c_text(path), o_rdonly, 0_c_int)
     if (descriptor < 0) then
       call raise(error, status_input, path//": cannot read this file: "//reason(last_error()))
       return
@@ -280,27 +128,83 @@ contains
   subroutine check_creatable(path, error)
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
-    type(text_file_t) :: file
+    integer(c_int) :: descriptor, ignored
 
     if (allocated(error)) return
-    call file%create(path, error)
-    if (.not. allocated(error)) call file%close(error)
+    descriptor = c_creat(c_text(path), file_mode)
+    if (descriptor < 0) then
+      call raise(error, status_failure, path//": cannot create this file: "//reason(last_error()))
+      return
+    end if
+    ignored = c_close(descriptor)
   end subroutine check_creatable
+
+  !> The file that a name leads to.
+  type(identity_t) function identity_of(path) result(identity)
+    character(len=*), intent(in) :: path
+    integer(c_int64_t) :: status(stat_words)
+
+    if (c_stat(c_text(path), status) == 0) identity = identity_t(int(status(1), i8), int(status(2), i8))
+  end function identity_of
+
+  !> The file that is open as a descriptor.
+  type(identity_t) function identity_of_open(descriptor) result(identity)
+    integer(c_int), intent(in) :: descriptor
+    integer(c_int64_t) :: status(stat_words)
+
+    if (c_fstat(descriptor, status) == 0) identity = identity_t(int(status(1), i8), int(status(2), i8))
+  end function identity_of_open
+
+  !> Whether both are the same file, and one that there is.
+  pure logical function identity_equals(self, other)
+    class(identity_t), intent(in) :: self
+    type(identity_t), intent(in) :: other
+    identity_equals = self%inode /= 0 .and. self%inode == other%inode .and. self%device == other%device
+  end function identity_equals
+
+  !> Whether a name leads to a terminal, a pipe, /dev/null or the like: what has no room on a disk.
+  logical function is_device(path)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: descriptor, number, ignored
+
+    is_device = .false.
+    descriptor = c_open(c_text(path), ior(o_wronly, o_nonblock), 0_c_int)
+    if (descriptor < 0) return
+    ! to free room behind the end of a file changes nothing in it
+    number = 0
+    if (c_fallocate(descriptor, ior(falloc_fl_keep_size, falloc_fl_punch_hole), 2_c_int64_t**40, 1_c_int64_t) /= 0) &
+      & number = last_error()
+    is_device = number == enodev .or. number == espipe
+    ignored = c_close(descriptor)
+  end function is_device
+
+  !> The name of this machine.
+  function host_name() result(name)
+    character(len=:), allocatable :: name
+    character(kind=c_char, len=256), target :: buffer
+    integer(c_int) :: ignored
+
+    buffer = ""
+    ignored = c_gethostname(c_loc(buffer), int(len(buffer) - 1, c_size_t))
+    name = trim(buffer(1:index(buffer//c_null_char, c_null_char) - 1))
+  end function host_name
 
   !> Reserve disk space beyond the end of a file, leaving its length as it is, so that writing it later cannot fail
   !> for want of space. Where the file system knows no reservation, only compare with the space that is free now.
-  !> Failure: status_failure; the file is as it was.
-  subroutine reserve_space(path, bytes, error, start)
+  !> Failure: status_failure; the file is as it was, and so is what was reserved before.
+  subroutine reserve_space(path, bytes, error, start, held)
     character(len=*), intent(in) :: path
     integer(i8), intent(in) :: bytes
     type(error_t), allocatable, intent(inout) :: error
     !> also reserve what is missing between this place (from 0) and the end
     integer(i8), intent(in), optional :: start
+    !> up to this place space was reserved before
+    integer(i8), intent(in), optional :: held
     integer(c_int) :: descriptor, number, ignored
     integer(c_int64_t) :: length, first
 
     if (allocated(error) .or. bytes <= 0) return
-    descriptor = c_open(c_text(path), o_wronly)
+    descriptor = c_open(c_text(path), o_wronly, 0_c_int)
     if (descriptor < 0) then
       call raise(error, status_failure, path//": cannot write to this file: "//reason(last_error()))
       return
@@ -313,6 +217,9 @@ contains
     if (number /= 0) then
       ! some file systems keep the part that did fit: give it back
       ignored = c_ftruncate(descriptor, length)
+      if (present(held)) then
+        if (held > length) ignored = allocate_range(descriptor, length, int(held, c_int64_t))
+      end if
       call raise(error, status_failure, path//": "//reason(number)//": "//to_text(bytes)// &
         & " bytes needed; what was written before stays readable")
     end if
@@ -373,7 +280,7 @@ contains
     integer(c_int) :: descriptor, ignored
 
     length = 0
-    descriptor = c_open(c_text(path), o_rdonly)
+    descriptor = c_open(c_text(path), o_rdonly, 0_c_int)
     if (descriptor < 0) return
     length = int(c_lseek(descriptor, 0_c_int64_t, seek_end), i8)
     ignored = c_close(descriptor)
@@ -388,7 +295,7 @@ contains
 
     if (allocated(error)) return
     number = 0
-    descriptor = c_open(c_text(path), o_wronly)
+    descriptor = c_open(c_text(path), o_wronly, 0_c_int)
     if (descriptor < 0) then
       number = last_error()
     else
@@ -416,6 +323,7 @@ contains
     if (.not. allocated(error)) number = sync_to_disk(directory_of(to))
   end subroutine replace_file
 
+  !> The directory that a path names a file in, with a slash at its end where the path has one.
   pure function directory_of(path) result(directory)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: directory
@@ -429,7 +337,7 @@ contains
     integer(c_int) :: descriptor, ignored
 
     number = 0
-    descriptor = c_open(c_text(path), o_rdonly)
+    descriptor = c_open(c_text(path), o_rdonly, 0_c_int)
     if (descriptor < 0) then
       number = last_error()
       return
@@ -461,130 +369,6 @@ contains
     ! words of struct statvfs: 2 is the size of a block, 5 the number of blocks free to this user
     if (status(5) < bytes/max(status(2), 1_c_int64_t) + 1) number = enospc
   end function compare_with_free
-
-  !> Create an empty text file, replacing an older one. Failure: status_failure, with the system's reason.
-  subroutine text_file_create(self, path, error)
-    class(text_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error)) return
-    call self%close(error)
-    self%path = path
-    self%length = 0
-    self%descriptor = c_creat(c_text(path), file_mode)
-    if (self%descriptor < 0) then
-      call raise(error, status_failure, path//": cannot create this file: "//reason(last_error()))
-    end if
-  end subroutine text_file_create
-
-  !> Open a text file behind what it holds, creating it where there is none. Failure: status_failure, with the system's
-  !> reason.
-  subroutine text_file_continue(self, path, error)
-    class(text_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-    logical :: exists
-
-    if (allocated(error)) return
-    inquire (file=path, exist=exists)
-    if (.not. exists) then
-      call self%create(path, error)
-      return
-    end if
-    call self%close(error)
-    self%path = path
-    self%descriptor = c_open(c_text(path), o_wronly)
-    if (self%descriptor < 0) then
-      call raise(error, status_failure, path//": cannot write to this file: "//reason(last_error()))
-      return
-    end if
-    self%length = c_lseek(self%descriptor, 0_c_int64_t, seek_end)
-  end subroutine text_file_continue
-
-  !> Append text and hand it to the system at once. On failure the file is cut back to what it held before.
-  subroutine text_file_append(self, text, error)
-    class(text_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: text
-    type(error_t), allocatable, intent(inout) :: error
-    integer(c_int64_t) :: done, written, ignored
-    integer(c_int) :: number, cut
-
-    if (allocated(error)) return
-    done = 0
-    do while (done < len(text))
-      written = c_write(self%descriptor, text(done + 1:), int(len(text) - done, c_size_t))
-      if (written >= 0) then
-        done = done + written
-        cycle
-      end if
-      number = last_error()
-      if (number == eintr) cycle
-      cut = c_ftruncate(self%descriptor, self%length)
-      ignored = c_lseek(self%descriptor, self%length, seek_set)
-      call raise(error, status_failure, self%path//": cannot write to this file: "//reason(number)//": "// &
-        & to_text(int(len(text), i8))//" bytes needed; what was written before stays readable")
-      return
-    end do
-    self%length = self%length + done
-  end subroutine text_file_append
-
-  !> Give the file the name `path`, as replace_file does; it stays open.
-  subroutine text_file_replace(self, path, error)
-    class(text_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error)) return
-    call replace_file(self%path, path, error)
-    if (.not. allocated(error)) self%path = path
-  end subroutine text_file_replace
-
-  !> Close; a failure that the system had kept to itself shows here. Without effect on a file not open.
-  subroutine text_file_close(self, error)
-    class(text_file_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (self%descriptor < 0) return
-    if (c_close(self%descriptor) /= 0) then
-      call raise(error, status_failure, self%path//": cannot close this file: "//reason(last_error()))
-    end if
-    self%descriptor = -1
-  end subroutine text_file_close
-
-  pure logical function text_file_is_open(self) result(is_open)
-    class(text_file_t), intent(in) :: self
-    is_open = self%descriptor >= 0
-  end function text_file_is_open
-
-  !> The text as C wants it.
-  pure function c_text(text) result(terminated)
-    character(len=*), intent(in) :: text
-    character(len=:, kind=c_char), allocatable :: terminated
-    terminated = text//c_null_char
-  end function c_text
-
-  !> errno of the last call that failed.
-  integer(c_int) function last_error() result(number)
-    integer(c_int), pointer :: errno
-    call c_f_pointer(c_errno_location(), errno)
-    number = errno
-  end function last_error
-
-  !> The system's words for an error number.
-  function reason(number) result(text)
-    integer(c_int), intent(in) :: number
-    character(len=:), allocatable :: text
-
-    select case (number)
-    case (enospc)
-      text = "no space left on device"
-    case (edquot)
-      text = "disk quota exceeded"
-    case default
-      text = text_at(c_strerror(number))
-    end select
-  end function reason
 
   !> Add the paths of the files in a directory whose names end with `suffix`, in the order of their bytes.
   subroutine list_files(directory, suffix, paths)
@@ -632,23 +416,5 @@ contains
       pattern = pattern//path(i:i)
     end do
   end function escaped
-
-  !> The text that C keeps at an address, empty for the null address.
-  function text_at(address) result(text)
-    type(c_ptr), intent(in) :: address
-    character(len=:), allocatable :: text
-    character(kind=c_char), pointer :: letters(:)
-    integer(c_size_t) :: length(1)
-    integer :: i
-
-    length = 0
-    if (c_associated(address)) length = c_strlen(address)
-    allocate (character(len=length(1)) :: text)
-    if (length(1) == 0) return
-    call c_f_pointer(address, letters, length)
-    do i = 1, len(text)
-      text(i:i) = letters(i)
-    end do
-  end function text_at
 
 end module gravier_file_system

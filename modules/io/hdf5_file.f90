@@ -11,7 +11,7 @@ module gravier_hdf5_file
     & hid_t, hsize_t, size_t
   use gravier_kinds, only: dp, i4, i8
   use gravier_errors, only: error_t
-  use gravier_file_system, only: text_at
+  use gravier_system_calls, only: text_at
   use gravier_hdf5_properties, only: text_type, is_ascii
   use gravier_hdf5_rows, only: h5_rows_t, table_integer, table_single, table_double
   implicit none

@@ -7,7 +7,6 @@ module gravier_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
-  use gravier_file_system, only: replace_file, remove_file
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
   use gravier_hdf5_file, only: h5_file_t
   implicit none
@@ -109,13 +108,12 @@ contains
     !> 2 or 3
     integer, intent(in) :: dimension
     type(error_t), allocatable, intent(inout) :: error
-    logical :: created
 
     if (allocated(error)) return
     self%comm = comm
     self%path = path
     self%dimension = dimension
-    call self%file%create(comm, path//".part", error)
+    call self%file%create(comm, path, error)
     call self%file%reserve(bytes_of_headers + len(version) + len(command) + len(input_text), error)
     call self%file%make_group("/run", error)
     call self%file%write_attribute("/run", "version", version, error)
@@ -123,15 +121,7 @@ contains
     call self%file%write_attribute("/run", "input_text", input_text, error)
     call self%file%write_attribute("/run", "dimension", dimension, error)
     call self%file%make_group("/steps", error, members=steps_in_block)
-    call self%file%flush(error)
-    created = self%file%is_open()
-    call self%file%close(error)
-    if (comm%rank == 0) then
-      call replace_file(path//".part", path, error)
-      if (allocated(error) .and. created) call remove_file(path//".part")
-    end if
-    call comm%agree(error)
-    call self%file%reopen(comm, path, error)
+    call self%file%show(error)
   end subroutine results_open
 
   !> Go on with a file that a run left: steps above `last_step` are removed, and more can be written. Failure, with what

@@ -8,7 +8,8 @@ module gravier_vtkhdf_file
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: replace_file, remove_file
+  use gravier_file_system, only: remove_file
+  use gravier_own_files, only: part_of
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
   use gravier_hdf5_file, only: h5_file_t, table_integer, table_single, table_double
   implicit none
@@ -61,7 +62,8 @@ module gravier_vtkhdf_file
   integer, parameter :: chunks_in_block = 128
   !> rows of a chunk of short tables, and of the others at least and at most (4 GiB bound a chunk)
   integer(i8), parameter :: short_chunk = 512, least_chunk = 2048, greatest_chunk = 67108864
-  integer(i8), parameter :: bytes_of_headers = 65536
+  !> room for the headers of a step, and for the block that knows the chunks of a table
+  integer(i8), parameter :: bytes_of_headers = 65536, bytes_of_block = 6144
 
 contains
 
@@ -81,12 +83,14 @@ contains
     call set_up(self, comm, path, n_points, field)
     self%chunk = min(max(least_chunk, expected/chunks_in_block), greatest_chunk)
     if (comm%rank == 0) call remove_file(path)
-    call self%file%create(comm, path//".part", error, chunks_in_block)
+    call self%file%create(comm, path, error, chunks_in_block)
+    call self%file%reserve(bytes_of_headers, error)
     call self%file%make_group(root, error)
     call self%file%write_attribute(root, "Version", [2_i8, 0_i8], error)
     call self%file%write_attribute(root, "Type", "PolyData", error)
     call make_tables(self, error)
     call self%file%flush(error)
+    if (allocated(error)) call self%file%discard()
   end subroutine vtkhdf_open
 
   subroutine set_up(self, comm, path, n_points, field)
@@ -168,15 +172,13 @@ contains
 
     if (allocated(error)) return
     named = exists(comm, path)
-    begun = exists(comm, path//".part")
+    begun = exists(comm, part_of(path))
     if (.not. (named .or. begun)) then
       call self%open(comm, path, n_points, field, expected, error)
       return
     end if
     call set_up(self, comm, path, n_points, field)
-    if (named .and. comm%rank == 0) call replace_file(path, path//".part", error)
-    call comm%agree(error)
-    call self%file%reopen(comm, path//".part", error)
+    call self%file%reopen(comm, path, error, aside=.not. named)
     call self%file%read_attribute(steps_group, "NSteps", written, error)
     do k = 1, size(field)
       if (allocated(error)) exit
@@ -189,16 +191,18 @@ contains
     end if
     if (allocated(error)) then
       error%status = status_input
-      call self%file%close(error)
+      call self%file%leave()
       return
     end if
+    if (named) call self%file%hide(error)
     self%steps = count(step <= last_step, kind=i8)
     call find_rows(self, written, error)
     call self%file%change_attribute(steps_group, "NSteps", self%steps, error)
     call self%file%flush(error)
     call cut_steps(self, error)
     call self%file%flush(error)
-    if (self%steps > 1) call show(self, error)
+    if (self%steps > 1) call self%file%show(error)
+    self%shown = self%steps > 1 .and. .not. allocated(error)
   end subroutine vtkhdf_reopen
 
   !> Whether there is a file, as rank 0 sees it. Collective.
@@ -252,14 +256,13 @@ contains
     real(dp), allocatable :: point(:, :), value(:, :), part(:, :)
     real(dp) :: now(1, 1)
     integer(i8) :: total
-    integer :: k, first, width
+    integer :: k, first
 
     if (allocated(error)) return
     total = self%comm%total(size(rows%key, 2, kind=i8))
     if (self%rows + total == 0) return
     call sort_rows(self%comm, rows, point, value)
-    width = 4*size(point, 1) + 8*(2 + self%n_points) + 8*size(value, 1)
-    call self%file%reserve(bytes_of_headers + width*total, error)
+    call self%file%reserve(bytes_of_headers + bytes_of_step(self, total), error)
     allocate (part(3, self%n_points*size(point, 2)))
     do k = 1, size(part, 2)
       first = 3*mod(k - 1, self%n_points)
@@ -285,8 +288,46 @@ contains
     if (allocated(error)) return
     self%steps = self%steps + 1
     self%rows = self%rows + total
-    if (.not. self%shown .and. self%steps > 1) call show(self, error)
+    if (self%shown .or. self%steps < 2) return
+    call self%file%show(error)
+    self%shown = .true.
   end subroutine vtkhdf_write_step
+
+  !> Bytes by which the tables grow with a step of `total` rows: whole chunks, and the blocks that know them.
+  pure integer(i8) function bytes_of_step(self, total) result(bytes)
+    type(vtkhdf_file_t), intent(in) :: self
+    integer(i8), intent(in) :: total
+    integer :: k
+
+    ! with one row a step: points, cells, connectivities and offsets of the topologies but one, six tables of the steps, step
+    bytes = (3*size(topologies) + 5 + size(self%field))*growth(self%steps, 1_i8, short_chunk, 8) + &
+      & 2*growth(self%steps, 1_i8, short_chunk, 8*size(topologies))
+    associate (np => self%n_points)
+      bytes = bytes + growth(np*self%rows, np*total, np*self%chunk, 12) + growth(np*self%rows, np*total, np*self%chunk, 8) + &
+        & growth(self%rows + self%steps, total + 1, self%chunk, 8)
+    end associate
+    do k = 1, size(self%field)
+      bytes = bytes + growth(self%rows, total, self%chunk, self%field(k)%components*merge(8, 4, self%field(k)%whole))
+    end do
+  end function bytes_of_step
+
+  !> Bytes by which a table grows from `before` rows by `more`.
+  pure integer(i8) function growth(before, more, chunk, width)
+    !> rows of a chunk
+    integer(i8), intent(in) :: before, more, chunk
+    !> bytes of a row
+    integer, intent(in) :: width
+    integer(i8) :: chunks, known, blocks
+
+    known = (before + chunk - 1)/chunk
+    chunks = (before + more + chunk - 1)/chunk - known
+    blocks = 0
+    if (known == 0) blocks = 1
+    ! a full block becomes two, and these want one above them
+    if (known + chunks > chunks_in_block) blocks = blocks + 2 + 2*chunks/chunks_in_block
+    growth = 0
+    if (chunks > 0) growth = chunks*chunk*width + blocks*bytes_of_block
+  end function growth
 
   !> The rows of all ranks in the order of their keys, cut into nearly equal blocks.
   subroutine sort_rows(comm, rows, point, value)
@@ -381,27 +422,20 @@ contains
     call self%file%put_rows(path, self%steps, value(:, 1:merge(1, 0, self%comm%rank == 0)), error)
   end subroutine put_number
 
-  !> Give the file its name. Collective.
-  subroutine show(self, error)
-    type(vtkhdf_file_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-
-    call self%file%close(error)
-    if (self%comm%rank == 0) call replace_file(self%path//".part", self%path, error)
-    call self%comm%agree(error)
-    call self%file%reopen(self%comm, self%path, error)
-    self%shown = .true.
-  end subroutine show
-
-  !> Close; a file without a step is removed. Without effect on a file not open. Collective.
+  !> Close. A file without a step is removed; one that has no name yet takes it, or stays aside where something failed before.
+  !> Without effect on a file not open. Collective.
   subroutine vtkhdf_close(self, error)
     class(vtkhdf_file_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
 
-    if (.not. self%file%is_open()) return
-    if (.not. self%shown .and. self%steps > 0) call show(self, error)
-    call self%file%close(error)
-    if (self%steps == 0 .and. self%comm%rank == 0) call remove_file(self%path//".part")
+    if (self%steps == 0) then
+      call self%file%discard()
+    else if (allocated(error)) then
+      ! what was written of a step that failed is behind the whole ones, and a restart goes on from these
+      call self%file%leave()
+    else
+      call self%file%close(error)
+    end if
   end subroutine vtkhdf_close
 
 end module gravier_vtkhdf_file

@@ -224,9 +224,11 @@ contains
     type(error_t), allocatable :: error
     real(dp), allocatable :: x(:)
     integer :: step
+    logical :: exists
 
     allocate (x(20000/comm%size*(1 + comm%rank)), source=1.0_dp)
     call file%create(comm, disk//"/plain.h5", error)
+    call file%show(error)
     do step = 1, 100
       call file%begin_group("/"//to_text(step), error)
       call file%write_rows("/"//to_text(step)//"/x", x, error)
@@ -254,10 +256,12 @@ contains
     call fill(4096)
     call file%write_rows("/group/x", x, error)
     call expect(error, "plain.h5: /group/x: cannot write this dataset: is the disk full?", "rows on a full disk")
-    call file%close(error)
-    call expect_none(error, "closing at once after a write that failed")
+    call file%discard()
     call fill(-1)
-    if (comm%rank == 0) call remove_file(disk//"/plain.h5")
+    inquire (file=disk//"/plain.h5", exist=exists)
+    call check(.not. exists, "a file that is not whole has no name")
+    inquire (file=disk//"/plain.h5.part", exist=exists)
+    call check(.not. exists, "a file that was given up is removed")
   end subroutine test_without_reservation
 
   !> No room even for an empty file.

@@ -302,7 +302,7 @@ contains
     x = 0
     allocate (tables(merge(2, 3, comm%rank == 1), 2), source=0.0_dp)
     call file%create(comm, path//"/none.h5", error)
-    call expect(error, status_failure, "none.h5: cannot create this file: Not a directory", "no such directory")
+    call expect(error, status_failure, "none.h5.part: cannot create this file: Not a directory", "no such directory")
     call check(.not. file%is_open(), "not open after a failure")
     call file%create(comm, path, error)
     call file%write_rows("/x", x, error)

@@ -111,7 +111,7 @@ contains
     call check_equal(content(), "a,b"//newline//"1,2"//newline, "a refused row leaves no trace")
 
     call table%open(path//"/none.csv", "a", error)
-    call expect(error, "none.csv: cannot create this file: Not a directory", "no such directory")
+    call expect(error, "none.csv.part: cannot create this file: Not a directory", "no such directory")
     call table%open("/dev/full", "a", error)
     call expect(error, "/dev/full: cannot write to this file: no space left on device", "a full disk")
     call table%close(error)

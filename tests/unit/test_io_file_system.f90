@@ -1,10 +1,12 @@
-!> Directories, renames, reservation of disk space, and text files whose writes are checked.
+!> Directories, renames, reservation of disk space, text files whose writes are checked, and files that are others than before.
 program test_io_file_system
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, status_input, status_failure
   use gravier_file_system, only: make_directory, remove_directory, rename_file, replace_file, remove_file, check_readable, &
-    & check_creatable, reserve_space, extend_file, text_file_t
+    & check_creatable, reserve_space, extend_file, is_device
+  use gravier_own_files, only: part_of, give_name, note_own, remove_own, check_own_files
+  use gravier_text_file, only: text_file_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=:), allocatable :: here
@@ -16,6 +18,7 @@ program test_io_file_system
   call test_renames()
   call test_removing_directories()
   call test_replacing()
+  call test_own_files()
   call test_reservation()
   call finish_checks()
   call MPI_Finalize()
@@ -69,7 +72,7 @@ contains
     call expect_none(error, "a directory that exists")
     call make_directory(here//"/a//d/", error)
     call expect_none(error, "a path with slashes to spare")
-    call file%create(here//"/a/d/file", error)
+    call file%create(here//"/a/d/file", "", error)
     call file%close(error)
     call expect_none(error, "a file in the new directory")
     call make_directory(here//"/a/d/file", error)
@@ -88,9 +91,9 @@ contains
     type(error_t), allocatable :: error
     type(text_file_t) :: file
 
-    call file%create(here//"/text", error)
+    call file%create(here//"/text", "one"//new_line("a"), error)
     call check(file%is_open(), "open after create")
-    call file%append("one"//new_line("a"), error)
+    call check_equal(content(here//"/text"), "one"//new_line("a"), "what it begins with")
     call file%append("", error)
     call file%append("two", error)
     call check_equal(content(here//"/text"), "one"//new_line("a")//"two", "content before the file is closed")
@@ -99,9 +102,12 @@ contains
     call file%close(error)
     call expect_none(error, "text file")
 
-    call file%create(here//"/missing/text", error)
-    call expect(error, status_failure, "missing/text: cannot create this file: No such file", "create in a missing directory")
-    call file%create("/dev/full", error)
+    call file%create(here//"/missing/text", "", error)
+    call expect(error, status_failure, "missing/text.part: cannot create this file: No such file", "create in a missing directory")
+    call check(.not. is_device(here//"/text"), "a file is no device")
+    call check(.not. is_device(here//"/none"), "what is not there is no device")
+    call check(is_device("/dev/full"), "a device")
+    call file%create("/dev/full", "", error)
     call file%append("some text", error)
     call expect(error, status_failure, "/dev/full: cannot write to this file: no space left on device: 9 bytes needed", &
       & "append to a full device")
@@ -116,18 +122,17 @@ contains
     type(error_t), allocatable :: error
     type(text_file_t) :: file
 
-    call file%create(here//"/new", error)
-    call file%append("new", error)
-    call file%create(here//"/old", error)
-    call file%append("old", error)
+    call file%create(here//"/new", "new", error)
+    call file%create(here//"/old", "old", error)
     call file%close(error)
     call rename_file(here//"/new", here//"/old", error)
     call expect_none(error, "rename")
     call check_equal(content(here//"/old"), "new", "a rename replaces")
     call rename_file(here//"/new", here//"/old", error)
     call expect(error, status_failure, "new: cannot rename to ", "rename of what is not there")
-    call remove_file(here//"/old")
-    call remove_file(here//"/old")
+    call remove_own(here//"/new")
+    call remove_own(here//"/old")
+    call remove_own(here//"/old")
     call check_readable(here//"/old", error)
     call expect(error, status_input, "No such file", "removed")
   end subroutine test_renames
@@ -138,14 +143,14 @@ contains
     type(text_file_t) :: file
 
     call make_directory(here//"/gone", error)
-    call file%create(here//"/gone/text", error)
+    call file%create(here//"/gone/text", "", error)
     call file%close(error)
     call remove_directory(here//"/gone")
     call check_readable(here//"/gone/text", error)
     call expect_none(error, "a directory with a file stays")
-    call remove_file(here//"/gone/text")
+    call remove_own(here//"/gone/text")
     call remove_directory(here//"/gone")
-    call file%create(here//"/gone/text", error)
+    call file%create(here//"/gone/text", "", error)
     call expect(error, status_failure, "No such file", "an empty directory goes")
   end subroutine test_removing_directories
 
@@ -154,12 +159,12 @@ contains
     type(error_t), allocatable :: error
     type(text_file_t) :: file, other
 
-    call other%create(here//"/place", error)
-    call other%append("older", error)
+    call other%create(here//"/place", "older", error)
     call other%close(error)
-    call file%create(here//"/place.part", error)
+    call file%begin(here//"/place", error)
     call file%append("new", error)
-    call file%replace(here//"/place", error)
+    call check_equal(content(here//"/place"), "older", "the older file while another is begun")
+    call file%show(here//"/place", error)
     call file%append("er", error)
     call expect_none(error, "a file in the place of another")
     call check_equal(content(here//"/place"), "newer", "what is written after it took its place")
@@ -178,13 +183,39 @@ contains
     call expect(error, status_failure, "none: cannot write to this file: No such file", "a longer file that is not there")
   end subroutine test_replacing
 
+  !> Files of this process that others have replaced or removed, and those that it removed itself.
+  subroutine test_own_files()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+
+    call file%create(here//"/own", "own", error)
+    call file%close(error)
+    call check_own_files(error)
+    call expect_none(error, "files as they were written")
+    call execute_command_line("cd '"//here//"' && cp own other && mv other own")
+    call check_own_files(error)
+    call expect(error, status_failure, here//"/own: the file that was written under this name is not there any more", "replaced")
+    call note_own(here//"/own")
+    call check_own_files(error)
+    call expect_none(error, "gone on with")
+    call remove_file(here//"/own")
+    call check_own_files(error)
+    call expect(error, status_failure, here//"/own: the file that was written", "removed")
+    call file%create(here//"/own", "own", error)
+    call file%close(error)
+    call remove_own(here//"/own")
+    call check_own_files(error)
+    call expect_none(error, "removed by itself")
+    call give_name(here//"/own", error)
+    call expect(error, status_failure, "own.part: cannot bring this file to the disk: No such file", "a name for no file")
+  end subroutine test_own_files
+
   !> What a full disk does is tested on a small file system in test_io_full_disk.
   subroutine test_reservation()
     type(error_t), allocatable :: error
     type(text_file_t) :: file
 
-    call file%create(here//"/reserved", error)
-    call file%append("12345", error)
+    call file%create(here//"/reserved", "12345", error)
     call file%close(error)
     call reserve_space(here//"/reserved", 100000_i8, error)
     call reserve_space(here//"/reserved", 0_i8, error)

@@ -1,0 +1,198 @@
+"""Programs that write to one place at the same time: one of them does its work, the others are refused in one line with status 2,
+before anything is overwritten."""
+import contextlib
+import fcntl
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import unittest
+import unittest.mock
+
+from gravier_runs import RunTestCase, each, gravier, merged, namelist, run_case, write
+from killed_runs import Going
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import fault_trials  # noqa: E402
+
+CASE = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [10, 8], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3},
+    "time": {"step": 1e-3, "steps": 20},
+    "solver": {"tolerance": 1e-2, "method": "nscdd"},
+    "decomposition": {"subdomains": 2},
+    "output": {"every": 5, "checkpoint_every": 5},
+}
+#: goes on until it is told to stop
+LONG = merged(CASE, {"time": {"steps": 1000000}, "output": {"every": 1000000, "checkpoint_every": 0}})
+
+#: a system whose files know no locks
+SHIM = r"""
+#include <errno.h>
+#include <stdarg.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+int fcntl(int fd, int command, ...) {
+  va_list list;
+  va_start(list, command);
+  long argument = va_arg(list, long);
+  va_end(list);
+  if (command == 6) { errno = ENOLCK; return -1; }
+  return (int)syscall(SYS_fcntl, fd, command, argument);
+}
+"""
+
+
+def files(directory):
+    """Inode and content of every file by its name; those written aside come and go."""
+    found = {}
+    for name in sorted(os.listdir(directory)):
+        if name.endswith(".part"):
+            continue
+        with open(os.path.join(directory, name), "rb") as file:
+            found[name] = os.stat(file.fileno()).st_ino, file.read()
+    return found
+
+
+class TwoAtOnce(RunTestCase):
+
+    def assert_refused(self, run, pattern=r"another program writes here: "):
+        self.assert_status(run, 2)
+        self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
+        self.assertRegex(run.stderr, r"^gravier\w*: error: \S+: " + pattern)
+
+    def going(self, name, ranks=1, case=LONG):
+        run = Going(case, ranks, self.here(name))
+        self.addCleanup(run.end)
+        self.addCleanup(run.send, signal.SIGKILL)
+        run.wait_for_rows(2)
+        return run
+
+    def test_a_second_run_is_refused(self):
+        """Begun anew or as a restart, on one and on two ranks, and under another spelling of the directory."""
+        run = self.going("second")
+        results = os.path.join(run.directory, "results")
+        before = files(results)
+        for ranks, directory, options in ((1, "results", []), (2, "./results/../results", []), (1, "results", ["--restart"])):
+            write(os.path.join(run.directory, "other.nml"), namelist(merged(CASE, {"output": {"directory": directory}})))
+            second = gravier(*options, "other.nml", ranks=ranks, directory=run.directory)
+            self.assert_refused(second, r"another program writes here: gravier case\.nml, process \d+; expected a place")
+            after = files(results)
+            for name, (inode, content) in before.items():
+                self.assertEqual(after[name][0], inode, name)
+                self.assertTrue(after[name][1].startswith(content), name)
+            self.assertEqual(set(before), set(after))
+        run.send(signal.SIGTERM)
+        status, said = run.end()
+        self.assertEqual(status, 4, said)
+        self.assertIn("interrupted *** by SIGTERM", said)
+        self.assertNotIn(".gravier.lock", os.listdir(results))
+
+    def test_ranks_that_outlive_their_launcher(self):
+        """A rank that is left holds the second byte of the lock: a run waits while it goes, and is refused where it stays."""
+        directory = self.here("outlived")
+        path = os.path.join(directory, "results", ".gravier.lock")
+        os.makedirs(os.path.dirname(path))
+        rank = subprocess.Popen([sys.executable, "-c", "import fcntl, sys, time\nfile = open(sys.argv[1], 'w+')\n"
+                                 "file.write('elsewhere\\ngravier case.nml, process 77\\n')\nfile.flush()\n"
+                                 "fcntl.lockf(file, fcntl.LOCK_SH, 1, 1)\nprint('held', flush=True)\n"
+                                 "sys.stdin.readline()\ntime.sleep(1.5)\n", path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.addCleanup(rank.communicate)
+        self.assertEqual(rank.stdout.readline(), "held\n")
+        self.assert_refused(run_case(CASE, 1, directory))
+        self.assertEqual(os.listdir(os.path.dirname(path)), [".gravier.lock"])
+        rank.stdin.write("\n")
+        rank.stdin.flush()
+        self.assert_status(run_case(CASE, 2, directory), 0)
+
+    def test_a_lock_that_a_crash_has_left(self):
+        """A lock file that nobody holds is no obstacle; one that another machine holds is named with the line that clears it."""
+        directory = self.here("it's left")
+        path = os.path.join(directory, "results", ".gravier.lock")
+        os.makedirs(os.path.dirname(path))
+        write(path, "elsewhere\ngravier case.nml, process 77\n")
+        self.assert_status(run_case(CASE, 2, directory), 0)
+        self.assertFalse(os.path.exists(path))
+        write(path, "elsewhere\ngravier case.nml, process 77\n")
+        with open(path, "rb+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX)
+            refused = run_case(merged(CASE, {"output": {"directory": os.path.dirname(path)}}), 1, directory)
+            self.assert_status(refused, 2)
+            self.assertIn("gravier case.nml, process 77 on elsewhere; if that one is no more, this clears its lock: rm ", refused.stderr)
+            line = refused.stderr.split("clears its lock: ")[1].split("; expected")[0]
+            subprocess.run(line, shell=True, check=True)
+            self.assert_status(run_case(CASE, 2, directory), 0)
+            write(path, "")
+        with open(path, "rb+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX)
+            self.assertIn("another program writes here, results/.gravier.lock is locked", run_case(CASE, 1, directory).stderr)
+
+    def test_no_locks(self):
+        """A lock file that cannot be one is an error; a file system without locks is warned of."""
+        directory = self.here("no locks")
+        os.makedirs(os.path.join(directory, "results", ".gravier.lock"))
+        for ranks in (1, 2):
+            run = run_case(CASE, ranks, directory)
+            self.assert_status(run, 4)
+            self.assertIn("results/.gravier.lock: cannot lock this file: Is a directory", run.stderr)
+        os.rmdir(os.path.join(directory, "results", ".gravier.lock"))
+        source, library = write(self.here("shim.c"), SHIM), self.here("shim.so")
+        subprocess.run([shutil.which("cc") or "gcc", "-shared", "-fPIC", "-o", library, source], check=True)
+        with unittest.mock.patch.dict(os.environ, {"LD_PRELOAD": library}):
+            run = run_case(CASE, 2, directory)
+        self.assert_status(run, 0)
+        self.assertIn("warning     the file system of results keeps no locks: a second run there is not refused\n", run.stdout)
+
+    def test_files_that_are_replaced_are_seen(self):
+        """Whatever replaces or removes a file of a run, the run does not end as if nothing had happened."""
+        for name, change in (("results.h5", "replace"), ("history.csv", "replace"), ("run.log", "remove"), ("results.h5", "remove"),
+                             ("step_1.hdf5", "replace")):
+            with self.subTest(file=name, change=change):
+                run = self.going(f"{change} {name}", 2, merged(LONG, {"output": {"fclib_step": 1}}))
+                path = os.path.join(run.directory, "results", name)
+                if change == "replace":
+                    shutil.copy(path, path + ".copy")
+                    os.rename(path + ".copy", path)
+                else:
+                    os.remove(path)
+                run.send(signal.SIGTERM)
+                status, said = run.end()
+                self.assertEqual(status, 4, said)
+                self.assertIn(f"results/{name}: the file that was written under this name is not there any more", said)
+                self.assertIn("lost        *** files of this run in results", said)
+                self.assertNotIn("interrupted ***", said)
+                self.assertNotIn("finished ", said)
+
+    def test_other_programs(self):
+        """Of two samples in one file, of two studies and of two sets of FCLIB problems in one directory one is refused; samples in
+        different files are made side by side."""
+        directory = self.here("others")
+        os.makedirs(directory)
+        fault_trials.write_sample(directory, "sample.nml", "grains.h5", 50)
+        fault_trials.write_sample(directory, "other.nml", "other.h5", 50)
+        problem = fault_trials.write_fclib(directory)
+        taken = ((".grains.h5.lock", "gravier_sample", ["sample.nml"]), ("out/.gravier.lock", "gravier_fclib", ["--write", "out", problem]),
+                 (".table.csv.lock", "gravier_fclib", ["--csv", "table.csv", problem]),
+                 (".profile.csv.lock", "gravier_fclib", ["--profile", "profile.csv", problem]),
+                 ("columns/.gravier.lock", "gravier_columns", ["--count", "4", "--subdomains", "2"]),
+                 (".error.csv.lock", "gravier_error", [fault_trials.write_error_case(directory)]),
+                 ("study/.gravier.lock", "gravier_accuracy", [fault_trials.write_study(directory)]),
+                 (".bench.csv.lock", "gravier_bench", ["--csv", "bench.csv"]))
+        with contextlib.ExitStack() as held:
+            for lock, _, _ in taken:
+                path = os.path.join(directory, lock)
+                os.makedirs(os.path.dirname(path), exist_ok=True)
+                fcntl.lockf(held.enter_context(open(path, "wb+")), fcntl.LOCK_EX)
+            before = {folder: names for folder, _, names in os.walk(directory)}
+            # each waits some seconds
+            runs = each(lambda _, program, arguments: gravier(*arguments, program=program, directory=directory), taken, workers=len(taken))
+            for run, (lock, program, _) in zip(runs, taken):
+                with self.subTest(program=program, lock=lock):
+                    self.assert_refused(run, "another program writes here, ")
+            self.assertEqual({folder: sorted(names) for folder, _, names in os.walk(directory)},
+                             {folder: sorted(names) for folder, names in before.items()})
+            self.assert_status(gravier("other.nml", program="gravier_sample", directory=directory), 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
