@@ -3,6 +3,7 @@
 !> line that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns
@@ -183,7 +184,7 @@ contains
       & ": expected 2 or 3", error)
     call read_vector(source, group//"/vectors/mu", -1, mu, error)
     if (allocated(error)) return
-    dimension = int(found)
+    dimension = narrow(found)
     if (size(mu) == 0) then
       call source%refuse(group//"/vectors/mu: expected at least one contact", error)
     else if (minval(mu) < 0.0_dp) then
@@ -251,7 +252,7 @@ contains
       call source%refuse(dataset//": expected numbers from "//to_text(lowest)//" to "//to_text(highest), error)
       return
     end if
-    values = int(found)
+    values = narrow(found)
   end subroutine read_indices
 
   !> A matrix stored in any of the three ways.
@@ -278,14 +279,14 @@ contains
         & ": expected -2 (rows), -1 (columns) or the number of triplets", error)
     end if
     if (allocated(error)) return
-    select case (int(nz))
+    select case (narrow(nz))
     case (by_rows)
       call read_compressed(source, group, n_rows, n_columns, row, column, error)
     case (by_columns)
       call read_compressed(source, group, n_columns, n_rows, column, row, error)
     case default
-      call read_indices(source, group//"/i", int(nz), 0, n_rows - 1, row, error)
-      call read_indices(source, group//"/p", int(nz), 0, n_columns - 1, column, error)
+      call read_indices(source, group//"/i", narrow(nz), 0, n_rows - 1, row, error)
+      call read_indices(source, group//"/p", narrow(nz), 0, n_columns - 1, column, error)
       if (.not. allocated(error)) then
         row(:) = row + 1
         column(:) = column + 1

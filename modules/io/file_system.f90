@@ -2,7 +2,8 @@
 !> whether the standard output is a terminal.
 module gravier_file_system
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, c_f_pointer, c_loc
-  use gravier_kinds, only: i8
+  use gravier_kinds, only: i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_system_calls, only: c_close, c_creat, c_fallocate, c_fstat, c_fstatvfs, c_fsync, c_ftruncate, c_getpid, &
@@ -235,7 +236,7 @@ contains
     on_terminal = c_isatty(1_c_int) == 1
     call get_environment_variable("OMPI_COMM_WORLD_SIZE", length=length)
     if (.not. on_terminal .or. length == 0) return
-    process = int(c_getpid())
+    process = int(c_getpid(), i4)
     mine = output_of(process)
     place = mine
     do level = 1, highest_ancestor
@@ -254,7 +255,7 @@ contains
     integer(c_int64_t) :: length
 
     length = c_readlink(c_text("/proc/"//to_text(process)//"/fd/1"), c_loc(buffer), int(len(buffer), c_size_t))
-    place = buffer(1:max(0, int(length)))
+    place = buffer(1:max(0, narrow(length)))
   end function output_of
 
   !> The process that started another one; 0 where that is not known.
@@ -381,7 +382,7 @@ contains
     found(:) = 0
     n = 0
     nullify (address)
-    if (c_glob(escaped(directory)//"/*"//suffix//c_null_char, 0_c_int, c_null_ptr, found) == 0) n(1) = int(found(1))
+    if (c_glob(escaped(directory)//"/*"//suffix//c_null_char, 0_c_int, c_null_ptr, found) == 0) n(1) = narrow(found(1))
     if (n(1) > 0) call c_f_pointer(transfer(found(2), c_null_ptr), address, n)
     do k = 1, n(1)
       call add_path(text_at(address(k)), paths)
