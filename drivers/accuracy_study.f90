@@ -545,7 +545,7 @@ contains
   end subroutine check_samples
 
   !> Value `k` of the key that is varied as a number, its place in the list where it is none.
-  real(dp) function study_value_of(self, k) result(value)
+  pure real(dp) function study_value_of(self, k) result(value)
     class(study_t), intent(in) :: self
     integer, intent(in) :: k
 

@@ -2,7 +2,7 @@
 module gravier_bench_options
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_command_line, only: argument, option_value
+  use gravier_command_line, only: argument, option_value, positive_integer, positive_real
   implicit none
   private
   public :: options_t, read_options, usage
@@ -92,7 +92,7 @@ contains
       options%kernel = word
       if (word == "") call raise(error, status_input, "--kernel '': expected the name of a kernel")
     case ("--seconds")
-      call read_seconds(word, options%seconds)
+      options%seconds = positive_real(word)
       if (.not. options%seconds > 0.0_dp) call raise(error, status_input, "--seconds '"//word// &
         & "': expected a finite real number > 0")
     case ("--rounds")
@@ -113,27 +113,12 @@ contains
 
     subroutine read_count(value)
       integer, intent(inout) :: value
-      integer :: stat
 
-      value = 0
-      stat = 0
-      if (word /= "" .and. verify(word, "0123456789") == 0) read (word, *, iostat=stat) value
-      if (stat /= 0 .or. value < 1) call raise(error, status_input, argument(k)//" '"//word//"': expected an integer >= 1")
+      value = positive_integer(word)
+      if (value < 1) call raise(error, status_input, argument(k)//" '"//word//"': expected an integer >= 1")
     end subroutine read_count
 
   end subroutine read_value
-
-  !> 0 for what is no positive finite number.
-  subroutine read_seconds(word, value)
-    character(len=*), intent(in) :: word
-    real(dp), intent(out) :: value
-    integer :: stat
-
-    value = 0.0_dp
-    if (word == "" .or. verify(word, "0123456789.eEdD+-") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat /= 0 .or. .not. value <= huge(value)) value = 0.0_dp
-  end subroutine read_seconds
 
   !> The defaults of what was not given; those of `contacts` and `triad` depend on the machine and stay 0.
   subroutine fill_in(options)

@@ -329,7 +329,7 @@ contains
     associate (problem => simulation%problem, scheme => simulation%scheme)
       call scheme%start(problem, error)
       if (allocated(error)) return
-      call velocity%start(problem)
+      call velocity%start(problem, 0.1_dp*problem%error_scale)
       seconds = 0.0_dp
       n = 1
       do k = 1, plan%iterations(size(plan%iterations))
@@ -492,7 +492,7 @@ contains
       accelerated = scheme%momentum%on
       scheme%momentum%on = .false.
       call scheme%start(problem, error)
-      if (.not. allocated(error)) call velocity%start(problem)
+      if (.not. allocated(error)) call velocity%start(problem, 0.1_dp*problem%error_scale)
       n = 0
       do k = 1, plan%sweeps
         call scheme%iterate(problem, .false., jump, error)

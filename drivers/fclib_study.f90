@@ -2,6 +2,8 @@
 module gravier_fclib_study
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_magnitude, only: is_size, size_text
   use gravier_communicator, only: communicator_t
   use gravier_fclib_file, only: fclib_local_t, fclib_global_t, read_fclib
   use gravier_condensation, only: multipliers_t, condense, eliminate_constraints
@@ -16,6 +18,8 @@ module gravier_fclib_study
     type(fclib_local_t), allocatable :: local
     type(delassus_t) :: packed
     type(multipliers_t) :: multipliers
+    !> W is that of the file, entry by entry
+    logical :: same_matrix = .false.
   end type problem_t
 
   !> solves shorter than this are repeated for so long, and the median of their times is taken [s]
@@ -38,14 +42,33 @@ contains
     if (allocated(global)) then
       allocate (problem%local)
       call condense(global, problem%local, problem%multipliers, reason)
+      if (allocated(global%r)) problem%local%r = global%r
+      problem%local%remark = global%remark
     else
+      problem%same_matrix = problem%local%remark == "" .and. size(problem%local%s) == 0
       call eliminate_constraints(problem%local, problem%multipliers, reason)
     end if
     associate (local => problem%local)
       call problem%packed%init(local%dimension, local%w, local%q, local%mu, reason)
     end associate
+    call check_sizes(problem%packed, reason)
     if (allocated(reason)) call raise(error, status_input, path//": "//reason%message)
   end subroutine read_problem
+
+  !> Refuse a problem whose measures overflow or are lost beside 0.
+  subroutine check_sizes(packed, error)
+    type(delassus_t), intent(in) :: packed
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: a
+
+    if (allocated(error)) return
+    do a = 1, packed%n_contacts
+      if (.not. is_size(packed%stiffness(a))) call raise(error, status_input, "contact "//to_text(a)//": mean diagonal of W is "// &
+        & to_text(packed%stiffness(a))//": expected "//size_text)
+    end do
+    if (maxval(abs(packed%q)) > 0.0_dp .and. .not. is_size(maxval(abs(packed%q)))) call raise(error, status_input, &
+      & "velocities without impulses of at most "//to_text(maxval(abs(packed%q)))//": expected 0, or "//size_text)
+  end subroutine check_sizes
 
   !> Solve; processor time of the solve alone.
   subroutine solve_timed(problem, control, start, r, report, seconds, error)

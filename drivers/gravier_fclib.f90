@@ -10,8 +10,9 @@ program gravier_fclib
   use gravier_output_lock, only: output_lock_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
-  use gravier_fclib_file, only: write_fclib_local
+  use gravier_fclib_file, only: write_fclib_local, name_of_solution, name_of_guess
   use gravier_friction_solver, only: friction_control_t, friction_methods, verdict_no_solution
+  use gravier_fclib_outputs, only: written_path, check_outputs
   use gravier_fclib_study, only: problem_t, read_problem, solve_timed
   use gravier_fclib_report, only: result_t, print_heading, print_result, open_results, add_result, write_profile
   implicit none
@@ -24,7 +25,7 @@ program gravier_fclib
     & "                       several with commas between, or all"//nl// &
     & "  --tolerance T        on es, the unit-consistent measure of the defect (1e-8)"//nl// &
     & "  --max-iterations N   sweeps and Newton steps of one solve (100000)"//nl// &
-    & "  --warm               start from the impulses in the file, its solution or first guess, where it has some"//nl// &
+    & "  --warm               start from the impulses in the file, its solution or first guess, and say where it has none"//nl// &
     & "  --csv FILE           the results as a table"//nl// &
     & "  --profile FILE       performance profile of the methods, as a table"//nl// &
     & "  --write DIR          each problem, reduced to its contacts, with the impulses found by the method named last"//nl// &
@@ -100,22 +101,8 @@ contains
       end select
       k = k + 1
     end do
-    if (options%directory /= "") then
-      do k = 1, size(files)
-        if (files(k)%text == written_path(options%directory, files(k)%text) .or. "./"//files(k)%text == &
-          & written_path(options%directory, files(k)%text)) call raise(error, status_input, "--write '"//options%directory// &
-          & "': expected another directory than that of "//files(k)%text)
-      end do
-    end if
     if (size(files) == 0 .and. .not. options%help) call raise(error, status_input, "no file given; see gravier_fclib --help")
   end subroutine read_options
-
-  !> Where --write puts the problem of a file.
-  pure function written_path(directory, path) result(written)
-    character(len=*), intent(in) :: directory, path
-    character(len=:), allocatable :: written
-    written = directory//"/"//path(index(path, "/", back=.true.) + 1:)
-  end function written_path
 
   !> Read option `k` of the command line and its value, which follows.
   subroutine read_value(options, k, error)
@@ -203,12 +190,18 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(problem_t) :: problem
     type(output_lock_t) :: directory_lock, csv_lock, profile_lock
+    character(len=:), allocatable :: notes
     integer :: p
 
+    if (comm%rank == 0) call check_outputs(files, options%csv, options%profile, options%directory, error)
+    call comm%agree(error)
+    notes = ""
     do p = 1, size(files)
       call read_problem(comm, files(p)%text, problem, error)
+      if (allocated(error)) return
+      notes = notes//notes_on(options, files(p)%text, problem)
     end do
-    if (allocated(error)) return
+    if (comm%rank == 0) write (error_unit, "(a)", advance="no") notes
     if (options%directory /= "") then
       if (comm%rank == 0) call make_directory(options%directory, error)
       call comm%agree(error)
@@ -260,6 +253,19 @@ contains
     call comm%agree(error)
   end subroutine solve_all
 
+  !> Lines to say of a problem once all files are read: what was read otherwise than it stands, and that --warm has nothing to start from.
+  function notes_on(options, path, problem) result(notes)
+    type(options_t), intent(in) :: options
+    character(len=*), intent(in) :: path
+    type(problem_t), intent(in) :: problem
+    character(len=:), allocatable :: notes
+
+    notes = ""
+    if (problem%local%remark /= "") notes = "gravier_fclib: note: "//path//": "//problem%local%remark//nl
+    if (options%warm .and. .not. allocated(problem%local%r)) notes = notes//"gravier_fclib: note: "//path// &
+      & ": --warm found neither "//name_of_solution//" nor "//name_of_guess//": the solve starts from zero impulses"//nl
+  end function notes_on
+
   !> One problem by every method. Collective.
   subroutine solve_problem(options, path, problem, results, table, error)
     type(options_t), intent(in) :: options
@@ -299,7 +305,8 @@ contains
     call problem%packed%velocity(r, v)
     call problem%multipliers%evaluate(r, l)
     problem%local%r = r
-    call write_fclib_local(comm, written_path(options%directory, path), problem%local, error, velocity=v, multipliers=l)
+    call write_fclib_local(comm, written_path(options%directory, path), problem%local, error, velocity=v, multipliers=l, &
+      & origin=path, same_matrix=problem%same_matrix)
   end subroutine solve_problem
 
 end program gravier_fclib

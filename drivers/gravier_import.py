@@ -3,14 +3,19 @@
 
     gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V]
 
+--period takes two numbers in 2D and three in 3D, 0 along an axis that is not periodic.
 Reads BODIES.DAT, BULK_BEHAV.DAT and TACT_BEHAV.DAT and, where they are there, DRV_DOF.DAT, DOF.INI and Vloc_Rloc.INI; writes NAME.nml,
 NAME.h5 (bodies), NAME_drive_K.csv (drives that change in time) and NAME_contacts.csv (the contacts of Vloc_Rloc.INI).
-What has no counterpart is named, with file and line, and refused: status 2, nothing is written."""
+What has no counterpart is named, with file and line, and refused: status 2, nothing is written. So is a case that `gravier --check`
+refuses: the program of $GRAVIER_PROGRAM, or the one beside this script or in PATH, reads it before its files get their names."""
 import argparse
 import math
 import os
 import re
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 try:
@@ -19,9 +24,12 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
+from whole_file import give_names
+
 LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
-#: names of parameters of laws as LMGC90 itself writes them, and as its pre-processor does
-OLDER = {"dfric": "dyfr", "sfric": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "restn": "rstn", "restt": "rstt"}
+#: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
+OLDER = {"dfric": "dyfr", "dfrc": "dyfr", "sfric": "stfr", "sfrc": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "Weth": "Wthk",
+         "restn": "rstn", "restt": "rstt"}
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
 #: `name= number`; forces and gaps of contacts stand without the sign
@@ -56,7 +64,8 @@ class Entry:
         if name in self.values:
             return self.values[name]
         if default is None:
-            self.refuse(f"{name}= is missing", "a value")
+            names = [name] + [older for older, newer in OLDER.items() if newer == name]
+            self.refuse(f"{'=, '.join(names[:-1])}{'= or ' if names[1:] else ''}{names[-1]}= is missing", "a value")
         return default
 
     def vector(self, name, count, default=None):
@@ -288,10 +297,12 @@ def read_contacts(path, bodies, laws):
 
 class Case:
     """The case that is made: grains, boundaries, materials (one for each contactor and colour), laws (one for each line of the table of
-    visibility that grains have part in), remarks for the user. `slip` is the scale [m/s] of laws with static and dynamic friction."""
+    visibility that grains have part in), remarks for the user. `slip` is the scale [m/s] of laws with static and dynamic friction, `period`
+    has a length for each axis or is empty."""
 
-    def __init__(self, bodies, density, gravity, laws, sees, planes, slip):
+    def __init__(self, bodies, density, gravity, laws, sees, planes, slip, period):
         self.bodies, self.density, self.gravity, self.laws, self.sees, self.planes = bodies, density, gravity, laws, sees, planes
+        self.period = period
         self.dimension, self.slip = bodies[0].dimension, slip
         self.grains, self.boundaries, self.remarks, self.used, self.materials, self.met = [], [], [], [], [], {}
         self.free = [body for body in bodies if not body.drives and body.contactors[0].words[0] in GRAINS]
@@ -489,26 +500,35 @@ class Case:
         normal, along = frame[:, -1], frame[:, 0] * half
         height = (self.centres - centre) @ normal
         sides = [side for side in (1.0, -1.0) if np.any(side * height > 0.0)]
+        across = frame[:, 1] * contactor.get("axe2") if d == 3 else 0.0 * along
+        spans = self.spans_period(normal, np.abs(along) + np.abs(across))
+        if spans and not self.planes and len(sides) == 1:
+            self.remarks.append(f"body {body.rank} {shape}: it is as wide as the period, and becomes an endless plane")
+        endless = (self.planes or spans) and len(sides) == 1
         found = []
         for side in sides:
             face = centre + side * thick * normal
             label = "" if len(sides) == 1 else " above" if side > 0.0 else " below"
-            if self.planes and len(sides) == 1:
+            if endless:
                 keys = {"shape": "plane", "point": list(face), "normal": list(side * normal)}
             elif d == 2:
                 keys = {"shape": "segment", "point": list(face - along), "end": list(face + along)}
             else:
-                across = frame[:, 1] * contactor.get("axe2")
                 keys = {"shape": "rectangle", "point": list(face - along - across), "edge_a": list(2.0 * along),
                         "edge_b": list(2.0 * across)}
             found.append((label, keys))
-        if d == 3 and not self.planes:
+        if d == 3 and not self.planes and not endless:
             self.remarks.append(f"body {body.rank} PLANx: its edges are sharp here, round with {thick:g} m in LMGC90")
         forced = any(kind == "force" for kind, _, _ in body.drives.values()) or len(body.drives) < 3 * d - 3
-        ends = [] if d == 3 or self.planes or forced else [(centre - along, thick), (centre + along, thick)]
-        if forced and d == 2 and not self.planes:
+        ends = [] if d == 3 or self.planes or endless or forced else [(centre - along, thick), (centre + along, thick)]
+        if forced and d == 2 and not self.planes and not endless:
             self.remarks.append(f"body {body.rank} JONCx: moved by forces, its ends are sharp here")
         return found, ends
+
+    def spans_period(self, normal, half):
+        """Does a flat wall of these half widths reach round a periodic axis along which it lies?"""
+        return any(length > 0.0 and abs(across) < ROUND and 2.0 * width >= length * (1.0 - ROUND)
+                   for length, across, width in zip(self.period, normal, half))
 
     def add_wall(self, body):
         for number_of, contactor in enumerate(body.contactors, 1):
@@ -576,8 +596,8 @@ def group_text(name, keys):
     return f"&{name}\n" + "".join(f"  {key} = {text_of(value)}\n" for key, value in keys.items()) + "/\n"
 
 
-def write_files(case, stem, options, contacts):
-    """Everything beside its final name first: what is there is whole."""
+def write_bodies(case, path):
+    """The bodies file; grains without a number get one."""
     d = case.dimension
     taken = {grain[0] for grain in case.grains}
     later = max(len(case.bodies), *(i for i in taken if i)) + 1
@@ -585,8 +605,7 @@ def write_files(case, stem, options, contacts):
         if grain[0] is None:
             grain[0], later = later, later + 1
     spins = 3 * d - 3
-    made = {stem + ".h5": None}
-    with h5py.File(stem + ".h5.part", "w") as file:
+    with h5py.File(path, "w") as file:
         file["bodies/id"] = np.array([grain[0] for grain in case.grains], dtype=np.int64)
         file["bodies/position"] = np.array([grain[1] for grain in case.grains])
         file["bodies/radius"] = np.array([grain[2] for grain in case.grains])
@@ -595,6 +614,11 @@ def write_files(case, stem, options, contacts):
         file["bodies/material"] = np.array([1 + case.materials.index(grain[6]) for grain in case.grains], dtype=np.int64)
         if any(grain[5] for grain in case.grains):
             file["bodies/group"] = np.array([grain[5] for grain in case.grains], dtype=np.int64)
+
+
+def texts_of(case, stem, options, contacts):
+    """The text files as {ending of the name: text}, with names that begin with `stem` in the case."""
+    d, made = case.dimension, {}
     scene = {"title": f"imported from {options.datbox}", "dimension": d, "gravity": list(case.gravity[:d]), "bodies": "file",
              "bodies_file": stem + ".h5", "alert_distance": max(case.used)}
     if options.period:
@@ -608,22 +632,54 @@ def write_files(case, stem, options, contacts):
             text = "time," + ",".join(columns) + "\n" + "".join(
                 ",".join(repr(float(x)) for x in row) + "\n"
                 for row in np.stack([times, *(function.at(times) for function in columns.values())], axis=1))
-            path = tables.setdefault(text, f"{stem}_drive_{len(tables) + 1}.csv")
-            made[path] = text
-            keys = {**keys, "table": path}
+            ending = tables.setdefault(text, f"_drive_{len(tables) + 1}.csv")
+            made[ending] = text
+            keys = {**keys, "table": stem + ending}
         parts.append(group_text("boundary", keys))
     parts += [group_text("time", {"step": options.step, "steps": options.steps}),
               group_text("output", {"directory": stem + "_results", "every": max(1, options.steps // 10)})]
-    made[stem + ".nml"] = "! " + f"made by gravier_import from {options.datbox}\n" + "\n".join(parts)
+    made[".nml"] = "! " + f"made by gravier_import from {options.datbox}\n" + "\n".join(parts)
     if contacts is not None:
-        made[stem + "_contacts.csv"] = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n" + "".join(
+        made["_contacts.csv"] = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n" + "".join(
             ",".join(str(cell) for cell in row) + "\n" for row in contacts)
-    for path, text in made.items():
-        if text is not None:
-            Path(path + ".part").write_text(text, encoding="utf-8")
-    for path in made:
-        os.replace(path + ".part", path)
-    return list(made)
+    return made
+
+
+def write_files(case, stem, options, contacts):
+    """Write everything into a directory beside the final names, let `gravier --check` read it there, and then give the files their names:
+    what is there is whole, and is a case. Returns the names."""
+    folder, name = os.path.split(stem)
+    with tempfile.TemporaryDirectory(prefix=".gravier_import-", dir=folder or ".") as draft:
+        write_bodies(case, os.path.join(draft, name + ".h5"))
+        for ending, text in texts_of(case, name, options, contacts).items():
+            Path(draft, name + ending).write_text(text, encoding="utf-8")
+        check(case, draft, name + ".nml", stem + ".nml")
+        made = texts_of(case, stem, options, contacts)
+        Path(draft, name + ".nml").write_text(made[".nml"], encoding="utf-8")
+        made = [".h5", *made]
+        # the case comes last: where it is there, so is what it names
+        give_names({stem + ending: os.path.join(draft, name + ending) for ending in sorted(made, key=".nml".__eq__)})
+    return [stem + ending for ending in made]
+
+
+def find_program():
+    """The program that reads cases: that of the environment, or the one beside this script or in PATH; None where there is none."""
+    beside = [os.path.dirname(path) for path in (os.path.abspath(__file__), os.path.realpath(__file__), os.path.abspath(sys.argv[0]))]
+    wanted = os.environ.get("GRAVIER_PROGRAM")
+    return shutil.which(wanted) if wanted else next(filter(None, (shutil.which("gravier", path=folder) for folder in [*beside, None])), None)
+
+
+def check(case, folder, name, final):
+    """Refuse a case that the program refuses; without a program say so."""
+    program = find_program()
+    if program is None:
+        case.remarks.append(f"there is no program gravier beside this script or in PATH: {final} is not checked; see gravier --check {final}")
+        return
+    # the program runs by itself, whatever launcher has started this script
+    done = subprocess.run([program, "--check", name], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        said = next((line for line in done.stderr.splitlines() if "gravier: error: " in line), f"status {done.returncode}")
+        raise Refused(f"{final}: gravier --check refuses the case that was made: {said.removeprefix('gravier: error: ')}")
 
 
 def parse():
@@ -632,7 +688,9 @@ def parse():
     parser.add_argument("--step", type=float, required=True, metavar="H", help="time step [s]: the command script of LMGC90 has it")
     parser.add_argument("--steps", type=int, default=100, metavar="N", help="number of steps (100)")
     parser.add_argument("--out", default="imported", metavar="NAME", help="the files are NAME.nml, NAME.h5 and so on (imported)")
-    parser.add_argument("--period", type=float, nargs="+", metavar="L", help="lengths of the periodic cell, which the command script has")
+    parser.add_argument("--period", type=float, nargs="+", metavar="L",
+                        help="lengths of the periodic cell, which the command script has: LX LY in 2D, LX LY LZ in 3D, 0 along an axis that is "
+                        "not periodic")
     parser.add_argument("--planes", action="store_true", help="walls with all grains on one side become endless planes")
     parser.add_argument("--slip", type=float, metavar="V",
                         help="slip [m/s] over which friction falls from static to dynamic, for IQS_DS_CLB and RST_DS_CLB")
@@ -659,8 +717,11 @@ def main():
             read_drives(box / "DRV_DOF.DAT", bodies, start, start + options.step * options.steps)
         contacts = read_contacts(box / "Vloc_Rloc.INI", bodies, laws) if (box / "Vloc_Rloc.INI").is_file() else None
         if options.period and len(options.period) != bodies[0].dimension:
-            raise Refused(f"--period: {len(options.period)} numbers: expected {bodies[0].dimension}, 0 along an axis that is not periodic")
-        case = Case(bodies, density, gravity, laws, sees, options.planes, options.slip)
+            raise Refused(f"--period: {len(options.period)} {'numbers' if options.period[1:] else 'number'}: expected {bodies[0].dimension}, for "
+                          f"bodies {bodies[0].kind} in {bodies[0].dimension}D, 0 along an axis that is not periodic")
+        if options.period and not all(math.isfinite(length) and length >= 0.0 for length in options.period):
+            raise Refused(f"--period {' '.join(f'{length:g}' for length in options.period)}: expected finite numbers >= 0")
+        case = Case(bodies, density, gravity, laws, sees, options.planes, options.slip, options.period or [])
         case.build()
         made = write_files(case, options.out, options, contacts)
     except Refused as refused:

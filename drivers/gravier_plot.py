@@ -20,6 +20,7 @@ import matplotlib.animation
 import matplotlib.pyplot as plt
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
+from whole_file import whole_file
 
 # slow is nearly white, so that the chains stand out; red on blue is safe for the colour-blind
 SPEEDS = LinearSegmentedColormap.from_list("speeds", ["#f4f8fc", "#9ecae1", "#4292c6", "#08519c", "#08306b"])
@@ -305,7 +306,8 @@ def save(figure, path, dpi=200):
     """PNG or SVG, by the ending of the path, without what would tell when."""
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        figure.savefig(path, dpi=dpi, bbox_inches="tight", metadata={"Software": None} if path.suffix == ".png" else {"Date": None})
+        with whole_file(path) as part:
+            figure.savefig(part, dpi=dpi, bbox_inches="tight", metadata={"Software": None} if path.suffix == ".png" else {"Date": None})
     except OSError as reason:
         refuse(f"{path}: {reason.strerror}; expected a file that can be written")
     plt.close(figure)
@@ -359,7 +361,8 @@ def draw_movie(run, options):
         for k, step in enumerate(steps):
             figure = draw_packing(run, step, options, frame)
             # frames of one size
-            figure.savefig(folder / f"frame_{k:05d}.png", dpi=100, metadata={"Software": None})
+            with whole_file(folder / f"frame_{k:05d}.png") as part:
+                figure.savefig(part, dpi=100, metadata={"Software": None})
             plt.close(figure)
         if movie:
             join_frames(sorted(folder.glob("frame_*.png")), out, options.fps)
@@ -374,7 +377,8 @@ def join_frames(paths, out, fps):
     image = figure.figimage(first)
     play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k]))], frames=len(paths))
     try:
-        play.save(out, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
+        with whole_file(out) as part:
+            play.save(part, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
     except OSError as reason:
         refuse(f"{out}: {reason.strerror}; expected a file that can be written")
     except subprocess.CalledProcessError as reason:

@@ -15,6 +15,7 @@ except ImportError as missing:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.ticker import NullFormatter
+from whole_file import save_figure
 
 # one colour a variant (Okabe and Ito, safe for the colour-blind), one marker an error
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#F0E442"]
@@ -220,8 +221,8 @@ def draw(directory, rows):
     figure.subplots_adjust(left=0.09, right=0.98, top=0.89, wspace=0.28, bottom=0.15 + 0.045 * -(-len(handles) // columns))
     figure.suptitle(rows[0]["title"], fontsize=10)
     # neither file says when it was made or by which version
-    figure.savefig(directory / "accuracy.png", dpi=200, metadata={"Software": None})
-    figure.savefig(directory / "accuracy.svg", metadata={"Date": None, "Creator": None})
+    save_figure(figure, directory / "accuracy.png", dpi=200, metadata={"Software": None})
+    save_figure(figure, directory / "accuracy.svg", metadata={"Date": None, "Creator": None})
 
 
 def main():

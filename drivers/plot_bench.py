@@ -12,6 +12,7 @@ except ImportError as missing:
     sys.exit(f"plot_bench.py: {missing}; expected a python3 with matplotlib")
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from whole_file import save_figure
 
 # where the data of a problem lie, from fast to slow; one colour each (Okabe and Ito, safe for the colour-blind)
 PLACES = {"kernel_core_cache": ("caches of the core", "#56B4E9"), "kernel_last_cache": ("last cache", "#009E73"),
@@ -154,8 +155,8 @@ def main():
         figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
         draw(rows, axes)
         figure.supxlabel(machine, fontsize=6)
-        figure.savefig(options.out / f"{name}.png", dpi=200, metadata={"Software": None})
-        figure.savefig(options.out / f"{name}.svg", metadata={"Date": None, "Creator": None})
+        save_figure(figure, options.out / f"{name}.png", dpi=200, metadata={"Software": None})
+        save_figure(figure, options.out / f"{name}.svg", metadata={"Date": None, "Creator": None})
         plt.close(figure)
 
 

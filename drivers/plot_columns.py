@@ -11,6 +11,7 @@ except ImportError as missing:
     sys.exit(f"plot_columns.py: {missing}; expected a python3 with matplotlib")
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from whole_file import save_figure
 
 SWEEPS = 1  # n_GS of the curves
 # one colour a method (Okabe and Ito, safe for the colour-blind), one line style and marker a search direction
@@ -102,8 +103,8 @@ def main():
     figure.legend(handles, labels, loc="lower center", ncol=2 * len(curves), frameon=False, fontsize=8.5,
                   columnspacing=1.4)
     # neither file says when it was made or by which version
-    figure.savefig(directory / "columns.png", dpi=200, metadata={"Software": None})
-    figure.savefig(directory / "columns.svg", metadata={"Date": None, "Creator": None})
+    save_figure(figure, directory / "columns.png", dpi=200, metadata={"Software": None})
+    save_figure(figure, directory / "columns.svg", metadata={"Date": None, "Creator": None})
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ except ImportError as missing:
     sys.exit(f"plot_fclib.py: {missing}; expected a python3 with matplotlib")
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from whole_file import save_figure
 
 # one colour a method (Okabe and Ito, safe for the colour-blind)
 STYLES = {
@@ -56,7 +57,7 @@ def main():
     axes.legend(loc="lower right", frameon=False)
     # the file does not say when it was made or by which version
     svg = arguments.out.suffix == ".svg"
-    figure.savefig(arguments.out, dpi=200, metadata={"Date": None, "Creator": None} if svg else {"Software": None})
+    save_figure(figure, arguments.out, dpi=200, metadata={"Date": None, "Creator": None} if svg else {"Software": None})
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ contacts as tubes as thick as their normal force."""
 import argparse
 import sys
 from pathlib import Path
+from whole_file import whole_file
 
 try:
     import vtk
@@ -104,9 +105,10 @@ def main():
     grab = vtk.vtkWindowToImageFilter()
     grab.SetInput(window)
     writer = vtk.vtkPNGWriter()
-    writer.SetFileName(str(options.out))
     writer.SetInputConnection(grab.GetOutputPort())
-    writer.Write()
+    with whole_file(options.out) as part:
+        writer.SetFileName(str(part))
+        writer.Write()
     print(options.out)
 
 

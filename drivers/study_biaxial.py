@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from study_support import draw_disks, loose, plt, radii_by_volume, read_bodies, read_history, run, states, write_csv, write_hdf5
+from whole_file import save_figure
 
 PRESSURE = 1000.0  # N/m
 DENSITY = 2500.0  # kg/m^2
@@ -211,7 +212,7 @@ def draw(out, strain, sine, fraction, start, radii):
     figure.colorbar(disks, ax=right, label="way besides the mean strain / mean radius", shrink=0.8)
     right.set_xlabel("x [m]")
     right.set_ylabel("y [m]")
-    figure.savefig(out / "study_biaxial.png", dpi=130)
+    save_figure(figure, out / "study_biaxial.png", dpi=130)
 
 
 if __name__ == "__main__":

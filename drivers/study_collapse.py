@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from study_support import draw_disks, lattice, plt, read_bodies, run, states, write_csv, write_hdf5
+from whole_file import save_figure
 
 STEP = 5.0e-4  # s
 # radii [m], grains of a column, aspect ratios aimed at, flat columns below the one and tall ones above the other measured
@@ -157,7 +158,7 @@ def draw(path, ratio, run_out, slopes, heaps):
         axes[panel].axvline(1.0, color="#b2182b", linewidth=0.8)
         axes[panel].set_title(f"$a$ = {ratio[k]:.2g}", fontsize=10)
         axes[panel].set_xlabel("$x/r_0$")
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path, dpi=130)
 
 
 if __name__ == "__main__":

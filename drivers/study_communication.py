@@ -20,6 +20,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from whole_file import save_figure, whole_file  # noqa: E402
 
 CASE = """&scene
   dimension = {dimension}
@@ -63,7 +64,7 @@ def run_case(program, bodies, dimension, partition, subdomains):
     """The row of history.csv of one step."""
     with tempfile.TemporaryDirectory() as scratch:
         case = os.path.join(scratch, "case.nml")
-        with open(case, "w", encoding="utf-8") as file:
+        with whole_file(case) as part, open(part, "w", encoding="utf-8") as file:
             file.write(CASE.format(dimension=dimension, bodies=bodies, partition=partition, subdomains=subdomains,
                                    directory=os.path.join(scratch, "out")))
         run = subprocess.run([program, case], capture_output=True, text=True, check=False)
@@ -92,7 +93,7 @@ def main():
                           "ghosts_a_step": int(row["ghosts"]) / n,
                           "shared_share": int(row["interface_bodies"]) / grains})
             print(", ".join(f"{key} {value:.5g}" if not isinstance(value, str) else value for key, value in table[-1].items()))
-    with open(os.path.join(options.out, "communication.csv"), "w", newline="", encoding="utf-8") as file:
+    with whole_file(os.path.join(options.out, "communication.csv")) as part, open(part, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, table[0].keys())
         writer.writeheader()
         writer.writerows(table)
@@ -118,7 +119,7 @@ def main():
     axes.set_ylabel("bytes sent an iteration by the subdomain that sends most")
     axes.legend(frameon=False)
     figure.tight_layout()
-    figure.savefig(os.path.join(options.out, "communication.svg"))
+    save_figure(figure, os.path.join(options.out, "communication.svg"))
 
 
 if __name__ == "__main__":

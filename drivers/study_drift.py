@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from study_support import BINARIES, lattice, plt, read_bodies, read_history, run, states, write_csv, write_hdf5
+from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.008, 0.012  # m
 RADIUS = 0.5 * (SMALLEST + LARGEST)
@@ -168,7 +169,7 @@ def draw(path, curves):
         low, high = panel.get_ylim()
         panel.set_ylim(low, high * (high / low)**0.2)
         panel.legend(frameon=False, fontsize=7, loc="upper center", ncol=3 if name == "disks" else 2)
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path, dpi=130)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from study_support import SOURCE, draw_disks, plt, run, states, write_csv
+from whole_file import save_figure
 
 RADIUS, RATE = 0.2, 1.0  # m, rad/s
 START = 2.0  # s, when the flow has become steady
@@ -60,7 +61,7 @@ def main():
     right.set_xlim(-1.03 * RADIUS, 1.03 * RADIUS)
     right.set_ylim(-1.03 * RADIUS, 1.03 * RADIUS)
     figure.colorbar(disks, ax=right, label="speed [m/s]", shrink=0.8)
-    figure.savefig(options.out / "study_drum.png", dpi=130)
+    save_figure(figure, options.out / "study_drum.png", dpi=130)
 
 
 if __name__ == "__main__":

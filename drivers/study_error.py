@@ -28,6 +28,7 @@ from error_cost import HEIGHTS, study_cost
 from error_rest import study_rest
 from error_strength import study_strength
 from study_support import BINARIES, ENVIRONMENT, gravier, run, write_hdf5, write_measured
+from whole_file import whole_file
 
 PARTS = ("estimate", "rest", "cost", "strength")
 STEP = 1.0e-3  # s
@@ -408,7 +409,7 @@ def study_estimate(out, quick, only):
         packing.settle(out)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         rows = [row for found in pool.map(lambda scene: measure_scene(scene, out), chosen) for row in found]
-    with open(out / "error_states.csv", "w", newline="", encoding="ascii") as file:
+    with whole_file(out / "error_states.csv") as part, open(part, "w", newline="", encoding="ascii") as file:
         table = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
@@ -444,7 +445,7 @@ def main():
     if "rest" in parts:
         failures += study_rest(at_rest(options.quick), out, 100 if options.quick else 500, options.beside)
     if "cost" in parts:
-        failures += study_cost(out, (4, 8) if options.quick else HEIGHTS, 6 if options.quick else 10, DIAMETER, STEP, measure)
+        failures += study_cost(out, (4, 8) if options.quick else HEIGHTS, 6 if options.quick else 14, DIAMETER, STEP, measure)
     if "strength" in parts:
         failures += study_strength(out, 100 if options.quick else 0)
     print(f"\n{time.time() - started:.0f} s; tables in {options.out}: " + ", ".join(sorted(path.name for path in out.glob("error*.csv"))))

@@ -16,6 +16,7 @@ SOURCE = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(SOURCE / "tests" / "hard"), str(SOURCE / "tests" / "support")]
 import gravier_runs  # noqa: E402
 from hard_cases import cases, disagreement, methods_of, play  # noqa: E402
+from whole_file import whole_file  # noqa: E402
 
 COLUMNS = ["case", "method", "ranks", "subdomains", "steps", "iterations", "residual", "energy_change", "overlap", "status", "wrong"]
 #: methods that run the long cases at full length: minutes each
@@ -110,7 +111,7 @@ def main():
     chosen = [case for name, case in cases().items() if re.search(options.cases, name)]
     found = gravier_runs.each(study, [(options, case) for case in chosen], options.workers)
     rows = joined(options.out / "hard_cases.csv", [r for several in found for r in several])
-    with open(options.out / "hard_cases.csv", "w", encoding="ascii", newline="") as file:
+    with whole_file(options.out / "hard_cases.csv") as part, open(part, "w", encoding="ascii", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)

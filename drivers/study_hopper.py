@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from study_support import draw_disks, lattice, plt, read_history, run, states, write_csv, write_hdf5
+from whole_file import save_figure
 
 STEP = 5.0e-4  # s
 DENSITY = 2500.0  # kg/m^3, kg/m^2 in 2D
@@ -118,7 +119,7 @@ def main():
             disks = draw_disks(right, place[seen][:, [0, -1]], state["bodies/radius"][:][seen], speed, "viridis", (0.0, 0.6))
             figure.colorbar(disks, ax=right, label="speed [m/s]", shrink=0.8)
             right.set_title(f"$D/d$ = {shown:g}, {time:.2g} s", fontsize=10)
-    figure.savefig(options.out / f"{case.name}.png", dpi=130)
+    save_figure(figure, options.out / f"{case.name}.png", dpi=130)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from study_support import plt, read_history, run, write_csv
+from whole_file import save_figure
 
 #: name: dimension, grains along each axis, steps of settling; 1e5 as high as 1e4
 PACKINGS = {"disks 1e3": (2, [32, 31], 500), "disks 1e4": (2, [100, 100], 900), "disks 1e5": (2, [1000, 100], 900),
@@ -210,7 +211,7 @@ def draw(rows, columns, path):
     axes[2].set_title("columns, 10 sweeps", fontsize=9)
     axes[2].legend(frameon=False, fontsize=8)
     figure.tight_layout()
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_large(rows, path):
@@ -233,7 +234,7 @@ def draw_large(rows, path):
     axes[0].set_ylabel("iterations to a residual of 1e-3")
     axes[0].legend(frameon=False, fontsize=8)
     figure.tight_layout()
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def study(directory, listed, path):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from study_support import draw_disks, lattice, plt, run, states, write_csv, write_hdf5
+from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.004, 0.006  # m
 CELLS = 12  # grains across
@@ -91,7 +92,7 @@ def main():
     left.legend(frameon=False)
     draw_disks(right, position, radii)
     right.set_xlabel("x [m]")
-    figure.savefig(options.out / "study_silo.png", dpi=130)
+    save_figure(figure, options.out / "study_silo.png", dpi=130)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 !> The command line of the program, and how it ends.
 module gravier_command_line
   use, intrinsic :: iso_c_binding, only: c_int
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_number_text, only: read_integer, read_real
   implicit none
   private
   public :: arguments_t, read_arguments, argument, option_value, positive_integer, positive_real, leave
@@ -99,25 +101,23 @@ contains
   end function option_value
 
   !> The number that a word of digits means; 0 for anything else.
-  integer function positive_integer(word) result(value)
+  pure integer function positive_integer(word) result(value)
     character(len=*), intent(in) :: word
-    integer :: stat
+    integer(i8) :: found
+    logical :: fits
 
+    call read_integer(word, found, fits)
     value = 0
-    if (word == "" .or. verify(word, "0123456789") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat /= 0) value = 0
+    if (found > 0 .and. found <= huge(value)) value = narrow(found)
   end function positive_integer
 
   !> The finite number > 0 that a word means; 0 for anything else.
-  real(dp) function positive_real(word) result(value)
+  pure real(dp) function positive_real(word) result(value)
     character(len=*), intent(in) :: word
-    integer :: stat
+    integer :: size
 
-    value = 0.0_dp
-    if (word == "" .or. verify(word, "0123456789.eEdD+-") > 0) return
-    read (word, *, iostat=stat) value
-    if (stat /= 0 .or. .not. (value > 0.0_dp .and. value <= huge(value))) value = 0.0_dp
+    call read_real(word, value, size)
+    value = max(value, 0.0_dp)
   end function positive_real
 
   !> End the process with an exit status, without the lines that STOP prints.

@@ -161,6 +161,8 @@ contains
       call check_contact(report, scene%dimension, scene%contact, "scene", "", error)
       call check_contact(report, scene%dimension, scene%wall_contact, "scene", "wall_", error)
       call expect(report, all(scene%period >= 0.0_dp), "scene", "period", error)
+      call expect(report, scene%gravity_table == "" .or. .not. is_given(report, "scene", "gravity"), "scene", "gravity", error, &
+                  "a scene without it where "//shown_text(report, "scene", "gravity_table")//" replaces it")
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
       call expect(report, scene%overlap_allowed > 0.0_dp .or. .not. scene%overlap_given, "scene", "overlap_allowed", error)
@@ -245,7 +247,7 @@ contains
       call expect(report, parts%repartition_every >= 0, "decomposition", "repartition_every", error)
       call expect(report, parts%repartition_imbalance > 1.0_dp .or. .not. abs(parts%repartition_imbalance) > 0.0_dp, &
                   "decomposition", "repartition_imbalance", error)
-      if (all(parts%grid == 0)) return
+      if (.not. parts%grid_given) return
       call expect(report, parts%partition == "grid", "decomposition", "grid", error, &
                   "no grid where partition = '"//trim(parts%partition)//"': give subdomains, or partition = 'grid'")
       call expect(report, positive(parts%grid, config%scene%dimension), "decomposition", "grid", error, &

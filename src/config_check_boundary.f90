@@ -56,8 +56,8 @@ contains
     n = size(boundaries)
     call expect(report, boundaries(n)%name /= "", "boundary", "name", error)
     do i = 1, n - 1
-      call expect(report, boundaries(i)%name /= boundaries(n)%name, "boundary", "name", error, &
-                  "a name of its own, but the "//ordinal(i)//" has it too")
+      if (boundaries(i)%name == boundaries(n)%name) call expect(report, .false., "boundary", "name", error, &
+                                                             "a name of its own, but the "//ordinal(i)//" has it too")
     end do
   end subroutine check_name
 
@@ -71,9 +71,8 @@ contains
     n = size(boundaries)
     if (boundaries(n)%shape /= "grains") return
     do i = 1, n - 1
-      if (boundaries(i)%shape /= "grains") cycle
-      call expect(report, boundaries(i)%group /= boundaries(n)%group, "boundary", "group", error, &
-                  "a group of its own, but the "//ordinal(i)//" has it too")
+      if (boundaries(i)%shape /= "grains" .or. boundaries(i)%group /= boundaries(n)%group) cycle
+      call expect(report, .false., "boundary", "group", error, "a group of its own, but the "//ordinal(i)//" has it too")
     end do
   end subroutine check_group
 

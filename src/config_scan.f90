@@ -41,6 +41,8 @@ module gravier_config_scan
   type :: cursor_t
     character(len=:), allocatable :: file, text
     integer :: at = 1
+    !> lines that end before position `counted`
+    integer :: lines = 0, counted = 1
     !> a place where a value is put together, as long as the text
     character(len=:), allocatable :: buffer
   end type cursor_t
@@ -140,6 +142,9 @@ contains
     integer :: line
 
     line = line_of(cursor)
+    ! not counted again for the next group
+    cursor%lines = line - 1
+    cursor%counted = cursor%at
     if (next(cursor) /= "&") then
       call fail(cursor, "not a namelist: line "//to_text(line)//": '"//excerpt(rest_of_line(cursor)) &
                 //"' stands outside a group (a group is &name key = value ... /, and a text needs quotes)", error)
@@ -412,7 +417,7 @@ contains
 
   pure integer function line_of(cursor)
     type(cursor_t), intent(in) :: cursor
-    line_of = 1 + occurrences(cursor%text(:cursor%at - 1), newline)
+    line_of = 1 + cursor%lines + occurrences(cursor%text(cursor%counted:cursor%at - 1), newline)
   end function line_of
 
   pure integer function occurrences(text, character)

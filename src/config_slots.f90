@@ -299,6 +299,7 @@ contains
     case ("repartition_every"); slot%integer => config%decomposition%repartition_every
     case ("repartition_imbalance"); slot%real => config%decomposition%repartition_imbalance
     end select
+    if (name == "grid") slot%given => config%decomposition%grid_given
   end subroutine decomposition_slot
 
   subroutine enriched_slot(config, name, slot)

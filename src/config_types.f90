@@ -123,6 +123,8 @@ module gravier_config_types
     character(len=choice_length) :: kind
     !> subdomains along each axis; all 0 when not given; once given, the third entry is 1 in 2D
     integer :: grid(3)
+    !> false: the grid is found from subdomains
+    logical :: grid_given = .false.
     !> total number; the product of grid when grid is given
     integer :: subdomains
     !> steps; 0 never

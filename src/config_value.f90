@@ -1,17 +1,15 @@
-!> Reads the text of one value through a namelist read of one internal record.
+!> Reads the text of one value through a namelist read of one internal record, once each of its entries is written as its kind is.
 module gravier_config_value
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, ieee_set_halting_mode, &
-                                                                              ieee_support_halting, ieee_overflow
   use gravier_kinds, only: dp
   use gravier_text, only: lower
+  use gravier_number_text, only: number_size, is_integer, size_usual, size_tiny
   use gravier_config_types, only: text_length, choice_length
   use gravier_config_table, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
   use gravier_config_keys, only: has_word
   use gravier_config_slots, only: slot_t
   implicit none
   private
-  public :: read_value, number_of, most_entries
+  public :: read_value, most_entries
 
   !> entries of the longest key
   integer, parameter :: most_entries = 3
@@ -36,6 +34,7 @@ contains
 
     touched = .false.
     failed = key%count == 1 .and. index /= ""
+    if (.not. failed) failed = .not. are_of_kind(key%kind, value)
     if (failed) return
     select case (key%kind)
     case (kind_integer)
@@ -92,7 +91,7 @@ contains
     again = 1.0_dp
     call reals_of_record(assignment, values, status)
     if (status == 0) call reals_of_record(assignment, again, status)
-    failed = status /= 0 .or. .not. all(ieee_is_finite(values))
+    failed = status /= 0
     if (failed) return
     touched = abs(values - again) < 0.5_dp
     failed = .not. fits(touched, key%count)
@@ -101,7 +100,6 @@ contains
     if (key%count > 1) where (touched) slot%reals = values
   end subroutine read_real
 
-  !> Only T, F, TRUE and FALSE, with or without full stops: the intrinsic read would take `tomato` as true.
   subroutine read_logical(key, index, value, slot, touched, failed)
     type(key_t), intent(in) :: key
     !> with its parentheses, or empty
@@ -113,9 +111,6 @@ contains
     logical :: values(most_entries), again(most_entries)
     integer :: status
 
-    touched = .false.
-    failed = .not. are_logicals(value)
-    if (failed) return
     values = .false.
     again = .true.
     call logicals_of_record(index//" = "//value, values, status)
@@ -127,21 +122,39 @@ contains
     if (key%count > 1) where (touched) slot%logicals = values
   end subroutine read_logical
 
-  !> Are the entries of a list, each perhaps after a repeat count and a star, all words for a logical value?
-  pure logical function are_logicals(list)
+  !> Are the entries of a list, each perhaps after a repeat count and a star, all written as values of a kind are? The intrinsic read
+  !> would take `tomato` as true, `1-1` as 0.1 and `inf` as a number. Texts are not looked at.
+  pure logical function are_of_kind(kind, list)
+    integer, intent(in) :: kind
     character(len=*), intent(in) :: list
     integer :: first, length
 
-    are_logicals = .true.
+    are_of_kind = .true.
+    if (all(kind /= [kind_integer, kind_real, kind_logical])) return
     first = 1
-    do while (first <= len(list) .and. are_logicals)
+    do while (first <= len(list) .and. are_of_kind)
       length = scan(list(first:)//",", " ,") - 1
       associate (entry => list(first:first + length - 1))
-        if (length > 0) are_logicals = has_word("t f .t. .f. true false .true. .false.", lower(entry(index(entry, "*") + 1:)))
+        if (length > 0) are_of_kind = is_of_kind(kind, entry(index(entry, "*") + 1:))
       end associate
       first = first + length + 1
     end do
-  end function are_logicals
+  end function are_of_kind
+
+  !> Is it an integer, a real that is finite, or a word for a logical value?
+  pure logical function is_of_kind(kind, text)
+    integer, intent(in) :: kind
+    character(len=*), intent(in) :: text
+
+    select case (kind)
+    case (kind_integer)
+      is_of_kind = is_integer(text)
+    case (kind_real)
+      is_of_kind = any(number_size(text) == [size_usual, size_tiny])
+    case default
+      is_of_kind = has_word("t f .t. .f. true false .true. .false.", lower(text))
+    end select
+  end function is_of_kind
 
   !> A text of at most text_length characters, or one of the choices of the key in any case.
   subroutine read_text(key, value, slot, touched, failed)
@@ -211,8 +224,7 @@ contains
     namelist /one/ value
 
     record = "&one value"//assignment//" /"
-    status = 1
-    if (index(assignment, ";") == 0) read (record, nml=one, iostat=status)
+    read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
   end subroutine integers_of_record
 
@@ -223,17 +235,10 @@ contains
     !> not 0: it is not a list of reals
     integer, intent(out) :: status
     character(len=:), allocatable :: record
-    logical :: halting
     namelist /one/ value
 
     record = "&one value"//assignment//" /"
-    status = 1
-    ! a number too large, as 1e999, reads as infinity and must not end a program that traps overflows
-    call ieee_get_halting_mode(ieee_overflow, halting)
-    if (ieee_support_halting(ieee_overflow)) call ieee_set_halting_mode(ieee_overflow, .false.)
-    if (index(assignment, ";") == 0) read (record, nml=one, iostat=status)
-    call ieee_set_flag(ieee_overflow, .false.)
-    if (ieee_support_halting(ieee_overflow)) call ieee_set_halting_mode(ieee_overflow, halting)
+    read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
   end subroutine reals_of_record
 
@@ -278,18 +283,6 @@ contains
     read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()
   end subroutine texts_of_record
-
-  !> The real number that a text says, infinite when it is too large; the text must be a number.
-  function number_of(text) result(number)
-    character(len=*), intent(in) :: text
-    real(dp) :: number
-    real(dp) :: values(most_entries)
-    integer :: status
-
-    values = 0.0_dp
-    call reals_of_record(" = "//text, values, status)
-    number = values(1)
-  end function number_of
 
   !> A read of no consequence. The library of gfortran 12 keeps the rest of a record that it could not read, as
   !> `1e-` for a real number, and the next namelist read of the program sets nothing and reports success.

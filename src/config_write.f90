@@ -1,12 +1,12 @@
 !> Writes the options in force for the log, and the reference of all keys.
 module gravier_config_write
   use gravier_kinds, only: dp
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, growing_text_t
+  use gravier_number_text, only: read_real
   use gravier_config_types, only: config_t
   use gravier_config_table, only: group_t, key_t, groups, keys, fill_keys, kind_integer, kind_real, kind_logical, kind_choice
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs
-  use gravier_config_value, only: number_of
   implicit none
   private
   public :: write_active, write_key_reference
@@ -56,19 +56,20 @@ contains
     character(len=:), allocatable :: text
     !> a copy to point into
     type(config_t), target :: copy
+    type(growing_text_t) :: lines
     integer :: g, k, instance
 
     copy = config
-    text = ""
     do g = 1, size(groups)
       do instance = 1, group_count(config, groups(g)%name)
-        text = text//"&"//trim(groups(g)%name)//newline
+        call lines%add("&"//trim(groups(g)%name)//newline)
         do k = 1, size(keys)
-          if (keys(k)%group == groups(g)%name) text = text//active_line(copy, keys(k), instance)
+          if (keys(k)%group == groups(g)%name) call lines%add(active_line(copy, keys(k), instance))
         end do
-        text = text//"/"//newline
+        call lines%add("/"//newline)
       end do
     end do
+    text = lines%get()
   end function active_text
 
   !> The line of one option with its newline, a comment where the program finds the value; empty for an option that does
@@ -98,6 +99,7 @@ contains
 
     in_force = belongs(config, key, instance)
     if (key%group == "boundary" .and. key%name == "mass") in_force = any(config%boundaries(instance)%free)
+    if (key%group == "scene" .and. key%name == "gravity") in_force = config%scene%gravity_table == ""
     if (key%group == "sample" .and. key%name == "solid_fraction") &
       in_force = in_force .and. config%sample%box(config%scene%dimension) <= 0.0_dp
   end function in_force
@@ -164,11 +166,11 @@ contains
     real(dp), intent(in) :: value
     character(len=:), allocatable :: text
     real(dp) :: back
-    integer :: n
+    integer :: n, size
 
     do n = 1, 17
       text = to_text(value, n)
-      back = number_of(text)
+      call read_real(text, back, size)
       if (.not. abs(back - value) > 0.0_dp) exit
     end do
     text = plain(text)

@@ -3,7 +3,7 @@ module gravier_run_log
   use, intrinsic :: iso_fortran_env, only: output_unit
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, growing_text_t
   use gravier_communicator, only: communicator_t, mpi_library
   use gravier_timers, only: gather_timers, phase_names, n_phases
   use gravier_file_system, only: on_terminal
@@ -40,7 +40,7 @@ module gravier_run_log
     type(communicator_t), pointer :: comm => null()
     type(text_file_t) :: file
     !> kept until the file is open
-    character(len=:), allocatable :: early
+    type(growing_text_t) :: early
     !> how often what is said
     type(progress_t) :: progress
     !> rank 0 writes to a terminal; a live line stands there
@@ -70,7 +70,7 @@ contains
     class(run_log_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
     self%comm => comm
-    self%early = ""
+    self%early = growing_text_t()
     if (comm%rank == 0) self%live = on_terminal()
     call self%progress%begin()
   end subroutine run_log_init
@@ -86,11 +86,11 @@ contains
     if (self%comm%rank /= 0) return
     if (continued) then
       call self%file%continue(path, error)
-      call self%file%append(self%early, error)
+      call self%file%append(self%early%get(), error)
     else
-      call self%file%create(path, self%early, error)
+      call self%file%create(path, self%early%get(), error)
     end if
-    self%early = ""
+    self%early = growing_text_t()
   end subroutine run_log_open
 
   subroutine run_log_line(self, text, error)
@@ -115,7 +115,7 @@ contains
     if (self%file%is_open()) then
       call self%file%append(text//newline, error)
     else
-      self%early = self%early//text//newline
+      call self%early%add(text//newline)
     end if
   end subroutine note_line
 
@@ -498,6 +498,8 @@ contains
 
     if (solver%criterion == "error") then
       text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
+    else if (solver%criterion == "residual" .and. solve%status == solve_unbounded .and. solve%residual <= solver%tolerance) then
+      text = "impulses larger than any loads can make"
     else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
       text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solve%violation > solve%violation_allowed .and. (solve%status == solve_unbounded .or. &

@@ -11,8 +11,8 @@ module gravier_run_memory
   private
   public :: check_planned_grains, check_read_grains
 
-  !> bytes of a grain that touches no other, with its copies on the way from the scene to the first step, in 2D and 3D: peaks of runs
-  !> of 500 000 grains without friction were 600 and 730
+  !> bytes of a grain that touches no other, with its copies on the way from the scene to the first step, in 2D and 3D: the peaks
+  !> of runs of 500 000 grains without friction were 600 and 730
   integer, parameter :: run_bytes(2:3) = [550, 700]
 
 contains

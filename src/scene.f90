@@ -137,20 +137,23 @@ contains
 
   end subroutine check_places
 
-  !> Refuse grains of a material that the input does not have; without materials their numbers say nothing. Errors are the same
-  !> on all ranks. Collective.
+  !> Refuse grains of a material that the input does not have; without any &material all are of the first, which then says nothing.
+  !> Errors are the same on all ranks. Collective.
   subroutine check_data(comm, config, data, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
     type(bodies_data_t), intent(in) :: data
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: expected
     integer :: k, n
 
     n = size(config%materials)
     do k = 1, data%n
-      if (n == 0 .or. data%material(k) <= n) cycle
+      if (data%material(k) <= max(1, n)) cycle
+      expected = "1 to "//to_text(n)//", the number of a &material of "//config%file
+      if (n == 0) expected = "1, since "//config%file//" has no &material"
       call raise(error, status_input, trim(config%scene%bodies_file)//": id "//to_text(data%id(k))//": material "// &
-        & to_text(data%material(k))//": expected 1 to "//to_text(n)//", the number of a &material of "//config%file)
+        & to_text(data%material(k))//": expected "//expected)
       exit
     end do
     call comm%agree(error)
@@ -316,7 +319,7 @@ contains
       scene%grains%velocity(:, k) = data%velocity(1:nv, k)
       if (.not. config%scene%rotation) scene%grains%velocity(nd + 1:, k) = 0.0_dp
       scene%grains%radius(k) = data%radius(k)
-      if (size(config%materials) > 0) scene%grains%material(k) = data%material(k)
+      scene%grains%material(k) = data%material(k)
       if (allocated(data%mass)) then
         scene%grains%mass(k) = data%mass(k)
       else

@@ -1,9 +1,9 @@
-!> Sparse matrices by compressed rows.
+!> Sparse matrices by compressed rows, and halves of symmetric ones.
 module gravier_sparse_rows
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: sparse_rows_t, compressed_rows, transposed, no_columns
+  public :: sparse_rows_t, compressed_rows, transposed, no_columns, half_of, mirrored
 
   !> Rows and columns are numbered from 1; entries of the same place add up, and the columns of a row come in any order.
   type :: sparse_rows_t
@@ -14,6 +14,9 @@ module gravier_sparse_rows
     integer, allocatable :: column(:)
     real(dp), allocatable :: value(:)
   end type sparse_rows_t
+
+  !> what rounding may add to the square of an entry of a positive matrix, relative to the product of those on the diagonal
+  real(dp), parameter :: rounding = 1.0e-6_dp
 
 contains
 
@@ -68,5 +71,77 @@ contains
     allocate (matrix%start(n_rows + 1), matrix%column(0), matrix%value(0))
     matrix%start(:) = 1
   end function no_columns
+
+  !> On which side of the diagonal of a square matrix the entries other than 0 are: 1 above alone, -1 below alone, 0 on both or none.
+  pure integer function half_of(matrix) result(side)
+    type(sparse_rows_t), intent(in) :: matrix
+    integer :: i, k
+
+    side = 0
+    do i = 1, matrix%n_rows
+      do k = matrix%start(i), matrix%start(i + 1) - 1
+        if (matrix%column(k) == i .or. abs(matrix%value(k)) <= 0.0_dp) cycle
+        if (side == 0) side = sign(1, matrix%column(k) - i)
+        if (side == sign(1, matrix%column(k) - i)) cycle
+        side = 0
+        return
+      end do
+    end do
+  end function half_of
+
+  !> The symmetric matrix of which one half is given. `bad_row` is 0 where every entry allows it to be positive, or negative, semidefinite,
+  !> a_ij^2 <= a_ii a_jj, and otherwise a row with one that does not: that was no half.
+  subroutine mirrored(half, whole, bad_row)
+    !> square, with entries on one side of its diagonal
+    type(sparse_rows_t), intent(in) :: half
+    type(sparse_rows_t), intent(out) :: whole
+    integer, intent(out) :: bad_row
+    integer, allocatable :: row(:), column(:)
+    real(dp), allocatable :: value(:), diagonal(:), sums(:)
+    integer :: i, k, n
+
+    n = size(half%value)
+    allocate (row(2*n), column(2*n), value(2*n), diagonal(half%n_rows), sums(half%n_rows))
+    n = 0
+    diagonal(:) = 0.0_dp
+    do i = 1, half%n_rows
+      do k = half%start(i), half%start(i + 1) - 1
+        call add(i, half%column(k), half%value(k))
+        if (half%column(k) == i) then
+          diagonal(i) = diagonal(i) + half%value(k)
+        else
+          call add(half%column(k), i, half%value(k))
+        end if
+      end do
+    end do
+    whole = compressed_rows(half%n_rows, half%n_rows, row(1:n), column(1:n), value(1:n))
+    bad_row = 0
+    sums(:) = 0.0_dp
+    do i = 1, half%n_rows
+      do k = half%start(i), half%start(i + 1) - 1
+        sums(half%column(k)) = sums(half%column(k)) + half%value(k)
+      end do
+      do k = half%start(i), half%start(i + 1) - 1
+        if (half%column(k) /= i .and. .not. sums(half%column(k))**2 <= (1.0_dp + rounding)*diagonal(i)*diagonal(half%column(k))) &
+          & bad_row = i
+      end do
+      do k = half%start(i), half%start(i + 1) - 1
+        sums(half%column(k)) = 0.0_dp
+      end do
+    end do
+
+  contains
+
+    subroutine add(i, j, x)
+      integer, intent(in) :: i, j
+      real(dp), intent(in) :: x
+
+      n = n + 1
+      row(n) = i
+      column(n) = j
+      value(n) = x
+    end subroutine add
+
+  end subroutine mirrored
 
 end module gravier_sparse_rows

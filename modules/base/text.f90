@@ -3,7 +3,7 @@ module gravier_text
   use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: to_text, lower
+  public :: to_text, lower, growing_text_t
 
   !> Shortest usual text of a number: integers without blanks, reals with 9 significant digits
   !> or as many as asked, logicals as T or F.
@@ -14,7 +14,42 @@ module gravier_text
     module procedure text_of_logical
   end interface to_text
 
+  !> A text put together piece by piece, in a time that grows as its length does.
+  type :: growing_text_t
+    private
+    integer :: length = 0
+    character(len=:), allocatable :: room
+  contains
+    procedure :: add => growing_text_add
+    procedure :: get => growing_text_get
+  end type growing_text_t
+
 contains
+
+  !> One more piece at the end.
+  pure subroutine growing_text_add(self, piece)
+    class(growing_text_t), intent(inout) :: self
+    character(len=*), intent(in) :: piece
+    character(len=:), allocatable :: larger
+
+    if (.not. allocated(self%room)) allocate (character(len=1024) :: self%room)
+    if (self%length + len(piece) > len(self%room)) then
+      allocate (character(len=2*(self%length + len(piece))) :: larger)
+      larger(1:self%length) = self%room(1:self%length)
+      call move_alloc(larger, self%room)
+    end if
+    self%room(self%length + 1:self%length + len(piece)) = piece
+    self%length = self%length + len(piece)
+  end subroutine growing_text_add
+
+  !> What was added so far.
+  pure function growing_text_get(self) result(text)
+    class(growing_text_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (allocated(self%room)) text = self%room(1:self%length)
+  end function growing_text_get
 
   pure function text_of_i4(value) result(text)
     integer(i4), intent(in) :: value

@@ -262,10 +262,10 @@ contains
 
     ! norm2 is slow for its care of overflow
     tangential = sqrt(sum(x(2:)**2))
-    if (tangential <= mu*x(1)) return
+    ! the polar cone first: without friction and tangential part, x(1) < 0 passes for a point of the cone
     if (mu*tangential <= -x(1)) then
       x(:) = 0.0_dp
-    else
+    else if (tangential > mu*x(1)) then
       x(1) = (x(1) + mu*tangential)/(1.0_dp + mu**2)
       x(2:) = x(2:)*(mu*x(1)/tangential)
     end if

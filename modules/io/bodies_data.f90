@@ -108,10 +108,6 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: each, rest, next
 
-    first = 0
-    n = 0
-    call check_memory(comm, what//": "//to_text(total)//" grains", real(total, dp), data_bytes(dimension), error)
-    if (allocated(error)) return
     ! total*rank might be too large a number
     each = total/comm%size
     rest = mod(total, int(comm%size, i8))
@@ -119,6 +115,7 @@ contains
     next = each*(comm%rank + 1) + rest*(comm%rank + 1)/comm%size
     call take_count(next - first, what//": rows of a rank", n, error)
     call comm%agree(error)
+    call check_memory(comm, what//": "//to_text(total)//" grains", real(total, dp), data_bytes(dimension), error)
   end subroutine find_own_rows
 
   !> Scale a vector to length one; impossible for the zero vector. Safe for every size of a finite vector.

@@ -7,6 +7,7 @@ module gravier_csv_table
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text, lower
   use gravier_random_hash, only: hash_rows
+  use gravier_number_text, only: read_integer, read_real, size_usual, size_tiny, size_huge
   use gravier_file_system, only: check_readable
   implicit none
   private
@@ -17,8 +18,6 @@ module gravier_csv_table
   integer, parameter :: bytes_of_word = 8
   !> put by some programs before UTF-8 text
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
-  !> what number_size tells
-  integer, parameter :: not_a_number = 0, size_usual = 1, size_tiny = 2, size_huge = 3
 
   !> An open table, standing on one of its rows.
   type :: csv_table_t
@@ -332,15 +331,13 @@ contains
     integer, intent(in) :: k
     integer(i8), intent(inout) :: value
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: cell
-    integer :: stat
+    integer(i8) :: found
+    logical :: fits
 
     if (allocated(error)) return
-    cell = self%get_text(k)
-    stat = 1
-    ! 18 digits always fit
-    if (is_integer(cell) .and. len(cell) - sign_length(cell) <= 18) read (cell, "(i20)", iostat=stat) value
-    if (stat /= 0) call self%refuse(k, "a whole number of at most 18 digits", error)
+    call read_integer(self%get_text(k), found, fits)
+    if (fits) value = found
+    if (.not. fits) call self%refuse(k, "a whole number of at most 18 digits", error)
   end subroutine table_get_integer
 
   !> The finite real in column k.
@@ -349,85 +346,20 @@ contains
     integer, intent(in) :: k
     real(dp), intent(inout) :: value
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: cell
-    integer :: stat
+    real(dp) :: found
+    integer :: size
 
     if (allocated(error)) return
-    cell = self%get_text(k)
-    select case (number_size(cell))
-    case (size_usual)
-      read (cell, *, iostat=stat) value
-      if (stat /= 0) call self%refuse(k, "a number", error)
-    case (size_tiny)
-      value = 0
+    call read_real(self%get_text(k), found, size)
+    select case (size)
+    case (size_usual, size_tiny)
+      value = found
     case (size_huge)
-      call self%refuse(k, "a number below 1e308 in size", error)
+      call self%refuse(k, "a number of at most 1.7976931348623157e308 in size", error)
     case default
       call self%refuse(k, "a finite number", error)
     end select
   end subroutine table_get_real
-
-  !> Whether a text is a decimal number such as -1.5e-3, and whether its size fits a real (deciding that by reading it
-  !> could raise a floating-point exception).
-  pure integer function number_size(text) result(size)
-    character(len=*), intent(in) :: text
-    integer :: mantissa_start, mantissa_end, exponent
-
-    size = not_a_number
-    mantissa_start = 1 + sign_length(text)
-    mantissa_end = scan(text, "eEdD") - 1
-    if (mantissa_end < 0) mantissa_end = len(text)
-    exponent = 0
-    if (mantissa_end < len(text)) then
-      if (.not. is_integer(text(mantissa_end + 2:))) return
-      exponent = bounded_integer(text(mantissa_end + 2:))
-    end if
-    associate (mantissa => text(mantissa_start:mantissa_end))
-      if (verify(mantissa, "0123456789.") > 0 .or. scan(mantissa, "0123456789") == 0) return
-      if (index(mantissa, ".") /= index(mantissa, ".", back=.true.)) return
-      size = size_usual
-      if (scan(mantissa, "123456789") == 0) return
-      exponent = exponent + leading_exponent(mantissa)
-    end associate
-    if (exponent > 307) size = size_huge
-    if (exponent < -320) size = size_tiny
-  end function number_size
-
-  !> Power of ten of the first digit that is not 0.
-  pure integer function leading_exponent(mantissa) result(exponent)
-    character(len=*), intent(in) :: mantissa
-    integer :: point, first
-
-    first = scan(mantissa, "123456789")
-    point = index(mantissa, ".")
-    if (point == 0) point = len(mantissa) + 1
-    exponent = point - first
-    if (first < point) exponent = exponent - 1
-  end function leading_exponent
-
-  pure logical function is_integer(text)
-    character(len=*), intent(in) :: text
-    is_integer = len(text) > sign_length(text) .and. verify(text(1 + sign_length(text):), "0123456789") == 0
-  end function is_integer
-
-  !> Value of a text that is an integer, cut at a million in size.
-  pure integer function bounded_integer(text) result(value)
-    character(len=*), intent(in) :: text
-    integer :: i
-
-    value = 0
-    do i = 1 + sign_length(text), len(text)
-      value = min(1000000, 10*value + iachar(text(i:i)) - iachar("0"))
-    end do
-    if (text(1:1) == "-") value = -value
-  end function bounded_integer
-
-  pure integer function sign_length(text) result(length)
-    character(len=*), intent(in) :: text
-
-    length = 0
-    if (len(text) > 0) length = merge(1, 0, scan(text(1:1), "+-") == 1)
-  end function sign_length
 
   !> Raise an error about the cell in column k of the row: file, line, column, value, and what was expected.
   subroutine table_refuse(self, k, expected, error)

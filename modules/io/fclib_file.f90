@@ -1,18 +1,23 @@
 !> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + V l + q and global
-!> ones (M, H and G) read, those without the constraints of V or G written. What is wrong with a file ends in status_input and one
-!> line that names the dataset.
+!> ones (M, H and G) read, those without the constraints of V or G written. Solutions and guesses stand at the root of a file, as
+!> libfclib has them; those that older versions put into the group of the problem are read, too. What is wrong with a file ends in
+!> status_input and one line that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
-  use gravier_narrow, only: narrow
+  use gravier_narrow, only: narrow, take_count
+  use gravier_room, only: make_room
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns, half_of, mirrored
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
+  use gravier_magnitude, only: is_bounded
+  use gravier_file_system, only: file_length
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
   public :: fclib_local_t, fclib_global_t, fclib_rows_t, read_fclib, write_fclib_local, write_fclib_global
+  public :: name_of_solution, name_of_guess
 
   !> v = W r + V l + q, of each contact (n, t) or (n, t, s), and bilateral constraints V^T r + R l + s = 0 with multipliers l.
   type :: fclib_local_t
@@ -28,6 +33,8 @@ module gravier_fclib_file
     real(dp), allocatable :: mu(:)
     !> (dimension, contacts) impulses of the solution, or of the first guess, where the file has one
     real(dp), allocatable :: r(:, :)
+    !> what of the file was read otherwise than it stands, in a sentence; empty: nothing
+    character(len=:), allocatable :: remark
   end type fclib_local_t
 
   !> M V = H r + G l + f, G^T V + b = 0, v = H^T V + w.
@@ -37,6 +44,9 @@ module gravier_fclib_file
     type(sparse_rows_t) :: m, h, g
     !> (n), (p), (dimension*contacts), (contacts)
     real(dp), allocatable :: f(:), b(:), w(:), mu(:)
+    !> as in fclib_local_t
+    real(dp), allocatable :: r(:, :)
+    character(len=:), allocatable :: remark
   end type fclib_global_t
 
   !> What one rank holds of a global problem without G: a block of the unknowns and a block of the contacts, those of rank 0 first.
@@ -51,16 +61,22 @@ module gravier_fclib_file
     real(dp), allocatable :: mu(:), w(:), r(:), u(:)
   end type fclib_rows_t
 
-  !> An open file and where it is, for messages.
+  !> An open file and where it is, for messages, and what was read otherwise than it stands.
   type :: source_t
     type(h5_file_t) :: file
-    character(len=:), allocatable :: path
+    character(len=:), allocatable :: path, remark
   contains
     procedure :: refuse => source_refuse
   end type source_t
 
   !> values of nz that tell how a matrix is stored; others count the entries of triplets
   integer, parameter :: by_columns = -1, by_rows = -2
+  !> groups of problems
+  character(len=*), parameter :: local_group = "/fclib_local", global_group = "/fclib_global"
+  !> impulses of the solution and of the first guess, from the root
+  character(len=*), parameter :: name_of_solution = "/solution/r", name_of_guess = "/guesses/1/r"
+  !> what FCLIB says of a matrix, beside its entries
+  character(len=*), parameter :: matrix_info(4) = [character(len=12) :: "comment", "conditioning", "determinant", "rank"]
 
 contains
 
@@ -76,14 +92,19 @@ contains
 
     if (allocated(error)) return
     source%path = path
+    source%remark = ""
     call source%file%open(comm, path, error)
     if (allocated(error)) return
-    if (source%file%exists("/fclib_local")) then
+    if (source%file%exists(local_group)) then
       allocate (local)
       call read_local(source, local, error)
-    else if (source%file%exists("/fclib_global")) then
+      call read_impulses(source, local_group, local%dimension, local%mu, local%r, error)
+      local%remark = source%remark
+    else if (source%file%exists(global_group)) then
       allocate (global)
       call read_global(source, global, error)
+      call read_impulses(source, global_group, global%dimension, global%mu, global%r, error)
+      global%remark = source%remark
     else
       call source%refuse("expected a group /fclib_local or /fclib_global", error)
     end if
@@ -107,39 +128,48 @@ contains
     call read_contacts(source, "/fclib_local", local%dimension, local%mu, error)
     if (allocated(error)) return
     n = local%dimension*size(local%mu)
-    call read_matrix(source, "/fclib_local/W", n, n, local%w, error)
+    call read_matrix(source, "/fclib_local/W", n, n, local%w, error, symmetric=.true.)
     call read_vector(source, "/fclib_local/vectors/q", n, local%q, error)
     if (source%file%exists("/fclib_local/V")) then
       call read_vector(source, "/fclib_local/vectors/s", -1, local%s, error)
       if (allocated(error)) return
       n_constraints = size(local%s)
       call read_matrix(source, "/fclib_local/V", n, n_constraints, local%coupling, error)
-      call read_matrix(source, "/fclib_local/R", n_constraints, n_constraints, local%constraint, error)
+      call read_matrix(source, "/fclib_local/R", n_constraints, n_constraints, local%constraint, error, symmetric=.true.)
     else
       allocate (local%s(0))
       local%coupling = no_columns(n)
       local%constraint = no_columns(0)
     end if
-    if (source%file%exists("/fclib_local/solution/r")) then
-      call read_impulses(source, "/fclib_local/solution/r", local, error)
-    else if (source%file%exists("/fclib_local/guesses/1/r")) then
-      call read_impulses(source, "/fclib_local/guesses/1/r", local, error)
-    end if
   end subroutine read_local
 
-  subroutine read_impulses(source, dataset, local, error)
+  !> The impulses of the solution, or of the first guess, at the root of the file or in the group of the problem; not allocated where
+  !> there are none.
+  subroutine read_impulses(source, group, dimension, mu, r, error)
     type(source_t), intent(inout) :: source
-    character(len=*), intent(in) :: dataset
-    type(fclib_local_t), intent(inout) :: local
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: dimension
+    !> (contacts)
+    real(dp), allocatable, intent(in) :: mu(:)
+    !> (dimension, contacts)
+    real(dp), allocatable, intent(inout) :: r(:, :)
     type(error_t), allocatable, intent(inout) :: error
     real(dp), allocatable :: values(:)
+    character(len=:), allocatable :: dataset
     integer :: a
 
-    call read_vector(source, dataset, local%dimension*size(local%mu), values, error)
     if (allocated(error)) return
-    allocate (local%r(local%dimension, size(local%mu)))
-    do a = 1, size(local%mu)
-      local%r(:, a) = values((a - 1)*local%dimension + 1:a*local%dimension)
+    dataset = ""
+    if (source%file%exists(group//name_of_guess)) dataset = group//name_of_guess
+    if (source%file%exists(name_of_guess)) dataset = name_of_guess
+    if (source%file%exists(group//name_of_solution)) dataset = group//name_of_solution
+    if (source%file%exists(name_of_solution)) dataset = name_of_solution
+    if (dataset == "") return
+    call read_vector(source, dataset, dimension*size(mu), values, error)
+    if (allocated(error)) return
+    allocate (r(dimension, size(mu)))
+    do a = 1, size(mu)
+      r(:, a) = values((a - 1)*dimension + 1:a*dimension)
     end do
   end subroutine read_impulses
 
@@ -163,7 +193,7 @@ contains
       global%g = no_columns(n)
       allocate (global%b(0))
     end if
-    call read_matrix(source, "/fclib_global/M", n, n, global%m, error)
+    call read_matrix(source, "/fclib_global/M", n, n, global%m, error, symmetric=.true.)
     call read_matrix(source, "/fclib_global/H", n, global%dimension*size(global%mu), global%h, error)
     call read_vector(source, "/fclib_global/vectors/w", global%dimension*size(global%mu), global%w, error)
   end subroutine read_global
@@ -176,6 +206,7 @@ contains
     real(dp), allocatable, intent(inout) :: mu(:)
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: found
+    integer :: unknowns
 
     dimension = 0
     call read_integer(source, group//"/spacedim", found, error)
@@ -183,6 +214,8 @@ contains
     if (found /= 2 .and. found /= 3) call source%refuse(group//"/spacedim = "//to_text(found)// &
       & ": expected 2 or 3", error)
     call read_vector(source, group//"/vectors/mu", -1, mu, error)
+    if (allocated(error)) return
+    call take_count(found*size(mu), source%path//": "//group//": components of the contacts", unknowns, error)
     if (allocated(error)) return
     dimension = narrow(found)
     if (size(mu) == 0) then
@@ -214,19 +247,36 @@ contains
     real(dp), allocatable, intent(inout) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: found
+    integer :: length
 
     call source%file%row_count(dataset, found, error)
     if (allocated(error)) return
-    if (n >= 0 .and. found /= n .or. found > huge(n)) then
+    if (n >= 0 .and. found /= n) then
       call source%refuse(dataset//": "//to_text(found)//" numbers: expected "//to_text(n), error)
       return
     end if
-    allocate (values(found))
-    values(:) = 0.0_dp
+    call take_count(found, source%path//": "//dataset//": numbers", length, error)
+    if (allocated(error)) return
+    call make_room(values, found, source%path//": "//dataset, error)
+    call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
-    if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
+    call check_numbers(source, dataset, values, error)
   end subroutine read_vector
+
+  !> Refuse numbers that are not finite, or beyond what products of a few of them survive.
+  subroutine check_numbers(source, dataset, values, error)
+    type(source_t), intent(in) :: source
+    character(len=*), intent(in) :: dataset
+    real(dp), intent(in), contiguous :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. all(is_finite(values))) then
+      call source%refuse(dataset//": expected finite numbers", error)
+    else if (.not. all(is_bounded(values))) then
+      call source%refuse(dataset//": expected numbers of at most 1e30 in size", error)
+    end if
+  end subroutine check_numbers
 
   !> A vector of at least n integers, of which the first n are kept, each in [lowest, highest].
   subroutine read_indices(source, dataset, n, lowest, highest, values, error)
@@ -244,8 +294,8 @@ contains
       call source%refuse(dataset//": "//to_text(length)//" numbers: expected "//to_text(n), error)
       return
     end if
-    allocate (found(n))
-    found(:) = lowest
+    call make_room(found, int(n, i8), source%path//": "//dataset, error)
+    call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, found, error)
     if (allocated(error)) return
     if (any(found < lowest .or. found > highest)) then
@@ -256,12 +306,14 @@ contains
   end subroutine read_indices
 
   !> A matrix stored in any of the three ways.
-  subroutine read_matrix(source, group, n_rows, n_columns, matrix, error)
+  subroutine read_matrix(source, group, n_rows, n_columns, matrix, error, symmetric)
     type(source_t), intent(inout) :: source
     character(len=*), intent(in) :: group
     integer, intent(in) :: n_rows, n_columns
     type(sparse_rows_t), intent(inout) :: matrix
     type(error_t), allocatable, intent(inout) :: error
+    !> present: by its meaning it is, so that entries on one side of the diagonal alone are half of it
+    logical, intent(in), optional :: symmetric
     integer, allocatable :: row(:), column(:)
     real(dp), allocatable :: value(:)
     integer(i8) :: m, n, nz
@@ -293,8 +345,33 @@ contains
       end if
     end select
     if (.not. allocated(error)) call read_entries(source, group//"/x", size(row), value, error)
-    if (.not. allocated(error)) matrix = compressed_rows(n_rows, n_columns, row, column, value)
+    if (allocated(error)) return
+    matrix = compressed_rows(n_rows, n_columns, row, column, value)
+    if (present(symmetric)) call complete_half(source, group, matrix, error)
   end subroutine read_matrix
+
+  !> Mirror a matrix of which the file has one half, and note it.
+  subroutine complete_half(source, group, matrix, error)
+    type(source_t), intent(inout) :: source
+    character(len=*), intent(in) :: group
+    type(sparse_rows_t), intent(inout) :: matrix
+    type(error_t), allocatable, intent(inout) :: error
+    type(sparse_rows_t) :: whole
+    character(len=:), allocatable :: side
+    integer :: bad_row
+
+    if (half_of(matrix) == 0) return
+    side = trim(merge("above", "below", half_of(matrix) > 0))
+    call mirrored(matrix, whole, bad_row)
+    if (bad_row > 0) then
+      call source%refuse(group//": entries "//side//" the diagonal alone, and row "//to_text(bad_row)// &
+        & " has one that no positive semidefinite matrix has: expected all entries, or one half of a symmetric matrix", error)
+      return
+    end if
+    matrix = whole
+    if (source%remark /= "") source%remark = source%remark//"; "
+    source%remark = source%remark//group//" has entries "//side//" the diagonal alone and is read as half of a symmetric matrix"
+  end subroutine complete_half
 
   !> Numbers of the line (row or column) and of the place in it, from 1, of the entries of a matrix compressed by lines.
   subroutine read_compressed(source, group, n_lines, n_places, line, place, error)
@@ -329,16 +406,16 @@ contains
     real(dp), allocatable, intent(inout) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
 
-    allocate (values(n))
-    values(:) = 0.0_dp
+    call make_room(values, int(n, i8), source%path//": "//dataset, error)
+    call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
-    if (.not. all(is_finite(values))) call source%refuse(dataset//": expected finite numbers", error)
+    call check_numbers(source, dataset, values, error)
   end subroutine read_entries
 
   !> Write a local problem without constraints, W by compressed rows, and its solution if there is one. Collective, the same on all
   !> ranks.
-  subroutine write_fclib_local(comm, path, local, error, velocity, multipliers)
+  subroutine write_fclib_local(comm, path, local, error, velocity, multipliers, origin, same_matrix)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> where `r` is allocated it is written as the solution
@@ -348,13 +425,21 @@ contains
     real(dp), intent(in), contiguous, optional :: velocity(:, :)
     !> of the constraints that the problem was rid of; none is not written (p)
     real(dp), intent(in), contiguous, optional :: multipliers(:)
+    !> the file that the problem was read from, whose `info` is kept; and what it says of W, where W is the same
+    character(len=*), intent(in), optional :: origin
+    logical, intent(in), optional :: same_matrix
     type(h5_file_t) :: file
+    integer(i8) :: bytes
     logical :: mine
 
     if (allocated(error)) return
     mine = comm%rank == 0
     call file%create(comm, path, error)
-    call file%reserve(16_i8*size(local%w%value) + 32_i8*size(local%q) + 65536_i8, error)
+    bytes = 16_i8*size(local%w%value) + 40_i8*size(local%q) + 65536_i8
+    if (present(multipliers)) bytes = bytes + 8_i8*size(multipliers)
+    ! what is kept of a file is not longer than the file
+    if (present(origin)) bytes = bytes + file_length(origin)
+    call file%reserve(bytes, error)
     call write_integer("/fclib_local/spacedim", local%dimension)
     call write_integer("/fclib_local/W/m", local%w%n_rows)
     call write_integer("/fclib_local/W/n", local%w%n_columns)
@@ -365,14 +450,35 @@ contains
     call write_reals("/fclib_local/W/x", local%w%value)
     call write_reals("/fclib_local/vectors/q", local%q)
     call write_reals("/fclib_local/vectors/mu", local%mu)
-    if (allocated(local%r)) call write_columns("/fclib_local/solution/r", local%r)
-    if (present(velocity)) call write_columns("/fclib_local/solution/u", velocity)
+    if (allocated(local%r)) call write_columns(name_of_solution, local%r)
+    if (present(velocity)) call write_columns("/solution/u", velocity)
     if (present(multipliers)) then
-      if (size(multipliers) > 0) call write_reals("/fclib_local/solution/l", multipliers)
+      if (size(multipliers) > 0) call write_reals("/solution/l", multipliers)
     end if
+    if (present(origin)) call keep_info(origin)
     call file%close(error)
 
   contains
+
+    !> What the file of origin says of the problem and of W.
+    subroutine keep_info(origin)
+      character(len=*), intent(in) :: origin
+      type(h5_file_t) :: source
+      type(error_t), allocatable :: ignored
+      logical :: same
+      integer :: k
+
+      same = .false.
+      if (present(same_matrix)) same = same_matrix
+      call source%open(comm, origin, error)
+      if (allocated(error)) return
+      call file%take_over(source, local_group//"/info", local_group//"/info", error)
+      if (.not. source%exists(local_group)) call file%take_over(source, global_group//"/info", local_group//"/info", error)
+      do k = 1, merge(size(matrix_info), 0, same)
+        call file%take_over(source, local_group//"/W/"//trim(matrix_info(k)), local_group//"/W/"//trim(matrix_info(k)), error)
+      end do
+      call source%close(ignored)
+    end subroutine keep_info
 
     subroutine write_integer(dataset, value)
       character(len=*), intent(in) :: dataset
@@ -444,9 +550,9 @@ contains
     call file%write_rows("/fclib_global/vectors/f", rows%f, error)
     call file%write_rows("/fclib_global/vectors/w", rows%w, error)
     call file%write_rows("/fclib_global/vectors/mu", rows%mu, error)
-    call file%write_rows("/fclib_global/solution/v", rows%v, error)
-    call file%write_rows("/fclib_global/solution/r", rows%r, error)
-    call file%write_rows("/fclib_global/solution/u", rows%u, error)
+    call file%write_rows("/solution/v", rows%v, error)
+    call file%write_rows(name_of_solution, rows%r, error)
+    call file%write_rows("/solution/u", rows%u, error)
     call file%close(error)
 
   contains

@@ -1,4 +1,4 @@
-!> What Fortran leaves to the operating system: directories, atomic renames, which file a name leads to, reserved disk space, and
+!> What Fortran leaves to the operating system: directories, atomic renames, where paths lead, reserved disk space, and
 !> whether the standard output is a terminal.
 module gravier_file_system
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, c_f_pointer, c_loc
@@ -6,30 +6,36 @@ module gravier_file_system
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
-  use gravier_system_calls, only: c_close, c_creat, c_fallocate, c_fstat, c_fstatvfs, c_fsync, c_ftruncate, c_getpid, &
-    & c_gethostname, c_glob, c_globfree, c_isatty, c_lseek, c_mkdir, c_open, c_readlink, c_rename, c_rmdir, c_stat, c_unlink, &
-    & c_write, c_text, text_at, last_error, reason, o_rdonly, o_wronly, o_nonblock, file_mode, directory_mode, &
-    & falloc_fl_keep_size, falloc_fl_punch_hole, seek_end, eintr, eexist, enodev, espipe, enospc, enosys, eopnotsupp, &
-    & statvfs_words, stat_words, glob_words
+  use gravier_system_calls, only: c_close, c_creat, c_fallocate, c_fstatvfs, c_fsync, c_ftruncate, c_getpid, c_gethostname, &
+    & c_glob, c_globfree, c_isatty, c_lseek, c_mkdir, c_open, c_readlink, c_rename, c_rmdir, c_statx, c_unlink, c_write, c_text, &
+    & text_at, last_error, reason, o_rdonly, o_wronly, o_nonblock, file_mode, directory_mode, falloc_fl_keep_size, &
+    & falloc_fl_punch_hole, seek_end, at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word, &
+    & eintr, eexist, enodev, espipe, enospc, enosys, eopnotsupp, statvfs_words, glob_words
   implicit none
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file, directory_of, on_terminal, host_name
+  public :: extend_file, replace_file, on_terminal, host_name
   public :: path_t, add_path, list_files
-  public :: identity_t, identity_of, identity_of_open, is_device
+  public :: place_t, place_of, place_of_open, is_device
 
   !> A path of any length.
   type :: path_t
     character(len=:), allocatable :: text
   end type path_t
 
-  !> Which file it is, whatever its name; zeros where there is none.
-  type :: identity_t
+  !> Where a path leads, whatever it is spelled like: two places are equal (==) where the paths lead to one file, be it there or not
+  !> yet.
+  type :: place_t
+    private
+    !> of the file, or of the nearest directory above it that is there
     integer(i8) :: device = 0, inode = 0
+    !> the way on from there, to what is not there yet
+    character(len=:), allocatable :: rest
   contains
-    procedure, private :: identity_equals
-    generic :: operator(==) => identity_equals
-  end type identity_t
+    procedure :: is_there => place_is_there
+    procedure, private :: equals => place_equals
+    generic :: operator(==) => equals
+  end type place_t
 
   !> processes between a rank and its launcher, at most
   integer, parameter :: highest_ancestor = 16
@@ -140,28 +146,62 @@ contains
     ignored = c_close(descriptor)
   end subroutine check_creatable
 
-  !> The file that a name leads to.
-  type(identity_t) function identity_of(path) result(identity)
+  !> Where a path leads: the file by its device and inode, links followed; for a file that is not there yet, the nearest directory
+  !> above it and the names on the way.
+  type(place_t) function place_of(path) result(place)
     character(len=*), intent(in) :: path
-    integer(c_int64_t) :: status(stat_words)
+    character(len=:), allocatable :: here, name, rest
+    integer :: cut
 
-    if (c_stat(c_text(path), status) == 0) identity = identity_t(int(status(1), i8), int(status(2), i8))
-  end function identity_of
+    here = path
+    if (here == "") here = "."
+    rest = ""
+    do
+      place = identified(at_fdcwd, here, 0_c_int)
+      if (place%is_there() .or. here == "." .or. here == "/") exit
+      cut = index(here, "/", back=.true.)
+      name = here(cut + 1:)
+      if (name /= "" .and. name /= ".") rest = "/"//name//rest
+      if (cut == 0) then
+        here = "."
+      else
+        here = here(1:max(1, cut - 1))
+      end if
+    end do
+    place%rest = rest
+  end function place_of
 
-  !> The file that is open as a descriptor.
-  type(identity_t) function identity_of_open(descriptor) result(identity)
+  !> The file that is open as a descriptor, be it under a name still or not.
+  type(place_t) function place_of_open(descriptor) result(place)
     integer(c_int), intent(in) :: descriptor
-    integer(c_int64_t) :: status(stat_words)
+    place = identified(descriptor, "", at_empty_path)
+  end function place_of_open
 
-    if (c_fstat(descriptor, status) == 0) identity = identity_t(int(status(1), i8), int(status(2), i8))
-  end function identity_of_open
+  !> The file or directory that statx finds, by its device and inode; both zero where it finds none.
+  type(place_t) function identified(directory, path, flags) result(place)
+    integer(c_int), intent(in) :: directory, flags
+    character(len=*), intent(in) :: path
+    integer(c_int64_t) :: status(statx_words)
 
-  !> Whether both are the same file, and one that there is.
-  pure logical function identity_equals(self, other)
-    class(identity_t), intent(in) :: self
-    type(identity_t), intent(in) :: other
-    identity_equals = self%inode /= 0 .and. self%inode == other%inode .and. self%device == other%device
-  end function identity_equals
+    place%rest = ""
+    if (c_statx(directory, c_text(path), flags, statx_ino, status) /= 0) return
+    place%device = int(status(statx_device_word), i8)
+    place%inode = int(status(statx_inode_word), i8)
+  end function identified
+
+  !> Whether there was a file or directory when the place was asked for.
+  pure logical function place_is_there(self) result(is_there)
+    class(place_t), intent(in) :: self
+    is_there = self%inode /= 0 .and. self%rest == ""
+  end function place_is_there
+
+  pure logical function place_equals(self, other) result(equal)
+    class(place_t), intent(in) :: self
+    type(place_t), intent(in) :: other
+
+    equal = self%inode /= 0 .and. self%inode == other%inode .and. self%device == other%device
+    if (equal) equal = self%rest == other%rest
+  end function place_equals
 
   !> Whether a name leads to a terminal, a pipe, /dev/null or the like: what has no room on a disk.
   logical function is_device(path)
@@ -324,7 +364,6 @@ contains
     if (.not. allocated(error)) number = sync_to_disk(directory_of(to))
   end subroutine replace_file
 
-  !> The directory that a path names a file in, with a slash at its end where the path has one.
   pure function directory_of(path) result(directory)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: directory

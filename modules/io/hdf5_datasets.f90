@@ -6,8 +6,8 @@ module gravier_hdf5_datasets
     & H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING_F, H5_INTEGER_KIND, H5_REAL_KIND, h5dclose_f, h5dcreate_f, h5dget_space_f, &
     & h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5kind_to_type, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
     & h5pset_chunk_f, h5pset_dxpl_mpio_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, &
-    & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, &
-    & h5tget_class_f, h5tget_size_f, hid_t, hsize_t, size_t
+    & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, h5sselect_all_f, &
+    & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tget_class_f, h5tget_size_f, hid_t, hsize_t, size_t
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_hdf5_tree, only: h5_tree_t
@@ -157,7 +157,7 @@ contains
     integer(hid_t) :: file_space, memory_space, mode
     integer(hsize_t) :: start(2), count(2)
     type(c_ptr) :: place
-    integer :: n_dims, ignored
+    integer :: n_dims, n_dims_of_file, ignored
 
     place = rows%buffer
     call get_shape(rows%n_columns, int(max(rows%n, 1), i8), n_dims, count)
@@ -165,7 +165,10 @@ contains
     start(n_dims) = int(first, hsize_t)
     call h5dget_space_f(dataset, file_space, ignored)
     call h5screate_simple_f(n_dims, count(1:n_dims), memory_space, ignored)
-    if (rows%n > 0) then
+    call h5sget_simple_extent_ndims_f(file_space, n_dims_of_file, ignored)
+    if (rows%n > 0 .and. n_dims_of_file == 0) then
+      call h5sselect_all_f(file_space, ignored)
+    else if (rows%n > 0) then
       call h5sselect_hyperslab_f(file_space, H5S_SELECT_SET_F, start(1:n_dims), count(1:n_dims), ignored)
     else
       call h5sselect_none_f(file_space, ignored)
@@ -184,7 +187,8 @@ contains
     call h5sclose_f(file_space, ignored)
   end subroutine transfer_rows
 
-  !> Number of dimensions of a dataset, -1 for anything else, and their lengths in Fortran's order when it has 1 or 2.
+  !> Number of dimensions of a dataset, -1 for anything else, and their lengths in Fortran's order when it has 1 or 2. A scalar is a
+  !> vector of one number.
   subroutine get_extent(self, path, n_dims, extent)
     class(h5_tree_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -205,6 +209,10 @@ contains
       call h5sget_simple_extent_ndims_f(space, n_dims, stat)
       if (n_dims == 1 .or. n_dims == 2) then
         call h5sget_simple_extent_dims_f(space, extent(1:n_dims), greatest(1:n_dims), stat)
+      else if (n_dims == 0) then
+        ! a dataset may have no dimension and no number either
+        call h5sget_simple_extent_npoints_f(space, extent(1), stat)
+        n_dims = 1
       end if
       call h5sclose_f(space, stat)
     end if

@@ -58,7 +58,7 @@ module gravier_hdf5_rows
 
 contains
 
-  !> k of an (N, k) dataset, 0 of a vector of N numbers, -1 of anything else. Not collective.
+  !> k of an (N, k) dataset, 0 of a vector of N numbers or of a scalar, -1 of anything else. Not collective.
   integer function h5_columns(self, path) result(columns)
     class(h5_rows_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -72,7 +72,7 @@ contains
     if (n_dims == 2) columns = narrow(extent(1))
   end function h5_columns
 
-  !> N of an (N, k) dataset or of a vector of N numbers.
+  !> N of an (N, k) dataset or of a vector of N numbers, 1 of a scalar.
   subroutine h5_row_count(self, path, n, error)
     class(h5_rows_t), intent(in) :: self
     character(len=*), intent(in) :: path

@@ -7,8 +7,9 @@
 module gravier_hdf5_tree
   use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5P_FILE_CREATE_F, H5_INDEX_NAME_F, &
     & H5_ITER_INC_F, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, &
-    & h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5odecr_refcount_f, &
-    & h5oincr_refcount_f, h5olink_f, h5pclose_f, h5pcreate_f, h5pset_istore_k_f, h5pset_obj_track_times_f, hid_t, hsize_t
+    & h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5ocopy_f, &
+    & h5odecr_refcount_f, h5oincr_refcount_f, h5olink_f, h5pclose_f, h5pcreate_f, h5pset_istore_k_f, &
+    & h5pset_obj_track_times_f, hid_t, hsize_t
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_communicator, only: communicator_t
@@ -53,6 +54,7 @@ module gravier_hdf5_tree
     procedure :: commit_group => h5_commit_group
     procedure :: abandon_group => h5_abandon_group
     procedure :: remove_group => h5_remove_group
+    procedure :: take_over => h5_take_over
 
     procedure :: exists => h5_exists
     procedure :: member_count => h5_member_count
@@ -462,6 +464,27 @@ contains
     if (stat < 0) call self%fail(path, "cannot remove this group", error)
     call self%comm%agree(error)
   end subroutine h5_remove_group
+
+  !> Copy a group or dataset of another open file, with all that is in it and its attributes, if it has one of that path.
+  subroutine h5_take_over(self, source, path, target_path, error)
+    class(h5_tree_t), intent(inout) :: self
+    class(h5_tree_t), intent(in) :: source
+    !> in the other file, and here
+    character(len=*), intent(in) :: path, target_path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(hid_t) :: from, to
+    character(len=:), allocatable :: name, target_name
+    integer :: stat
+
+    if (allocated(error)) return
+    if (.not. source%exists(path)) return
+    call source%locate(path, from, name)
+    call self%make_groups_above(target_path)
+    call self%locate(target_path, to, target_name)
+    call h5ocopy_f(from, name, to, target_name, stat)
+    if (stat < 0) call self%fail(target_path, "cannot copy "//path//" of "//source%path, error)
+    call self%comm%agree(error)
+  end subroutine h5_take_over
 
   !> Where HDF5 finds `path`: a place and a name relative to it.
   subroutine h5_locate(self, path, place, name)

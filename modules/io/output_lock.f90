@@ -7,7 +7,7 @@ module gravier_output_lock
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: identity_t, identity_of, identity_of_open, is_device, host_name, remove_file
+  use gravier_file_system, only: place_of, place_of_open, is_device, host_name, remove_file
   use gravier_system_calls, only: c_close, c_fcntl, c_ftruncate, c_getpid, c_open, c_read, c_usleep, c_write, c_text, &
     & last_error, reason, range_lock_t, set_lock, lock_exclusive, lock_shared, o_rdonly, o_rdwr, o_creat, o_cloexec, &
     & file_mode, eacces, eagain, eintr, enolck, enosys, eopnotsupp
@@ -130,7 +130,7 @@ contains
       number = lock_bytes(self%descriptor, lock_exclusive, byte_of_root, 2_c_int64_t)
       ! a program that has ended meanwhile has removed the file: others do not see a lock on that one
       if (number == 0) then
-        if (identity_of_open(self%descriptor) == identity_of(self%path)) exit
+        if (place_of_open(self%descriptor) == place_of(self%path)) exit
       end if
       ignored = c_close(self%descriptor)
       self%descriptor = -1
@@ -245,7 +245,7 @@ contains
     if (self%descriptor >= 0) then
       if (self%comm%rank == 0) then
         ! not that of a program that came after the file was removed by hand
-        if (identity_of_open(self%descriptor) == identity_of(self%path)) call remove_file(self%path)
+        if (place_of_open(self%descriptor) == place_of(self%path)) call remove_file(self%path)
       end if
       ignored = c_close(self%descriptor)
     end if

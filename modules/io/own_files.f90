@@ -3,14 +3,14 @@
 !> their names. Not collective: the rank that writes calls.
 module gravier_own_files
   use gravier_errors, only: error_t, raise, status_failure
-  use gravier_file_system, only: identity_t, identity_of, replace_file, remove_file
+  use gravier_file_system, only: place_t, place_of, replace_file, remove_file
   implicit none
   private
   public :: part_of, give_name, note_own, remove_own, check_own_files
 
   type :: own_file_t
     character(len=:), allocatable :: path
-    type(identity_t) :: identity
+    type(place_t) :: place
   end type own_file_t
 
   !> those of this process
@@ -58,7 +58,7 @@ contains
     end if
     n_own = max(n_own, k)
     own(k)%path = path
-    own(k)%identity = identity_of(path)
+    own(k)%place = place_of(path)
   end subroutine note_own
 
   !> Remove a file of this process, if it is there, and forget it.
@@ -78,10 +78,13 @@ contains
   !> Check that the files of this process are still those under their names. Failure (status_failure): another one is, or none.
   subroutine check_own_files(error)
     type(error_t), allocatable, intent(inout) :: error
+    type(place_t) :: now
     integer :: k
 
     do k = 1, n_own
-      if (.not. identity_of(own(k)%path) == own(k)%identity) call raise(error, status_failure, own(k)%path// &
+      now = place_of(own(k)%path)
+      if (now%is_there() .and. now == own(k)%place) cycle
+      call raise(error, status_failure, own(k)%path// &
         & ": the file that was written under this name is not there any more: it was removed, or another program has replaced it")
     end do
   end subroutine check_own_files

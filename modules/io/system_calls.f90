@@ -5,9 +5,10 @@ module gravier_system_calls
   private
   public :: c_mkdir, c_rename, c_unlink, c_rmdir, c_open, c_creat, c_close, c_write, c_lseek, c_fsync, c_ftruncate
   public :: c_fallocate, c_fstatvfs, c_glob, c_globfree, c_getpid, c_isatty, c_readlink, c_errno_location, c_strerror
-  public :: c_strlen, c_read, c_fcntl, c_stat, c_fstat, c_gethostname, c_usleep
+  public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_usleep
   public :: o_rdonly, o_wronly, o_rdwr, o_creat, o_nonblock, o_cloexec, file_mode, directory_mode
-  public :: falloc_fl_keep_size, falloc_fl_punch_hole, seek_set, seek_end, statvfs_words, stat_words, glob_words
+  public :: falloc_fl_keep_size, falloc_fl_punch_hole, seek_set, seek_end, statvfs_words, glob_words
+  public :: at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word
   public :: eintr, eacces, eagain, eexist, enodev, enospc, espipe, enolck, enosys, eopnotsupp
   public :: range_lock_t, set_lock, lock_shared, lock_exclusive
   public :: c_text, text_at, last_error, reason
@@ -22,8 +23,12 @@ module gravier_system_calls
   !> of fcntl: take a lock or fail at once; two kinds of locks
   integer(c_int), parameter :: set_lock = 6
   integer(c_short), parameter :: lock_shared = 0, lock_exclusive = 1
-  !> more than the lengths of struct statvfs, and of struct stat, which begins with device and inode
-  integer, parameter :: statvfs_words = 32, stat_words = 64
+  !> of statx: paths from the working directory on, or none and an open file; what is asked for
+  integer(c_int), parameter :: at_fdcwd = -100, at_empty_path = int(z"1000", c_int), statx_ino = 256
+  !> more than the length of struct statx, on every processor the same, and its words of the inode and of the device
+  integer, parameter :: statx_words = 64, statx_inode_word = 5, statx_device_word = 18
+  !> more than the length of struct statvfs
+  integer, parameter :: statvfs_words = 32
   !> more than the length of struct glob_t, which begins with the number of paths and their address
   integer, parameter :: glob_words = 16
   !> permissions before the user's umask
@@ -194,19 +199,13 @@ module gravier_system_calls
       type(range_lock_t), intent(inout) :: range
     end function c_fcntl
 
-    integer(c_int) function c_stat(path, status) bind(C, name="stat")
+    integer(c_int) function c_statx(directory, path, flags, mask, status) bind(C, name="statx")
       import :: c_int, c_int64_t, c_char
       implicit none
+      integer(c_int), value :: directory, flags, mask
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int64_t), intent(inout) :: status(*)
-    end function c_stat
-
-    integer(c_int) function c_fstat(descriptor, status) bind(C, name="fstat")
-      import :: c_int, c_int64_t
-      implicit none
-      integer(c_int), value :: descriptor
-      integer(c_int64_t), intent(inout) :: status(*)
-    end function c_fstat
+    end function c_statx
 
     integer(c_int) function c_gethostname(name, room) bind(C, name="gethostname")
       import :: c_int, c_size_t, c_ptr

@@ -29,7 +29,7 @@ module gravier_contact_newton
   type :: newton_control_t
     !> on the figure of gravier_delassus
     real(dp) :: tolerance = 1.0e-8_dp
-    !> Newton's steps, each a factorisation
+    !> Newton's steps, each a factorisation, and proximal points found without any
     integer :: most_steps = 100000
   end type newton_control_t
 
@@ -76,7 +76,7 @@ contains
   end subroutine contact_newton_free
 
   !> Solve the problem given to `init`, from the impulses given. Ends early where impulses grow without bound, or where rounding hides
-  !> what a step could change.
+  !> what a step could change. A proximal point that is found without a step counts as one.
   subroutine contact_newton_solve(self, problem, control, r, steps, figure, growth)
     class(contact_newton_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem
@@ -101,8 +101,9 @@ contains
       self%x(:, :) = self%centre
       call find_proximal_point(self, norm2(problem%q)*control%tolerance, &
         & min(most_inner_steps, control%most_steps - steps), taken, success)
+      ! a point found at once counts, too: every pass brings the loop nearer to its end
+      steps = steps + max(taken, 1)
       if (taken == 0 .and. self%alpha <= alpha_least) exit
-      steps = steps + taken
       if (taken > 0) then
         self%direction(:, :) = self%x - self%centre
         call note_growth(problem, self%direction, growth)

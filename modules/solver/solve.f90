@@ -11,6 +11,7 @@ module gravier_solve
   use gravier_check_schedule, only: check_schedule_t, growth_limit
   use gravier_stagnation, only: stagnation_t
   use gravier_layer_trial, only: layer_trial_t
+  use gravier_vain_impulses, only: normals_are_in_vain
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
@@ -27,8 +28,6 @@ module gravier_solve
   !> iterations, see also growth_limit of gravier_check_schedule
   real(dp), parameter :: unmended_limit = 4.0_dp
   integer, parameter :: unmended_iterations = 9
-  !> root mean square of the impulses over the largest load of a body, beyond what heights and arches make of loads
-  real(dp), parameter :: most_impulses = 1.0e6_dp
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 6
 
@@ -127,7 +126,7 @@ contains
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
     call start_timer(phase_setup)
     call scheme%start(problem, error)
-    if (.not. allocated(error)) call velocity%start(problem)
+    if (.not. allocated(error)) call velocity%start(problem, control%accuracy*problem%error_scale)
     call stop_timer(phase_setup)
     if (allocated(error)) return
     report%start_seconds = clock() - began
@@ -224,15 +223,15 @@ contains
       is_met = .not. report%residual > 0.0_dp
       if (is_met) return
       if (.not. velocity%is_assessed) then
-        if (velocity%rests(limit)) then
-          is_met = velocity%excludes_violations(problem, limit)
+        if (velocity%rests()) then
+          is_met = velocity%excludes_violations(problem)
           if (is_met) return
         else if (report%iterations < copies_ready) then
           return
         end if
         call velocity%assess(problem, scheme, report%iterations, report%residual, defect)
       end if
-      if (velocity%criterion() <= limit .and. .not. velocity%rests(limit)) call velocity%add_levels(problem)
+      if (velocity%criterion() <= limit .and. .not. velocity%rests()) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
       is_met = velocity%criterion() <= limit
     end function velocity_is_met
@@ -275,11 +274,14 @@ contains
       if (report%iterations == 0) reference = max(defect, problem%force_scale)
       report%velocity_error = 0.0_dp
       if (report%residual > 0.0_dp) report%velocity_error = velocity%estimate()
-      ! impulses that no loads can make are those of a problem without a solution
-      met = is_met() .and. problem%impulse_scale <= most_impulses*problem%rounded_scale
+      met = is_met()
       call take_figure()
       if (met) then
         report%status = solve_converged
+        ! a residual is relative to the impulses, and falls where they grow without bound
+        if (control%criterion == by_residual .and. .not. problem%rest_is_admissible .and. report%iterations > 0) then
+          if (normals_are_in_vain(problem)) report%status = solve_unbounded
+        end if
       else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
         report%status = solve_diverged
       else if (grows(defect)) then

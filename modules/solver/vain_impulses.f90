@@ -15,7 +15,7 @@ module gravier_vain_impulses
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: kept_impulses_t, are_in_vain
+  public :: kept_impulses_t, are_in_vain, normals_are_in_vain
 
   !> Impulses of a subdomain (lanes, nc, blocks) [N s].
   type :: kept_impulses_t
@@ -34,6 +34,37 @@ contains
     !> of the subdomains of this rank
     type(kept_impulses_t), intent(in) :: earlier(:)
     type(kept_impulses_t) :: now(size(problem%sub))
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        now(s)%value = sub%impulse
+        sub%impulse(:, :, :) = sub%impulse - earlier(s)%value
+        call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
+      end associate
+    end do
+    in_vain = exceeds_bound(problem)
+    call put_back(problem, now)
+  end function are_in_vain
+
+  !> Whether the normal impulses themselves are larger than any loads can make: no velocities obey the law. Impulses and velocities
+  !> stay as they are. Collective.
+  logical function normals_are_in_vain(problem) result(in_vain)
+    type(contact_problem_t), intent(inout) :: problem
+    type(kept_impulses_t) :: now(size(problem%sub))
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      now(s)%value = problem%sub(s)%impulse
+      problem%sub(s)%impulse(:, 2:, :) = 0.0_dp
+    end do
+    in_vain = exceeds_bound(problem)
+    call put_back(problem, now)
+  end function normals_are_in_vain
+
+  !> Whether z, which stands in the place of the impulses, asks for velocities far beyond those of the problem. Collective.
+  logical function exceeds_bound(problem) result(exceeds)
+    type(contact_problem_t), intent(inout) :: problem
     !> A and sum |P| (2, subdomains)
     real(dp) :: parts(2, size(problem%sub)), sums(2), fastest
     integer :: s
@@ -41,26 +72,31 @@ contains
     parts(:, :) = 0.0_dp
     fastest = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        now(s)%value = sub%impulse
-        sub%impulse(:, :, :) = sub%impulse - earlier(s)%value
-        call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
-        call problem%own_reactions(s)
-        call add_work(problem, sub, parts(1, s))
-        call problem%shared%load(s, sub%reaction)
-      end associate
+      call problem%own_reactions(s)
+      call add_work(problem, problem%sub(s), parts(1, s))
+      call problem%shared%load(s, problem%sub(s)%reaction)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
       call add_reactions(problem, problem%sub(s), parts(2, s), fastest)
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    fastest = problem%comm%highest(fastest)
+    exceeds = sums(1) > 0.0_dp .and. sums(1) > beyond*fastest*sums(2)
+  end function exceeds_bound
+
+  !> The impulses as they were, and the velocities under them. Collective.
+  subroutine put_back(problem, now)
+    type(contact_problem_t), intent(inout) :: problem
+    type(kept_impulses_t), intent(in) :: now(:)
+    integer :: s
+
+    do s = 1, size(problem%sub)
       problem%sub(s)%impulse(:, :, :) = now(s)%value
     end do
     call problem%evaluate()
-    call problem%comm%sum_parts(parts, sums)
-    fastest = problem%comm%highest(fastest)
-    in_vain = sums(1) > 0.0_dp .and. sums(1) > beyond*fastest*sums(2)
-  end function are_in_vain
+  end subroutine put_back
 
   !> A of a subdomain, whose `reaction` is H z of its own contacts [J].
   pure subroutine add_work(problem, sub, work)

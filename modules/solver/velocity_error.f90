@@ -11,7 +11,7 @@
 !>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
 !>      L^2 = sum m_l e_l^2.
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
-!>      (gravier_layered_start) long waves are gone, and a = 1.3.
+!>      (gravier_layered_start) long waves are gone, and a = 1.7.
 !>      Where groups of contacts creep, test impulses of little motion make E too large. The mean violation, each contact weighed by
 !>      r_n, over as many contacts as the depth D is long is more than any wave can be: E is at most 2 D sqrt(sum r_n |w|^2/sum r_n).
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
@@ -31,11 +31,13 @@ module gravier_velocity_error
   public :: velocity_error_t, copies_ready, violations_allowed
 
   !> weight of Y in the estimate; mean cosine between normals and the way down
-  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.3_dp, cosine = 0.65_dp
+  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp, cosine = 0.65_dp
   !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
   real(dp), parameter :: violations_allowed = 5.0_dp
+  !> times the error allowed by which what lies above a level may sink where what moves is at most so many times the error allowed
+  real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
   !> share of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> without momentum, ratio between the iterations at which impulses are copied, and the first of them
@@ -72,6 +74,8 @@ module gravier_velocity_error
   type :: velocity_error_t
     !> mass of the grains in contact, or of all that can move where there are none [kg]
     real(dp) :: mass = 0.0_dp
+    !> error allowed [m/s]
+    real(dp), private :: allowed = 0.0_dp
     !> whether Y, the mean and the largest violation are known
     logical :: is_assessed = .false.
     !> C, Y and L, as far as they are known, by the last `bound` or `assess` and `add_levels` [m/s]
@@ -82,6 +86,8 @@ module gravier_velocity_error
     real(dp) :: mean_violation = 0.0_dp
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
+    !> largest |e_l| of a level, by the last `add_levels`; 0 since `bound` [m/s]
+    real(dp) :: fastest_level = 0.0_dp
     !> largest depth; negative while it is not known
     integer :: most_depth = -1
     !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
@@ -106,14 +112,17 @@ module gravier_velocity_error
 contains
 
   !> Make ready for a solve. Collective.
-  subroutine velocity_error_start(self, problem)
+  subroutine velocity_error_start(self, problem, allowed)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    !> error [m/s]
+    real(dp), intent(in) :: allowed
     !> mass of the grains, of all bodies that can move
     real(dp) :: parts(2, size(problem%sub)), sums(2), heavy
     logical :: moves
     integer :: s, b
 
+    self%allowed = allowed
     allocate (self%part(size(problem%sub)))
     parts(:, :) = 0.0_dp
     moves = .false.
@@ -162,17 +171,16 @@ contains
     self%projection = unknown
     self%levels = 0.0_dp
     self%largest_violation = 0.0_dp
+    self%fastest_level = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
-  !> Whether no contact violates its law by more than what is allowed where the error may be `limit`, told by the velocities of the
+  !> Whether no contact violates its law by more than what is allowed, told by the velocities of the
   !> bodies alone: where everything prescribed is at rest, a violation is at most twice the largest of them. Collective.
-  logical function velocity_error_excludes_violations(self, problem, limit) result(excludes)
+  logical function velocity_error_excludes_violations(self, problem) result(excludes)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    !> [m/s]
-    real(dp), intent(in) :: limit
     real(dp) :: fastest, rim
     integer :: s, b
 
@@ -186,7 +194,7 @@ contains
         end do
       end associate
     end do
-    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*limit
+    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*self%allowed
   end function velocity_error_excludes_violations
 
   !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
@@ -195,6 +203,7 @@ contains
     class(velocity_error_t), intent(in) :: self
     criterion = max(self%largest_violation/violations_allowed, &
       & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
+    if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%fastest_level/sinking_allowed)
   end function velocity_error_criterion
 
   !> E with a weight on L, and at most D times the mean violation, so many times, where the depth D is known [m/s].
@@ -208,11 +217,9 @@ contains
   end function velocity_error_wave
 
   !> Whether C alone says that what moves is no more than what may where all could rest.
-  pure logical function velocity_error_rests(self, limit) result(rests)
+  pure logical function velocity_error_rests(self) result(rests)
     class(velocity_error_t), intent(in) :: self
-    !> error allowed [m/s]
-    real(dp), intent(in) :: limit
-    rests = self%bound_by_rest <= share_at_rest*limit
+    rests = self%bound_by_rest <= share_at_rest*self%allowed
   end function velocity_error_rests
 
   !> The smaller of E and C [m/s].
@@ -446,7 +453,7 @@ contains
     squares = 0.0_dp
     do l = 1, n
       if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
-      self%largest_violation = max(self%largest_violation, abs(sinking))
+      self%fastest_level = max(self%fastest_level, abs(sinking))
       squares = squares + sums(2*n + l)*sinking**2
     end do
     if (self%mass > 0.0_dp) self%levels = sqrt(squares/self%mass)

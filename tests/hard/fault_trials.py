@@ -127,10 +127,12 @@ def what_is_said(run, allowed=(0, 4)):
 # ---------------------------------------------------------------------------------------------- full disks
 
 def write_fclib(directory):
-    """A problem of two contacts, and its name."""
+    """A problem of two contacts with a long description, which is copied, and its name."""
     import numpy as np
     from fclib_problems import write_local
     write_local(os.path.join(directory, "problem.hdf5"), np.eye(6) + 0.1, np.array([-1.0, 0.2, 0.1, -2.0, 0.3, 0.0]), np.array([0.3, 0.4]))
+    with h5py.File(os.path.join(directory, "problem.hdf5"), "a") as file:
+        file["fclib_local/info/description"] = np.bytes_("two contacts " * 20000)
     return "problem.hdf5"
 
 
@@ -251,13 +253,19 @@ def kills(random_seed, trials, directory, all_ranks=(1, 2, 4)):
             else:
                 run.send(signal.SIGKILL, 1 if whom == "one rank" else None)
             results = os.path.join(place, "results")
-            problems = []
+            problems, end = [], f"{ranks} ranks"
             if whom == "the launcher":
                 # a restart at once, while ranks may still live
                 run.process.wait()
             else:
-                run.end()
-                problems = unreadable(results, os.path.join(straight, "results"))
+                begun = os.path.exists(results)
+                try:
+                    run.end(timeout=20)
+                except AssertionError as what:
+                    # Open MPI's launcher may wait for ever for a rank that dies while it starts, before the program has begun
+                    end = f"{ranks} ranks whose launcher hung before the program began"
+                    problems = [str(what)] if begun else []
+                problems += unreadable(results, os.path.join(straight, "results"))
             try:
                 again = gravier("--restart", "case.nml", ranks=draw.choice((1, 2)), directory=place, timeout=60)
                 problems += what_is_said(again, (0,)) + unreadable(results, os.path.join(straight, "results"))
@@ -266,7 +274,7 @@ def kills(random_seed, trials, directory, all_ranks=(1, 2, 4)):
             except AssertionError as what:
                 problems.append(str(what))
             run.end()
-            figure.note(f"{ranks} ranks", name, problems)
+            figure.note(end, name, problems)
             shutil.rmtree(place)
     return figure
 
@@ -366,13 +374,16 @@ def main():
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kinds", nargs="*", choices=KINDS, default=KINDS, help="of outputs, for full disks")
+    parser.add_argument("--ranks", type=int, nargs="*", default=(1, 2, 4), help="of runs that are killed")
     options = parser.parse_args()
     directory = tempfile.mkdtemp(prefix="gravier-trials-")
     try:
         if options.fault == "full_disks":
             figure = full_disks(options.seed, options.trials, directory, options.kinds)
+        elif options.fault == "kills":
+            figure = kills(options.seed, options.trials, directory, options.ranks)
         else:
-            figure = {"at_once": at_once, "kills": kills}[options.fault](options.seed, options.trials, directory)
+            figure = at_once(options.seed, options.trials, directory)
     finally:
         shutil.rmtree(directory, ignore_errors=True)
     print(figure)

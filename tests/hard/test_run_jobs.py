@@ -130,11 +130,22 @@ class Jobs(RunTestCase):
                 (("--list", "mu.csv", "--row", "a", "template.nml"), "--row a"), (("--list", "none.csv", "template.nml"), "no row"),
                 (("--list", "nu.csv", "template.nml"), "@mu@: no such column"), (("--list", "both.csv", "template.nml"), "no @nu@"),
                 (("--list", "short.csv", "template.nml"), "1 columns; expected 2"), (("--list", "mu.csv", "plain.nml"), "no @run@"),
-                (("bad.nml",), "status 2")):
+                (("--row", "1", "case.nml"), "--row 1: expected --list LIST.csv too"),
+                (("bad.nml",), "status 2, see bad.out: gravier: error: bad.job.nml: &scene bodies = 'cubes'")):
             with self.subTest(arguments):
                 done = self.sh("gravier_job", *arguments)
                 self.assertEqual(done.returncode, 2, done.stderr)
                 self.assertIn(words, done.stderr)
+        # what did not converge is said in the words of the run, and what says nothing, too
+        write(os.path.join(self.work, "rough.nml"), namelist({**CASE, "solver": {"tolerance": 1e-12, "max_iterations": 1},
+                                                              "decomposition": {}, "output": {"directory": "rough"}}))
+        done = self.sh("gravier_job", "--fresh", "rough.nml")
+        self.assertEqual(done.returncode, 3)
+        self.assertRegex(done.stderr, r"gravier_job: rough: the run ended with status 3, see rough.out: finished    \*\*\* \d+ of the steps "
+                                      r"did NOT reach the accuracy: .*results in rough\n")
+        self.program("silent", "#!/bin/sh\nexit 7\n")
+        done = self.sh("gravier_job", "--fresh", "rough.nml", GRAVIER_PROGRAM="silent", GRAVIER_LAUNCH="env")
+        self.assertEqual((done.returncode, done.stderr), (7, "gravier_job: rough: the run ended with status 7, see rough.out: it said nothing\n"))
         # a job that is too short for one step is not submitted for ever; one that is not submitted says so
         write(os.path.join(self.work, "case.reached"), "1\n")
         done = self.sh("gravier_job", "--fresh", "--seconds", "0.01", "case.nml")

@@ -51,6 +51,19 @@ class NoSolution(RunTestCase):
                 grains, groups = impossible()[name]
                 self.assert_refused(run, len(grains) + len(groups["boundary"]))
 
+    def test_residual(self):
+        """A residual is relative to the impulses: it falls where they grow without bound, and must not end a solve there."""
+        names = ["one disk", "one sphere", "chain of 3", "chain of 10", "chain, masses over five decades", "disks in a box, sides close",
+                 "gaps that close within the first step"]
+        jobs = [(name, method, ranks, {"solver": {"criterion": "residual"}}, "residual") for name in names
+                for method, ranks in (("nlgs", 1), ("nscdd", 2))]
+        for (name, method, ranks, *_), run in zip(jobs, each(self.play, jobs)):
+            with self.subTest(name, method=method, ranks=ranks):
+                self.assert_status(run, 3)
+                self.assertIn("NOT CONVERGED: impulses larger than any loads can make", run.stdout)
+                self.assertIn("no solution found: loads grow without bound in step", run.stdout)
+                self.assertEqual(run.history()["converged"][-1], 0)
+
     def test_first_step_without_a_solution(self):
         """The walls reach the row within the fifth step: the four before it are right, and it is the one that is refused."""
         run = self.play("gaps that close in the fifth step", "nlgs", 1, {"output": {"every": 1}}, "first")

@@ -561,7 +561,7 @@ contains
     call refuse_csv(plain, "1,abc,3,4", 'line 4: column x: "abc", but a finite number was expected')
     call refuse_csv(plain, "1,2,NaN,4", 'line 4: column y: "NaN", but a finite number was expected')
     call refuse_csv(plain, "1,2,-Infinity,4", 'line 4: column y: "-Infinity", but a finite number was expected')
-    call refuse_csv(plain, "1,2,1e400,4", 'line 4: column y: "1e400", but a number below 1e308')
+    call refuse_csv(plain, "1,2,1e400,4", 'line 4: column y: "1e400", but a number of at most 1.79')
     call refuse_csv(plain, "1,,3,4", "line 4: column x: empty, but a finite number was expected")
     call refuse_csv(plain, "1,2,3,", "line 4: column radius: empty, but a finite number was expected")
     call refuse_csv(plain, "1,2,3,0", 'line 4: column radius: "0", but a radius > 0 was expected')

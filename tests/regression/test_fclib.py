@@ -139,13 +139,20 @@ class Fclib(RunTestCase):
     def path(self, name):
         return os.path.join(self.directory, name)
 
+    def bytes_of(self, *names):
+        found = {}
+        for name in names:
+            with open(self.path(name), "rb") as file:
+                found[name] = file.read()
+        return found
+
     def impulses(self, name):
         with h5py.File(self.path(name)) as file:
-            return file["fclib_local/solution/r"][()], file["fclib_local/solution/u"][()]
+            return file["solution/r"][()], file["solution/u"][()]
 
     def multipliers(self, name):
         with h5py.File(self.path(name)) as file:
-            return file["fclib_local/solution/l"][()]
+            return file["solution/l"][()]
 
     def test_storage_forms_are_one_problem(self):
         w, q, mu = random_problem(3, 12)
@@ -195,14 +202,109 @@ class Fclib(RunTestCase):
     def test_warm_start(self):
         write_local(self.path("a.h5"), *local_problem())
         self.solve("a.h5", "--write", "solved", "--tolerance", "1e-9")
-        with h5py.File(self.path("solved/a.h5")) as file, h5py.File(self.path("a.h5"), "a") as cold:
-            cold["fclib_local/guesses/1/r"] = file["fclib_local/solution/r"][()]
-        for path in ("solved/a.h5", "a.h5"):
-            self.solve(path, "--csv", "cold.csv")
-            self.solve(path, "--warm", "--csv", "warm.csv")
-            self.assertGreater(int(read_table(self.path("cold.csv"))["sweeps"][0]), 10)
-            # the first check of a start that is a solution already
-            self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"])
+        r, u = self.impulses("solved/a.h5")
+        note = "gravier_fclib: note: {}: --warm found neither /solution/r nor /guesses/1/r: the solve starts from zero impulses\n"
+        self.assertEqual(self.solve("a.h5", "solved/a.h5", "--warm", "--csv", "warm.csv").stderr, note.format("a.h5"))
+        cold, warm = (int(sweeps) for sweeps in read_table(self.path("warm.csv"))["sweeps"])
+        self.assertGreater(cold, 10)
+        # the first check of a start that is a solution already
+        self.assertEqual(warm, 1)
+        # as libfclib writes them, and where older versions of Gravier put them; the first of several counts
+        names = ["solution", "fclib_local/solution", "guesses/1", "fclib_local/guesses/1"]
+        for k, name in enumerate(names):
+            write_local(self.path("b.h5"), *local_problem())
+            with h5py.File(self.path("b.h5"), "a") as file:
+                file[f"{name}/r"], file[f"{name}/u"] = r, u
+                for later in names[k + 1:]:
+                    file[f"{later}/r"] = np.zeros_like(r)
+            self.assertEqual(self.solve("b.h5", "--warm", "--csv", "warm.csv").stderr, "")
+            self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"], name)
+        # without --warm nothing is said, and nothing is taken
+        self.assertEqual(self.solve("solved/a.h5", "--csv", "cold.csv").stderr, "")
+        self.assertEqual(read_table(self.path("cold.csv"))["sweeps"], [str(cold)])
+
+    def test_warm_start_of_a_global_problem(self):
+        m, h, f, mu = box_stack()
+        write_global(self.path("a.h5"), m, h, f, mu)
+        self.solve("a.h5", "--write", "solved", "--tolerance", "1e-9")
+        for name in ("solution", "fclib_global/solution", "guesses/1"):
+            write_global(self.path("b.h5"), m, h, f, mu)
+            with h5py.File(self.path("b.h5"), "a") as file:
+                file[f"{name}/r"] = self.impulses("solved/a.h5")[0]
+            self.assertEqual(self.solve("b.h5", "--warm", "--csv", "warm.csv").stderr, "")
+            self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"], name)
+
+    def test_info_is_kept(self):
+        def describe(group, matrix):
+            for name in ("title", "description", "math_info"):
+                group[f"info/{name}"] = np.bytes_(f"{name} of {group.name}")
+            group["info"].attrs["number"] = np.array([7], "i4")
+            group[f"{matrix}/comment"], group[f"{matrix}/rank"] = np.bytes_("made here"), np.array([3], "i4")
+
+        (w, q, mu, constraints), (m, h, g, f, b, shift) = hinged_rods(7)
+        write_local(self.path("local.h5"), w, q, mu, dimension=2)
+        write_local(self.path("hinged.h5"), w, q, mu, dimension=2, constraints=constraints)
+        write_global(self.path("global.h5"), m, h, f, mu, g, b, shift, dimension=2)
+        for name, group, matrix in (("local", "fclib_local", "W"), ("hinged", "fclib_local", "W"), ("global", "fclib_global", "M")):
+            with h5py.File(self.path(f"{name}.h5"), "a") as file:
+                describe(file[group], matrix)
+        self.solve("local.h5", "hinged.h5", "global.h5", "--write", "out", ranks=2)
+        for name, group in (("local", "fclib_local"), ("hinged", "fclib_local"), ("global", "fclib_global")):
+            with h5py.File(self.path(f"out/{name}.h5")) as file:
+                info = file["fclib_local/info"]
+                self.assertEqual({key: info[key][()] for key in info}, {
+                    key: f"{key} of /{group}".encode() for key in ("title", "description", "math_info")})
+                self.assertEqual(info.attrs["number"], [7])
+                # what is said of W holds where W is the same
+                self.assertEqual("rank" in file["fclib_local/W"], name == "local")
+                self.assertEqual("comment" in file["fclib_local/W"], name == "local")
+
+    def test_scalars(self):
+        w, q, mu = random_problem(3, 1)
+        for form in ("rows", "triplets"):
+            write_local(self.path("a.h5"), w, q, mu, form)
+            with h5py.File(self.path("a.h5"), "a") as file:
+                local = file["fclib_local"]
+                for name in ("spacedim", "W/m", "W/n", "W/nz", "W/nzmax", "vectors/mu"):
+                    value = local[name][0]
+                    del local[name]
+                    local[name] = value
+                    self.assertEqual(local[name].shape, ())
+            for ranks in (1, 2):
+                self.solve("a.h5", "--write", "out", ranks=ranks)
+                self.assertLess(measures(w, q, mu, self.impulses("out/a.h5")[0])[1], 1.01e-8)
+        with h5py.File(self.path("a.h5"), "a") as file:
+            del file["fclib_local/spacedim"]
+            file["fclib_local/spacedim"] = h5py.Empty("i4")
+        self.assertIn("a.h5: /fclib_local/spacedim: ", self.solve("a.h5", status=2).stderr)
+
+    def test_half_of_a_symmetric_matrix(self):
+        m, h, f, mu = box_stack()
+        # bodies that are not their principal axes: M is no diagonal
+        m = m + np.kron(np.eye(len(f) // 6), 0.1 * np.eye(6)[[3, 4, 5, 0, 1, 2]])
+        w, q = h.T @ np.linalg.solve(m, h), h.T @ np.linalg.solve(m, f)
+        rods, mu_rods, (v, r, s) = hinged_rods(3)[0][:2], hinged_rods(3)[0][2], hinged_rods(3)[0][3]
+        for side, half in (("above", np.triu), ("below", np.tril)):
+            for form in ("rows", "columns", "triplets"):
+                write_local(self.path("w.h5"), half(w), q, mu, form)
+                write_local(self.path("r.h5"), half(rods[0]), rods[1], mu_rods, form, 2, (v, half(r), s))
+                write_global(self.path("m.h5"), half(m), h, f, mu)
+                write_global(self.path("whole.h5"), m, h, f, mu)
+                run = self.solve("w.h5", "r.h5", "m.h5", "whole.h5", "--write", "out", "--tolerance", "1e-11")
+                words = f"has entries {side} the diagonal alone and is read as half of a symmetric matrix"
+                self.assertEqual(run.stderr, f"gravier_fclib: note: w.h5: /fclib_local/W {words}\n"
+                                 f"gravier_fclib: note: r.h5: /fclib_local/W {words}; /fclib_local/R {words}\n"
+                                 f"gravier_fclib: note: m.h5: /fclib_global/M {words}\n")
+                for name in ("w", "m", "whole"):
+                    self.assertLess(measures(w, q, mu, self.impulses(f"out/{name}.h5")[0])[1], 1.01e-11)
+                (exact, *_), = solutions_in_plane(*rods, mu_rods, (v, r, s))
+                np.testing.assert_allclose(self.impulses("out/r.h5")[0], exact, atol=1e-9)
+        # a triangular matrix that is half of nothing
+        wrong = np.triu(w)
+        wrong[2, 5] = 2 * np.abs(w).max()
+        write_local(self.path("w.h5"), wrong, q, mu)
+        self.assertIn("w.h5: /fclib_local/W: entries above the diagonal alone, and row 3 has one that no positive semidefinite matrix has: "
+                      "expected all entries, or one half of a symmetric matrix", self.solve("w.h5", status=2).stderr)
 
     def test_global_problems_are_reduced(self):
         m, h, f, mu = box_stack()
@@ -244,7 +346,7 @@ class Fclib(RunTestCase):
         np.testing.assert_array_equal(self.impulses("again/a.h5"), self.impulses("out/a.h5"))
         self.assertEqual(read_table(self.path("warm.csv"))["sweeps"], ["1"])
         with h5py.File(self.path("again/a.h5")) as file:
-            self.assertNotIn("l", file["fclib_local/solution"])
+            self.assertNotIn("l", file["solution"])
 
     def test_constraints_of_bodies_and_of_contacts(self):
         # one problem by M, H and G, and by W, V and R
@@ -359,13 +461,19 @@ class Fclib(RunTestCase):
         for method in ("newton", "auto"):
             self.solve("a.h5", "--method", method, "--csv", "results.csv", status=3)
             self.assertEqual(read_table(self.path("results.csv"))["verdict"], ["not_converged"])
+        # proximal points that are found at once count: the limit holds wherever the steps end
+        self.solve("a.h5", "--method", "newton", "--csv", "results.csv", status=3)
+        steps = int(read_table(self.path("results.csv"))["newton_steps"][0])
+        for limit in range(1, steps):
+            self.solve("a.h5", "--method", "newton", "--max-iterations", str(limit), "--csv", "results.csv", status=3)
+            self.assertEqual(read_table(self.path("results.csv"))["newton_steps"], [str(limit)])
 
     def test_huge_impulses_are_no_solution(self):
         # two walls that move alike: the start is in balance, but q is lost beside it
         w, q, mu = impossible_problems.one_grain(2, 0.5, (1.0, 1.0))[0].problem()
         write_local(self.path("a.h5"), w, q, mu, dimension=2)
         with h5py.File(self.path("a.h5"), "a") as file:
-            file["fclib_local/guesses/1/r"] = np.array([1e17, 0, 1e17, 0])
+            file["guesses/1/r"] = np.array([1e17, 0, 1e17, 0])
         run = self.solve("a.h5", "--warm", "--method", "nlgs", "--max-iterations", "1", "--csv", "results.csv", status=3)
         self.assertRegex(run.stdout, r"NOT CONVERGED: the impulse of contact [12] is beyond what loads can make")
         rows = read_table(self.path("results.csv"))
@@ -414,6 +522,11 @@ class Fclib(RunTestCase):
             (replace("W/x", None), "/fclib_local/W/x: missing"),
             (replace("W/x", np.full(144, np.inf)), "/fclib_local/W/x: expected finite numbers"),
             (replace("W/x", np.ones(100)), "/fclib_local/W/x"),
+            # what these are measured by is lost beside 0 or overflows
+            (replace("W/x", w.ravel() * 1e200), "/fclib_local/W/x: expected numbers of at most 1e30 in size"),
+            (replace("W/x", w.ravel() * 1e-200), "contact 1: mean diagonal of W is "),
+            (replace("vectors/q", q * 1e200), "/fclib_local/vectors/q: expected numbers of at most 1e30 in size"),
+            (replace("vectors/q", q * 1e-200), "velocities without impulses of at most "),
             (replace("W/m", np.array([11])), "/fclib_local/W: a matrix of 11 rows and 12 columns: expected 12 and 12"),
             (replace("W/nz", np.array([-3])), "/fclib_local/W/nz = -3: expected -2 (rows), -1 (columns)"),
             (replace("W/i", np.full(144, 12)), "/fclib_local/W/i: expected numbers from 0 to 11"),
@@ -469,6 +582,42 @@ class Fclib(RunTestCase):
         run = self.solve("a.h5", status=2)
         self.assertIn("a.h5: the matrix of masses and constraints: expected a regular one", run.stderr)
 
+    def test_no_input_is_replaced(self):
+        os.makedirs(self.path("same/deep"))
+        os.mkdir(self.path("other"))
+        for name in ("same/a.h5", "other/a.h5", "same/b.h5"):
+            write_local(self.path(name), *random_problem(3, 4))
+        os.symlink("same", self.path("link"))
+        os.symlink("../same/b.h5", self.path("other/b.h5"))
+        os.mkdir(self.path("hard"))
+        os.link(self.path("same/b.h5"), self.path("hard/b.h5"))
+        before = self.bytes_of("same/a.h5", "other/a.h5", "same/b.h5")
+        another = "expected another directory than that of {}, which {} would replace"
+        cases = [("same/a.h5", directory, another.format("same/a.h5", f"{directory}/a.h5"))
+                 for directory in ("same", "./same/", "same/../same", "same/deep/..", "link", "../" + os.path.basename(self.directory) + "/same",
+                                   self.path("same"))]
+        cases += [("link/a.h5", "same", another.format("link/a.h5", "same/a.h5")),
+                  ("same", "link", another.format("same/a.h5", "link/a.h5")),
+                  # what the path leads to counts, by links of either kind
+                  ("same/b.h5", "other", another.format("same/b.h5", "other/b.h5")),
+                  ("same/b.h5", "hard", another.format("same/b.h5", "hard/b.h5")),
+                  # another input is in the way
+                  ("same/a.h5 other/b.h5", "hard", another.format("other/b.h5", "hard/b.h5")),
+                  ("same/a.h5 other/a.h5", "new", "expected files of different names, but same/a.h5 and other/a.h5 both become new/a.h5"),
+                  ("same/a.h5 ./same/a.h5", "new", "expected files of different names, but same/a.h5 and ./same/a.h5 both become new/a.h5")]
+        for inputs, directory, message in cases:
+            with self.subTest(message):
+                run = self.solve(*inputs.split(), "--write", directory, status=2)
+                self.assertEqual(run.stderr, f"gravier_fclib: error: --write '{directory}': {message}\n")
+                self.assertFalse(os.path.exists(self.path("new")))
+                self.assertEqual(self.bytes_of(*before), before)
+        write_local(self.path("t.csv.part"), *random_problem(3, 4))
+        run = self.solve("t.csv.part", "--csv", "t.csv", status=2)
+        self.assertEqual(run.stderr, "gravier_fclib: error: t.csv.part: expected a problem elsewhere than where t.csv is written until it is whole\n")
+        # the directory of another input is none of its files
+        self.solve("same/a.h5", "other/a.h5", "--csv", "t.csv")
+        self.solve("same/b.h5", "--write", "other/new", "--csv", "other/new/b.csv")
+
     def test_bad_usage(self):
         write_local(self.path("a.h5"), *random_problem(3, 4))
         with h5py.File(self.path("empty.h5"), "w"):
@@ -482,11 +631,16 @@ class Fclib(RunTestCase):
             (("a.h5", "--method", "simplex"), "--method 'simplex': expected auto, nlgs, momentum, newton, or all"),
             (("a.h5", "--method", "nlgs,"), "--method 'nlgs,': expected auto"),
             (("a.h5", "--tolerance", "0"), "--tolerance '0': expected a finite real number > 0"),
+            (("a.h5", "--tolerance", "1-1"), "--tolerance '1-1': expected a finite real number > 0"),
+            (("a.h5", "--max-iterations", "2147483648"), "--max-iterations '2147483648': expected an integer >= 1"),
             (("a.h5", "--max-iterations", "-1"), "--max-iterations '-1': expected an integer >= 1"),
             (("a.h5", "--csv"), "--csv '': expected a path"),
             (("a.h5", "--write", "."), "--write '.': expected another directory than that of a.h5"),
             (("nothing/../a.h5", "--write", "nothing/.."), "expected another directory than that of nothing/../a.h5"),
             (("a.h5", "--speed"), "unknown option '--speed'"),
+            (("a.h5", "--csv", "t.csv", "--profile", "./t.csv"), "./t.csv: expected a file of its own for each of --csv, --profile"),
+            (("a.h5", "--csv", "nothing/../a.h5"), "nothing/../a.h5: expected another file for a table than the problem a.h5"),
+            (("a.h5", "--csv", "new/a.h5", "--write", "new"), "new/a.h5: expected a file of its own"),
         ]:
             with self.subTest(message):
                 run = self.solve(*arguments, status=2)

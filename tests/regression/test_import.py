@@ -7,9 +7,9 @@ import sys
 import h5py
 import numpy as np
 
-from gravier_runs import SOURCE, RunTestCase, gravier, namelist, write
+from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, gravier, namelist, write
 
-IMPORT = os.path.join(SOURCE, "drivers", "gravier_import.py")
+IMPORT = os.path.join(PROGRAMS, "gravier_import")
 G = 9.81
 
 
@@ -89,11 +89,12 @@ class Import(RunTestCase):
         os.mkdir(folder)
         return folder
 
-    def convert(self, box, *options, step=1e-3, steps=50, status=0):
+    def convert(self, box, *options, step=1e-3, steps=50, status=0, **variables):
         folder = self.fresh("run")
         done = subprocess.run([sys.executable, IMPORT, box, "--step", str(step), "--steps", str(steps), "--out", "case", *options],
-                              cwd=folder, capture_output=True, text=True, check=False)
+                              cwd=folder, capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ, **variables})
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        self.assertEqual("is not checked" in done.stderr, "GRAVIER_PROGRAM" in variables)
         return folder, done.stderr
 
     def run_case(self, folder):
@@ -274,7 +275,10 @@ class Import(RunTestCase):
         self.assertIn("  kind = 'velocity'\n  static_friction = 0.5\n  dynamic_friction = 0.2\n  slip_scale = 0.001\n", self.case_of(folder))
         steps, _ = self.run_case(folder)
         self.assertLess(abs(steps[-1]["velocity"][0, 0] - (1.0 - 0.2 * G * 0.02)), 1e-4)
-        # names as LMGC90 itself writes them
+        # names as LMGC90 itself writes them, in full and in four letters
+        four = self.law("dsclb", "IQS_WET_DS_CLB", {"cohen": 1.0, "cohet": 0.0}, {"Weth": 1e-3}, {"dfrc": 0.2, "sfrc": 0.2})
+        folder, _ = self.on_ground(four + self.see("dsclb"), [([0.0, 0.05], "BLUEx")])
+        self.assertIn("  kind = 'adhesive'\n  friction = 0.2\n  adhesion = 1.0\n  adhesion_range = 0.001\n", self.case_of(folder))
         equal = self.law("dsclb", "RST_DS_CLB", {"restn": 0.4, "restt": 0.0}, {"dfric": 0.2, "sfric": 0.2})
         folder, _ = self.on_ground(equal + self.see("dsclb"), [([0.0, 0.05], "BLUEx")])
         self.assertIn("  kind = 'coulomb'\n  friction = 0.2\n  restitution = 0.4\n", self.case_of(folder))
@@ -366,6 +370,61 @@ class Import(RunTestCase):
         _, message = self.convert(self.box(2, glued, LAW + self.see("iqsc0"), still(2, 2)), status=2)
         self.assertIn("no grain sees a contactor of body 2", message)
 
+    def test_a_ground_as_wide_as_the_period(self):
+        """A ground that reaches round the cell is a plane; one between grains above and below cannot be one, and gravier refuses it."""
+        for dimension, shape, wall, half in ((2, "DISKx", "JONCx", {"axe1": 0.5, "axe2": 0.01}),
+                                             (3, "SPHER", "PLANx", {"axe1": 0.6, "axe2": 0.3, "axe3": 0.01})):
+            rigid = f"RBDY{dimension}"
+            up = [0.0] * (dimension - 1)
+            ground = body(dimension, 2, [*up, -0.01], [(wall, "WALLx", values(**half))])
+            grain = body(dimension, 1, [*up, 0.05], [(shape, "BLUEx", values(byrd=0.05))])
+            laws = LAW + SEE.format(rigid, shape, "BLUEx", shape, "BLUEx") + SEE.format(rigid, shape, "BLUEx", wall, "WALLx")
+            period = ("--period", "1.0", *["0.0"] * (dimension - 1))
+            folder, notes = self.convert(self.box(dimension, grain + ground, laws, still(dimension, 2)), *period)
+            self.assertIn(f"note: body 2 {wall}: it is as wide as the period, and becomes an endless plane\n", notes)
+            self.assertEqual(self.case_of(folder).count("shape = 'plane'"), 1)
+            _, forces = self.run_case(folder)
+            weight = 2500.0 * G * (math.pi * 0.05**2 if dimension == 2 else 4.0 / 3.0 * math.pi * 0.05**3)
+            self.assertLess(abs(forces[-1][0, dimension - 1] + weight), 0.01 * weight)
+            below = body(dimension, 3, [*up, -0.07], [(shape, "BLUEx", values(byrd=0.05))])
+            folder, message = self.convert(self.box(dimension, grain + ground + below, laws, still(dimension, 2)), *period, status=2)
+            self.assertRegex(message, r"^gravier_import: error: case.nml: gravier --check refuses the case that was made: case.nml: boundary "
+                                      r"'body 2 above': expected a width, .* at most the period of 1.000E\+000 m, .*\n$")
+            self.assertEqual(os.listdir(folder), [])
+            # a wall narrower than the period stays what it is
+            half["axe1"] = 0.3
+            small = body(dimension, 2, [*up, -0.01], [(wall, "WALLx", values(**half))])
+            folder, notes = self.convert(self.box(dimension, grain + small, laws, still(dimension, 2)), *period)
+            self.assertNotIn("plane", notes + self.case_of(folder))
+
+    def test_the_case_is_checked(self):
+        """What gravier refuses is not written, and older files of the name stay; without the program that is said."""
+        deep = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.0, 0.06], [("DISKx", "BLUEx", values(byrd=0.05))])
+        box = self.box(2, deep, LAW + self.see("iqsc0"))
+        folder, message = self.convert(box, status=2)
+        self.assertRegex(message, r"^gravier_import: error: case.nml: gravier --check refuses the case that was made: .*overlap.*\n$")
+        self.assertEqual(os.listdir(folder), [])
+        folder, notes = self.convert(box, GRAVIER_PROGRAM="no_such_program")
+        self.assertIn("case.nml is not checked; see gravier --check case.nml", notes)
+        self.assertEqual(sorted(os.listdir(folder)), ["case.h5", "case.nml"])
+
+    def test_periods(self):
+        disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
+        ball = body(3, 1, [0.0, 0.0, 0.05], [("SPHER", "BLUEx", values(byrd=0.05))])
+        flat = self.box(2, disk, LAW + self.see("iqsc0"))
+        space = self.box(3, ball, LAW + SEE.format("RBDY3", "SPHER", "BLUEx", "SPHER", "BLUEx"))
+        zero = "0 along an axis that is not periodic"
+        for box, period, words in (
+                (flat, ["1.0"], f"--period: 1 number: expected 2, for bodies RBDY2 in 2D, {zero}"),
+                (space, ["1.0", "1.0"], f"--period: 2 numbers: expected 3, for bodies RBDY3 in 3D, {zero}"),
+                (flat, ["1.0", "nan"], "--period 1 nan: expected finite numbers >= 0"),
+                (space, ["1.0", "-1.0", "0"], "--period 1 -1 0: expected finite numbers >= 0")):
+            folder, message = self.convert(box, "--period", *period, status=2)
+            self.assertEqual(message, f"gravier_import: error: {words}\n")
+            self.assertEqual(os.listdir(folder), [])
+        folder, _ = self.convert(space, "--period", "1.0", "2.0", "0")
+        self.assertIn("  period = 1.0, 2.0, 0.0\n", self.case_of(folder))
+
     def test_what_has_no_counterpart_is_refused(self):
         disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
         wall = body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
@@ -381,7 +440,7 @@ class Import(RunTestCase):
             ({"bodies": disk.replace("stone", "brick") + wall}, ("material brick",)),
             ({"bodies": wall, "drives": still(2, 1)}, ("no grain moves freely",)),
             ({"laws": laws.replace("IQS_CLB ", "IQS_MAC_CZM")}, ("TACT_BEHAV.DAT: line 2", "IQS_MAC_CZM", "IQS_WET_DS_CLB, RST_CLB")),
-            ({"laws": laws.replace("IQS_CLB", "RST_CLB")}, ("TACT_BEHAV.DAT: line 2", "rstn= is missing")),
+            ({"laws": laws.replace("IQS_CLB", "RST_CLB")}, ("TACT_BEHAV.DAT: line 2", "rstn= or restn= is missing")),
             ({"laws": LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")}, ("do not see each other",)),
             ({"laws": laws.replace("0.2000000D-02", "")}, ("alert= is missing",)),
             ({"laws": LAW}, ("no table of visibility", "$seety")),

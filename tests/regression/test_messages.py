@@ -37,6 +37,7 @@ UNPROVOKED = {
     "not a finite number; expected speeds": "as the motion of boundaries",
     "cannot read this dataset": "within HDF5",
     "cannot remove this group": "within HDF5",
+    "cannot copy ": "within HDF5",
     "cannot cut this table": "within HDF5",
     "cannot write rows of this table: is the disk full?": "within HDF5; a full disk is met by test_run_full_disk at other places",
 }
@@ -198,6 +199,10 @@ class Messages(RunTestCase):
             for name, values in (("f", [0.0, 0.0]), ("w", [0.0, 0.0]), ("mu", [0.3])):
                 problem[f"vectors/{name}"] = np.array(values)
         self.assertIn("expected a regular one", self.run_program("singular.hdf5", program="gravier_fclib"))
+        self.has(self.run_program("singular.hdf5", "--csv", "./singular.hdf5", program="gravier_fclib"),
+                 ("./singular.hdf5: expected another file for a table than the problem singular.hdf5",))
+        self.has(self.run_program("singular.hdf5", "--csv", "t.csv", "--profile", "./t.csv", program="gravier_fclib"),
+                 ("./t.csv: expected a file of its own for each of --csv, --profile and the problems of --write",))
 
     def test_every_message_is_provoked(self):
         write(self.here("pair.csv"), "id,x,y,radius\n1,0.05,0.05,0.05\n2,0.16,0.05,0.05\n")

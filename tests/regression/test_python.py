@@ -188,7 +188,7 @@ class Package(RunTestCase):
                 status, said = self.plot("movie", "heap/results", "--out", "film.mp4", "--every", "3", "--fps", "5", "--size", "4.37")
                 if end == 0:
                     self.assertEqual((status, said), (0, "film.mp4\n"))
-                    with open(self.here("film.mp4.said"), encoding="ascii") as file:
+                    with open(self.here("film.part.mp4.said"), encoding="ascii") as file:
                         width, height = map(int, re.search(r"-s (\d+)x(\d+) -pix_fmt rgba -.* 5.0 ", file.read()).groups())
                     self.assertEqual((width % 2, height % 2), (0, 0))
                     pictures = np.fromfile(self.here("film.mp4"), dtype=np.uint8).reshape(2, height, width, 4)

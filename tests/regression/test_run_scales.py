@@ -110,7 +110,7 @@ class Scales(RunTestCase):
         """Loads and speeds are the largest of their tables; U is that of the first step."""
         files = {"lid.csv": "time,vx,pressure\n0,0,1000\n0.5,0.4,4000\n1.0,0,1000\n", "g.csv": "time,gy\n0,-1\n0.5,-4\n1,0\n"}
         lid = {**SHEAR["boundary"][0], "table": "lid.csv", "velocity": None, "pressure": None}
-        text = self.check_case(SHEAR, {"scene": {"gravity_table": "g.csv"}, "time": {"step": 1e-3},
+        text = self.check_case(SHEAR, {"scene": {"gravity": None, "gravity_table": "g.csv"}, "time": {"step": 1e-3},
                                        "boundary": [{k: v for k, v in lid.items() if v is not None}]}, files=files)
         self.figures(text, rf"g h = {NUMBER} m/s", 4e-3)
         self.figures(text, rf"pressure P = {NUMBER} N/m", 4000.0)

@@ -97,16 +97,18 @@ class SmallScene(RunTestCase):
 
     def play(self, title, grains, boundaries=(), gravity=None, steps=100, ranks=1, files=(), **groups):
         """Run `grains` between `boundaries` (lists of keys) and return what was written. Boundaries have the identifiers that
-        follow on those of the grains."""
+        follow on those of the grains. Without gravity none acts, or that of a table in the groups."""
         dimension = len(grains[0].place)
-        gravity = np.zeros(dimension) if gravity is None else gravity
+        if gravity is None and "gravity_table" not in groups.get("scene", {}):
+            gravity = np.zeros(dimension)
         directory = self.here(title)
         os.makedirs(directory)
         write(os.path.join(directory, "bodies.csv"), bodies_csv(grains))
         for name, text in dict(files).items():
             write(os.path.join(directory, name), text)
         case = merged({
-            "scene": {"dimension": dimension, "bodies": "file", "bodies_file": "bodies.csv", "gravity": floats(gravity)},
+            "scene": {"dimension": dimension, "bodies": "file", "bodies_file": "bodies.csv",
+                      "gravity": None if gravity is None else floats(gravity)},
             "boundary": [dict(keys) for keys in boundaries],
             "time": {"step": self.step, "steps": steps},
             "solver": {"criterion": "residual", "tolerance": 1e-13, "check_every": 1, "warm_start": False, "max_iterations": 20000},

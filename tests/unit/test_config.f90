@@ -139,7 +139,6 @@ contains
     call check_vector(scene%period, [0.0_dp, 8.0_dp, 16.0_dp], "period")
     call check_vector(scene%period_origin, [-1.0_dp, -2.0_dp, -3.0_dp], "period_origin")
     call check_vector(scene%body_force, [4.0_dp, 5.0_dp, 6.0_dp], "body_force")
-    call check_equal(scene%gravity_table, "g.csv", "gravity_table")
     call check_close(scene%skin, 0.375_dp, 0.0_dp, "skin")
     call check(scene%skin_given, "skin_given")
     call check_close(scene%overlap_allowed, 0.0625_dp, 0.0_dp, "overlap_allowed")
@@ -160,7 +159,7 @@ contains
     text = "&scene title = 'three spheres', dimension = 3, gravity = 0.5, -0.25, -1.5" // newline &
       // "  bodies = 'column', column_count = 7, radius = 0.5, mass = 2.0, friction = 0.375" // newline &
       // "  wall_friction = 0.625, restitution = 0.25, wall_restitution = 0.75, rotation = .false." // newline &
-      // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6, gravity_table = 'g.csv'" // newline &
+      // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6" // newline &
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
       // "  start_overlap = 0.25" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
@@ -345,7 +344,6 @@ contains
     call accept(column // "&solver method = 'schwarz' / &decomposition partition = 'metis', subdomains = 5 /", "metis", config)
     call check_equal(config%decomposition%subdomains, 5, "subdomains alone")
     call accept(column // "&decomposition grid = 1, 1 /", "nlgs on a grid of one box", config)
-    call accept(column // "&decomposition partition = 'metis' grid = 3*0 /", "a grid of zeros, which is none", config)
     call accept(column // "&enriched interface = 'cg' /", "enriched keys with another method", config)
   end subroutine test_derived_values
 
@@ -611,6 +609,14 @@ contains
     call refuse_radius("inf")
     call refuse_radius("-Infinity")
     call refuse_radius("1e999")
+    call refuse_radius("1-1")
+    call refuse_radius("1+1")
+    call refuse_radius("1.5-3")
+    call refuse_radius("infinity")
+    call refuse(scene("bodies = 'column' gravity = 0, 1-1"), &
+      "&scene gravity = 0, 1-1: expected at most 3 finite real numbers (m/s^2)")
+    call refuse(scene("bodies = 'column' gravity = 2*1+1"), &
+      "&scene gravity = 2*1+1: expected at most 3 finite real numbers (m/s^2)")
     call refuse_radius("1 .5 ! a comment" // newline // "2", "1 .5 2")
     call refuse(scene("bodies = 'column' radius = mass = 1"), "&scene radius = (nothing): " // positive // " (m)")
     call refuse(scene("bodies = 'column' gravity = 0, nan"), &
@@ -753,8 +759,14 @@ contains
     call refuse(column // "&solver accuracy = 0 /", "&solver accuracy = 0: " // positive)
     call refuse(column // "&solver max_iterations = 0 /", "&solver max_iterations = 0: expected an integer >= 1")
     call refuse(column // "&solver sweeps = 0 /", "&solver sweeps = 0: expected an integer >= 1")
-    call refuse(column // "&solver relaxation = 0.0 /", "&solver relaxation = 0.0: expected a finite real number in (0, 1]")
-    call refuse(column // "&solver relaxation = 1.5 /", "&solver relaxation = 1.5: expected a finite real number in (0, 1]")
+    call refuse(column // "&solver method = 'schwarz' relaxation = 0.0 /", &
+      "&solver relaxation = 0.0: expected a finite real number in (0, 1]")
+    call refuse(column // "&solver method = 'schwarz' relaxation = 1.5 /", &
+      "&solver relaxation = 1.5: expected a finite real number in (0, 1]")
+    call refuse(column // "&solver relaxation = 0.5 /", "&solver relaxation = 0.5: relaxation belongs to method = 'schwarz' or " &
+      // "'schwarz_ec', expected without it where method = 'nlgs'")
+    call refuse(scene("bodies = 'column' gravity_table = 'g.csv' gravity = 0, -1"), &
+      "&scene gravity = 0, -1: expected a scene without it where gravity_table = 'g.csv' replaces it")
     call refuse(column // "&solver check_every = 0 /", "&solver check_every = 0: expected an integer >= 1")
     call refuse(column // "&solver velocity_scale = 0 /", "&solver velocity_scale = 0: " // positive // " (m/s)")
   end subroutine test_rules_of_time_and_solver
@@ -775,6 +787,9 @@ contains
     call refuse(nscdd // "grid = 2 /", "&decomposition grid = 2: expected 2 integers >= 1 where dimension = 2")
     call refuse(nscdd // "grid = 2, 2, 2 /", "&decomposition grid = 2, 2, 2: expected 2 integers >= 1 where dimension = 2")
     call refuse(nscdd // "grid = 2, -2 /", "&decomposition grid = 2, -2: expected 2 integers >= 1 where dimension = 2")
+    call refuse(nscdd // "grid = 0, 0, 0 /", "&decomposition grid = 0, 0, 0: expected 2 integers >= 1 where dimension = 2")
+    call refuse(nscdd // "partition = 'metis' grid = 3*0 /", &
+      "&decomposition grid = 3*0: expected no grid where partition = 'metis': give subdomains, or partition = 'grid'")
     call refuse(nscdd // "grid = 2*1000000 /", "&decomposition grid = 2*1000000: expected at most 2147483647 subdomains")
     call refuse(scene("bodies = 'column' dimension = 3", "&solver method = 'nscdd' / &decomposition grid(1:2) = 2, 2 /"), &
       "&decomposition grid(1:2) = 2, 2: expected 3 integers >= 1 where dimension = 3")
@@ -1404,6 +1419,8 @@ contains
   subroutine test_round_trip()
     call check_round_trip(column, "a column")
     call check_round_trip(whole_file(), "a whole file")
+    call check_round_trip(scene("bodies = 'column' gravity_table = 'g.csv'"), "a table of gravity")
+    call check_round_trip(column // "&solver method = 'schwarz' relaxation = 0.5 /", "a given relaxation")
     call check_round_trip(scene("bodies = 'lattice' alert_distance = 1e-300 density = 1234567.125" // lattice_keys), &
       "a lattice")
     call check_round_trip(scene("bodies = 'file' bodies_file = 'it''s/here' friction = 0.1 " &

@@ -1,10 +1,12 @@
 !> Directories, renames, reservation of disk space, text files whose writes are checked, and files that are others than before.
 program test_io_file_system
+  use, intrinsic :: iso_c_binding, only: c_int
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, status_input, status_failure
   use gravier_file_system, only: make_directory, remove_directory, rename_file, replace_file, remove_file, check_readable, &
-    & check_creatable, reserve_space, extend_file, is_device
+    & check_creatable, reserve_space, extend_file, is_device, place_t, place_of, place_of_open
+  use gravier_system_calls, only: c_open, c_close, c_text, o_rdonly
   use gravier_own_files, only: part_of, give_name, note_own, remove_own, check_own_files
   use gravier_text_file, only: text_file_t
   use gravier_check, only: check, check_equal, finish_checks
@@ -16,6 +18,7 @@ program test_io_file_system
   call test_directories()
   call test_text_files()
   call test_renames()
+  call test_places()
   call test_removing_directories()
   call test_replacing()
   call test_own_files()
@@ -61,6 +64,55 @@ contains
       call check(.true., name)
     end if
   end subroutine expect_none
+
+  !> A file is where its device and inode are, whatever the path; what is not there yet is where it would be.
+  subroutine test_places()
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+    type(place_t) :: place
+
+    call make_directory(here//"/places/deep", error)
+    call file%create(here//"/places/file", "", error)
+    call file%close(error)
+    call expect_none(error, "a file to find")
+    place = place_of(here//"/places/file")
+    call check(place == place_of(here//"//places/./deep/../file"), "another spelling of a file")
+    call check(.not. place == place_of(here//"/places/deep"), "a file and a directory")
+    call check(.not. place == place_of(here//"/places/new"), "a file and one that is not there")
+    place = place_of(here//"/places/new/file")
+    call check(place == place_of(here//"/places/deep/../new/./file"), "another spelling of a file that is not there")
+    call check(.not. place == place_of(here//"/places/deep/new/file"), "two directories that are not there")
+    call check(place_of("new") == place_of("./new"), "from the working directory on")
+    call check(place_of("") == place_of("."), "no path")
+    call test_place_of_open(here//"/places/open")
+  end subroutine test_places
+
+  !> A file that is open is where its name leads to, until the name leads to another file or to none.
+  subroutine test_place_of_open(path)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable :: error
+    type(text_file_t) :: file
+    type(place_t) :: place
+    integer(c_int) :: descriptor, ignored
+
+    call file%create(path, "older", error)
+    call file%close(error)
+    descriptor = c_open(c_text(path), o_rdonly, 0_c_int)
+    call check(place_of_open(descriptor) == place_of(path), "an open file and its name")
+    call check(place_of_open(descriptor) == place_of_open(descriptor), "an open file and itself")
+    call file%create(path, "newer", error)
+    call file%close(error)
+    call expect_none(error, "a file that takes the place of an open one")
+    call check(.not. place_of_open(descriptor) == place_of(path), "an open file whose name another one has")
+    place = place_of(path)
+    call check(place%is_there(), "a file that is there")
+    call remove_own(path)
+    call check(.not. place_of_open(descriptor) == place_of(path), "an open file without a name")
+    place = place_of(path)
+    call check(.not. place%is_there(), "a file that is not there any more")
+    ignored = c_close(descriptor)
+    call check(.not. place_of_open(descriptor) == place_of_open(descriptor), "no open file is equal to none")
+  end subroutine test_place_of_open
 
   subroutine test_directories()
     type(error_t), allocatable :: error

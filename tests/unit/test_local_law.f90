@@ -171,6 +171,13 @@ contains
       call check_close(max(norm2(p(2:)) - mu*p(1), polar, abs(dot_product(x - p, p)), 0.0_dp), 0.0_dp, exact, &
         & "projection on the cone")
     end do
+    ! on the axis, where products with mu = 0 have no sign
+    do k = -1, 1
+      p(1) = real(k, dp)
+      p(2:) = 0.0_dp
+      call project_on_cone(p, 0.0_dp)
+      call check_close(p(1), real(max(k, 0), dp), 0.0_dp, "projection on the cone without friction, from its axis")
+    end do
   end subroutine check_projection
 
 end program test_local_law

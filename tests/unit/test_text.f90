@@ -4,7 +4,7 @@ program test_text
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_random_hash, only: hash_uniform
-  use gravier_text, only: to_text, lower
+  use gravier_text, only: to_text, lower, growing_text_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
 
@@ -13,11 +13,28 @@ program test_text
   call test_reals()
   call test_round_trip()
   call test_logicals_and_case()
+  call test_growing_text()
   call test_raise()
   call finish_checks()
   call MPI_Finalize()
 
 contains
+
+  !> A text put together from pieces is all of them.
+  subroutine test_growing_text()
+    type(growing_text_t) :: text
+    character(len=:), allocatable :: expected
+    integer :: k
+
+    call check_equal(text%get(), "", "nothing added")
+    expected = ""
+    do k = 1, 2000
+      call text%add(to_text(k)//" ")
+      expected = expected//to_text(k)//" "
+    end do
+    call text%add("")
+    call check_equal(text%get(), expected, "pieces of a growing text")
+  end subroutine test_growing_text
 
   !> Equal in characters and in length: check_equal takes no notice of trailing blanks.
   subroutine check_text(text, expected, name)

@@ -1,5 +1,6 @@
 """The contact problem of a step as a file of FCLIB: the solution that the run found solves it, gravier_fclib reads it and finds the
 same velocities, and it does not depend on ranks and subdomains. Restitution, drives and prescribed motion are in it."""
+import csv
 import unittest
 
 import h5py
@@ -43,7 +44,7 @@ class Dump:
             self.dimension = int(problem["spacedim"][0])
             self.m, self.h = matrix(problem["M"]), matrix(problem["H"])
             self.f, self.w, self.mu = (problem["vectors"][name][:] for name in "f w mu".split())
-            self.v, self.r, self.u = (problem["solution"][name][:] for name in "vru")
+            self.v, self.r, self.u = (file["solution"][name][:] for name in "vru")
 
 
 class FclibStep(RunTestCase):
@@ -73,7 +74,12 @@ class FclibStep(RunTestCase):
         run = gravier("--tolerance", "1e-9", "--write", "solved", dump.path, program="gravier_fclib", directory=self.here(name))
         self.assert_status(run, 0)
         with h5py.File(run.path("solved", f"step_{STEP}.hdf5")) as file:
-            found = file["fclib_local/solution/r"][:]
+            found = file["solution/r"][:]
+        # from the impulses in the file, which meet the tolerance, nothing is left to do
+        run = gravier("--warm", "--tolerance", "1e-4", "--csv", "warm.csv", dump.path, program="gravier_fclib", directory=self.here(name))
+        self.assert_status(run, 0)
+        with open(run.path("warm.csv"), newline="", encoding="ascii") as file:
+            self.assertEqual((run.stderr, [row["sweeps"] for row in csv.DictReader(file)]), ("", ["1"]))
         velocity = np.linalg.solve(dump.m, dump.h @ found + dump.f)
         self.assertLess(np.abs(velocity - dump.v)[: len(dump.v)].max(), 1e-3 * np.abs(dump.v).max())
         return dump

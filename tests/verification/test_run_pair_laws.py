@@ -64,6 +64,11 @@ class Materials(SmallScene):
                        directory=self.here("unknown"))
         self.assert_status(run, 2)
         self.assertIn("three.csv: id 8: material 3: expected 1 to 2, the number of a &material of case.nml", run.stderr)
+        for options in ((), ("--check",)):
+            run = run_case({"scene": {"bodies": "file", "bodies_file": path}, "time": {"step": 1e-3, "steps": 1}},
+                           directory=self.here("none"), options=options)
+            self.assert_status(run, 2)
+            self.assertEqual(run.stderr, f"gravier: error: {path}: id 8: material 3: expected 1, since case.nml has no &material\n")
 
 
 class SlipDependentFriction(SmallScene):
@@ -244,7 +249,7 @@ class Bonds(SmallScene):
 
     def test_broken_for_good(self):
         """A disk is torn from a ceiling and thrown back at it: the bond does not form again."""
-        record = self.play("torn", [Grain((0, -RADIUS))], [plane((0, 0), (0, -1), material="b")], (0, 0), 200,
+        record = self.play("torn", [Grain((0, -RADIUS))], [plane((0, 0), (0, -1), material="b")], None, 200,
                            scene={"gravity_table": "g.csv"}, files={"g.csv": "time,gx,gy\n0,0,-9\n0.05,0,-9\n0.0501,0,9\n0.3,0,9\n0.301,0,-5\n1,0,-5\n"},
                            material=named("a", "b"),
                            law=[law(("a", "b"), "bonded", bond_strength=8.0 * MASS, bond_friction=0.5, bond_distance=1e-6)])

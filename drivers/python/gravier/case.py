@@ -101,7 +101,9 @@ def run(groups, directory, ranks=1, program=None):
     in a case are relative to that directory. Returns the exit status: 0, or 3 where a solve missed its tolerance."""
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
-    (directory / "case.nml").write_text(namelist(groups), encoding="utf-8")
+    # written aside: a run that begins reads a whole case
+    (directory / "case.nml.part").write_text(namelist(groups), encoding="utf-8")
+    os.replace(directory / "case.nml.part", directory / "case.nml")
     launcher = os.environ.get("MPIEXEC", "mpiexec")
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:
         done = subprocess.run([launcher, "-n", str(ranks), str(program or find_program()), "case.nml"], cwd=directory,

@@ -1,0 +1,183 @@
+!> The estimate of the velocity error, the ways it rests on, and a pass over layers, on a column of disks, where all of them are known:
+!> impulses a share of the exact ones leave every disk with the same velocity.
+program test_velocity_error
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_velocity_error, only: velocity_error_t
+  use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
+  use gravier_layered_start, only: carry_loads
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+  character(len=*), parameter :: newline = new_line("a")
+  real(dp), parameter :: gravity = 9.81_dp, step = 1.0e-3_dp, mass = 2.0_dp, radius = 0.5_dp
+  type(communicator_t), target :: comm
+
+  call start_parallel()
+  call comm%init()
+  call test_ways(1)
+  call test_ways(4)
+  call test_share(1)
+  call test_share(4)
+  call test_exact()
+  call test_layers(1)
+  call test_layers(4)
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> A column of disks on the ground in the first step, divided along its height.
+  subroutine make(count, n_subdomains, sim)
+    integer, intent(in) :: count, n_subdomains
+    type(simulation_t), intent(inout) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+
+    call parse_config("column", "&scene bodies = 'column', column_count = "//to_text(count)//", radius = "//to_text(radius)// &
+      & ", mass = "//to_text(mass)//" / &time step = "//to_text(step)//", steps = 1 / &solver method = 'nscdd' /"//newline// &
+      & "&decomposition subdomains = "//to_text(n_subdomains)//", grid = 1, "//to_text(n_subdomains)//" /", config, error)
+    call check(.not. allocated(error), "configuration")
+    call sim%init(comm, config, error)
+    call sim%assemble(figures)
+    call check(.not. allocated(error), "assembly")
+    call sim%scheme%start(sim%problem, error)
+    call check(.not. allocated(error), "start")
+  end subroutine make
+
+  !> Place of body `b` from the ground, 0 of the ground itself.
+  integer function place(problem, s, b, count)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s, b, count
+    place = merge(int(problem%sub(s)%id(b)), 0, problem%sub(s)%id(b) <= count)
+  end function place
+
+  !> A share of the impulses that carry the weight.
+  subroutine set_impulses(problem, count, share)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: count
+    real(dp), intent(in) :: share
+    integer :: s, c, lower
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          lower = min(place(problem, s, sub%pair(1, c), count), place(problem, s, sub%pair(2, c), count))
+          sub%impulse(lane_of(c), 1, block_of(c)) = share*(count - lower)*mass*gravity*step
+        end do
+      end associate
+    end do
+    call problem%evaluate()
+  end subroutine set_impulses
+
+  !> Ways counted in contacts, and in lengths of which a diameter is one; nothing leads to what is cut off.
+  subroutine test_ways(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    integer, parameter :: count = 23
+    type(simulation_t) :: sim
+    type(ways_t), allocatable :: ways(:)
+    real(dp) :: expected
+    integer :: s, b, kind
+
+    call make(count, n_subdomains, sim)
+    do kind = 1, 2
+      allocate (ways(size(sim%problem%sub)))
+      if (kind == 1) call list_closed(sim%problem, ways)
+      if (kind == 2) call list_closed(sim%problem, ways, unit=2*radius)
+      do s = 1, size(ways)
+        call check(all(ways(s)%length >= unreached), "no way is known before a root is")
+        ways(s)%length(sim%problem%sub(s)%n_bodies + 1:) = 0.0_dp
+      end do
+      call shorten_ways(sim%problem, ways)
+      do s = 1, size(ways)
+        do b = 1, sim%problem%sub(s)%n_bodies
+          expected = place(sim%problem, s, b, count)
+          ! the contact with the ground has the length of a radius
+          if (kind == 2) expected = expected - 0.5_dp
+          call check_close(ways(s)%length(b), expected, 1e-12_dp*count, "way of disk "//to_text(place(sim%problem, s, b, count)))
+        end do
+      end do
+      deallocate (ways)
+    end do
+    call sim%free()
+  end subroutine test_ways
+
+  !> Nine tenths of the exact impulses: everything falls with a tenth of g h. Y and C are that exactly, because the velocities that the
+  !> impulses make are uniform; all sink as one, and the estimate is the smaller of E and C.
+  subroutine test_share(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    integer, parameter :: count = 40
+    real(dp), parameter :: expected = 0.1_dp*gravity*step
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    real(dp) :: residual, defect, alone, alone_defect
+
+    call make(count, n_subdomains, sim)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    call check(sim%problem%rest_is_admissible, "rest is admissible on a ground at rest")
+    call check_close(velocity%mass, count*mass, 1e-12_dp*count*mass, "mass")
+    call set_impulses(sim%problem, count, 0.9_dp)
+    call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
+    call check_close(velocity%projection, expected, 1e-9_dp*expected, "Y of a uniform velocity")
+    call check_close(velocity%bound_by_rest, expected, 1e-9_dp*expected, "C of a uniform velocity")
+    ! the disk on the ground violates its law by what it falls with, the others by nothing
+    call check_close(velocity%largest_violation, expected, 1e-9_dp*expected, "largest violation")
+    call velocity%add_levels(sim%problem)
+    call check_equal(velocity%most_depth, count, "depth")
+    ! the power at the ground over 0.65 of its force is what all sink with
+    call check_close(velocity%levels, expected/0.65_dp, 1e-9_dp*expected, "L of a uniform velocity")
+    call check_close(velocity%estimate(), expected, 1e-9_dp*expected, "estimate")
+    ! the residual of an assessment is that of the problem
+    call sim%problem%residual(alone, alone_defect)
+    call check_close(residual, alone, 1e-12_dp*alone, "residual")
+    call check_close(defect, alone_defect, 1e-12_dp*alone_defect, "defect")
+    call sim%free()
+  end subroutine test_share
+
+  !> The exact impulses: nothing is left.
+  subroutine test_exact()
+    integer, parameter :: count = 40
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    real(dp) :: residual, defect
+
+    call make(count, 4, sim)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    call set_impulses(sim%problem, count, 1.0_dp)
+    call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
+    call velocity%add_levels(sim%problem)
+    call check(velocity%estimate() <= 1e-9_dp*gravity*step, "estimate of the exact impulses: "//to_text(velocity%estimate(), 3))
+    call check(velocity%criterion() <= 1e-6_dp*gravity*step, "criterion of the exact impulses")
+    call sim%free()
+  end subroutine test_exact
+
+  !> A pass over layers leaves a column of 100 with less than a tenth of g h; a column of 20 is not deep enough for one.
+  subroutine test_layers(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    integer, parameter :: count = 100
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    real(dp) :: residual, defect, sweeps
+
+    call make(count, n_subdomains, sim)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    call carry_loads(sim%problem, 25.0_dp, sim%scheme%work, sweeps)
+    call check(sweeps >= 20.0_dp .and. sweeps <= 1.5_dp*200.0_dp, "sweeps of a pass: "//to_text(sweeps, 3))
+    call sim%problem%evaluate()
+    call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
+    call check(velocity%bound_by_rest <= 0.1_dp*gravity*step, "velocities after a pass: "//to_text(velocity%bound_by_rest, 3))
+    call sim%free()
+    call make(count/5, n_subdomains, sim)
+    call carry_loads(sim%problem, 25.0_dp, sim%scheme%work, sweeps)
+    call check_close(sweeps, 0.0_dp, 0.0_dp, "no pass on what is not deep")
+    call sim%free()
+  end subroutine test_layers
+
+end program test_velocity_error

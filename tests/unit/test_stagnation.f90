@@ -1,0 +1,38 @@
+!> When a solve counts as one that gains nothing.
+program test_stagnation
+  use gravier_kinds, only: dp
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_stagnation, only: stagnation_t
+  use gravier_check, only: check, check_equal, finish_checks
+  implicit none
+  type(contact_problem_t) :: problem
+
+  allocate (problem%sub(0))
+  call check_equal(first_due(.true., 0.0_dp, 1.0_dp), 1020, "with momentum: 1000 after the gain, and as many as before")
+  call check_equal(first_due(.false., 0.0_dp, 1.0_dp), 2020, "without, after 2000")
+  call check_equal(first_due(.true., 5.0e-4_dp, 1.0_dp), 8050, "four times the longer patience where a small residual is missing")
+  call check_equal(first_due(.true., 0.5_dp, 1.0_dp), 1020, "but not where a large one is")
+  call check_equal(first_due(.true., 0.0_dp, 0.9995_dp), 0, "a figure that goes on falling is none")
+  call check_equal(first_due(.true., 0.0_dp, 0.99999_dp), 1020, "one that falls by less than a tenth is")
+  call finish_checks()
+
+contains
+
+  !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none is.
+  integer function first_due(with_momentum, missing_residual, factor)
+    logical, intent(in) :: with_momentum
+    real(dp), intent(in) :: missing_residual, factor
+    type(stagnation_t) :: stagnation
+    integer :: iteration
+    logical :: due
+
+    first_due = 0
+    do iteration = 10, 20000, 10
+      call stagnation%note(problem, iteration, factor**iteration, with_momentum, missing_residual, due)
+      if (.not. due) cycle
+      first_due = iteration
+      return
+    end do
+  end function first_due
+
+end program test_stagnation
