@@ -92,7 +92,8 @@ contains
   pure logical function changes_code(word)
     character(len=*), intent(in) :: word
     changes_code = index(word, "-O") == 1 .or. index(word, "-march=") == 1 .or. index(word, "-mprefer") == 1
-    if (index(word, "-f") == 1) changes_code = index(word, "-fintrinsic-modules") /= 1 .and. index(word, "-fpre") /= 1
+    if (index(word, "-f") == 1) changes_code = index(word, "-fintrinsic-modules") /= 1 .and. index(word, "-fpre") /= 1 .and. &
+      & word /= "-fno-backtrace"
   end function changes_code
 
   !> Today, as year-month-day.

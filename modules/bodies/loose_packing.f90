@@ -182,7 +182,7 @@ contains
       if (left == 0) return
       history(round) = left
       if (is_hopeless(self%box%nd, history(1:round))) return
-      self%trials = int(min(wanted/left, int(most_trials, i8)), i4)
+      self%trials = narrow(min(wanted/left, int(most_trials, i8)))
       call find_clear_places(comm, self, clear)
       call settle_proposals(comm, self, clear)
       self%tried = self%tried + self%trials

@@ -111,7 +111,7 @@ contains
     divisor = 1 + sum(weight)/most_weight
     allocate (light(size(weight)))
     do k = 1, size(weight)
-      light(k) = int(max(1_i8, weight(k)/divisor), i4)
+      light(k) = narrow(max(1_i8, weight(k)/divisor))
     end do
   end subroutine lighten
 

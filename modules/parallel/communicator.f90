@@ -1,7 +1,7 @@
 !> The communicator of a run and its collective operations. Results do not depend on the number of ranks:
 !> real sums are exact, and maxima and integer sums are exact by nature.
 module gravier_communicator
-  use, intrinsic :: iso_c_binding, only: c_int
+  use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, MPI_Finalize, &
     & MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_Comm_dup, MPI_Comm_free, &
@@ -10,7 +10,7 @@ module gravier_communicator
     & MPI_MIN, MPI_MAX, MPI_LOR, MPI_BXOR
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
-  use gravier_errors, only: error_t
+  use gravier_errors, only: error_t, status_failure
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -48,6 +48,18 @@ module gravier_communicator
   end type communicator_t
 
   interface
+    integer(c_int) function c_atexit(action) bind(C, name="atexit")
+      import :: c_int, c_funptr
+      implicit none
+      type(c_funptr), value :: action
+    end function c_atexit
+
+    subroutine c_exit_now(status) bind(C, name="_exit")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: status
+    end subroutine c_exit_now
+
     integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
       import :: c_int
       implicit none
@@ -55,19 +67,32 @@ module gravier_communicator
     end function c_usleep
   end interface
 
+  !> between start_parallel and stop_parallel
+  logical :: parallel = .false.
+
 contains
 
-  !> Start MPI, unless it is running.
+  !> Start MPI, unless it is running. A process that ends before stop_parallel, by a library that gives up, has status_failure.
   subroutine start_parallel()
     logical :: running
+    integer(c_int) :: ignored
+
+    if (.not. parallel) ignored = c_atexit(c_funloc(end_early))
+    parallel = .true.
     call MPI_Initialized(running)
     if (.not. running) call MPI_Init()
   end subroutine start_parallel
 
   !> End MPI.
   subroutine stop_parallel()
+    parallel = .false.
     call MPI_Finalize()
   end subroutine stop_parallel
+
+  !> What the C library calls when the process ends.
+  subroutine end_early() bind(C)
+    if (parallel) call c_exit_now(int(status_failure, c_int))
+  end subroutine end_early
 
   !> First line of what the MPI library says of itself.
   function mpi_library() result(text)
