@@ -3,7 +3,7 @@ function(gravier_compile_options target)
   target_compile_options(${target} PRIVATE
     -std=f2008 -Wall -Wextra -Wimplicit-interface -Warray-temporaries
     $<$<BOOL:${GRAVIER_WERROR}>:-Werror>
-    $<$<CONFIG:Release>:-O3> $<$<AND:$<CONFIG:Release>,$<BOOL:${GRAVIER_ARCH}>>:-march=${GRAVIER_ARCH}>
+    $<$<CONFIG:Release>:-O3 -fno-backtrace> $<$<AND:$<CONFIG:Release>,$<BOOL:${GRAVIER_ARCH}>>:-march=${GRAVIER_ARCH}>
     $<$<CONFIG:Debug>:-Og -g -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow>
     $<$<CONFIG:Sanitize>:-O1 -g -fbacktrace -fsanitize=address,undefined -fno-omit-frame-pointer>)
   target_link_options(${target} PRIVATE $<$<CONFIG:Sanitize>:-fsanitize=address,undefined>)

@@ -1,6 +1,7 @@
 !> One case of a study: a run from its start to its end in memory, and what is kept of it; or one solve, check by check.
 module gravier_accuracy_run
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: clock
@@ -57,7 +58,7 @@ contains
     run%grains = simulation%n_grains
     run%contacts = figures%contacts
     run%mean_radius = simulation%decomposition%rule%mean_radius
-    run%failed = int(simulation%failed)
+    run%failed = narrow(simulation%failed)
     run%residual = simulation%effort%worst
     run%overlap = simulation%worst_overlap
     run%iterations = simulation%effort%iterations

@@ -4,6 +4,7 @@
 !> are the program's own: the grains go through its scene, its neighbour lists and its builder.
 module gravier_bench_packing
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
@@ -78,7 +79,7 @@ contains
 
     cell = id - 1
     do d = 1, 3
-      place(d) = int(mod(cell, int(self%count(d), i8)))
+      place(d) = narrow(mod(cell, int(self%count(d), i8)))
       cell = cell/self%count(d)
     end do
     velocity(:) = 0.0_dp

@@ -2,7 +2,9 @@
 module gravier_bench_triad
   use mpi_f08, only: MPI_Wtime
   use gravier_kinds, only: dp, i8
-  use gravier_machine, only: last_cache, free_memory
+  use gravier_narrow, only: narrow
+  use gravier_machine, only: last_cache
+  use gravier_room, only: free_memory
   implicit none
   private
   public :: triad_t, triad_bytes
@@ -20,6 +22,9 @@ module gravier_bench_triad
     procedure, private :: once => triad_once
   end type triad_t
 
+  !> taken to be free where the system does not tell
+  integer(i8), parameter :: usual_memory = 4294967296_i8
+
 contains
 
   !> Three arrays of `n` numbers; with n = 0 as many as fill the last cache four times, or a quarter of the free memory of each
@@ -32,8 +37,10 @@ contains
 
     length = n
     if (n == 0) then
-      bytes = min(4*last_cache(), free_memory()/(4*ranks))
-      length = int(min(bytes/triad_bytes, int(huge(0), i8)))
+      bytes = free_memory()
+      if (bytes == 0) bytes = usual_memory
+      bytes = min(4*last_cache(), bytes/(4*ranks))
+      length = narrow(min(bytes/triad_bytes, int(huge(0), i8)))
     end if
     allocate (self%a(length), self%b(length), self%c(length))
     self%a(:) = 0.0_dp

@@ -6,11 +6,13 @@ module gravier_checkpoint
   use gravier_text, only: to_text
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_time_table, only: time_table_t
-  use gravier_body_store, only: place_word
-  use gravier_boundary, only: boundary_t, boundary_words
+  use gravier_narrow, only: narrow, take_count
+  use gravier_body_store, only: place_word, grain_record
+  use gravier_boundary, only: boundary_t, boundary_words, boundary_record
   use gravier_neighbour_list, only: pair_memory_t
-  use gravier_impulse_memory, only: list_impulses, match_impulses
-  use gravier_energy_balance, only: energy_words
+  use gravier_impulse_memory, only: list_impulses, match_impulses, pair_record
+  use gravier_energy_balance, only: energy_words, energy_record
+  use gravier_partition, only: head_words, head_record
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
   implicit none
@@ -24,6 +26,16 @@ module gravier_checkpoint
 
 contains
 
+  !> What the records of a checkpoint are, a line a kind, from the modules that make them: the version of the file.
+  function records_text() result(text)
+    character(len=:), allocatable :: text
+
+    text = "grain: "//grain_record//" position_now"//newline//"pair: "//pair_record//newline// &
+      & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
+      & "energy: "//energy_record//", "//to_text(energy_words)//" words"//newline// &
+      & "partition: "//head_record//", "//to_text(head_words)//" words"
+  end function records_text
+
   !> Write a checkpoint, in the place of an older one when it is complete. Collective; errors are the same on all ranks.
   subroutine save_checkpoint(simulation, path, error)
     type(simulation_t), intent(in) :: simulation
@@ -33,7 +45,7 @@ contains
     integer(i8), allocatable :: words(:)
 
     if (allocated(error)) return
-    call file%create(simulation%comm, path, error)
+    call file%create(simulation%comm, path, records_text(), error)
     call file%write_text("scene", fixed_options(simulation), error)
     call file%write_scalar("subdomains", int(simulation%decomposition%n_subdomains, i8), error)
     call file%write_scalar("time_step", simulation%physics%h, error)
@@ -82,10 +94,11 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8) :: step, last_written, builds
+    integer :: own_step, own_last
     integer(i8), allocatable :: words(:)
 
     if (allocated(error)) return
-    call file%open(simulation%comm, path, error)
+    call file%open(simulation%comm, path, records_text(), error)
     call check_scene(simulation, file, path, error)
     call file%read_scalar("step", step, error)
     call check_steps(simulation, step, path, error)
@@ -99,16 +112,23 @@ contains
     call file%read_scalar("lists_made", builds, error)
     call file%read_scalar("imbalance", simulation%imbalance, error)
     call file%read_scalar("reached_imbalance", simulation%reached_imbalance, error)
-    call file%read_array("boundary_impulses", words, error)
+    call take_count(step, path//": step", own_step, error)
+    ! -1 where none was written
+    call take_count(last_written + 1, path//": last_written", own_last, error)
+    call file%read_array("boundary_impulses", size(simulation%boundary_impulses), &
+      & size(simulation%boundary_impulses), words, error)
     if (.not. allocated(error)) call take_reals(words, simulation%boundary_impulses, size(simulation%boundary_impulses))
-    if (allocated(error)) return
-    simulation%step = int(step)
-    simulation%last_written = int(last_written)
+    if (allocated(error)) then
+      call file%close(error)
+      return
+    end if
+    simulation%step = own_step
+    simulation%last_written = own_last - 1
     simulation%restarted = .true.
     call simulation%make_subdomains()
     call load_partition(simulation, file, error)
     call load_grains(simulation, file, builds, error)
-    call file%read_array("energy_balance", words, error)
+    call file%read_array("energy_balance", 0, energy_words, words, error)
     if (.not. allocated(error)) then
       ! a balance that begins now has no past
       call simulation%start_diagnostics()
@@ -251,18 +271,11 @@ contains
     end do
   end subroutine pack_boundaries
 
-  subroutine unpack_boundaries(words, boundaries, path, error)
-    integer(i8), intent(in), contiguous :: words(:)
+  pure subroutine unpack_boundaries(words, boundaries)
     type(boundary_t), intent(inout) :: boundaries(:)
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), intent(in) :: words(boundary_words*size(boundaries))
     integer :: b
 
-    if (allocated(error)) return
-    if (size(words) /= boundary_words*size(boundaries)) then
-      call raise(error, status_input, path//": as many boundaries were expected as the input has, "//to_text(size(boundaries)))
-      return
-    end if
     do b = 1, size(boundaries)
       call boundaries(b)%set_state(words((b - 1)*boundary_words + 1:b*boundary_words))
     end do
@@ -373,11 +386,11 @@ contains
     integer(i8), allocatable :: head(:), records(:, :), counts(:), words(:)
     integer, allocatable :: lengths(:)
 
-    call file%read_array("partition", head, error)
-    call file%read_table("cells", simulation%decomposition%n_subdomains, records, counts, error)
+    call file%read_array("partition", head_words, huge(head_words), head, error)
+    call file%read_table("cells", simulation%decomposition%n_subdomains, 1, records, counts, error)
     if (allocated(error)) return
     words = records(1, :)
-    lengths = int(counts)
+    lengths = narrow(counts)
     call simulation%decomposition%partition%restore(simulation%comm, head, words, lengths)
   end subroutine load_partition
 
@@ -389,26 +402,26 @@ contains
     integer(i8), intent(in) :: builds
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:)
-    integer :: s, k, n, d, nd, n_words
+    integer :: s, k, n, d, nd, n_words, n_boundary
 
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
       n_words = decomposition%grain_words()
-      call file%read_table("grains", decomposition%n_subdomains, records, counts, error)
-      if (builds > 0) call file%read_array("boundaries_when_listed", words, error)
-      call file%read_array("boundaries", now, error)
+      n_boundary = boundary_words*size(decomposition%boundaries)
+      call file%read_table("grains", decomposition%n_subdomains, n_words + nd, records, counts, error)
+      if (builds > 0) call file%read_array("boundaries_when_listed", n_boundary, n_boundary, words, error)
+      call file%read_array("boundaries", n_boundary, n_boundary, now, error)
       if (allocated(error)) return
       n = 0
       do s = 1, size(decomposition%home)
-        call decomposition%home(s)%init(nd, decomposition%nv, decomposition%ni, int(counts(s)))
+        call decomposition%home(s)%init(nd, decomposition%nv, decomposition%ni, narrow(counts(s)))
         do k = 1, decomposition%home(s)%n
           call decomposition%home(s)%set_record(k, records(1:n_words, n + k))
         end do
         n = n + decomposition%home(s)%n
       end do
       if (builds > 0) then
-        call unpack_boundaries(words, decomposition%boundaries, simulation%config%file, error)
-        if (allocated(error)) return
+        call unpack_boundaries(words, decomposition%boundaries)
         call simulation%neighbourhoods%build(decomposition)
         simulation%neighbourhoods%builds = builds
         call load_impulses(simulation, file, error)
@@ -422,7 +435,7 @@ contains
         end do
         n = n + decomposition%home(s)%n
       end do
-      call unpack_boundaries(now, decomposition%boundaries, simulation%config%file, error)
+      call unpack_boundaries(now, decomposition%boundaries)
     end associate
   end subroutine load_grains
 
@@ -438,13 +451,15 @@ contains
     call file%read_scalar("impulse_entries", n_impulse, error)
     call file%read_scalar("law_row", law_row, error)
     call file%read_scalar("rest_row", rest_row, error)
-    call file%read_table("impulses", simulation%decomposition%n_subdomains, records, counts, error)
+    call take_count(n_impulse, "impulse_entries of the checkpoint", kept%n_impulse, error)
+    call take_count(law_row, "law_row of the checkpoint", kept%law_row, error)
+    call take_count(rest_row, "rest_row of the checkpoint", kept%rest_row, error)
+    call file%read_table("impulses", simulation%decomposition%n_subdomains, 2 + kept%words(), records, counts, error)
     if (allocated(error)) return
-    kept = pair_memory_t(int(n_impulse), int(law_row), int(rest_row))
     n = 0
     do s = 1, size(simulation%neighbourhoods%view)
-      call match_impulses(records(:, n + 1:n + int(counts(s))), kept, simulation%neighbourhoods%view(s))
-      n = n + int(counts(s))
+      call match_impulses(records(:, n + 1:n + narrow(counts(s))), kept, simulation%neighbourhoods%view(s))
+      n = n + narrow(counts(s))
     end do
   end subroutine load_impulses
 

@@ -1,6 +1,7 @@
 !> The exact impulses of a column of equal grains at rest under gravity: each contact carries what stands on it.
 module gravier_column_solution
   use gravier_kinds, only: dp
+  use gravier_narrow, only: narrow
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_solve, only: exact_solution_t
@@ -31,8 +32,8 @@ contains
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
           ! the grain that stands on the contact: the higher of two, or the one on the ground
-          upper = int(sub%id(sub%pair(1, c)))
-          if (sub%pair(2, c) <= sub%n_bodies) upper = max(upper, int(sub%id(sub%pair(2, c))))
+          upper = narrow(sub%id(sub%pair(1, c)))
+          if (sub%pair(2, c) <= sub%n_bodies) upper = max(upper, narrow(sub%id(sub%pair(2, c))))
           impulse(:) = sub%impulse(lane_of(c), :, block_of(c))
           exact = (self%count - upper + 1)*self%unit_impulse
           parts(1, s) = parts(1, s) + (impulse(1) - exact)**2 + sum(impulse(2:)**2)

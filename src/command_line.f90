@@ -2,6 +2,7 @@
 module gravier_command_line
   use, intrinsic :: iso_c_binding, only: c_int
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_number_text, only: read_integer, read_real
   implicit none
@@ -107,7 +108,7 @@ contains
 
     call read_integer(word, found, fits)
     value = 0
-    if (found > 0 .and. found <= huge(value)) value = int(found)
+    if (found > 0 .and. found <= huge(value)) value = narrow(found)
   end function positive_integer
 
   !> The finite number > 0 that a word means; 0 for anything else.

@@ -24,8 +24,10 @@ contains
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
       nv = decomposition%nv
-      call allocate_bodies(data, nd, sum(decomposition%home%n))
-      allocate (data%mass(data%n))
+      call allocate_bodies(data, nd, sum(decomposition%home%n), .true., path, error)
+      call allocate_walls(data, nd, simulation%n_walls, path, error)
+      call simulation%comm%agree(error)
+      if (allocated(error)) return
       data%total = simulation%n_grains
       n = 0
       do s = 1, size(decomposition%home)
@@ -42,7 +44,6 @@ contains
           end do
         end associate
       end do
-      call allocate_walls(data, nd, simulation%n_walls)
       do w = 1, simulation%n_walls
         data%wall_id(w) = decomposition%boundaries(w)%id
         data%wall_point(:, w) = decomposition%boundaries(w)%point(1:nd)

@@ -4,7 +4,7 @@ module gravier_machine
   use gravier_kinds, only: i8
   implicit none
   private
-  public :: processor_model, last_cache, free_memory, compiler_flags, date_text
+  public :: processor_model, last_cache, compiler_flags, date_text
 
 contains
 
@@ -28,16 +28,6 @@ contains
     end do
     if (bytes == 0) bytes = 33554432_i8
   end function last_cache
-
-  !> Bytes of memory that programs can still get; 4 GiB where the system does not tell.
-  integer(i8) function free_memory() result(bytes)
-    character(len=:), allocatable :: text
-
-    text = value_after("/proc/meminfo", "MemAvailable")
-    bytes = 0
-    if (index(text, " kB") > 0) bytes = bytes_of(text(1:index(text, " kB") - 1)//"K")
-    if (bytes == 0) bytes = 4294967296_i8
-  end function free_memory
 
   !> Bytes of a text such as 2048K or 32M; 0 for any other.
   integer(i8) function bytes_of(text) result(bytes)
@@ -102,7 +92,8 @@ contains
   pure logical function changes_code(word)
     character(len=*), intent(in) :: word
     changes_code = index(word, "-O") == 1 .or. index(word, "-march=") == 1 .or. index(word, "-mprefer") == 1
-    if (index(word, "-f") == 1) changes_code = index(word, "-fintrinsic-modules") /= 1 .and. index(word, "-fpre") /= 1
+    if (index(word, "-f") == 1) changes_code = index(word, "-fintrinsic-modules") /= 1 .and. index(word, "-fpre") /= 1 .and. &
+      & word /= "-fno-backtrace"
   end function changes_code
 
   !> Today, as year-month-day.

@@ -6,6 +6,7 @@
 !> Attractions are loads: they are in f, and r has r_n + h F.
 module gravier_problem_dump
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_ordered_rows, only: order_rows
@@ -103,13 +104,13 @@ contains
         end do
         b = b + nv
       end if
-      destination(k) = int(ordered(2, k))
+      destination(k) = narrow(ordered(2, k))
       answers(1:2, k) = ordered(3:4, k)
       answers(3, k) = place
     end do
     call sparse_exchange(problem%comm, answers, destination, received)
     do k = 1, size(received, 2)
-      bodies(int(received(1, k)))%place(int(received(2, k))) = received(3, k)
+      bodies(narrow(received(1, k)))%place(narrow(received(2, k))) = received(3, k)
     end do
   end subroutine order_bodies
 

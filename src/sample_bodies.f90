@@ -40,12 +40,13 @@ contains
     radii%radius_min = config%scene%radius_min
     radii%radius_max = config%scene%radius_max
     data%total = product(int(config%scene%lattice_count(1:box%nd), i8))
-    call draw_grains(comm, radii, density_of(config, 1), config%scene%seed, data)
+    call draw_grains(comm, radii, density_of(config, 1), config%scene%seed, data, error)
+    if (allocated(error)) return
     call check_box(comm, config, box, data, error)
     if (allocated(error)) return
     call lattice%init(box, config%scene%radius_max, data%total, never)
     call lattice%place(config%scene%seed, data%id, data%radius, data%position)
-    call make_planes(box, .false., data)
+    call make_planes(box, .false., data, error)
   end subroutine make_lattice
 
   !> The box of the lattice, which the period must have room for.
@@ -112,7 +113,8 @@ contains
     call set_radii(comm, config, radii, error)
     if (allocated(error)) return
     data%total = config%sample%count
-    call draw_grains(comm, radii, density_of(config, 1), config%sample%seed, data)
+    call draw_grains(comm, radii, density_of(config, 1), config%sample%seed, data, error)
+    if (allocated(error)) return
     box%nd = config%scene%dimension
     box%lower(:) = config%scene%period_origin
     box%upper(:) = box%lower + config%sample%box
@@ -129,7 +131,7 @@ contains
       error%message = config%file//": &sample box: "//error%message
       return
     end if
-    call make_planes(box, config%sample%preparation == "compacted", data)
+    call make_planes(box, config%sample%preparation == "compacted", data, error)
     data%has_box = any(box%periodic)
     data%origin(:) = config%scene%period_origin
     data%period(:) = config%scene%period
@@ -155,19 +157,21 @@ contains
   end subroutine set_radii
 
   !> Identifiers, radii and masses of the grains of this rank, of `data%total` in all, at rest.
-  subroutine draw_grains(comm, radii, density, seed, data)
+  subroutine draw_grains(comm, radii, density, seed, data, error)
     type(communicator_t), intent(in) :: comm
     type(radius_distribution_t), intent(in) :: radii
     !> [kg/m^nd]
     real(dp), intent(in) :: density
     integer, intent(in) :: seed
     type(bodies_data_t), intent(inout) :: data
+    type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: first
     integer :: k, n
 
-    call find_own_rows(comm, data%total, first, n)
-    call allocate_bodies(data, radii%nd, n)
-    allocate (data%mass(n))
+    call find_own_rows(comm, data%total, radii%nd, "the grains to be made", first, n, error)
+    call allocate_bodies(data, radii%nd, n, .true., "the grains to be made", error)
+    call comm%agree(error)
+    if (allocated(error)) return
     do k = 1, n
       data%id(k) = first + k
       data%radius(k) = radii%draw(data%id(k), seed)
@@ -206,16 +210,18 @@ contains
 
   !> Planes on the sides of the box that are not periodic, facing inwards: the floor, the two sides across each other axis,
   !> and the lid.
-  subroutine make_planes(box, lid, data)
+  subroutine make_planes(box, lid, data, error)
     type(sample_box_t), intent(in) :: box
     logical, intent(in) :: lid
     type(bodies_data_t), intent(inout) :: data
+    type(error_t), allocatable, intent(inout) :: error
     integer :: d, n, nd
 
     nd = box%nd
     n = 2*count(.not. box%periodic(1:nd))
     if (.not. (lid .or. box%periodic(nd))) n = n - 1
-    call allocate_walls(data, nd, n)
+    call allocate_walls(data, nd, n, "planes", error)
+    if (allocated(error)) return
     data%wall_normal(:, :) = 0.0_dp
     n = 0
     if (.not. box%periodic(nd)) call add_plane(nd, 1.0_dp)

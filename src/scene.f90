@@ -17,11 +17,15 @@ module gravier_scene
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_keys, only: has_word
   use gravier_config_laws, only: density_of, collect_laws
+  use gravier_run_memory, only: check_planned_grains, check_read_grains
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
   use gravier_scene_boundaries, only: make_boundaries
   implicit none
   private
   public :: scene_t, make_scene
+
+  !> what make_column makes, for messages
+  character(len=*), parameter :: column = "the grains of the column"
 
   !> A scene as it starts. Grains are spread over the ranks in any way; boundaries are on all of them.
   type :: scene_t
@@ -50,15 +54,18 @@ contains
     type(bodies_data_t) :: data
     integer :: b
 
+    call check_planned_grains(comm, config, error)
+    if (allocated(error)) return
     select case (config%scene%bodies)
     case ("column")
-      call make_column(comm, config%scene, data)
+      call make_column(comm, config%scene, data, error)
     case ("lattice")
       call make_lattice(comm, config, data, error)
     case ("sample")
       call make_sample(comm, config, data, error)
     case default
       call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error)
+      call check_read_grains(comm, config, data%total, error)
     end select
     call check_exact_solution(config, error)
     if (allocated(error)) return
@@ -204,24 +211,27 @@ contains
   end subroutine check_exact_solution
 
   !> Equal grains, one upon the other on a ground: the columns of the paper.
-  subroutine make_column(comm, scene, data)
+  subroutine make_column(comm, scene, data, error)
     type(communicator_t), intent(in) :: comm
     type(scene_config_t), intent(in) :: scene
     type(bodies_data_t), intent(out) :: data
+    type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: first
     integer :: k, n
 
     data%total = scene%column_count
-    call find_own_rows(comm, data%total, first, n)
-    call allocate_bodies(data, scene%dimension, n)
-    allocate (data%mass(n), source=scene%mass)
+    call find_own_rows(comm, data%total, scene%dimension, column, first, n, error)
+    call allocate_bodies(data, scene%dimension, n, .true., column, error)
+    call allocate_walls(data, scene%dimension, 1, column, error)
+    call comm%agree(error)
+    if (allocated(error)) return
+    data%mass(:) = scene%mass
     data%radius(:) = scene%radius
     data%position(:, :) = 0.0_dp
     do k = 1, n
       data%id(k) = first + k
       data%position(scene%dimension, k) = (2*data%id(k) - 1)*scene%radius
     end do
-    call allocate_walls(data, scene%dimension, 1)
     data%wall_id(1) = data%total + 1
     data%wall_point(:, 1) = 0.0_dp
     data%wall_normal(:, 1) = 0.0_dp

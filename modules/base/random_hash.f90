@@ -1,9 +1,9 @@
-!> Random numbers that depend on a seed and a counter only, so that any rank draws the same for the same body.
+!> Random numbers that depend on a seed and a counter only, so that any rank draws the same for the same body, and digests of words.
 module gravier_random_hash
   use gravier_kinds, only: dp, i8
   implicit none
   private
-  public :: hash_uniform, hash_words
+  public :: hash_uniform, hash_words, hash_rows
 
 contains
 
@@ -32,6 +32,26 @@ contains
       digest = mix(ieor(digest, words(k)))
     end do
   end function hash_words
+
+  !> Checksum of rows of words: the exclusive or of a number for each row, which tells its place and its words. That of a table is
+  !> the exclusive or of those of its parts, however it is cut.
+  pure integer(i8) function hash_rows(rows, first) result(digest)
+    !> (words of a row, rows)
+    integer(i8), intent(in), contiguous :: rows(:, :)
+    !> place of the first of these rows in the table, from 0
+    integer(i8), intent(in) :: first
+    integer(i8) :: row
+    integer :: i, k
+
+    digest = 0
+    do i = 1, size(rows, 2)
+      row = mix(first + i)
+      do k = 1, size(rows, 1)
+        row = mix(ieor(row, rows(k, i)))
+      end do
+      digest = ieor(digest, row)
+    end do
+  end function hash_rows
 
   !> Bijective mixing of 64 bits by shifts and multiplications of 32-bit halves, so that nothing overflows.
   pure integer(i8) function mix(word) result(z)

@@ -1,6 +1,6 @@
 !> Stable sorting by integer keys, and search in sorted keys.
 module gravier_sorting
-  use gravier_kinds, only: i8
+  use gravier_kinds, only: i4, i8
   implicit none
   private
   public :: argsort, argsort_rows, find_sorted
@@ -85,7 +85,7 @@ contains
       if (ibits(differing, lowest, digit) == 0) cycle
       next(:) = 0
       do i = 1, size(word)
-        d = int(ibits(word(i), lowest, digit))
+        d = int(ibits(word(i), lowest, digit), i4)
         next(d) = next(d) + 1
       end do
       below = 0
@@ -95,7 +95,7 @@ contains
         below = below + here
       end do
       do i = 1, size(word)
-        d = int(ibits(word(i), lowest, digit))
+        d = int(ibits(word(i), lowest, digit), i4)
         sorted(next(d)) = word(i)
         sorted_order(next(d)) = order(i)
         next(d) = next(d) + 1

@@ -1,12 +1,15 @@
 !> Grains (disks in 2D, spheres in 3D) in packed arrays.
 module gravier_body_store
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   implicit none
   private
-  public :: body_set_t, append_bodies, place_word
+  public :: body_set_t, append_bodies, place_word, grain_record
 
   !> first of the words of a record that hold the grain's place
   integer, parameter :: place_word = 6
+  !> the words of a record, in their order: the version of checkpoints, which changes with them
+  character(len=*), parameter :: grain_record = "id radius mass glued material position velocity image inertia"
 
   !> Grains of one subdomain, or of any batch. Velocities hold the translation first, then the spin where the
   !> scene has one: (vx, vy[, omega]) in 2D, (vx, vy, vz[, wx, wy, wz]) in 3D, all in global axes.
@@ -103,8 +106,8 @@ contains
     self%id(k) = record(1)
     self%radius(k) = transfer(record(2), 0.0_dp)
     self%mass(k) = transfer(record(3), 0.0_dp)
-    self%glued(k) = int(record(4))
-    self%material(k) = int(record(5))
+    self%glued(k) = narrow(record(4))
+    self%material(k) = narrow(record(5))
     do d = 1, self%nd
       self%position(d, k) = transfer(record(place_word - 1 + d), 0.0_dp)
     end do
@@ -112,7 +115,7 @@ contains
       self%velocity(d, k) = transfer(record(place_word - 1 + self%nd + d), 0.0_dp)
     end do
     do d = 1, self%ni
-      self%image(d, k) = int(record(place_word - 1 + self%nd + self%nv + d))
+      self%image(d, k) = narrow(record(place_word - 1 + self%nd + self%nv + d))
     end do
     if (self%nv > self%nd) self%inertia(k) = transfer(record(self%record_words()), 0.0_dp)
   end subroutine body_set_set_record

@@ -83,6 +83,9 @@ module gravier_boundary
 
   !> words of the state of a boundary
   integer, parameter, public :: boundary_words = 28
+  !> what they are, in their order: the version of checkpoints, which changes with them
+  character(len=*), parameter, public :: boundary_record = &
+    & "present point axis edges pivot velocity spin last_velocity last_spin"
 
 contains
 

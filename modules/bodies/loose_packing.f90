@@ -1,7 +1,8 @@
 !> Grains placed without overlap at random in a box. Where a grain comes to lie depends on the seed, the box and all
 !> identifiers and radii, never on the number of ranks or on which rank asks for it.
 module gravier_loose_packing
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
@@ -181,7 +182,7 @@ contains
       if (left == 0) return
       history(round) = left
       if (is_hopeless(self%box%nd, history(1:round))) return
-      self%trials = int(min(wanted/left, int(most_trials, i8)))
+      self%trials = narrow(min(wanted/left, int(most_trials, i8)))
       call find_clear_places(comm, self, clear)
       call settle_proposals(comm, self, clear)
       self%tried = self%tried + self%trials
@@ -234,7 +235,7 @@ contains
     call answers%init(2, size(received, 2)/4 + 1)
     do t = 1, size(received, 2)
       position(:) = real_of(received(5:, t))
-      if (is_clear(self, real_of(received(4, t)), position)) call answers%add(int(received(1, t)), received(2:3, t))
+      if (is_clear(self, real_of(received(4, t)), position)) call answers%add(narrow(received(1, t)), received(2:3, t))
     end do
     call answers%exchange(comm, received)
     call take_first_trials(self, received, clear)
@@ -251,8 +252,8 @@ contains
 
     allocate (first(size(self%waiting)), source=huge(1))
     do k = 1, size(answers, 2)
-      w = int(answers(1, k))
-      first(w) = min(first(w), int(answers(2, k)))
+      w = narrow(answers(1, k))
+      first(w) = min(first(w), narrow(answers(2, k)))
     end do
     clear = first < huge(1)
     do w = 1, size(first)
@@ -349,7 +350,7 @@ contains
       if (self%bricks%rank_of(position) /= comm%rank) cycle
       if (self%rivals%blocks(proposals(3, k), radius, position)) cycle
       record(:) = proposals(2:, k)
-      call outbox%add(int(proposals(1, k)), record)
+      call outbox%add(narrow(proposals(1, k)), record)
       record(1) = 0
       call self%bricks%add_within_reach(position, self%reach(radius), record, outbox)
     end do
@@ -360,7 +361,7 @@ contains
     class(placement_t), intent(in) :: self
     real(dp), intent(in) :: radius
 
-    size_class = int(min(classes_per_table*log(self%largest/radius)/log(2.0_dp), real(last_of_classes, dp)))
+    size_class = int(min(classes_per_table*log(self%largest/radius)/log(2.0_dp), real(last_of_classes, dp)), i4)
   end function placement_class_of
 
   !> Largest radius of a class, to a rounding [m].

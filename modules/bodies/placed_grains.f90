@@ -1,6 +1,7 @@
 !> Boxes with periodic axes, and grains in them that are found by their place.
 module gravier_placed_grains
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
+  use gravier_narrow, only: narrow
   implicit none
   private
   public :: sample_box_t, placed_grains_t
@@ -97,7 +98,7 @@ contains
     self%cells(:) = 1
     do d = 1, box%nd
       self%length(d) = box%upper(d) - box%lower(d)
-      self%cells(d) = max(1, int(min(self%length(d)/(2.0_dp*largest*slack), real(most_cells, dp))))
+      self%cells(d) = max(1, int(min(self%length(d)/(2.0_dp*largest*slack), real(most_cells, dp)), i4))
       self%per_length(d) = self%cells(d)/self%length(d)
     end do
     if (.not. allocated(self%head)) then
@@ -165,7 +166,7 @@ contains
 
     place(:) = 0
     do d = 1, self%box%nd
-      place(d) = min(max(int((point(d) - self%box%lower(d))*self%per_length(d)), 0), self%cells(d) - 1)
+      place(d) = min(max(int((point(d) - self%box%lower(d))*self%per_length(d), i4), 0), self%cells(d) - 1)
     end do
   end subroutine find_cell
 
@@ -177,7 +178,7 @@ contains
 
     row = place(2)*2654435761_i8 + place(3)*3266489917_i8
     row = ieor(row, shiftr(row, 15))
-    bucket = int(iand(place(1) + row, int(size(self%head) - 1, i8)))
+    bucket = narrow(iand(place(1) + row, int(size(self%head) - 1, i8)))
   end function placed_bucket
 
   !> True when a grain overlaps one of the set, or one of the set that precedes it where precedence counts: a larger one,

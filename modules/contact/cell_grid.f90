@@ -82,7 +82,7 @@ contains
     place(:) = 0
     do d = 1, self%nd
       x = (point(d) - self%origin(d))/self%edge
-      place(d) = int(min(max(x, 0.0_dp), real(self%n(d) - 1, dp)))
+      place(d) = int(min(max(x, 0.0_dp), real(self%n(d) - 1, dp)), i4)
     end do
   end subroutine cell_grid_locate
 

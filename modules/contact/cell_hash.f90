@@ -1,6 +1,7 @@
 !> Occupied cells of grids of several edges, found by hashing: empty space costs nothing, however far bodies fly.
 module gravier_cell_hash
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort
   implicit none
   private
@@ -102,7 +103,7 @@ contains
     mixed = ieor(mixed, ishft(mixed, -7))
     mixed = ieor(mixed, ishft(mixed, 17))
     mixed = ieor(mixed, ishft(mixed, -29))
-    at = int(iand(mixed, int(room - 1, i8)))
+    at = narrow(iand(mixed, int(room - 1, i8)))
   end function start_of
 
 end module gravier_cell_hash

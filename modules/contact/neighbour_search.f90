@@ -2,6 +2,7 @@
 !> which subdomain a pair belongs to.
 module gravier_neighbour_search
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
   use gravier_body_store, only: body_set_t
@@ -124,7 +125,7 @@ contains
     place(:) = 0
     do d = 1, size(point)
       cell = int(min(max((point(d) - lower(d))/edge, 0.0_dp), farthest), i8)
-      place(d) = int(iand(cell, int(last_cell, i8)))
+      place(d) = narrow(iand(cell, int(last_cell, i8)))
     end do
   end function place_of
 

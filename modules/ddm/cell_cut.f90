@@ -2,6 +2,7 @@
 !> given to a near subdomain.
 module gravier_cell_cut
   use gravier_kinds, only: i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
   use gravier_cell_map, only: cell_map_t
@@ -48,7 +49,7 @@ contains
     k = 0
     do cell = 1, size(groups%group_of_cell)
       if (groups%group_of_cell(cell) /= g) cycle
-      n = merge(int(groups%cells%pieces()), 1, groups%in_pieces(cell))
+      n = merge(narrow(groups%cells%pieces()), 1, groups%in_pieces(cell))
       cell_of(k + 1:k + n) = cell
       k = k + n
     end do
@@ -110,7 +111,7 @@ contains
     divisor = 1 + sum(weight)/most_weight
     allocate (light(size(weight)))
     do k = 1, size(weight)
-      light(k) = int(max(1_i8, weight(k)/divisor), i4)
+      light(k) = narrow(max(1_i8, weight(k)/divisor))
     end do
   end subroutine lighten
 

@@ -2,6 +2,7 @@
 !> only the ranks near it hold.
 module gravier_cell_groups
   use gravier_kinds, only: i8
+  use gravier_narrow, only: narrow
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_cell_map, only: cell_map_t
@@ -68,7 +69,7 @@ contains
     do cell = 1, size(group_of_cell)
       g = group_of_cell(cell)
       ! a length that outgrows integers is refused by whoever makes the map
-      self%before(cell) = int(min(self%length(g), int(huge(1), i8)))
+      self%before(cell) = narrow(min(self%length(g), int(huge(1), i8)))
       self%length(g) = self%length(g) + merge(cells%pieces(), 1_i8, in_pieces(cell))
     end do
   end subroutine cell_groups_set
@@ -224,16 +225,16 @@ contains
 
     n = 0
     do r = 1, size(requests, 2)
-      n = n + (int(self%length(requests(1, r))) + chunk - 1)/chunk
+      n = n + (narrow(self%length(requests(1, r))) + chunk - 1)/chunk
     end do
     allocate (records(chunk + 2, n), destination(n))
     n = 0
     do r = 1, size(requests, 2)
-      g = int(requests(1, r))
-      do start = 0, int(self%length(g)) - 1, chunk
+      g = narrow(requests(1, r))
+      do start = 0, narrow(self%length(g)) - 1, chunk
         n = n + 1
-        stop_at = min(start + chunk, int(self%length(g)))
-        destination(n) = int(requests(2, r))
+        stop_at = min(start + chunk, narrow(self%length(g)))
+        destination(n) = narrow(requests(2, r))
         records(1, n) = g
         records(2, n) = start
         records(3:, n) = 0
@@ -267,11 +268,11 @@ contains
     integer :: r, g, start, n
 
     do r = 1, size(records, 2)
-      g = int(records(1, r))
-      start = int(records(2, r))
+      g = narrow(records(1, r))
+      start = narrow(records(2, r))
       if (self%known(g) == 0) call self%hold(g)
-      n = min(chunk, int(self%length(g)) - start)
-      self%maps(self%known(g))%subdomain(start + 1:start + n) = int(records(3:2 + n, r))
+      n = min(chunk, narrow(self%length(g)) - start)
+      self%maps(self%known(g))%subdomain(start + 1:start + n) = narrow(records(3:2 + n, r))
     end do
   end subroutine take
 

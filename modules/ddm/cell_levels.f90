@@ -1,6 +1,7 @@
 !> A graph partition on two levels: cells are cut into groups, and the cells of each group, in pieces, into subdomains.
 module gravier_cell_levels
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_sorting, only: argsort_rows
   use gravier_communicator, only: communicator_t
@@ -124,7 +125,7 @@ contains
 
     wanted = 4.0_dp*real(occupied, dp)*real(pieces, dp)/real(cell_limit, dp)
     wanted = max(wanted, real(n_subdomains, dp)/subdomains_per_group)
-    n = int(min(wanted, real(occupied/cells_per_group, dp), real(n_subdomains/least_per_group, dp)))
+    n = int(min(wanted, real(occupied/cells_per_group, dp), real(n_subdomains/least_per_group, dp)), i4)
     n = max(1, n)
   end function number_of_groups
 
@@ -152,7 +153,7 @@ contains
     call merge_records(own, records)
     allocate (destination(size(records, 2)))
     do k = 1, size(destination)
-      destination(k) = comm%rank_of(int(records(1, k)), groups%n)
+      destination(k) = comm%rank_of(narrow(records(1, k)), groups%n)
     end do
     call sparse_exchange(comm, records, destination, received)
     call merge_records(received, records)

@@ -1,6 +1,6 @@
 !> Equal cells over the box of a partition, on axes that may be periodic; each cell may be split into equal pieces.
 module gravier_cell_map
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
   use gravier_periodic, only: wrap
   use gravier_cell_grid, only: cell_grid_t
   implicit none
@@ -69,7 +69,7 @@ contains
     self%unit(1:self%nd) = edge
     do d = 1, self%nd
       if (.not. period(d) > 0.0_dp) cycle
-      self%n(d) = max(1, int(min(period(d)/edge, real(grid%n(d), dp))))
+      self%n(d) = max(1, int(min(period(d)/edge, real(grid%n(d), dp)), i4))
       self%unit(d) = period(d)
       self%scale(d) = real(self%n(d), dp)
     end do
@@ -135,11 +135,11 @@ contains
 
     ! by halves: the whole way may have no number
     y = 2.0_dp*((0.5_dp*x - 0.5_dp*self%origin(d))/self%unit(d)*self%scale(d))
-    cell = int(min(max(y, 0.0_dp), real(self%n(d) - 1, dp)))
+    cell = int(min(max(y, 0.0_dp), real(self%n(d) - 1, dp)), i4)
     place = cell
     if (self%split == 1) return
     y = min(max(y - cell, 0.0_dp), 1.0_dp)
-    place = cell*self%split + min(int(y*self%split), self%split - 1)
+    place = cell*self%split + min(int(y*self%split, i4), self%split - 1)
   end function inner_place
 
   !> Places within `reach` of any image of a point, along each axis. Along periodic axes they may lie outside the box, to
@@ -182,7 +182,7 @@ contains
 
     y = (x - self%origin(d))/self%unit(d)*self%scale(d)
     cell = floor(y)
-    place = cell*self%split + min(int((y - cell)*self%split), self%split - 1)
+    place = cell*self%split + min(int((y - cell)*self%split, i4), self%split - 1)
   end function outer_place
 
   !> Number of the cell that holds the piece at `place`, from 1; the first axis varies fastest.

@@ -1,6 +1,6 @@
 !> How grains hold each other: coordination, fabric, sliding, distribution of forces, overlaps.
 module gravier_contact_structure
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -185,7 +185,7 @@ contains
           force = abs(sub%impulse(lane_of(c), 1, block_of(c)))/(h*self%force_mean)
           part(s) = part(s) + (force - 1.0_dp)**2
           bin = n_bins + 1
-          if (force < n_bins*bin_width) bin = min(int(force/bin_width) + 1, n_bins)
+          if (force < n_bins*bin_width) bin = min(int(force/bin_width, i4) + 1, n_bins)
           self%histogram(bin) = self%histogram(bin) + 1
         end do
       end associate

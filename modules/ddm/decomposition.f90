@@ -1,6 +1,7 @@
 !> Who owns which grain.
 module gravier_decomposition
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort, find_sorted
   use gravier_periodic, only: period_t
   use gravier_communicator, only: communicator_t
@@ -88,7 +89,7 @@ contains
     integer(i8), intent(in) :: key(2)
     integer, intent(out) :: h, place
 
-    h = int(key(1)) - self%first + 1
+    h = narrow(key(1)) - self%first + 1
     place = find_sorted(self%home(h)%id, key(2))
   end subroutine decomposition_find_home
 
@@ -304,7 +305,7 @@ contains
     allocate (sets(size(self%home)), counts(size(self%home)))
     counts(:) = 0
     do k = 1, size(received, 2)
-      s = int(received(1, k)) - self%first + 1
+      s = narrow(received(1, k)) - self%first + 1
       counts(s) = counts(s) + 1
     end do
     do s = 1, size(sets)
@@ -312,7 +313,7 @@ contains
     end do
     counts(:) = 0
     do k = 1, size(received, 2)
-      s = int(received(1, k)) - self%first + 1
+      s = narrow(received(1, k)) - self%first + 1
       counts(s) = counts(s) + 1
       call sets(s)%set_record(counts(s), received(lead + 1:, k))
     end do

@@ -12,7 +12,7 @@ module gravier_energy_balance
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: energy_balance_t, energy_words
+  public :: energy_balance_t, energy_words, energy_record
 
   !> Energies at the end of a step, and what was done since the start; the same on every rank [J].
   type :: energy_balance_t
@@ -41,6 +41,9 @@ module gravier_energy_balance
 
   !> words of the state of a balance
   integer, parameter :: energy_words = 10
+  !> what they are, in their order: the version of checkpoints, which changes with them
+  character(len=*), parameter :: energy_record = "translation rotation boundaries potential start load_work boundary_work "// &
+    & "dissipated_normal dissipated_friction carried_away"
   !> places among the sums of a step
   integer, parameter :: in_translation = 1, in_rotation = 2, in_start = 3, in_load = 4, in_normal = 5, in_friction = 6, &
     & in_boundary = 7, n_sums = 7

@@ -3,6 +3,7 @@ module gravier_graph_partition
   use, intrinsic :: iso_c_binding, only: c_int32_t, c_int, c_ptr, c_null_ptr, c_loc
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
+  use gravier_kinds, only: i4
   implicit none
   private
   public :: partition_graph
@@ -61,7 +62,7 @@ contains
     stat = metis_partgraphkway(size(part, kind=c_int32_t), 1_c_int32_t, first, neighbour, c_loc(vertex_weight), &
       & c_null_ptr, c_loc(edge_weight), int(n_parts, c_int32_t), c_null_ptr, c_null_ptr, options, cut, part)
     if (stat /= metis_ok) call raise(error, status_failure, "graph partition (METIS) failed with status "// &
-      & to_text(int(stat))//" for "//to_text(size(part))//" cells and "//to_text(n_parts)//" subdomains")
+      & to_text(int(stat, i4))//" for "//to_text(size(part))//" cells and "//to_text(n_parts)//" subdomains")
   end subroutine partition_graph
 
 end module gravier_graph_partition

@@ -2,6 +2,7 @@
 !> pairs of the neighbour lists, and move with them when the lists are made anew; so do the states of pairs.
 module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: shift_of_code
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
@@ -14,7 +15,10 @@ module gravier_impulse_memory
   implicit none
   private
   public :: memory_of, impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses, list_impulses, &
-    & match_impulses
+    & match_impulses, pair_record
+
+  !> the words of a record of list_impulses, in their order: the version of checkpoints, which changes with them
+  character(len=*), parameter :: pair_record = "candidate antagonist impulse states"
 
 contains
 
@@ -255,7 +259,7 @@ contains
     subroutine take_state(row, row_kept)
       integer, intent(in) :: row, row_kept
 
-      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = int(records(2 + kept%n_impulse + row_kept, k))
+      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = narrow(records(2 + kept%n_impulse + row_kept, k))
     end subroutine take_state
 
   end subroutine match_impulses

@@ -1,6 +1,7 @@
 !> The interface that a partition makes: which bodies several subdomains share, their plan of exchange, and its figures.
 module gravier_interface
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort, argsort_rows, find_sorted
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_shared_exchange, only: shared_part_t
@@ -185,7 +186,7 @@ contains
               answers(1, n) = touches(2, order(a))
               answers(2, n) = touches(1, order(a))
               answers(3, n) = touches(2, order(b))
-              destination(n) = decomposition%comm%rank_of(int(touches(2, order(a))), decomposition%n_subdomains)
+              destination(n) = decomposition%comm%rank_of(narrow(touches(2, order(a))), decomposition%n_subdomains)
             end do
           end do
         end if
@@ -250,7 +251,7 @@ contains
         end if
         part%first(part%n_shared) = k
       end if
-      part%sharer(k) = int(received(3, order(k)))
+      part%sharer(k) = narrow(received(3, order(k)))
     end do
     part%first(part%n_shared + 1) = size(order) + 1
     do k = 1, part%n_shared

@@ -6,6 +6,7 @@
 !> back, it has the same bits on any number of ranks.
 module gravier_interface_direct
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_double_double, only: extended_product, extended_add
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_contact_problem, only: contact_problem_t
@@ -94,12 +95,12 @@ contains
     if (problem%comm%total(mine) > huge(0)) call raise(error, status_failure, &
       & "the interface has more than 2^31 unknowns; choose interface = 'cg'")
     if (allocated(error)) return
-    self%n = int(problem%comm%total(mine))
+    self%n = narrow(problem%comm%total(mine))
     allocate (first(problem%comm%size + 1), source=0_i8)
     first(problem%comm%rank + 1) = next
     call problem%comm%sum_counts(first)
     first(problem%comm%size + 1) = self%n + 1
-    self%first_row = int(first)
+    self%first_row = narrow(first)
     if (allocated(self%blocks)) deallocate (self%blocks)
     allocate (self%blocks(size(problem%sub)))
     do s = 1, size(problem%sub)
@@ -107,7 +108,7 @@ contains
         allocate (block%upper(part%n_shared), block%lower(part%n_shared), source=0)
         do k = 1, part%n_shared
           if (part%rung(k) == part%multiplicity(k)) cycle
-          block%upper(k) = int(next)
+          block%upper(k) = narrow(next)
           next = next + nv
         end do
         do k = 1, part%n_slots

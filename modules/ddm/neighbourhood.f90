@@ -2,6 +2,7 @@
 !> have moved far enough.
 module gravier_neighbourhood
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_set_t, append_bodies
   use gravier_boundary, only: boundary_t, shape_plane, shape_grains, shape_outlet
@@ -145,9 +146,9 @@ contains
       end associate
     end do
     do k = 1, size(received, 2)
-      s = int(received(1, k)) - decomposition%first + 1
+      s = narrow(received(1, k)) - decomposition%first + 1
       next(s) = next(s) + 1
-      self%view(s)%home(next(s)) = int(received(2, k))
+      self%view(s)%home(next(s)) = narrow(received(2, k))
       self%arrival(1, k) = s
       self%arrival(2, k) = next(s)
     end do

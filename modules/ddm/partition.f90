@@ -1,6 +1,7 @@
 !> Partitions of space into subdomains: a grid of equal boxes (paper, (3)-(4)), or cells shared out by a graph partition.
 module gravier_partition
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp, i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
@@ -12,12 +13,15 @@ module gravier_partition
   use gravier_cell_levels, only: cut_levels, cells_per_subdomain
   implicit none
   private
-  public :: partition_t, choose_boxes, check_subdomains
+  public :: partition_t, choose_boxes, check_subdomains, head_words, head_record
 
   !> kinds of a partition: boxes; cells with one map that every rank has; cells with a map for each group
   integer, parameter :: kind_boxes = 0, kind_cells = 1, kind_groups = 2
   !> words of a head before those of the groups
   integer, parameter :: head_words = 30
+  !> what they are, in their order: the version of checkpoints, which changes with them
+  character(len=*), parameter :: head_record = "kind dimensions subdomains cell_limit boxes cells split lower upper period "// &
+    & "origin unit scale groups, firsts of groups, groups and pieces of cells"
 
   !> Points outside the box of the partition belong to the nearest subdomain of its border, but along periodic axes to that
   !> of their image inside.
@@ -69,7 +73,7 @@ contains
     self%kind = kind_boxes
     self%groups = none
     self%boxes(:) = boxes
-    self%n_subdomains = int(min(product(real(boxes, dp)), real(huge(1), dp)))
+    self%n_subdomains = int(min(product(real(boxes, dp)), real(huge(1), dp)), i4)
     call self%cells%set_boxes(lower, upper, self%period(1:self%nd), boxes)
     call check_subdomains(lower, upper, edge, self%n_subdomains, error)
   end subroutine partition_init_grid
@@ -219,7 +223,7 @@ contains
     else
       self%kind = kind_groups
       ! as many pieces along the edge of a cell as leave them no smaller than asked for
-      call self%cells%set_split(int(min(cell_edge/edge, real(huge(1), dp))))
+      call self%cells%set_split(int(min(cell_edge/edge, real(huge(1), dp)), i4))
       call cut_levels(self%groups, comm, self%cells, weight, points, weights, n_subdomains, self%cell_limit, occupied, error)
       call refuse_too_many(n_subdomains, occupied, error)
       call comm%agree(error)
@@ -424,14 +428,14 @@ contains
     real(dp) :: reals(18)
     integer :: k
 
-    self%kind = int(head(1))
-    self%nd = int(head(2))
-    self%n_subdomains = int(head(3))
+    self%kind = narrow(head(1))
+    self%nd = narrow(head(2))
+    self%n_subdomains = narrow(head(3))
     self%cell_limit = head(4)
-    self%boxes(:) = int(head(5:7))
+    self%boxes(:) = narrow(head(5:7))
     self%cells%nd = self%nd
-    self%cells%n(:) = int(head(8:10))
-    self%cells%split = int(head(11))
+    self%cells%n(:) = narrow(head(8:10))
+    self%cells%split = narrow(head(11))
     do k = 1, size(reals)
       reals(k) = transfer(head(11 + k), 1.0_dp)
     end do
@@ -455,7 +459,7 @@ contains
     allocate (map(self%groups%length(1)), source=0_i8)
     if (comm%rank_of(1, self%n_subdomains) == comm%rank) map(:) = words(1:size(map))
     call comm%sum_counts(map)
-    self%groups%maps(1)%subdomain(:) = int(map)
+    self%groups%maps(1)%subdomain(:) = narrow(map)
   end subroutine restore_one_map
 
   !> Take the maps stored with the subdomains of this rank, and share them.
@@ -468,14 +472,14 @@ contains
     logical, allocatable :: in_pieces(:)
     integer :: n, cell, g, s, next
 
-    n = int(head(head_words))
+    n = narrow(head(head_words))
     allocate (group_of_cell(self%cells%cells()), in_pieces(self%cells%cells()), holder(n))
     do cell = 1, size(group_of_cell)
-      group_of_cell(cell) = int(head(head_words + n + 1 + cell)/2)
+      group_of_cell(cell) = narrow(head(head_words + n + 1 + cell)/2)
       in_pieces(cell) = mod(head(head_words + n + 1 + cell), 2_i8) == 1
     end do
     call self%groups%set(self%cells, n, group_of_cell, in_pieces)
-    self%groups%first(:) = int(head(head_words + 1:head_words + n + 1))
+    self%groups%first(:) = narrow(head(head_words + 1:head_words + n + 1))
     do g = 1, n
       holder(g) = comm%rank_of(self%groups%first(g), self%n_subdomains)
     end do
@@ -484,7 +488,7 @@ contains
       if (counts(s) == 0) cycle
       g = self%groups%group_of(comm%first_subdomain(comm%rank, self%n_subdomains) + s - 1)
       call self%groups%hold(g)
-      self%groups%maps(self%groups%known(g))%subdomain(:) = int(words(next + 1:next + counts(s)))
+      self%groups%maps(self%groups%known(g))%subdomain(:) = narrow(words(next + 1:next + counts(s)))
       next = next + counts(s)
     end do
     call self%groups%share(comm, holder)

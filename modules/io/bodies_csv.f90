@@ -1,6 +1,7 @@
 !> Bodies and walls from a comma-separated table: one row a body or plane, columns by name in any order.
 module gravier_bodies_csv
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow, take_count
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text, lower
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
@@ -34,7 +35,7 @@ contains
     type(csv_table_t) :: table
     type(layout_t) :: layout
     integer(i8) :: n_grains, n_planes, first
-    integer :: n
+    integer :: n, n_walls
 
     if (allocated(error)) return
     n_grains = 0
@@ -47,11 +48,17 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     bodies%total = comm%total(n_grains)
-    call find_own_rows(comm, bodies%total, first, n)
-    call allocate_bodies(bodies, dimension, n)
-    call allocate_walls(bodies, dimension, int(comm%total(n_planes)))
+    call take_count(comm%total(n_planes), path//": planes", n_walls, error)
+    call find_own_rows(comm, bodies%total, dimension, path, first, n, error)
     call open_table(table, path, dimension, layout, error)
-    if (layout%mass > 0) allocate (bodies%mass(n), source=0.0_dp)
+    call allocate_bodies(bodies, dimension, n, layout%mass > 0, path, error)
+    call allocate_walls(bodies, dimension, n_walls, path, error)
+    call comm%agree(error)
+    if (allocated(error)) then
+      call table%close()
+      return
+    end if
+    if (layout%mass > 0) bodies%mass(:) = 0.0_dp
     call read_rows(table, layout, first, bodies, error)
     call table%close()
     call comm%agree(error)
@@ -217,7 +224,7 @@ contains
         if (wall <= bodies%n_walls) call read_plane(table, layout, wall, bodies, error)
       else
         grain = grain + 1
-        if (grain > first .and. grain <= first + bodies%n) call read_grain(table, layout, int(grain - first), bodies, error)
+        if (grain > first .and. grain <= first + bodies%n) call read_grain(table, layout, narrow(grain - first), bodies, error)
       end if
     end do
     if (grain /= bodies%total .or. wall /= bodies%n_walls) then
@@ -299,7 +306,7 @@ contains
     if (value < least .or. value > huge(number)) then
       call table%refuse(column, what//" from "//to_text(least)//" to "//to_text(huge(number)), error)
     else
-      number = int(value)
+      number = narrow(value)
     end if
   end subroutine read_number
 

@@ -1,14 +1,17 @@
 !> Bodies and walls as read from a file, and the checks common to all formats.
 module gravier_bodies_data
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow, take_count
+  use gravier_room, only: raise_no_room
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
+  use gravier_memory_need, only: check_memory
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_sorting, only: argsort
   implicit none
   private
-  public :: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit, check_unique_ids
+  public :: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, data_bytes, make_unit, check_unique_ids
 
   !> The rows of this rank, in the order of the file, and all walls. SI units.
   type :: bodies_data_t
@@ -44,37 +47,75 @@ module gravier_bodies_data
 
 contains
 
-  !> Room for n bodies at rest, free, of the first material, without masses.
-  subroutine allocate_bodies(bodies, dimension, n)
+  !> Of one body, the least that it takes while it is read or made.
+  pure integer function data_bytes(dimension) result(bytes)
+    integer, intent(in) :: dimension
+    bytes = 8*(4 + dimension + 3*(dimension - 1))
+  end function data_bytes
+
+  !> Room for n bodies at rest, free, of the first material. Failure: status_failure, without memory for them.
+  subroutine allocate_bodies(bodies, dimension, n, with_masses, what, error)
     type(bodies_data_t), intent(inout) :: bodies
     integer, intent(in) :: dimension, n
+    !> which are then to be set
+    logical, intent(in) :: with_masses
+    !> that has so many, for the message
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: nv, stat
 
+    if (allocated(error)) return
+    nv = 3*(dimension - 1)
     bodies%dimension = dimension
     bodies%n = n
-    allocate (bodies%id(n), bodies%position(dimension, n), bodies%radius(n))
-    allocate (bodies%group(n), source=0)
-    allocate (bodies%material(n), source=1)
-    allocate (bodies%velocity(3*(dimension - 1), n), source=0.0_dp)
+    allocate (bodies%id(n), bodies%position(dimension, n), bodies%radius(n), bodies%velocity(nv, n), bodies%group(n), &
+      & bodies%material(n), stat=stat)
+    if (stat == 0 .and. with_masses) allocate (bodies%mass(n), stat=stat)
+    if (stat /= 0) then
+      call raise_no_room(what, real(n, dp)*data_bytes(dimension), error)
+      return
+    end if
+    bodies%group(:) = 0
+    bodies%material(:) = 1
+    bodies%velocity(:, :) = 0.0_dp
   end subroutine allocate_bodies
 
-  !> Room for n walls.
-  subroutine allocate_walls(bodies, dimension, n)
+  !> Room for n walls. Failure: status_failure, without memory for them.
+  subroutine allocate_walls(bodies, dimension, n, what, error)
     type(bodies_data_t), intent(inout) :: bodies
     integer, intent(in) :: dimension, n
+    !> that has so many, for the message
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: stat
 
+    if (allocated(error)) return
     bodies%n_walls = n
-    allocate (bodies%wall_id(n), bodies%wall_point(dimension, n), bodies%wall_normal(dimension, n))
+    allocate (bodies%wall_id(n), bodies%wall_point(dimension, n), bodies%wall_normal(dimension, n), stat=stat)
+    if (stat /= 0) call raise_no_room(what, real(n, dp)*8*(1 + 2*dimension), error)
   end subroutine allocate_walls
 
-  !> The block of rows of this rank: `n` rows from `first` (from 0) on; blocks differ by one row at most.
-  pure subroutine find_own_rows(comm, total, first, n)
+  !> The block of rows of this rank: `n` rows from `first` (from 0) on; blocks differ by one row at most. Failure: status_input
+  !> for more rows than a rank can count, status_failure for more than there is memory for. Collective.
+  subroutine find_own_rows(comm, total, dimension, what, first, n, error)
     type(communicator_t), intent(in) :: comm
     integer(i8), intent(in) :: total
+    integer, intent(in) :: dimension
+    !> that has these rows, for the message
+    character(len=*), intent(in) :: what
     integer(i8), intent(out) :: first
     integer, intent(out) :: n
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: each, rest, next
 
-    first = total*comm%rank/comm%size
-    n = int(total*(comm%rank + 1)/comm%size - first)
+    ! total*rank might be too large a number
+    each = total/comm%size
+    rest = mod(total, int(comm%size, i8))
+    first = each*comm%rank + rest*comm%rank/comm%size
+    next = each*(comm%rank + 1) + rest*(comm%rank + 1)/comm%size
+    call take_count(next - first, what//": rows of a rank", n, error)
+    call comm%agree(error)
+    call check_memory(comm, what//": "//to_text(total)//" grains", real(total, dp), data_bytes(dimension), error)
   end subroutine find_own_rows
 
   !> Scale a vector to length one; impossible for the zero vector. Safe for every size of a finite vector.
@@ -108,7 +149,7 @@ contains
     ids(1, 1:bodies%n) = bodies%id
     ids(1, bodies%n + 1:) = bodies%wall_id(1:n_walls)
     allocate (owner(size(ids, 2)))
-    owner(:) = int(mod(ids(1, :), int(comm%size, i8)))
+    owner(:) = narrow(mod(ids(1, :), int(comm%size, i8)))
     call sparse_exchange(comm, ids, owner, received)
 
     call keep_least_repeated(received, ids)

@@ -2,6 +2,7 @@
 !> normal} and /box/{origin, period}.
 module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow, take_count
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
@@ -96,8 +97,10 @@ contains
     call check_lengths(file, path, "/bodies", body_sets, [.true., .true., .false., .true., .false., .false., .false.], &
       & bodies%total, error)
     if (allocated(error)) return
-    call find_own_rows(comm, bodies%total, first, n)
-    call allocate_bodies(bodies, dimension, n)
+    call find_own_rows(comm, bodies%total, dimension, path//": /bodies", first, n, error)
+    call allocate_bodies(bodies, dimension, n, file%exists("/bodies/mass"), path//": /bodies", error)
+    call comm%agree(error)
+    if (allocated(error)) return
     call file%read_rows("/bodies/id", first, bodies%id, error)
     call check_ids(comm, path//": /bodies/id", first, bodies%id, error)
     call file%read_rows("/bodies/position", first, bodies%position, error)
@@ -109,7 +112,6 @@ contains
       call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, quantity, error)
     end if
     if (file%exists("/bodies/mass")) then
-      allocate (bodies%mass(n))
       call file%read_rows("/bodies/mass", first, bodies%mass, error)
       call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, extent, error)
     end if
@@ -130,7 +132,7 @@ contains
       call file%read_rows("/bodies/"//name, first, values, error)
       call check_whole(comm, path, name, least, bodies%id, values, error)
       if (allocated(error)) return
-      numbers(:) = int(values)
+      numbers(:) = narrow(values)
     end subroutine read_places
 
   end subroutine read_grains
@@ -166,16 +168,17 @@ contains
     integer, intent(in) :: dimension
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: n
-    integer :: i
+    integer(i8) :: rows
+    integer :: n, i
     logical :: possible
 
     if (allocated(error)) return
-    n = 0
-    if (file%exists("/walls")) call check_lengths(file, path, "/walls", wall_sets, [.true., .true., .true.], n, error)
-    if (allocated(error)) return
-    call allocate_walls(bodies, dimension, int(n))
-    if (n == 0) return
+    rows = 0
+    if (file%exists("/walls")) call check_lengths(file, path, "/walls", wall_sets, [.true., .true., .true.], rows, error)
+    call take_count(rows, path//": /walls/id: rows", n, error)
+    call allocate_walls(bodies, dimension, n, path//": /walls", error)
+    call file%comm%agree(error)
+    if (allocated(error) .or. n == 0) return
     call file%read_rows("/walls/id", 0_i8, bodies%wall_id, error)
     call file%read_rows("/walls/point", 0_i8, bodies%wall_point, error)
     call file%read_rows("/walls/normal", 0_i8, bodies%wall_normal, error)
@@ -445,8 +448,8 @@ contains
     end if
     call unpack_reals(ordered, 4, nd, sorted%position)
     call unpack_reals(ordered, 4 + nd, nv, sorted%velocity)
-    sorted%group = int(ordered(4 + nd + nv, :))
-    sorted%material = int(ordered(5 + nd + nv, :))
+    sorted%group = narrow(ordered(4 + nd + nv, :))
+    sorted%material = narrow(ordered(5 + nd + nv, :))
     sorted%n_walls = bodies%n_walls
     sorted%wall_id = bodies%wall_id
     sorted%wall_point = bodies%wall_point

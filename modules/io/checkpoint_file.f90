@@ -4,6 +4,8 @@ module gravier_checkpoint_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
+  use gravier_room, only: make_room
+  use gravier_narrow, only: check_counts
   use gravier_communicator, only: communicator_t
   use gravier_hdf5_file, only: h5_file_t
   implicit none
@@ -41,7 +43,6 @@ module gravier_checkpoint_file
 
   !> what /format says of itself
   character(len=*), parameter :: format_name = "gravier checkpoint"
-  integer(i8), parameter :: format_version = 3
   !> room for the headers of the file, and of a table
   integer(i8), parameter :: bytes_of_headers = 65536, bytes_of_table = 16384
   integer, parameter :: bytes_of_word = 8
@@ -51,10 +52,12 @@ contains
   ! ------------------------------------------------------------------------------------------------ writing
 
   !> Begin a checkpoint; it is written beside `path` until commit. Failure: status_failure.
-  subroutine checkpoint_create(self, comm, path, error)
+  subroutine checkpoint_create(self, comm, path, records, error)
     class(checkpoint_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
+    !> what the words of its records are, a line a kind: the version of the file
+    character(len=*), intent(in) :: records
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(error)) return
@@ -64,7 +67,7 @@ contains
     call self%file%reserve(bytes_of_headers, error)
     call self%file%make_group("/format", error)
     call self%file%write_attribute("/format", "name", format_name, error)
-    call self%file%write_attribute("/format", "version", format_version, error)
+    call self%file%write_attribute("/format", "records", records, error)
     call self%file%make_group("/scalars", error)
     call self%file%make_group("/texts", error)
     call self%file%make_group("/arrays", error)
@@ -98,14 +101,16 @@ contains
     call self%file%write_attribute("/scalars", name, value, error)
   end subroutine checkpoint_write_real
 
-  !> A text of any length, the same on all ranks.
+  !> A text of any length, the same on all ranks, without the blanks at its end.
   subroutine checkpoint_write_text(self, name, value, error)
     class(checkpoint_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name, value
     type(error_t), allocatable, intent(inout) :: error
+    character(len=len(value)) :: values(1)
 
+    values(1) = value
     call self%file%reserve(bytes_of_table + len(value), error)
-    call self%file%write_attribute("/texts", name, value, error)
+    call self%file%write_rows("/texts/"//name, values(1:merge(1, 0, self%comm%rank == 0)), error)
   end subroutine checkpoint_write_text
 
   !> Numbers that all ranks hold: those of rank 0 are written.
@@ -156,14 +161,16 @@ contains
 
   ! ------------------------------------------------------------------------------------------------ reading
 
-  !> Open a checkpoint. Failure (status_input): no such file, truncated, another kind of file, another version.
-  subroutine checkpoint_open(self, comm, path, error)
+  !> Open a checkpoint. Failure (status_input): no such file, truncated, another kind of file, other records.
+  subroutine checkpoint_open(self, comm, path, records, error)
     class(checkpoint_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
+    !> as for create
+    character(len=*), intent(in) :: records
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: name
-    integer(i8) :: version
+    character(len=:), allocatable :: name, found
+    logical :: known
 
     if (allocated(error)) return
     self%comm = comm
@@ -173,13 +180,37 @@ contains
     if (.not. self%file%exists("/format")) call self%refuse("not a checkpoint", error)
     call self%file%read_attribute("/format", "name", name, error)
     if (name /= format_name) call self%refuse("not a checkpoint", error)
-    call self%file%read_attribute("/format", "version", version, error)
-    if (version /= format_version) then
-      call self%refuse("a checkpoint of version "//to_text(version)//", but version "//to_text(format_version)// &
-        & " was expected", error)
+    known = self%file%has_attribute("/format", "records")
+    if (.not. known) then
+      call self%refuse("a checkpoint of an earlier version of Gravier, which does not say what its records are", error)
     end if
+    call self%file%read_attribute("/format", "records", found, error)
+    if (found /= records) call self%refuse("a checkpoint of another version of Gravier: "//difference(found, records), error)
     if (allocated(error)) call self%file%close(error)
   end subroutine checkpoint_open
+
+  !> The first line in which the records of a file are not those expected.
+  pure function difference(found, expected) result(text)
+    character(len=*), intent(in) :: found, expected
+    character(len=:), allocatable :: text
+    integer :: start
+
+    start = 1
+    do while (line_at(found, start) == line_at(expected, start) .and. start <= max(len(found), len(expected)))
+      start = start + len(line_at(expected, start)) + 1
+    end do
+    text = 'its records are "'//line_at(found, start)//'", but "'//line_at(expected, start)//'" was expected'
+  end function difference
+
+  !> The line of a text that begins at a place, without its end; none beyond the text.
+  pure function line_at(text, start) result(line)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: start
+    character(len=:), allocatable :: line
+
+    line = text(min(start, len(text) + 1):)
+    if (index(line, new_line("a")) > 0) line = line(1:index(line, new_line("a")) - 1)
+  end function line_at
 
   !> Close what was opened for reading; without effect on a file not open.
   subroutine checkpoint_close(self, error)
@@ -216,58 +247,72 @@ contains
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: value
     type(error_t), allocatable, intent(inout) :: error
-    call self%file%read_attribute("/texts", name, value, error)
+    call self%file%read_long_text("/texts/"//name, value, error)
   end subroutine checkpoint_read_text
 
-  !> The whole array on every rank.
-  subroutine checkpoint_read_array(self, name, values, error)
+  !> The whole array on every rank. Failure: status_input, for an array that is missing, damaged or of another length.
+  subroutine checkpoint_read_array(self, name, least, most, values, error)
     class(checkpoint_file_t), intent(in) :: self
     character(len=*), intent(in) :: name
+    !> lengths that it may have
+    integer, intent(in) :: least, most
     !> allocated in any case, empty after a failure
     integer(i8), allocatable, intent(out) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: n
 
     call self%file%row_count("/arrays/"//name, n, error)
-    allocate (values(n), source=0_i8)
+    if (n < least .or. n > most) call self%refuse("/arrays/"//name//": "//to_text(n)//" words, but "//to_text(least)// &
+      & " to "//to_text(most)//" were expected", error)
+    call make_room(values, merge(0_i8, n, allocated(error)), self%path//": /arrays/"//name, error)
+    call self%comm%agree(error)
     call self%file%read_rows("/arrays/"//name, 0_i8, values, error)
   end subroutine checkpoint_read_array
 
   !> The records of the subdomains that this rank owns now, whatever rank wrote them. Failure: status_input, for a table
-  !> that is missing or damaged or of another number of subdomains.
-  subroutine checkpoint_read_table(self, name, n_subdomains, records, counts, error)
+  !> that is missing or damaged, of another number of subdomains or of records of another width.
+  subroutine checkpoint_read_table(self, name, n_subdomains, words, records, counts, error)
     class(checkpoint_file_t), intent(in) :: self
     character(len=*), intent(in) :: name
     !> of the whole scene
     integer, intent(in) :: n_subdomains
-    !> (words of a record, sum(counts)), as write_table has them; allocated in any case
+    !> of a record
+    integer, intent(in) :: words
+    !> (words, sum(counts)), as write_table has them; allocated in any case
     integer(i8), allocatable, intent(out) :: records(:, :)
     !> (subdomains of this rank)
     integer(i8), allocatable, intent(out) :: counts(:)
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: group
     integer(i8) :: n_counts, n_records, total, first
+    integer :: width
     logical :: damaged
 
     allocate (counts(own_subdomains(self%comm, n_subdomains)), source=0_i8)
     if (allocated(error)) then
-      allocate (records(0, 0))
+      allocate (records(words, 0))
       return
     end if
     group = "/tables/"//name
+    width = self%file%columns(group//"/records")
+    if (width >= 0 .and. width /= words) then
+      call self%refuse(group//": records of "//to_text(width)//" words, but "//to_text(words)//" were expected", error)
+    end if
     call self%file%row_count(group//"/records", n_records, error)
     call self%file%row_count(group//"/counts", n_counts, error)
     if (n_counts /= n_subdomains) then
       call self%refuse(group//": "//to_text(n_counts)//" subdomains, but "//to_text(n_subdomains)//" were expected", error)
     end if
     call self%file%read_rows(group//"/counts", int(self%comm%first_subdomain(self%comm%rank, n_subdomains) - 1, i8), counts, error)
-    damaged = self%comm%any_true(any(counts < 0))
+    damaged = self%comm%any_true(any(counts < 0 .or. counts > n_records))
     total = self%comm%total(sum(counts))
     if (damaged .or. total /= n_records) then
       call self%refuse(group//": the counts of records do not add up to the "//to_text(n_records)//" that are there", error)
     end if
     if (allocated(error)) counts(:) = 0
-    allocate (records(max(0, self%file%columns(group//"/records")), sum(counts)), source=0_i8)
+    call check_counts(counts, self%path//": "//group//"/counts", error)
+    call make_room(records, words, sum(counts), self%path//": "//group, error)
+    call self%comm%agree(error)
     first = self%comm%offset(sum(counts))
     call self%file%read_rows(group//"/records", first, records, error)
   end subroutine checkpoint_read_table

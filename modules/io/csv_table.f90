@@ -1,9 +1,12 @@
 !> Reading of comma-separated tables line by line: a header with the names of the columns, then rows. Blank lines and
-!> lines that begin with # are passed over; lines may end in CR LF. Not collective.
+!> lines that begin with # are passed over; lines may end in CR LF. A first line "# checksum" with 16 hexadecimal digits seals the
+!> table: it is refused where what follows is not what it was. Not collective.
 module gravier_csv_table
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text, lower
+  use gravier_random_hash, only: hash_rows
   use gravier_number_text, only: read_integer, read_real, size_usual, size_tiny, size_huge
   use gravier_file_system, only: check_readable
   implicit none
@@ -11,6 +14,8 @@ module gravier_csv_table
   public :: csv_table_t
 
   integer, parameter :: block_length = 65536
+  character(len=*), parameter :: checksum_mark = "# checksum "
+  integer, parameter :: bytes_of_word = 8
   !> put by some programs before UTF-8 text
   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
@@ -29,6 +34,9 @@ module gravier_csv_table
     character(len=:), allocatable :: line
     integer :: line_length = 0
     integer(i8) :: line_number = 0
+    !> whether its first line has a checksum, that, and that of the lines read since
+    logical :: sealed = .false.
+    integer(i8) :: written = 0, found = 0
     !> names of the columns
     character(len=:), allocatable :: header
     integer :: n_columns = 0
@@ -51,6 +59,7 @@ module gravier_csv_table
     procedure, private :: next_line
     procedure, private :: read_block
     procedure, private :: append_to_line
+    procedure, private :: check_line
     procedure, private :: read_header
     procedure, private :: split
   end type csv_table_t
@@ -83,6 +92,8 @@ contains
     self%block_fill = 0
     self%block_next = 1
     self%line_number = 0
+    self%sealed = .false.
+    self%found = 0
     if (.not. allocated(self%block)) allocate (character(len=block_length) :: self%block)
     if (.not. allocated(self%line)) allocate (character(len=256) :: self%line)
     call self%read_header(error)
@@ -164,12 +175,41 @@ contains
       end do
       if (allocated(error) .or. .not. found) exit
       self%line_number = self%line_number + 1
+      call self%check_line()
       first = verify(self%line(1:self%line_length), " "//achar(9)//achar(13))
       if (first == 0) cycle
       if (self%line(first:first) /= "#") exit
     end do
     if (allocated(error)) found = .false.
+    if (.not. found .and. self%sealed .and. self%found /= self%written) call self%refuse_file( &
+      & "the checksum of its first line is not that of the others: the file is damaged, or was changed since it was sealed", error)
   end subroutine next_line
+
+  !> Take a checksum from the first line, and add the others to theirs.
+  subroutine check_line(self)
+    class(csv_table_t), intent(inout) :: self
+    integer(i8) :: words(self%line_length/bytes_of_word + 2, 1)
+    character(len=bytes_of_word) :: letters
+    integer :: k, stat
+
+    if (self%line_number == 1) then
+      if (index(self%line(1:self%line_length), checksum_mark) /= 1) return
+      letters = ""
+      associate (digits => self%line(len(checksum_mark) + 1:self%line_length))
+        if (len_trim(digits) /= 16 .or. verify(trim(digits), "0123456789abcdef") /= 0) return
+        read (digits, "(z16)", iostat=stat) self%written
+      end associate
+      self%sealed = stat == 0
+    else if (self%sealed) then
+      do k = 1, size(words, 1) - 1
+        letters = self%line(min((k - 1)*bytes_of_word, self%line_length) + 1:min(k*bytes_of_word, self%line_length))
+        words(k, 1) = transfer(letters, 0_i8)
+      end do
+      ! blanks that fill up the last word are told from those of the line
+      words(size(words, 1), 1) = self%line_length
+      self%found = ieor(self%found, hash_rows(words, self%line_number))
+    end if
+  end subroutine check_line
 
   !> Move `n` characters from the block to the end of the line.
   subroutine append_to_line(self, n)
@@ -195,7 +235,7 @@ contains
     integer :: stat
 
     self%block_next = 1
-    self%block_fill = int(min(int(block_length, i8), self%length - self%position))
+    self%block_fill = narrow(min(int(block_length, i8), self%length - self%position))
     if (self%block_fill <= 0) then
       self%block_fill = 0
       return

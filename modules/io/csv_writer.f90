@@ -2,6 +2,7 @@
 !> writes, and what fails is to be made known to the others by the caller.
 module gravier_csv_writer
   use gravier_kinds, only: dp, i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_finite, only: is_finite
@@ -107,7 +108,7 @@ contains
     kept = 0
     call open_old(path, unit, length, error)
     if (allocated(error)) return
-    call read_text(path, unit, int(min(length, len(first_line, i8))), text, error)
+    call read_text(path, unit, narrow(min(length, len(first_line, i8))), text, error)
     if (text /= first_line(1:len(text))) then
       call raise(error, status_input, path//": line 1: "//first_line(1:len(first_line) - 1)//" was expected")
     end if
@@ -117,7 +118,7 @@ contains
     cell = ""
     in_cell = .true.
     rows: do while (position < length .and. .not. allocated(error))
-      call read_text(path, unit, int(min(length - position, int(block_length, i8))), text, error)
+      call read_text(path, unit, narrow(min(length - position, int(block_length, i8))), text, error)
       do i = 1, len(text)
         select case (text(i:i))
         case (",")
@@ -169,7 +170,7 @@ contains
     if (allocated(error)) return
     position = 0
     do while (position < n .and. .not. allocated(error))
-      call read_text(path, unit, int(min(n - position, int(block_length, i8))), text, error)
+      call read_text(path, unit, narrow(min(n - position, int(block_length, i8))), text, error)
       call file%append(text, error)
       position = position + len(text)
     end do

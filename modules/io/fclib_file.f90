@@ -4,6 +4,8 @@
 !> status_input and one line that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow, take_count
+  use gravier_room, only: make_room
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns, half_of, mirrored
@@ -204,6 +206,7 @@ contains
     real(dp), allocatable, intent(inout) :: mu(:)
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: found
+    integer :: unknowns
 
     dimension = 0
     call read_integer(source, group//"/spacedim", found, error)
@@ -212,7 +215,9 @@ contains
       & ": expected 2 or 3", error)
     call read_vector(source, group//"/vectors/mu", -1, mu, error)
     if (allocated(error)) return
-    dimension = int(found)
+    call take_count(found*size(mu), source%path//": "//group//": components of the contacts", unknowns, error)
+    if (allocated(error)) return
+    dimension = narrow(found)
     if (size(mu) == 0) then
       call source%refuse(group//"/vectors/mu: expected at least one contact", error)
     else if (minval(mu) < 0.0_dp) then
@@ -242,15 +247,18 @@ contains
     real(dp), allocatable, intent(inout) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: found
+    integer :: length
 
     call source%file%row_count(dataset, found, error)
     if (allocated(error)) return
-    if (n >= 0 .and. found /= n .or. found > huge(n)) then
+    if (n >= 0 .and. found /= n) then
       call source%refuse(dataset//": "//to_text(found)//" numbers: expected "//to_text(n), error)
       return
     end if
-    allocate (values(found))
-    values(:) = 0.0_dp
+    call take_count(found, source%path//": "//dataset//": numbers", length, error)
+    if (allocated(error)) return
+    call make_room(values, found, source%path//": "//dataset, error)
+    call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
     call check_numbers(source, dataset, values, error)
@@ -286,15 +294,15 @@ contains
       call source%refuse(dataset//": "//to_text(length)//" numbers: expected "//to_text(n), error)
       return
     end if
-    allocate (found(n))
-    found(:) = lowest
+    call make_room(found, int(n, i8), source%path//": "//dataset, error)
+    call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, found, error)
     if (allocated(error)) return
     if (any(found < lowest .or. found > highest)) then
       call source%refuse(dataset//": expected numbers from "//to_text(lowest)//" to "//to_text(highest), error)
       return
     end if
-    values = int(found)
+    values = narrow(found)
   end subroutine read_indices
 
   !> A matrix stored in any of the three ways.
@@ -323,14 +331,14 @@ contains
         & ": expected -2 (rows), -1 (columns) or the number of triplets", error)
     end if
     if (allocated(error)) return
-    select case (int(nz))
+    select case (narrow(nz))
     case (by_rows)
       call read_compressed(source, group, n_rows, n_columns, row, column, error)
     case (by_columns)
       call read_compressed(source, group, n_columns, n_rows, column, row, error)
     case default
-      call read_indices(source, group//"/i", int(nz), 0, n_rows - 1, row, error)
-      call read_indices(source, group//"/p", int(nz), 0, n_columns - 1, column, error)
+      call read_indices(source, group//"/i", narrow(nz), 0, n_rows - 1, row, error)
+      call read_indices(source, group//"/p", narrow(nz), 0, n_columns - 1, column, error)
       if (.not. allocated(error)) then
         row(:) = row + 1
         column(:) = column + 1
@@ -398,8 +406,8 @@ contains
     real(dp), allocatable, intent(inout) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
 
-    allocate (values(n))
-    values(:) = 0.0_dp
+    call make_room(values, int(n, i8), source%path//": "//dataset, error)
+    call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
     call check_numbers(source, dataset, values, error)

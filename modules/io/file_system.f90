@@ -3,7 +3,8 @@
 module gravier_file_system
   use, intrinsic :: iso_c_binding, only: c_int, c_short, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
     & c_f_pointer, c_loc
-  use gravier_kinds, only: i8
+  use gravier_kinds, only: i4, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_system_calls, only: ask_window_size, c_window_size, c_close, c_creat, c_fallocate, c_fstatvfs, c_fsync, &
@@ -285,7 +286,7 @@ contains
       width = width_of(1_c_int)
       return
     end if
-    process = int(c_getpid())
+    process = int(c_getpid(), i4)
     mine = output_of(process)
     place = mine
     do level = 1, highest_ancestor
@@ -319,7 +320,7 @@ contains
     integer(c_int64_t) :: length
 
     length = c_readlink(c_text("/proc/"//to_text(process)//"/fd/1"), c_loc(buffer), int(len(buffer), c_size_t))
-    place = buffer(1:max(0, int(length)))
+    place = buffer(1:max(0, narrow(length)))
   end function output_of
 
   !> The process that started another one; 0 where that is not known.
@@ -445,7 +446,7 @@ contains
     found(:) = 0
     n = 0
     nullify (address)
-    if (c_glob(escaped(directory)//"/*"//suffix//c_null_char, 0_c_int, c_null_ptr, found) == 0) n(1) = int(found(1))
+    if (c_glob(escaped(directory)//"/*"//suffix//c_null_char, 0_c_int, c_null_ptr, found) == 0) n(1) = narrow(found(1))
     if (n(1) > 0) call c_f_pointer(transfer(found(2), c_null_ptr), address, n)
     do k = 1, n(1)
       call add_path(text_at(address(k)), paths)

@@ -2,27 +2,33 @@
 module gravier_hdf5_datasets
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, &
-    & H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_IEEE_F64LE, H5T_NO_CLASS_F, &
-    & H5T_STD_I64LE, H5_INTEGER_KIND, H5_REAL_KIND, h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, &
-    & h5dread_f, h5dwrite_f, h5kind_to_type, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_dxpl_mpio_f, &
-    & h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
-    & h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, h5sselect_all_f, h5sselect_hyperslab_f, h5sselect_none_f, &
-    & h5tclose_f, h5tget_class_f, hid_t, hsize_t
+    & H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_FLOAT_F, H5T_IEEE_F64LE, &
+    & H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING_F, H5_INTEGER_KIND, H5_REAL_KIND, h5dclose_f, h5dcreate_f, h5dget_space_f, &
+    & h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5kind_to_type, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
+    & h5pset_chunk_f, h5pset_dxpl_mpio_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, &
+    & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, h5sselect_all_f, &
+    & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tget_class_f, h5tget_size_f, hid_t, hsize_t, size_t
   use gravier_kinds, only: dp, i8
-  use gravier_hdf5_properties, only: with_groups_above
+  use gravier_narrow, only: narrow
   use gravier_hdf5_tree, only: h5_tree_t
   implicit none
   private
-  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, class_of
+  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, class_of, type_of
 
   !> Rows of this rank in memory.
   type :: rows_t
     !> 0: a vector
     integer :: n_columns = 0
     integer :: n = 0
+    !> 64-bit words of a row
+    integer :: words = 1
     !> of a number in a file and in memory
     integer(hid_t) :: file_type = -1, memory_type = -1
     type(c_ptr) :: buffer = c_null_ptr
+    !> of a text that type_of made
+    integer(hid_t) :: own_type = -1
+  contains
+    procedure :: close => rows_close
   end type rows_t
 
   interface rows_of
@@ -35,7 +41,7 @@ contains
   type(rows_t) function rows_of_integers(values) result(rows)
     integer(i8), intent(in), contiguous, target :: values(:)
 
-    rows = rows_t(0, size(values), H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND))
+    rows = rows_t(0, size(values), 1, H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND))
     if (size(values) > 0) rows%buffer = c_loc(values(1))
   end function rows_of_integers
 
@@ -43,7 +49,7 @@ contains
   type(rows_t) function rows_of_integer_columns(values) result(rows)
     integer(i8), intent(in), contiguous, target :: values(:, :)
 
-    rows = rows_t(size(values, 1), size(values, 2), H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND))
+    rows = rows_t(size(values, 1), size(values, 2), size(values, 1), H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND))
     if (size(values) > 0) rows%buffer = c_loc(values(1, 1))
   end function rows_of_integer_columns
 
@@ -51,7 +57,7 @@ contains
   type(rows_t) function rows_of_reals(values) result(rows)
     real(dp), intent(in), contiguous, target :: values(:)
 
-    rows = rows_t(0, size(values), H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND))
+    rows = rows_t(0, size(values), 1, H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND))
     if (size(values) > 0) rows%buffer = c_loc(values(1))
   end function rows_of_reals
 
@@ -59,9 +65,38 @@ contains
   type(rows_t) function rows_of_real_columns(values) result(rows)
     real(dp), intent(in), contiguous, target :: values(:, :)
 
-    rows = rows_t(size(values, 1), size(values, 2), H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND))
+    rows = rows_t(size(values, 1), size(values, 2), size(values, 1), H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND))
     if (size(values) > 0) rows%buffer = c_loc(values(1, 1))
   end function rows_of_real_columns
+
+  !> Rows, none yet, of the numbers or texts of an open dataset of n_columns, as write_rows has them in memory. To be closed.
+  subroutine type_of(dataset, n_columns, rows)
+    integer(hid_t), intent(in) :: dataset
+    integer, intent(in) :: n_columns
+    type(rows_t), intent(out) :: rows
+    integer(size_t) :: bytes
+    integer :: data_class, stat
+
+    rows%n_columns = max(0, n_columns)
+    rows%words = max(1, n_columns)
+    rows%memory_type = h5kind_to_type(i8, H5_INTEGER_KIND)
+    call h5dget_type_f(dataset, rows%own_type, stat)
+    if (stat < 0) return
+    call h5tget_class_f(rows%own_type, data_class, stat)
+    if (data_class == H5T_FLOAT_F) rows%memory_type = h5kind_to_type(dp, H5_REAL_KIND)
+    if (data_class /= H5T_STRING_F) return
+    call h5tget_size_f(rows%own_type, bytes, stat)
+    rows%memory_type = rows%own_type
+    rows%words = narrow((bytes + 7)/8)
+  end subroutine type_of
+
+  subroutine rows_close(self)
+    class(rows_t), intent(inout) :: self
+    integer :: stat
+
+    if (self%own_type >= 0) call h5tclose_f(self%own_type, stat)
+    self%own_type = -1
+  end subroutine rows_close
 
   !> Number of dimensions of a table and their lengths in Fortran's order; n_columns = 0 is a vector.
   pure subroutine get_shape(n_columns, n_rows, n_dims, extent)
@@ -85,13 +120,13 @@ contains
     integer(hid_t), intent(out) :: dataset
     integer, intent(out) :: stat
     integer(i8), intent(in), optional :: rows_a_chunk
-    integer(hid_t) :: place, space, creation, links
+    integer(hid_t) :: place, space, creation
     integer(hsize_t) :: extent(2), chunk(2), greatest(2)
     character(len=:), allocatable :: name
     integer :: n_dims, ignored
 
+    call self%make_groups_above(path)
     call self%locate(path, place, name)
-    links = with_groups_above()
     call h5pcreate_f(H5P_DATASET_CREATE_F, creation, ignored)
     ! every row is written, and a file must not tell when it was made
     call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, ignored)
@@ -105,10 +140,9 @@ contains
       greatest(n_dims) = H5S_UNLIMITED_F
     end if
     call h5screate_simple_f(n_dims, extent(1:n_dims), space, ignored, greatest(1:n_dims))
-    call h5dcreate_f(place, name, file_type, space, dataset, stat, dcpl_id=creation, lcpl_id=links)
+    call h5dcreate_f(place, name, file_type, space, dataset, stat, dcpl_id=creation)
     call h5sclose_f(space, ignored)
     call h5pclose_f(creation, ignored)
-    call h5pclose_f(links, ignored)
   end subroutine create_dataset
 
   !> Write or read rows [first, first + n) of an open dataset. Reading is collective MPI I/O. Writing is not: the

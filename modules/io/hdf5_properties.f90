@@ -2,15 +2,15 @@
 module gravier_hdf5_properties
   use, intrinsic :: iso_c_binding, only: c_bool, c_char, c_double, c_int, c_int64_t, c_long, c_size_t
   use mpi_f08, only: MPI_INFO_NULL
-  use hdf5, only: H5F_CLOSE_STRONG_F, H5P_CRT_ORDER_TRACKED_F, H5P_FILE_ACCESS_F, H5P_LINK_CREATE_F, H5T_CSET_UTF8_F, H5T_C_S1, &
-    & H5T_STRING, H5T_STR_NULLPAD_F, h5eset_auto_f, h5open_f, h5pcreate_f, h5pset_create_inter_group_f, h5pset_est_link_info_f, &
-    & h5pset_fapl_mpio_f, h5pset_fclose_degree_f, h5pset_link_creation_order_f, h5pset_link_phase_change_f, h5tcopy_f, &
-    & h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, size_t
+  use hdf5, only: H5F_CLOSE_STRONG_F, H5F_LIBVER_V18_F, H5P_CRT_ORDER_TRACKED_F, H5P_FILE_ACCESS_F, H5P_GROUP_CREATE_F, &
+    & H5T_CSET_UTF8_F, H5T_C_S1, H5T_STRING, H5T_STR_NULLPAD_F, h5eset_auto_f, h5open_f, h5pcreate_f, h5pset_obj_track_times_f, &
+    & h5pset_est_link_info_f, h5pset_fapl_mpio_f, h5pset_fclose_degree_f, h5pset_libver_bounds_f, h5pset_link_creation_order_f, &
+    & h5pset_link_phase_change_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f, h5tset_strpad_f, hid_t, size_t
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_communicator, only: communicator_t
   implicit none
   private
-  public :: start_library, parallel_access, with_groups_above, ask_for_one_block, text_type, is_ascii
+  public :: start_library, parallel_access, of_group, ask_for_one_block, text_type, is_ascii
 
   !> H5AC_cache_config_t of HDF5's C library, which its Fortran interface does not have
   type, bind(C) :: cache_config_t
@@ -77,8 +77,9 @@ contains
   end subroutine start_library
 
   !> Access by all ranks of `comm` together.
-  integer(hid_t) function parallel_access(comm) result(access)
+  integer(hid_t) function parallel_access(comm, writing) result(access)
     type(communicator_t), intent(in) :: comm
+    logical, intent(in) :: writing
     type(cache_config_t) :: config
     integer :: stat
 
@@ -92,6 +93,9 @@ contains
     ! HDF5 1.10 takes integer handles
     call h5pset_fapl_mpio_f(access, comm%mpi%mpi_val, MPI_INFO_NULL%mpi_val, stat)
     call h5pset_fclose_degree_f(access, H5F_CLOSE_STRONG_F, stat)
+    ! headers that carry checksums, by which HDF5 knows those that were damaged; later versions mark files that are open, and
+    ! those of a run that died could not be gone on with
+    if (writing) call h5pset_libver_bounds_f(access, H5F_LIBVER_V18_F, H5F_LIBVER_V18_F, stat)
   end function parallel_access
 
   !> Let a group keep its links side by side in its header, with room for so many: HDF5 would share them out over a tree
@@ -107,12 +111,12 @@ contains
     call h5pset_est_link_info_f(creation, members, length_of_name, ignored)
   end subroutine ask_for_one_block
 
-  !> Property of links: missing groups on the way are made.
-  integer(hid_t) function with_groups_above() result(links)
+  !> How a group is made: without the time, which a file must not tell. The caller closes it.
+  integer(hid_t) function of_group() result(creation)
     integer :: stat
-    call h5pcreate_f(H5P_LINK_CREATE_F, links, stat)
-    call h5pset_create_inter_group_f(links, 1, stat)
-  end function with_groups_above
+    call h5pcreate_f(H5P_GROUP_CREATE_F, creation, stat)
+    call h5pset_obj_track_times_f(creation, .false., stat)
+  end function of_group
 
   !> A string of fixed length, or of any where `length` is 0; the caller closes it.
   integer(hid_t) function text_type(length, ascii) result(type)

@@ -5,16 +5,17 @@
 !> end of the program it dies. So nothing is made in a file before there is room for it: writers call `reserve` with a bound of what
 !> they write up to the next flush, headers included.
 module gravier_hdf5_tree
-  use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, &
-    & H5_INDEX_NAME_F, H5_ITER_INC_F, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, &
-    & h5gclose_f, h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5ocopy_f, &
-    & h5odecr_refcount_f, h5oincr_refcount_f, h5olink_f, h5pclose_f, h5pcreate_f, h5pset_istore_k_f, hid_t, hsize_t
+  use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5P_FILE_CREATE_F, H5_INDEX_NAME_F, &
+    & H5_ITER_INC_F, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, &
+    & h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5ocopy_f, &
+    & h5odecr_refcount_f, h5oincr_refcount_f, h5olink_f, h5pclose_f, h5pcreate_f, h5pset_istore_k_f, &
+    & h5pset_obj_track_times_f, hid_t, hsize_t
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, extend_file, remove_file, replace_file
   use gravier_own_files, only: part_of, give_name, note_own
-  use gravier_hdf5_properties, only: start_library, parallel_access, with_groups_above, ask_for_one_block
+  use gravier_hdf5_properties, only: start_library, parallel_access, of_group, ask_for_one_block
   implicit none
   private
   public :: h5_tree_t
@@ -61,6 +62,7 @@ module gravier_hdf5_tree
 
     !> for the types that extend this one
     procedure :: locate => h5_locate
+    procedure :: make_groups_above => h5_make_groups_above
     procedure :: fail => h5_fail
   end type h5_tree_t
 
@@ -91,8 +93,9 @@ contains
     end if
     call comm%agree(error)
     if (allocated(error)) return
-    access = parallel_access(comm)
+    access = parallel_access(comm, .true.)
     call h5pcreate_f(H5P_FILE_CREATE_F, creation, ignored)
+    call h5pset_obj_track_times_f(creation, .false., ignored)
     call ask_for_one_block(creation, members_of_root)
     if (present(chunks)) call h5pset_istore_k_f(creation, (chunks + 1)/2, ignored)
     call h5fcreate_f(self%path, H5F_ACC_TRUNC_F, self%id, stat, creation_prp=creation, access_prp=access)
@@ -171,7 +174,7 @@ contains
     end if
     call comm%agree(error)
     if (allocated(error)) return
-    access = parallel_access(comm)
+    access = parallel_access(comm, writable)
     call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable), self%id, stat, access_prp=access)
     call h5pclose_f(access, ignored)
     if (stat < 0) call raise(error, status_input, path//": truncated or damaged HDF5 file")
@@ -344,25 +347,45 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> keep room for so many members, 1500 at most, in one block: to show one more of them is then a single write
     integer, intent(in), optional :: members
-    integer(hid_t) :: place, group, links, creation
-    character(len=:), allocatable :: name
-    integer :: stat, ignored
+    integer :: stat
 
     if (allocated(error)) return
-    call self%locate(path, place, name)
-    links = with_groups_above()
-    call h5pcreate_f(H5P_GROUP_CREATE_F, creation, ignored)
-    if (present(members)) call ask_for_one_block(creation, members)
-    call h5gcreate_f(place, name, group, stat, lcpl_id=links, gcpl_id=creation)
-    call h5pclose_f(creation, ignored)
-    call h5pclose_f(links, ignored)
-    if (stat < 0) then
-      call self%fail(path, "cannot make this group", error)
-    else
-      call h5gclose_f(group, ignored)
-    end if
+    call self%make_groups_above(path)
+    call make_one_group(self, path, stat, members)
+    if (stat < 0) call self%fail(path, "cannot make this group", error)
     call self%comm%agree(error)
   end subroutine h5_make_group
+
+  !> Make the groups above `path` that are missing; what fails, fails again with `path`.
+  subroutine h5_make_groups_above(self, path)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer :: i, ignored
+    logical :: there
+
+    do i = 2, len(path)
+      if (path(i:i) /= "/") cycle
+      there = self%exists(path(1:i - 1))
+      if (.not. there) call make_one_group(self, path(1:i - 1), ignored)
+    end do
+  end subroutine h5_make_groups_above
+
+  subroutine make_one_group(self, path, stat, members)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer, intent(out) :: stat
+    integer, intent(in), optional :: members
+    integer(hid_t) :: place, group, creation
+    character(len=:), allocatable :: name
+    integer :: ignored
+
+    call self%locate(path, place, name)
+    creation = of_group()
+    if (present(members)) call ask_for_one_block(creation, members)
+    call h5gcreate_f(place, name, group, stat, gcpl_id=creation)
+    call h5pclose_f(creation, ignored)
+    if (stat == 0) call h5gclose_f(group, ignored)
+  end subroutine make_one_group
 
   !> Start a group that appears in the file only with commit_group; until then every path at or below `path` leads
   !> into it. Should the program die meanwhile, the file is what it was before.
@@ -370,13 +393,16 @@ contains
     class(h5_tree_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
+    integer(hid_t) :: creation
+    integer :: stat, ignored
 
     if (allocated(error)) return
     call self%abandon_group()
     if (self%exists(path)) call self%fail(path, "is in the file already", error)
     if (.not. allocated(error)) then
-      call h5gcreate_anon_f(self%id, self%hidden, stat)
+      creation = of_group()
+      call h5gcreate_anon_f(self%id, self%hidden, stat, gcpl_id=creation)
+      call h5pclose_f(creation, ignored)
       if (stat < 0) then
         self%hidden = -1
         call self%fail(path, "cannot make this group", error)
@@ -392,7 +418,6 @@ contains
   subroutine h5_commit_group(self, error)
     class(h5_tree_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: links
     integer :: stat, ignored
 
     ! counted as if it had its name, so that the name changes nothing in it
@@ -404,9 +429,8 @@ contains
       call self%abandon_group()
       return
     end if
-    links = with_groups_above()
-    call h5olink_f(self%hidden, self%id, self%hidden_path, stat, lcpl_id=links)
-    call h5pclose_f(links, ignored)
+    call self%make_groups_above(self%hidden_path)
+    call h5olink_f(self%hidden, self%id, self%hidden_path, stat)
     if (stat < 0) call self%fail(self%hidden_path, "cannot make this group", error)
     call h5odecr_refcount_f(self%hidden, ignored)
     call self%comm%agree(error)
@@ -448,17 +472,16 @@ contains
     !> in the other file, and here
     character(len=*), intent(in) :: path, target_path
     type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: from, to, links
+    integer(hid_t) :: from, to
     character(len=:), allocatable :: name, target_name
-    integer :: stat, ignored
+    integer :: stat
 
     if (allocated(error)) return
     if (.not. source%exists(path)) return
     call source%locate(path, from, name)
+    call self%make_groups_above(target_path)
     call self%locate(target_path, to, target_name)
-    links = with_groups_above()
-    call h5ocopy_f(from, name, to, target_name, stat, lcpl_id=links)
-    call h5pclose_f(links, ignored)
+    call h5ocopy_f(from, name, to, target_name, stat)
     if (stat < 0) call self%fail(target_path, "cannot copy "//path//" of "//source%path, error)
     call self%comm%agree(error)
   end subroutine h5_take_over

@@ -3,6 +3,7 @@
 !> Rows are in the order of the ids, and nothing in the file tells how many ranks wrote it or when.
 module gravier_results_file
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
@@ -149,7 +150,7 @@ contains
       call self%file%close(error)
       return
     end if
-    self%dimension = int(dimension)
+    self%dimension = narrow(dimension)
     call self%file%reserve(bytes_of_headers, error)
     do i = 1, n_later
       call self%file%remove_group("/steps/"//to_text(later(i)), error)
@@ -400,7 +401,7 @@ contains
     call unpack_reals(ordered, 2 + nd, nv, sorted%velocity)
     call unpack_reals(ordered, 2 + nd + nv, 1, column)
     sorted%radius = column(1, :)
-    if (ni > 0) sorted%image = int(ordered(3 + nd + nv:, :))
+    if (ni > 0) sorted%image = narrow(ordered(3 + nd + nv:, :))
   end subroutine sort_bodies
 
   !> Components of a moment, 0 where there are none.

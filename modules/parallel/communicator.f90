@@ -1,14 +1,16 @@
 !> The communicator of a run and its collective operations. Results do not depend on the number of ranks:
 !> real sums are exact, and maxima and integer sums are exact by nature.
 module gravier_communicator
-  use, intrinsic :: iso_c_binding, only: c_int
+  use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, MPI_Finalize, &
-    & MPI_Comm_rank, MPI_Comm_size, MPI_Comm_dup, MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, &
-    & MPI_Ibarrier, MPI_Test, MPI_Get_library_version, MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, &
-    & MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, MPI_SUM, MPI_MIN, MPI_MAX, MPI_LOR
+    & MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_Comm_dup, MPI_Comm_free, &
+    & MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Ibarrier, MPI_Test, MPI_Get_library_version, &
+    & MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, MPI_SUM, &
+    & MPI_MIN, MPI_MAX, MPI_LOR, MPI_BXOR
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
+  use gravier_narrow, only: narrow
+  use gravier_errors, only: error_t, status_failure
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -33,17 +35,31 @@ module gravier_communicator
     procedure :: lowest => communicator_lowest
     procedure :: highest_of => communicator_highest_of
     procedure :: largest => communicator_largest
+    procedure :: exclusive_or => communicator_exclusive_or
     procedure :: any_true => communicator_any_true
     procedure :: sum_parts => communicator_sum_parts
     procedure :: sum_real => communicator_sum_real
     procedure :: sum_counts => communicator_sum_counts
     procedure :: broadcast_text => communicator_broadcast_text
     procedure :: agree => communicator_agree
+    procedure :: ranks_here => communicator_ranks_here
     procedure :: rank_of => communicator_rank_of
     procedure :: first_subdomain => communicator_first_subdomain
   end type communicator_t
 
   interface
+    integer(c_int) function c_atexit(action) bind(C, name="atexit")
+      import :: c_int, c_funptr
+      implicit none
+      type(c_funptr), value :: action
+    end function c_atexit
+
+    subroutine c_exit_now(status) bind(C, name="_exit")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: status
+    end subroutine c_exit_now
+
     integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
       import :: c_int
       implicit none
@@ -51,19 +67,32 @@ module gravier_communicator
     end function c_usleep
   end interface
 
+  !> between start_parallel and stop_parallel
+  logical :: parallel = .false.
+
 contains
 
-  !> Start MPI, unless it is running.
+  !> Start MPI, unless it is running. A process that ends before stop_parallel, by a library that gives up, has status_failure.
   subroutine start_parallel()
     logical :: running
+    integer(c_int) :: ignored
+
+    if (.not. parallel) ignored = c_atexit(c_funloc(end_early))
+    parallel = .true.
     call MPI_Initialized(running)
     if (.not. running) call MPI_Init()
   end subroutine start_parallel
 
   !> End MPI.
   subroutine stop_parallel()
+    parallel = .false.
     call MPI_Finalize()
   end subroutine stop_parallel
+
+  !> What the C library calls when the process ends.
+  subroutine end_early() bind(C)
+    if (parallel) call c_exit_now(int(status_failure, c_int))
+  end subroutine end_early
 
   !> First line of what the MPI library says of itself.
   function mpi_library() result(text)
@@ -167,6 +196,13 @@ contains
     call MPI_Allreduce(n, largest, 1, MPI_INTEGER8, MPI_MAX, self%mpi)
   end function communicator_largest
 
+  !> Exclusive or of the bits of words, one a rank. Collective.
+  integer(i8) function communicator_exclusive_or(self, word) result(combined)
+    class(communicator_t), intent(in) :: self
+    integer(i8), intent(in) :: word
+    call MPI_Allreduce(word, combined, 1, MPI_INTEGER8, MPI_BXOR, self%mpi)
+  end function communicator_exclusive_or
+
   logical function communicator_any_true(self, flag) result(any_true)
     class(communicator_t), intent(in) :: self
     logical, intent(in) :: flag
@@ -263,6 +299,16 @@ contains
     error%message = message
   end subroutine communicator_agree
 
+  !> How many ranks share the memory of this machine. Collective.
+  integer function communicator_ranks_here(self) result(n)
+    class(communicator_t), intent(in) :: self
+    type(MPI_Comm) :: here
+
+    call MPI_Comm_split_type(self%mpi, MPI_COMM_TYPE_SHARED, self%rank, MPI_INFO_NULL, here)
+    call MPI_Comm_size(here, n)
+    call MPI_Comm_free(here)
+  end function communicator_ranks_here
+
   !> Rank that owns a subdomain: each rank owns a block of consecutive ones.
   pure integer function communicator_rank_of(self, subdomain, n_subdomains) result(rank)
     class(communicator_t), intent(in) :: self
@@ -270,14 +316,14 @@ contains
     integer, intent(in) :: subdomain
     !> of the whole scene
     integer, intent(in) :: n_subdomains
-    rank = int((int(subdomain, i8)*self%size - 1)/n_subdomains)
+    rank = narrow((int(subdomain, i8)*self%size - 1)/n_subdomains)
   end function communicator_rank_of
 
   !> First subdomain of `rank`; its last is the first of the next rank less one.
   pure integer function communicator_first_subdomain(self, rank, n_subdomains) result(first)
     class(communicator_t), intent(in) :: self
     integer, intent(in) :: rank, n_subdomains
-    first = int(int(n_subdomains, i8)*rank/self%size) + 1
+    first = narrow(int(n_subdomains, i8)*rank/self%size) + 1
   end function communicator_first_subdomain
 
 end module gravier_communicator

@@ -12,6 +12,8 @@ program test_io_checkpoint_file
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   integer, parameter :: words = 3
+  !> what the records are
+  character(len=*), parameter :: layout = "grain: id place mass"//new_line("a")//"energy: all of it, 10 words"
   type(communicator_t) :: world
   character(len=:), allocatable :: base
 
@@ -126,7 +128,7 @@ contains
     integer(i8), allocatable :: records(:, :), counts(:)
 
     call make_table(comm, n_subdomains, records, counts)
-    call file%create(comm, path, error)
+    call file%create(comm, path, layout, error)
     call file%write_scalar("step", 12345678901_i8, error)
     call file%write_text("input", "&scene /", error)
     call file%write_array("partition", [3_i8, 1_i8, 4_i8, -1_i8], error)
@@ -146,22 +148,22 @@ contains
     integer(i8), allocatable :: values(:), records(:, :), counts(:), expected_records(:, :), expected_counts(:)
     integer(i8) :: n
 
-    call file%open(comm, path, error)
+    call file%open(comm, path, layout, error)
     call file%read_scalar("step", n, error)
     call check_equal(n, 12345678901_i8, "a scalar")
     call file%read_text("input", text, error)
     call check_equal(text, "&scene /", "a text")
-    call file%read_array("partition", values, error)
+    call file%read_array("partition", 4, 4, values, error)
     call check_equal(size(values), 4, "size of an array")
     if (size(values) == 4) call check(all(values == [3, 1, 4, -1]), "an array")
-    call file%read_table("grains", n_subdomains, records, counts, error)
+    call file%read_table("grains", n_subdomains, words, records, counts, error)
     call make_table(comm, n_subdomains, expected_records, expected_counts)
     call check_equal(size(counts), size(expected_counts), "number of counts")
     if (size(counts) == size(expected_counts)) call check(all(counts == expected_counts), "counts")
     call check_equal(size(records, 1), words, "words of a record")
     call check_equal(size(records, 2), size(expected_records, 2), "number of records")
     if (size(records) == size(expected_records)) call check(all(records == expected_records), "records")
-    call file%read_table("nothing", n_subdomains, records, counts, error)
+    call file%read_table("nothing", n_subdomains, words, records, counts, error)
     call check_equal(size(records, 1), words, "words of no record")
     call check_equal(size(records, 2), 0, "no records")
     call file%close(error)
@@ -226,7 +228,7 @@ contains
     do i = 1, size(reals)
       records(i, :) = transfer(reals(i), 0_i8)
     end do
-    call file%create(world, base//".h5", error)
+    call file%create(world, base//".h5", layout, error)
     do i = 1, size(reals)
       call file%write_scalar("real "//to_text(i), reals(i), error)
     end do
@@ -236,7 +238,7 @@ contains
     call file%write_table("reals", 1, records, counts, error)
     call file%commit(error)
     call expect_none(error, "writing bits")
-    call file%open(world, base//".h5", error)
+    call file%open(world, base//".h5", layout, error)
     do i = 1, size(reals)
       call file%read_scalar("real "//to_text(i), x, error)
       call check_equal(transfer(x, 0_i8), transfer(reals(i), 0_i8), "bits of real "//to_text(i))
@@ -245,7 +247,7 @@ contains
     call check(text == repeat("0123456789", 10000), "a long text")
     call file%read_text("none", text, error)
     call check_equal(len(text), 0, "an empty text")
-    call file%read_table("reals", 1, records, counts, error)
+    call file%read_table("reals", 1, 7, records, counts, error)
     call check_equal(size(records, 2), n, "records of the owner")
     do i = 1, size(records)
       call check_equal(records(i, 1), transfer(reals(i), 0_i8), "bits in a record")
@@ -267,7 +269,7 @@ contains
     before = content(base//".h5")
     records = 1
     allocate (counts(world%first_subdomain(world%rank + 1, 5) - world%first_subdomain(world%rank, 5)), source=7_i8)
-    call file%create(world, base//".h5", error)
+    call file%create(world, base//".h5", layout, error)
     call file%write_table("grains", 5, records, counts, error)
     call expect(error, status_failure, base//".h5: table grains: the counts of rank 0 do not fit its subdomains and records", &
       & "counts that are wrong")
@@ -323,51 +325,67 @@ contains
     real(dp) :: x
 
     call write_all(world, base//".h5", 5, error)
-    call file%open(world, base//".h5", error)
+    call file%open(world, base//".h5", layout, error)
     call file%read_scalar("steps", n, error)
     call expect(error, status_input, base//".h5: /scalars: attribute steps is missing or not one number of its kind", "no scalar")
     call file%read_scalar("step", x, error)
     call expect(error, status_input, base//".h5: /scalars: attribute step is missing or not one number of its kind", "no real")
     call file%read_text("output", text, error)
-    call expect(error, status_input, base//".h5: /texts: attribute output is missing or not one text", "no text")
-    call file%read_array("parts", values, error)
+    call expect(error, status_input, base//".h5: /texts/output: missing", "no text")
+    call file%read_array("parts", 0, 4, values, error)
     call expect(error, status_input, base//".h5: /arrays/parts: missing", "no array")
-    call file%read_table("grain", 5, records, counts, error)
+    call file%read_table("grain", 5, words, records, counts, error)
     call expect(error, status_input, base//".h5: /tables/grain/records: missing", "no table")
-    call file%read_table("grains", 6, records, counts, error)
+    call file%read_table("grains", 6, words, records, counts, error)
     call expect(error, status_input, base//".h5: /tables/grains: 5 subdomains, but 6 were expected", "other subdomains")
     call check_equal(size(records, 2), 0, "no records after a failure")
-    call file%read_table("grains", 5, records, counts, error)
+    call file%read_table("grains", 5, words + 1, records, counts, error)
+    call expect(error, status_input, base//".h5: /tables/grains: records of 3 words, but 4 were expected", "wider records")
+    call file%read_table("grains", 5, words - 1, records, counts, error)
+    call expect(error, status_input, base//".h5: /tables/grains: records of 3 words, but 2 were expected", "narrower records")
+    call file%read_array("partition", 5, 9, values, error)
+    call expect(error, status_input, base//".h5: /arrays/partition: 4 words, but 5 to 9 were expected", "a longer array")
+    call check_equal(size(values), 0, "no words after a failure")
+    call file%read_table("grains", 5, words, records, counts, error)
     call expect_none(error, "reading after refusals")
     call file%close(error)
 
-    call file%open(world, base//".none", error)
+    call file%open(world, base//".none", layout, error)
     call expect(error, status_input, base//".none: cannot read this file: No such file or directory", "no file")
     call put(base//".foreign", "a text")
-    call file%open(world, base//".foreign", error)
+    call file%open(world, base//".foreign", layout, error)
     call expect(error, status_input, base//".foreign: not an HDF5 file", "a text file")
     call other%create(world, base//".foreign", error)
     call other%close(error)
-    call file%open(world, base//".foreign", error)
+    call file%open(world, base//".foreign", layout, error)
     call expect(error, status_input, base//".foreign: not a checkpoint", "another HDF5 file")
     call other%create(world, base//".foreign", error)
     call other%make_group("/format", error)
     call other%write_attribute("/format", "name", "gravier checkpoint", error)
-    call other%write_attribute("/format", "version", 4, error)
     call other%close(error)
-    call file%open(world, base//".foreign", error)
-    call expect(error, status_input, base//".foreign: a checkpoint of version 4, but version 3 was expected", "another version")
-    call file%read_table("grains", 5, records, counts, error)
+    call file%open(world, base//".foreign", layout, error)
+    call expect(error, status_input, base//".foreign: a checkpoint of an earlier version of Gravier, which does not say "// &
+      & "what its records are", "an earlier version")
+    call write_all(world, base//".foreign", 5, error)
+    call file%open(world, base//".foreign", layout//" less", error)
+    call expect(error, status_input, base//'.foreign: a checkpoint of another version of Gravier: its records are "energy: '// &
+      & 'all of it, 10 words", but "energy: all of it, 10 words less" was expected', "another version")
+    call file%open(world, base//".foreign", layout(1:20), error)
+    call expect(error, status_input, base//'.foreign: a checkpoint of another version of Gravier: its records are "energy: '// &
+      & 'all of it, 10 words", but "" was expected', "a version without energy")
+    call file%read_table("grains", 5, words, records, counts, error)
     call check_equal(size(records, 2), 0, "no records of a file not open")
     if (allocated(error)) deallocate (error)
   end subroutine test_refused
 
-  !> Cut short at any place, and counts that do not add up.
+  !> Cut short at any place, a bit that is another in any table, and counts that do not add up.
   subroutine test_damaged()
     type(checkpoint_file_t) :: file
     type(h5_file_t) :: other
     type(error_t), allocatable :: error
     character(len=:), allocatable :: whole
+    character(len=32) :: letters
+    integer(i8) :: record(words), four(4)
     integer(i8), allocatable :: records(:, :), counts(:)
     integer :: i
 
@@ -375,29 +393,79 @@ contains
     whole = content(base//".h5")
     do i = 1, 9
       call put(base//".cut", whole(1:i*(len(whole) - 1)/9))
-      call file%open(world, base//".cut", error)
+      call file%open(world, base//".cut", layout, error)
       call expect(error, status_input, base//".cut: truncated or damaged HDF5 file", "a file cut short")
     end do
     call put(base//".cut", whole(1:4))
-    call file%open(world, base//".cut", error)
+    call file%open(world, base//".cut", layout, error)
     call expect(error, status_input, base//".cut: not an HDF5 file", "a file cut within its first bytes")
+
+    record = record_of(3, 3)
+    letters(1:24) = transfer(record, letters(1:24))
+    call flip("a record", whole, "/tables/grains/records", letters(1:24))
+    do i = 1, 4
+      four(i) = count_of(i)
+    end do
+    letters = transfer(four, letters)
+    call flip("counts", whole, "/tables/grains/counts", letters)
+    four = [3, 1, 4, -1]
+    letters = transfer(four, letters)
+    call flip("an array", whole, "/arrays/partition", letters)
+    call flip("a text", whole, "/texts/input", "&scene /")
 
     call make_table(world, 5, records, counts)
     call other%create(world, base//".cut", error)
     call other%make_group("/format", error)
     call other%write_attribute("/format", "name", "gravier checkpoint", error)
-    call other%write_attribute("/format", "version", 3, error)
+    call other%write_attribute("/format", "records", layout, error)
     call other%write_rows("/tables/grains/records", records, error)
     counts = counts + 1
     call other%write_rows("/tables/grains/counts", counts, error)
     call other%close(error)
-    call file%open(world, base//".cut", error)
-    call file%read_table("grains", 5, records, counts, error)
+    call file%open(world, base//".cut", layout, error)
+    call file%read_table("grains", 5, words, records, counts, error)
     call expect(error, status_input, base//".cut: /tables/grains: the counts of records do not add up to the 10 that are there", &
       & "counts that do not add up")
     call file%close(error)
     call expect_none(error, "closing a damaged file")
   end subroutine test_damaged
+
+  !> Change one bit of what begins with `bytes` in a file: a reader of everything is told the table.
+  subroutine flip(name, whole, table, bytes)
+    character(len=*), intent(in) :: name, whole, table, bytes
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: changed
+    integer :: place
+
+    place = index(whole, bytes)
+    call check(place > 0, name//": is in the file")
+    changed = whole
+    changed(place + 2:place + 2) = char(ieor(ichar(whole(place + 2:place + 2)), 16))
+    call put(base//".cut", changed)
+    call read_everything(base//".cut", error)
+    call check(allocated(error), name//": refused")
+    if (.not. allocated(error)) return
+    call check_equal(error%message, base//".cut: "//table//": its attribute checksum is not that of what it holds: the file is "// &
+      & "damaged, or was changed since it was written", name)
+    call check_equal(error%status, status_input, name//": status")
+  end subroutine flip
+
+  !> All that write_all writes.
+  subroutine read_everything(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    type(checkpoint_file_t) :: file
+    type(error_t), allocatable :: ignored
+    integer(i8), allocatable :: records(:, :), counts(:), values(:)
+    character(len=:), allocatable :: text
+
+    call file%open(world, path, layout, error)
+    call file%read_text("input", text, error)
+    call file%read_array("partition", 4, 4, values, error)
+    call file%read_table("grains", 5, words, records, counts, error)
+    call file%read_table("nothing", 5, words, records, counts, error)
+    call file%close(ignored)
+  end subroutine read_everything
 
   !> Rank 0 writes a file, for all to see.
   subroutine put(name, text)

@@ -332,10 +332,10 @@ contains
     call expect(error, "checkpoint.h5.part: no space left on device: ", "a checkpoint on a full disk")
     inquire (file=disk//"/checkpoint.h5.part", exist=exists)
     call check(.not. exists, "no unfinished checkpoint is left")
-    call file%open(comm, disk//"/checkpoint.h5", error)
+    call file%open(comm, disk//"/checkpoint.h5", "grains: 5 steps", error)
     call file%read_scalar("step", step, error)
     call check_equal(step, 1_i8, "the older checkpoint")
-    call file%read_table("grains", comm%size, records, counts, error)
+    call file%read_table("grains", comm%size, 5, records, counts, error)
     call check_equal(size(records, 2), 10, "its records")
     call file%close(error)
     call expect_none(error, "reading the older checkpoint")
@@ -354,7 +354,7 @@ contains
 
     counts = n
     allocate (records(5, n), source=step)
-    call file%create(comm, disk//"/checkpoint.h5", error)
+    call file%create(comm, disk//"/checkpoint.h5", "grains: 5 steps", error)
     call file%write_scalar("step", step, error)
     call file%write_table("grains", comm%size, records, counts, error)
     call file%commit(error)

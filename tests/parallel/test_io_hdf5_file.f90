@@ -273,7 +273,7 @@ contains
     call file%row_count("/y", n, error)
     call expect(error, status_input, path//": /y: missing", "rows of a missing dataset")
     call file%row_count("/", n, error)
-    call expect(error, status_input, "a dataset of one or two dimensions", "rows of a group")
+    call expect(error, status_input, "/: a dataset was expected, but it is none or damaged", "rows of a group")
     call file%read_rows("/xyz", 0_i8, x, error)
     call expect(error, status_input, "/xyz: a dataset of shape (N, 3), but a dataset of shape (N) was", "a table as vector")
     call file%read_rows("/xyz", 0_i8, xy, error)

@@ -3,7 +3,7 @@
 program test_random_hash
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
-  use gravier_random_hash, only: hash_uniform
+  use gravier_random_hash, only: hash_uniform, hash_rows
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n = 65536
@@ -19,6 +19,7 @@ program test_random_hash
   call test_neighbours()
   call test_grid()
   call test_no_repeats()
+  call test_rows()
   call finish_checks()
   call MPI_Finalize()
 
@@ -34,6 +35,38 @@ contains
       sample(k) = hash_uniform(seed, from + k, stream)
     end do
   end subroutine draw
+
+  !> The checksum of a table is that of its parts, and another with any bit, and any two rows in each other's place.
+  subroutine test_rows()
+    integer(i8) :: table(3, 40), changed(3, 40), digest
+    integer :: i, k, bit
+    logical :: differs
+
+    do i = 1, size(table, 2)
+      do k = 1, 3
+        table(k, i) = 3*i + k
+      end do
+    end do
+    digest = hash_rows(table, 7_i8)
+    call check_equal(ieor(hash_rows(table(:, 1:13), 7_i8), hash_rows(table(:, 14:), 20_i8)), digest, "a table in two parts")
+    call check_equal(hash_rows(table(:, 1:0), 7_i8), 0_i8, "no rows")
+    differs = hash_rows(table, 8_i8) /= digest
+    do i = 1, size(table, 2)
+      do k = 1, 3
+        do bit = 0, 63
+          changed = table
+          changed(k, i) = ieor(changed(k, i), shiftl(1_i8, bit))
+          differs = differs .and. hash_rows(changed, 7_i8) /= digest
+        end do
+      end do
+      if (i == 1) cycle
+      changed = table
+      changed(:, i) = table(:, i - 1)
+      changed(:, i - 1) = table(:, i)
+      differs = differs .and. hash_rows(changed, 7_i8) /= digest
+    end do
+    call check(differs, "another place, another bit, other order: another checksum")
+  end subroutine test_rows
 
   subroutine test_range()
     integer(i8), parameter :: counters(*) = [0_i8, 1_i8, -1_i8, 1000003_i8, -1000003_i8, 2_i8**31, 2_i8**32, 2_i8**62, -2_i8**62]

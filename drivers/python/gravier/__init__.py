@@ -7,7 +7,8 @@
 needs numpy and h5py; `Table.frame()` needs pandas too.
 """
 from .case import CaseError, namelist, parse_namelist, run, study, value_text
+from .checksum import seal
 from .results import BodiesFile, ResultsError, Run, Table, read_table
 
-__all__ = ["BodiesFile", "CaseError", "ResultsError", "Run", "Table", "namelist", "parse_namelist", "read_table", "run", "study",
+__all__ = ["BodiesFile", "CaseError", "ResultsError", "Run", "Table", "namelist", "parse_namelist", "read_table", "run", "seal", "study",
            "value_text"]

@@ -1,11 +1,13 @@
 """What a run left in its directory, as numpy arrays."""
 import csv
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from .case import parse_namelist
+from .checksum import is_whole
 
 
 class ResultsError(Exception):
@@ -59,6 +61,8 @@ class Run:
     dimension, version, command, input_text: as in /run of results.h5; case: the input by groups; steps, times: what is written.
     """
 
+    _kind = "the results of a run"
+
     def __init__(self, directory):
         self.directory = Path(directory)
         self.path = self.directory / "results.h5"
@@ -70,15 +74,19 @@ class Run:
             self.times = np.array([file[f"steps/{step}"].attrs["time"] for step in self.steps], dtype=float)
         self.case = parse_namelist(self.input_text)
 
+    @contextmanager
     def _open(self):
+        """The file, open; what HDF5 cannot read of it is an error of one line."""
         try:
-            file = h5py.File(self.path, "r")
-        except OSError:
-            raise ResultsError(f"{self.path}: cannot read this file; expected the results of a run") from None
+            with h5py.File(self.path, "r") as file:
+                self._check(file)
+                yield file
+        except (OSError, KeyError, RuntimeError, ValueError) as reason:
+            raise ResultsError(f"{self.path}: cannot read this file; expected {self._kind}: {_one_line(reason)}") from None
+
+    def _check(self, file):
         if "run" not in file or "steps" not in file:
-            file.close()
             raise ResultsError(f"{self.path}: no groups /run and /steps; expected the results of a run")
-        return file
 
     def find_step(self, step=None):
         """A step that is written: the last one unless told."""
@@ -93,7 +101,18 @@ class Run:
         step = self.find_step(step)
         with self._open() as file:
             group = file[f"steps/{step}"]
-            return Table({key: node[()] for key, node in group[name].items()}) if name in group else None
+            return self._table(group[name]) if name in group else None
+
+    def _table(self, group):
+        return Table({key: self._values(group[key]) for key in group})
+
+    def _values(self, dataset):
+        """What a dataset holds, once it was found to be what was written."""
+        values = dataset[()]
+        if not is_whole(dataset, values):
+            raise ResultsError(f"{self.path}: {dataset.name}: its attribute checksum is not that of what it holds: the file is damaged, or "
+                               "was changed since it was written")
+        return values
 
     def time(self, step=None):
         """Time of a step [s]."""
@@ -120,7 +139,7 @@ class Run:
         rows = self._split(self._group(step, "boundaries"))
         with self._open() as file:
             for key in ("name", "shape"):
-                rows[key] = np.array([_text(value) for value in file[f"boundaries/{key}"][()]])
+                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])])
         return rows
 
     def contacts(self, step=None):
@@ -209,6 +228,8 @@ class BodiesFile(Run):
     """A bodies file in HDF5, as gravier_sample and `final_bodies` leave it, read as a run of one step 0 without contacts: bodies, and
     the walls as boundaries, which are planes. What is optional in the file is there only where the file has it."""
 
+    _kind = "a bodies file"
+
     def __init__(self, path):
         self.path = Path(path)
         self.directory = self.path.parent
@@ -216,20 +237,14 @@ class BodiesFile(Run):
             self.dimension = int(file["bodies/position"].shape[1])
         self.steps, self.times, self.case = np.array([0]), np.array([0.0]), {}
 
-    def _open(self):
-        try:
-            file = h5py.File(self.path, "r")
-        except OSError:
-            raise ResultsError(f"{self.path}: cannot read this file; expected a bodies file") from None
+    def _check(self, file):
         if any(f"bodies/{name}" not in file for name in ("id", "position", "radius")):
-            file.close()
             raise ResultsError(f"{self.path}: no /bodies with id, position and radius; expected a bodies file")
-        return file
 
     def _group(self, step, name):
         self.find_step(step)
         with self._open() as file:
-            return Table({key: node[()] for key, node in file[name].items()}) if name in file else None
+            return self._table(file[name]) if name in file else None
 
     def boundaries(self, step=None):
         """id, name, shape, position, normal."""
@@ -252,3 +267,7 @@ class BodiesFile(Run):
 
 def _text(value):
     return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _one_line(reason):
+    return " ".join(str(reason).split())
