@@ -104,6 +104,9 @@ class TooLarge(RunTestCase):
         ends = set()
         for kilobytes in range(least, least + 60000, 2500):
             run = self.start([*command, str(kilobytes)], here)
+            if "mca_" in run.stderr:
+                # MPI itself could not start: this is no matter of the program
+                continue
             self.assertIn(run.returncode, (0, 3, 4), run)
             self.assertIsNone(re.search("Backtrace|SIG[A-Z]+|Error termination", run.stdout + run.stderr), run)
             if run.returncode == 4:
