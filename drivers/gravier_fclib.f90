@@ -253,7 +253,8 @@ contains
     call comm%agree(error)
   end subroutine solve_all
 
-  !> Lines to say of a problem once all files are read: what was read otherwise than it stands, and that --warm has nothing to start from.
+  !> Lines to say of a problem once all files are read: what was read otherwise than it stands, and that --warm has nothing to start
+  !> from.
   function notes_on(options, path, problem) result(notes)
     type(options_t), intent(in) :: options
     character(len=*), intent(in) :: path

@@ -22,12 +22,16 @@ module gravier_progress
   integer, parameter :: first_lines = 10
   !> between two live lines, and between two lines of a log at least [s]; later ones after a part of the time so far
   real(dp), parameter :: live_interval = 0.2_dp, log_interval = 1.0_dp, part_of_time = 0.02_dp
+  !> within a solve, between two lines of a log at least [s]; later ones after a part of the time of the solve so far
+  real(dp), parameter :: solve_interval = 5.0_dp
   !> steps that the time of a step is averaged over
   integer, parameter :: memory = 50
 
   type :: progress_t
     private
     real(dp) :: start = 0.0_dp, last_line = 0.0_dp, last_live = 0.0_dp
+    !> end of the last step, last line within a solve [s]
+    real(dp) :: step_end = 0.0_dp, last_solve_line = 0.0_dp
     integer :: lines = 0, steps = 0
     !> mean of the last steps [s]
     real(dp) :: seconds_a_step = 0.0_dp
@@ -37,6 +41,7 @@ module gravier_progress
     procedure :: note_step => progress_note_step
     procedure :: line_due => progress_line_due
     procedure :: live_due => progress_live_due
+    procedure :: solve_line_due => progress_solve_line_due
     procedure :: left => progress_left
     procedure :: warn => progress_warn
     procedure :: warnings => progress_warnings
@@ -50,6 +55,8 @@ contains
     self%start = clock()
     self%last_line = self%start
     self%last_live = self%start - live_interval
+    self%step_end = self%start
+    self%last_solve_line = self%start
   end subroutine progress_begin
 
   !> A step is over that took so many seconds.
@@ -58,6 +65,8 @@ contains
     real(dp), intent(in) :: seconds
 
     self%steps = self%steps + 1
+    self%step_end = clock()
+    self%last_solve_line = self%step_end
     self%seconds_a_step = self%seconds_a_step + (seconds - self%seconds_a_step)/min(self%steps, memory)
   end subroutine progress_note_step
 
@@ -84,6 +93,19 @@ contains
     due = now - self%last_live >= live_interval
     if (due) self%last_live = now
   end function progress_live_due
+
+  !> Whether a line within a solve is due now; if so, it counts as written.
+  logical function progress_solve_line_due(self, seconds) result(due)
+    class(progress_t), intent(inout) :: self
+    !> since the end of the last step [s]
+    real(dp), intent(out) :: seconds
+    real(dp) :: now
+
+    now = clock()
+    seconds = now - self%step_end
+    due = now - self%last_solve_line >= max(solve_interval, part_of_time*seconds)
+    if (due) self%last_solve_line = now
+  end function progress_solve_line_due
 
   !> Time that so many more steps take, in words.
   function progress_left(self, steps) result(text)

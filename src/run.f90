@@ -254,7 +254,7 @@ contains
     if (simulation%config%output%every > 0 .and. .not. simulation%restarted) call output%write_state(simulation, error)
     do while (simulation%step < simulation%config%time%steps .and. .not. ends .and. .not. allocated(error))
       step_start = MPI_Wtime()
-      call simulation%advance(figures, error)
+      call simulation%advance(figures, error, watch=log)
       if (allocated(error)) exit
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)

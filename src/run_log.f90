@@ -6,20 +6,20 @@ module gravier_run_log
   use gravier_text, only: to_text, growing_text_t
   use gravier_communicator, only: communicator_t, mpi_library
   use gravier_timers, only: gather_timers, phase_names, n_phases
-  use gravier_file_system, only: on_terminal
+  use gravier_file_system, only: terminal_width
   use gravier_text_file, only: text_file_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_scheme, only: work_t
   use gravier_descent, only: effort_t, tenfold
-  use gravier_solve, only: solve_report_t, solve_converged, solve_diverged, solve_stagnated, solve_unbounded
+  use gravier_solve, only: solve_watch_t, solve_report_t, solve_converged, solve_diverged, solve_stagnated, solve_unbounded
   use gravier_config_types, only: solver_config_t
   use gravier_interface, only: interface_figures_t, n_multiplicities
   use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory, item_bytes, peak_memory
-  use gravier_progress, only: progress_t, warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, &
-    & warn_partition, note_balance, note_scale
+  use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_momentum, &
+    & warn_relaxation, warn_partition, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line
   use gravier_run_summary, only: converged_text, time_text, halving_text
@@ -30,21 +30,26 @@ module gravier_run_log
   public :: run_log_t, banner_text
 
   character(len=*), parameter :: newline = new_line("a")
-  !> back to the begin of a line of a terminal, which is wiped out; and how much of it is used
+  !> back to the begin of a line of a terminal, which is wiped out
   character(len=*), parameter :: wipe = achar(13)//achar(27)//"[K"
-  integer, parameter :: live_width = 79
 
   !> Lines go to the standard output, and to a file once it is open. On a terminal the steps are one line that changes, and their
   !> lines go to the file alone. On other ranks than 0 nothing is written, but collective calls must still be made there.
-  type :: run_log_t
+  type, extends(solve_watch_t) :: run_log_t
     type(communicator_t), pointer :: comm => null()
     type(text_file_t) :: file
     !> kept until the file is open
     type(growing_text_t) :: early
     !> how often what is said
     type(progress_t) :: progress
-    !> rank 0 writes to a terminal; a live line stands there
+    !> rank 0 writes to a terminal of so many columns; a live line stands there
     logical :: live = .false., line_stands = .false.
+    integer :: columns = 0
+    !> step that comes next; what its figure is and is compared with
+    integer :: next_step = 1
+    character(len=:), allocatable :: figure_name, goal_name
+    !> of a line within a solve that could not be written
+    type(error_t), allocatable :: unwritten
     !> up to the last step
     type(work_t) :: told
     !> kind of the velocity scale that was named last
@@ -57,6 +62,7 @@ module gravier_run_log
     procedure :: write_restart => run_log_write_restart
     procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
+    procedure :: look => run_log_look
     procedure :: write_interface => run_log_write_interface
     procedure :: write_scales => run_log_write_scales
     procedure :: write_memory => run_log_write_memory
@@ -71,7 +77,8 @@ contains
     type(communicator_t), target, intent(in) :: comm
     self%comm => comm
     self%early = growing_text_t()
-    if (comm%rank == 0) self%live = on_terminal()
+    if (comm%rank == 0) self%columns = terminal_width()
+    self%live = self%columns > 0
     call self%progress%begin()
   end subroutine run_log_init
 
@@ -173,6 +180,9 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: options
 
+    self%goal_name = goal_name(simulation)
+    self%figure_name = trim(simulation%config%solver%criterion)
+    if (self%figure_name == "velocity_error") self%figure_name = "velocity error with its weights over U"
     call write_lines(self, banner_text(), "", error)
     associate (config => simulation%config)
       call self%line(trim("case        "//config%file//"  "//config%scene%title), error)
@@ -200,6 +210,7 @@ contains
     type(simulation_t), intent(in) :: simulation
     type(error_t), allocatable, intent(inout) :: error
 
+    self%next_step = simulation%step + 1
     if (simulation%restarted) then
       call self%line("restart     from the checkpoint of step "//to_text(simulation%step), error)
     else
@@ -351,6 +362,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=160) :: row
 
+    if (allocated(self%unwritten)) call move_alloc(self%unwritten, error)
+    self%next_step = simulation%step + 1
     call self%progress%note_step(seconds)
     if (figures%solve%status == solve_diverged) then
       call write_recoveries(self, simulation, simulation%step + 1, error)
@@ -383,6 +396,28 @@ contains
       & text = self%progress%left(simulation%config%time%steps - simulation%step)
   end function left_text
 
+  !> A line within a long solve, where one is due; see solve_watch_t. On a terminal it takes the place of the live line.
+  subroutine run_log_look(self, report)
+    class(run_log_t), intent(inout) :: self
+    type(solve_report_t), intent(in) :: report
+    character(len=:), allocatable :: text
+    real(dp) :: seconds
+
+    if (self%comm%rank /= 0) return
+    if (.not. self%progress%solve_line_due(seconds)) return
+    text = "step "//to_text(self%next_step)//" is being solved: "//to_text(report%iterations)//" iterations in "// &
+      & duration_text(seconds)//", "//self%figure_name//" "//to_text(report%figure, 2)//" at the last check, "//self%goal_name// &
+      & " "//to_text(report%goal, 2)
+    if (self%live) then
+      call note_line(self, "            "//text, self%unwritten)
+      write (output_unit, "(2a)", advance="no") wipe, text(1:min(len(text), self%columns - 1))
+      flush (output_unit)
+      self%line_stands = .true.
+    else
+      call self%line("            "//text, self%unwritten)
+    end if
+  end subroutine run_log_look
+
   !> The line on a terminal that changes, where it is due.
   subroutine write_live_line(self, simulation, figures)
     class(run_log_t), intent(inout) :: self
@@ -399,7 +434,7 @@ contains
     text = text//"  "//trim(adjustl(time))//" s  "//to_text(figures%contacts)//" contacts  "// &
       & to_text(figures%solve%iterations)//" iterations  "//trim(adjustl(residual))
     if (left_text(self, simulation) /= "") text = text//"  "//left_text(self, simulation)//" left"
-    write (output_unit, "(2a)", advance="no") wipe, text(1:min(len(text), live_width))
+    write (output_unit, "(2a)", advance="no") wipe, text(1:min(len(text), self%columns - 1))
     flush (output_unit)
     self%line_stands = .true.
   end subroutine write_live_line

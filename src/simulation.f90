@@ -18,8 +18,8 @@ module gravier_simulation
   use gravier_scheme, only: scheme_t
   use gravier_descent, only: effort_t
   use gravier_run_tally, only: run_tally_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_diverged, solve_unbounded, &
-    & by_velocity, by_residual, by_error
+  use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, solve_contacts, solve_converged, solve_diverged, &
+    & solve_unbounded, by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_departures, only: some_leave, let_grains_out
@@ -518,15 +518,17 @@ contains
 
   !> One step. After a solve that diverged, velocities and places are not those of any step: the run must end.
   !> Collective.
-  subroutine simulation_advance(self, figures, error)
+  subroutine simulation_advance(self, figures, error, watch)
     class(simulation_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
     type(error_t), allocatable, intent(inout) :: error
+    !> is told how the solve goes on
+    class(solve_watch_t), intent(inout), optional :: watch
     real(dp) :: shifts, free_grains
 
     if (allocated(error)) return
     call self%assemble(figures)
-    call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column)
+    call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%column, watch)
     if (.not. allocated(error)) then
       if (figures%solve%status /= solve_converged) self%failed = self%failed + 1
       call self%tally%add_solve(figures%solve, self%velocity_scale%kind)

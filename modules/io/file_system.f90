@@ -1,12 +1,14 @@
 !> What Fortran leaves to the operating system: directories, atomic renames, where paths lead, reserved disk space, and
 !> whether the standard output is a terminal.
 module gravier_file_system
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, c_f_pointer, c_loc
+  use, intrinsic :: iso_c_binding, only: c_int, c_short, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
+    & c_f_pointer, c_loc
   use gravier_kinds, only: i4, i8
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
-  use gravier_system_calls, only: c_close, c_creat, c_fallocate, c_fstatvfs, c_fsync, c_ftruncate, c_getpid, c_gethostname, &
+  use gravier_system_calls, only: ask_window_size, c_window_size, c_close, c_creat, c_fallocate, c_fstatvfs, c_fsync, &
+    & c_ftruncate, c_getpid, c_gethostname, &
     & c_glob, c_globfree, c_isatty, c_lseek, c_mkdir, c_open, c_readlink, c_rename, c_rmdir, c_statx, c_unlink, c_write, c_text, &
     & text_at, last_error, reason, o_rdonly, o_wronly, o_nonblock, file_mode, directory_mode, falloc_fl_keep_size, &
     & falloc_fl_punch_hole, seek_end, at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word, &
@@ -14,7 +16,7 @@ module gravier_file_system
   implicit none
   private
   public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file, on_terminal, host_name
+  public :: extend_file, replace_file, terminal_width, host_name
   public :: path_t, add_path, list_files
   public :: place_t, place_of, place_of_open, is_device
 
@@ -37,6 +39,8 @@ module gravier_file_system
     generic :: operator(==) => equals
   end type place_t
 
+  !> columns of a terminal that does not say how many it has
+  integer, parameter :: usual_width = 80
   !> processes between a rank and its launcher, at most
   integer, parameter :: highest_ancestor = 16
 contains
@@ -267,15 +271,21 @@ contains
     ignored = c_close(descriptor)
   end subroutine reserve_space
 
-  !> Whether a person looks at the standard output of this process. Open MPI gives a rank a pseudo terminal whatever its own
-  !> output is: where it has started the process, the first process above that writes elsewhere is asked, the launcher.
-  logical function on_terminal()
+  !> Columns of the terminal on which a person looks at the standard output of this process, 0 where nobody does. Open MPI gives a rank
+  !> a pseudo terminal whatever its own output is: where it has started the process, the first process above that writes elsewhere
+  !> is asked, the launcher. Where the terminal does not say, 80.
+  integer function terminal_width() result(width)
     character(len=:), allocatable :: mine, place
     integer :: process, level, length
+    integer(c_int) :: descriptor, ignored
 
-    on_terminal = c_isatty(1_c_int) == 1
+    width = 0
+    if (c_isatty(1_c_int) /= 1) return
     call get_environment_variable("OMPI_COMM_WORLD_SIZE", length=length)
-    if (.not. on_terminal .or. length == 0) return
+    if (length == 0) then
+      width = width_of(1_c_int)
+      return
+    end if
     process = int(c_getpid(), i4)
     mine = output_of(process)
     place = mine
@@ -284,8 +294,23 @@ contains
       place = output_of(process)
       if (process <= 1 .or. place /= mine) exit
     end do
-    on_terminal = index(place, "/dev/pts/") == 1 .or. index(place, "/dev/tty") == 1
-  end function on_terminal
+    if (index(place, "/dev/pts/") /= 1 .and. index(place, "/dev/tty") /= 1) return
+    descriptor = c_open(c_text(place), ior(o_rdonly, o_nonblock), 0_c_int)
+    width = width_of(descriptor)
+    if (descriptor >= 0) ignored = c_close(descriptor)
+  end function terminal_width
+
+  integer function width_of(descriptor) result(width)
+    integer(c_int), intent(in) :: descriptor
+    integer(c_short) :: sizes(4)
+
+    sizes(:) = 0_c_short
+    width = 0
+    if (descriptor >= 0) then
+      if (c_window_size(descriptor, ask_window_size, sizes) == 0) width = sizes(2)
+    end if
+    if (width < 1) width = usual_width
+  end function width_of
 
   !> What a process has as its standard output; empty where that is not known.
   function output_of(process) result(place)

@@ -1,12 +1,13 @@
 !> Bindings to the C library, for the modules that deal with files: the only ones of this layer. Linux, 64 bits.
 module gravier_system_calls
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_short, c_size_t, c_char, c_ptr, c_null_char, c_f_pointer, c_associated
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_long, c_short, c_size_t, c_char, c_ptr, c_null_char, &
+    & c_f_pointer, c_associated
   implicit none
   private
   public :: c_mkdir, c_rename, c_unlink, c_rmdir, c_open, c_creat, c_close, c_write, c_lseek, c_fsync, c_ftruncate
   public :: c_fallocate, c_fstatvfs, c_glob, c_globfree, c_getpid, c_isatty, c_readlink, c_errno_location, c_strerror
-  public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_usleep
-  public :: o_rdonly, o_wronly, o_rdwr, o_creat, o_nonblock, o_cloexec, file_mode, directory_mode
+  public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_usleep, c_window_size
+  public :: ask_window_size, o_rdonly, o_wronly, o_rdwr, o_creat, o_nonblock, o_cloexec, file_mode, directory_mode
   public :: falloc_fl_keep_size, falloc_fl_punch_hole, seek_set, seek_end, statvfs_words, glob_words
   public :: at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word
   public :: eintr, eacces, eagain, eexist, enodev, enospc, espipe, enolck, enosys, eopnotsupp
@@ -23,6 +24,8 @@ module gravier_system_calls
   !> of fcntl: take a lock or fail at once; two kinds of locks
   integer(c_int), parameter :: set_lock = 6
   integer(c_short), parameter :: lock_shared = 0, lock_exclusive = 1
+  !> of ioctl: rows, columns, and two more numbers
+  integer(c_long), parameter :: ask_window_size = int(z"5413", c_long)
   !> of statx: paths from the working directory on, or none and an open file; what is asked for
   integer(c_int), parameter :: at_fdcwd = -100, at_empty_path = int(z"1000", c_int), statx_ino = 256
   !> more than the length of struct statx, on every processor the same, and its words of the inode and of the device
@@ -158,6 +161,14 @@ module gravier_system_calls
       implicit none
       integer(c_int), value :: descriptor
     end function c_isatty
+
+    integer(c_int) function c_window_size(descriptor, request, size) bind(C, name="ioctl")
+      import :: c_int, c_long, c_short
+      implicit none
+      integer(c_int), value :: descriptor
+      integer(c_long), value :: request
+      integer(c_short), intent(inout) :: size(4)
+    end function c_window_size
 
     integer(c_int64_t) function c_readlink(path, target, room) bind(C, name="readlink")
       import :: c_int64_t, c_size_t, c_char, c_ptr

@@ -14,7 +14,7 @@ module gravier_solve
   use gravier_vain_impulses, only: normals_are_in_vain
   implicit none
   private
-  public :: solve_control_t, solve_report_t, exact_solution_t, solve_contacts
+  public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, solve_contacts
   public :: by_velocity, by_residual, by_error
   public :: solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
 
@@ -92,10 +92,26 @@ module gravier_solve
     real(dp), allocatable :: trace(:, :)
   end type solve_report_t
 
+  !> Who is told how a solve goes on.
+  type, abstract :: solve_watch_t
+  contains
+    procedure(look_at), deferred :: look
+  end type solve_watch_t
+
+  abstract interface
+    !> After an iteration, with the figures of the last check. Each rank is told on its own.
+    subroutine look_at(self, report)
+      import :: solve_watch_t, solve_report_t
+      implicit none
+      class(solve_watch_t), intent(inout) :: self
+      type(solve_report_t), intent(in) :: report
+    end subroutine look_at
+  end interface
+
 contains
 
   !> Solve. The state is checked at the start, at the end and in between as gravier_check_schedule says. Collective.
-  subroutine solve_contacts(problem, scheme, control, report, error, exact)
+  subroutine solve_contacts(problem, scheme, control, report, error, exact, watch)
     !> with its velocity scale
     type(contact_problem_t), intent(inout) :: problem
     class(scheme_t), intent(inout) :: scheme
@@ -104,6 +120,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> needed where the criterion is by_error
     class(exact_solution_t), intent(in), optional :: exact
+    class(solve_watch_t), intent(inout), optional :: watch
     type(velocity_error_t) :: velocity
     type(check_schedule_t) :: schedule
     type(stagnation_t) :: stagnation
@@ -149,6 +166,7 @@ contains
         if (anew) call schedule%forget_ratio()
       end if
       call velocity%keep_copy(problem, scheme, report%iterations)
+      if (present(watch)) call watch%look(report)
     end do
     report%layered = trial%layered
     report%layered_sweeps = trial%sweeps

@@ -1,8 +1,11 @@
 """What a solve leaves out and what the log tells of its time: checks that can tell nothing new, the balance of sweeps, lines of
 steps, warnings and the closing summary."""
+import fcntl
 import os
 import re
+import struct
 import subprocess
+import termios
 import threading
 
 from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, RunTestCase, merged, namelist, run_case, settled_disks, write
@@ -71,15 +74,18 @@ class Progress(RunTestCase):
         self.assertNotIn("\033", run.stdout)
         self.assertNotIn("\r", run.stdout)
 
-    def on_terminal(self, command, directory):
-        """Status of a command, and what it writes to a terminal."""
+    def on_terminal(self, command, directory, columns=80, enough=None):
+        """Status of a command, and what it writes to a terminal of so many columns; it is stopped once it has said `enough`."""
         master, slave = os.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
         said = []
 
         def listen():
             try:
                 while text := os.read(master, 65536):
                     said.append(text)
+                    if enough and re.search(enough, b"".join(said).decode()):
+                        process.kill()
             except OSError:
                 pass  # the other end is closed
 
@@ -92,6 +98,24 @@ class Progress(RunTestCase):
         listener.join()
         os.close(master)
         return status, b"".join(said).decode()
+
+    def test_long_solve(self):
+        """A solve that takes long gives a sign of life: a line in run.log, on a terminal in the place of the live line, as long as the
+        terminal is wide."""
+        case = namelist({"scene": {"bodies": "column", "column_count": 3000, "radius": 0.5, "mass": 1.0},
+                         "time": {"step": 1e-3, "steps": 2}, "output": {"directory": "results"},
+                         "solver": {"criterion": "residual", "tolerance": 1e-14, "acceleration": "none", "max_iterations": 1000000000}})
+        sign = r"step 1 is being solved: \d+ iterations in \d[\d.minh ]* s, residual \d\.\dE-\d+ at the last check, tolerance 1.0E-014"
+        for title, command, columns, shown in (("wide", [], 150, sign), ("narrow", [], 40, r"step 1 is being solved: \d+ iterat"),
+                                               ("launched", [MPIEXEC, "-n", "2"], 150, sign)):
+            with self.subTest(title):
+                os.makedirs(self.here("long " + title))
+                write(self.here("long " + title, "case.nml"), case)
+                _, said = self.on_terminal([*command, GRAVIER, "case.nml"], self.here("long " + title), columns, shown)
+                self.assertRegex(said, r"\r\033\[K" + shown)
+                self.assertTrue(max(len(line) for line in re.findall(r"\033\[K(step [^\r]*)", said)) < columns)
+                with open(self.here("long " + title, "results", "run.log"), encoding="ascii") as file:
+                    self.assertRegex(file.read(), r"(?m)^ +" + sign + "$")
 
     def test_live_line(self):
         """On a terminal, with and without the launcher, steps are one line that is wiped out at the end; run.log has their lines."""
