@@ -146,8 +146,8 @@ module gravier_contact_kernels
       real(dp), intent(inout), contiguous :: power(:, :)
       !> (nv, n_columns) [N s, N m s]
       real(dp), intent(inout), contiguous :: local(:, :), recent(:, :)
-      !> the three of a residual; of y . w with the tests P - r, r and r - previous; of r_n |w|^2 and of r_n
-      real(dp), intent(out) :: sums(8)
+      !> the three of a residual; of y . w with the tests P - r, r and r - previous
+      real(dp), intent(out) :: sums(6)
       real(dp), intent(inout) :: largest
     end subroutine tests_kernel
   end interface

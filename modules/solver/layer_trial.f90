@@ -15,8 +15,9 @@ module gravier_layer_trial
   !> a pass is tried after the first iterations if the residual at the start, the velocity error over its scale and the way to supports
   !> are above these [1, 1, mean diameters]
   real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, deep = 25.0_dp
-  !> and after a part of the depth, where the way is above another [mean diameters]
+  !> and after a part of the depth, where the way is above another [mean diameters]; the depth is found after so many iterations
   real(dp), parameter :: late = 0.3_dp, very_deep = 60.0_dp
+  integer, parameter :: many = 20
   !> there are at least so many contacts on the way as mean diameters
   real(dp), parameter :: nearly = 0.7_dp
   !> iterations after a pass until it is judged, and what must be left of the error then
@@ -78,6 +79,7 @@ contains
     if (self%wants_first .and. iteration == copies_ready) &
       & call try(self, problem, scheme, velocity, iteration, much, deep, anew, error)
     if (allocated(error)) return
+    if (self%may_try .and. velocity%most_depth < 0 .and. iteration >= many) call velocity%find_depth(problem)
     if (self%may_try .and. velocity%most_depth > very_deep .and. iteration >= self%ends .and. &
       & (self%layered .or. iteration > late*velocity%most_depth)) &
       & call try(self, problem, scheme, velocity, iteration, allowed, very_deep, anew, error)

@@ -12,8 +12,6 @@
 !>      L^2 = sum m_l e_l^2.
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
 !>      (gravier_layered_start) long waves are gone, and a = 1.7.
-!>      Where groups of contacts creep, test impulses of little motion make E too large. The mean violation, each contact weighed by
-!>      r_n, over as many contacts as the depth D is long is more than any wave can be: E is at most 2 D sqrt(sum r_n |w|^2/sum r_n).
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
@@ -43,13 +41,10 @@ module gravier_velocity_error
   !> without momentum, ratio between the iterations at which impulses are copied, and the first of them
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
   integer, parameter :: first_copy = 2
-  !> test impulses; places of the sums of an assessment, the first of which make the residual: the powers y . w, the sums of r_n |w|^2
-  !> and of r_n, the products of the velocities that test impulses make
-  integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_means = at_powers + n_tests, at_products = at_means + 2, &
+  !> test impulses; places of the sums of an assessment, the first of which make the residual: the powers y . w, the products of the
+  !> velocities that test impulses make
+  integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_products = at_powers + n_tests, &
     & n_sums = at_products + n_tests*(n_tests + 1)/2
-  !> the estimate is at most so many times the depth and the mean violation; the iteration from which on the depth is found for that
-  real(dp), parameter :: most_waves = 2.0_dp
-  integer, parameter :: settled = 20
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> rows that take turns in sums by level
@@ -76,14 +71,12 @@ module gravier_velocity_error
     real(dp) :: mass = 0.0_dp
     !> error allowed [m/s]
     real(dp), private :: allowed = 0.0_dp
-    !> whether Y, the mean and the largest violation are known
+    !> whether Y and the largest violation are known
     logical :: is_assessed = .false.
     !> C, Y and L, as far as they are known, by the last `bound` or `assess` and `add_levels` [m/s]
     real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
     !> weight of Y
     real(dp) :: weight = weight_of_projection
-    !> root mean square of w, weighed by r_n, by the last `assess` [m/s]
-    real(dp) :: mean_violation = 0.0_dp
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> largest |e_l| of a level, by the last `add_levels`; 0 since `bound` [m/s]
@@ -206,14 +199,12 @@ contains
     if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%fastest_level/sinking_allowed)
   end function velocity_error_criterion
 
-  !> E with a weight on L, and at most D times the mean violation, so many times, where the depth D is known [m/s].
+  !> E with a weight on L [m/s].
   pure real(dp) function velocity_error_wave(self, weight_of_levels) result(wave)
     class(velocity_error_t), intent(in) :: self
     real(dp), intent(in) :: weight_of_levels
 
     wave = hypot(self%weight*self%projection, weight_of_levels*self%levels)
-    if (self%most_depth > 0 .and. self%is_assessed) wave = min(wave, &
-      & weight_of_levels*most_waves*self%most_depth*self%mean_violation)
   end function velocity_error_wave
 
   !> Whether C alone says that what moves is no more than what may where all could rest.
@@ -228,7 +219,7 @@ contains
     estimate = min(self%bound_by_rest, self%wave(1.0_dp))
   end function velocity_error_estimate
 
-  !> C, Y, the mean and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
+  !> C, Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
   !> the contacts and one reduction. Collective.
   subroutine velocity_error_assess(self, problem, scheme, iteration, residual, defect)
     class(velocity_error_t), intent(inout) :: self
@@ -272,14 +263,11 @@ contains
     call stop_timer(phase_reduction)
     call problem%take_residual(sums(1:n_residual_sums), residual, defect)
     call self%bound(problem)
-    if (iteration >= settled .and. self%most_depth < 0) call self%find_depth(problem)
     self%is_assessed = .true.
     self%largest_violation = sqrt(largest(1))
     self%projection = 0.0_dp
     if (self%mass > 0.0_dp) self%projection = &
-      & sqrt(projection_of(sums(at_powers + 1:at_means), sums(at_products + 1:))/self%mass)
-    self%mean_violation = 0.0_dp
-    if (sums(at_means + 2) > 0.0_dp) self%mean_violation = sqrt(max(0.0_dp, sums(at_means + 1))/sums(at_means + 2))
+      & sqrt(projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:))/self%mass)
 
   contains
 
@@ -301,7 +289,7 @@ contains
       type(error_part_t), intent(inout) :: part
       real(dp), intent(in), contiguous :: previous(:, :, :)
       integer, intent(in) :: a, z, at
-      real(dp) :: found(n_tests + 5)
+      real(dp) :: found(3 + n_tests)
 
       call problem%kernels%make_tests(sub%pair(:, (a - 1)*lanes + 1:z*lanes), sub%hot(:, :, a:z), sub%inverse_mass, &
         & sub%v_global, sub%impulse(:, :, a:z), previous(:, :, a:z), part%power(:, a:z), part%local, part%recent, found, largest(1))
