@@ -93,7 +93,8 @@ contains
     end if
     call comm%agree(error)
     if (allocated(error)) return
-    access = parallel_access(comm, .true.)
+    ! with headers of version 1.8 the room for chunks is kept in an object of HDF5's own that tells when it was made
+    access = parallel_access(comm, .not. present(chunks))
     call h5pcreate_f(H5P_FILE_CREATE_F, creation, ignored)
     call h5pset_obj_track_times_f(creation, .false., ignored)
     call ask_for_one_block(creation, members_of_root)

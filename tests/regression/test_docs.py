@@ -186,7 +186,7 @@ class Links(unittest.TestCase):
                 count += 1
                 with self.subTest(page=page.name, procedure=name):
                     text = (page.parent / path).read_text(encoding="utf-8")
-                    definition = rf"(?im)^ *[^!\n]*(?:\bsubroutine +|\bfunction +|\btype\b[^!\n]*:: *){name}\b"
+                    definition = rf"(?im)^ *[^!\n]*(?:\bsubroutine +|\bfunction +|\binterface +|\btype\b[^!\n]*:: *){name}\b"
                     self.assertTrue(re.search(definition, text), f"{page.name}: {name} is not defined in {path}")
         self.assertGreater(count, 50)
 
