@@ -25,6 +25,7 @@ program test_velocity_error
   call test_share(1)
   call test_share(4)
   call test_exact()
+  call test_decomposition()
   call test_layers(1)
   call test_layers(4)
   call finish_checks()
@@ -140,6 +141,50 @@ contains
     call check_close(defect, alone_defect, 1e-12_dp*alone_defect, "defect")
     call sim%free()
   end subroutine test_share
+
+  !> Impulses that are wrong from contact to contact: all parts of the estimate are the same in one subdomain and in several.
+  subroutine test_decomposition()
+    real(dp) :: one(4), four(4)
+    integer :: k
+
+    call assess_wrong(1, one)
+    call assess_wrong(4, four)
+    do k = 1, size(one)
+      call check_close(four(k), one(k), 1e-10_dp*one(k), "part "//to_text(k)//" of the estimate in four subdomains")
+    end do
+  end subroutine test_decomposition
+
+  !> Y, L, the largest violation and the residual.
+  subroutine assess_wrong(n_subdomains, found)
+    integer, intent(in) :: n_subdomains
+    real(dp), intent(out) :: found(4)
+    integer, parameter :: count = 40
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    real(dp) :: defect
+    integer :: s, g, q
+
+    call make(count, n_subdomains, sim)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    call set_impulses(sim%problem, count, 0.9_dp)
+    do s = 1, size(sim%problem%sub)
+      associate (impulse => sim%problem%sub(s)%impulse)
+        do g = 1, size(impulse, 3)
+          do q = 1, size(impulse, 1)
+            ! larger and smaller in turn, by the size of the impulse itself
+            impulse(q, 1, g) = impulse(q, 1, g)*(1.0_dp + 0.3_dp*sin(impulse(q, 1, g)/(mass*gravity*step)))
+          end do
+        end do
+      end associate
+    end do
+    call sim%problem%evaluate()
+    call velocity%assess(sim%problem, sim%scheme, 0, found(4), defect)
+    call velocity%add_levels(sim%problem)
+    found(1) = velocity%projection
+    found(2) = velocity%levels
+    found(3) = velocity%largest_violation
+    call sim%free()
+  end subroutine assess_wrong
 
   !> The exact impulses: nothing is left.
   subroutine test_exact()
