@@ -1,7 +1,7 @@
 !> Figures, drawn by the Python scripts of the drivers.
 module gravier_drawing
   use gravier_errors, only: error_t, raise, status_failure
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, shell_word
   use gravier_file_system, only: remove_file
   use gravier_command_line, only: argument
   use gravier_build_info, only: drivers_directory, share_directory
@@ -28,10 +28,10 @@ contains
     call remove_file(directory//"/"//name//".svg")
     script = "plot_"//name//".py"
     status = 0
-    call execute_command_line("program=$(command -v "//quoted(argument(0))//"); program=$(readlink -f ""$program""); "// &
-      & "script=$(dirname ""$program"")/"//quoted(share_directory//"/"//script)//"; [ -e ""$script"" ] || script="// &
-      & quoted(drivers_directory//"/"//script)//"; for python in ""$GRAVIER_PYTHON"" python3 /usr/bin/python3; do "// &
-      & """$python"" -c 'import matplotlib' >/dev/null 2>&1 && exec ""$python"" ""$script"" "//quoted(directory)// &
+    call execute_command_line("program=$(command -v "//shell_word(argument(0))//"); program=$(readlink -f ""$program""); "// &
+      & "script=$(dirname ""$program"")/"//shell_word(share_directory//"/"//script)//"; [ -e ""$script"" ] || script="// &
+      & shell_word(drivers_directory//"/"//script)//"; for python in ""$GRAVIER_PYTHON"" python3 /usr/bin/python3; do "// &
+      & """$python"" -c 'import matplotlib' >/dev/null 2>&1 && exec ""$python"" ""$script"" "//shell_word(directory)// &
       & "; done; exit "//to_text(no_python), exitstat=status, cmdstat=failed)
     if (failed /= 0) then
       call raise(error, status_failure, "the figure is NOT drawn: no shell could be started")
@@ -42,22 +42,5 @@ contains
         & to_text(status))
     end if
   end subroutine draw_figure
-
-  !> A text as one word of the shell.
-  pure function quoted(text) result(word)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: word
-    integer :: i
-
-    word = "'"
-    do i = 1, len(text)
-      if (text(i:i) == "'") then
-        word = word//"'\''"
-      else
-        word = word//text(i:i)
-      end if
-    end do
-    word = word//"'"
-  end function quoted
 
 end module gravier_drawing

@@ -3,7 +3,7 @@ module gravier_text
   use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: to_text, lower, growing_text_t
+  public :: to_text, lower, shell_word, growing_text_t
 
   !> Shortest usual text of a number: integers without blanks, reals with 9 significant digits
   !> or as many as asked, logicals as T or F.
@@ -101,5 +101,22 @@ contains
       low(i:i) = achar(c)
     end do
   end function lower
+
+  !> A text as one word of the shell, whatever it holds.
+  pure function shell_word(text) result(word)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: word
+    integer :: i
+
+    word = "'"
+    do i = 1, len(text)
+      if (text(i:i) == "'") then
+        word = word//"'\''"
+      else
+        word = word//text(i:i)
+      end if
+    end do
+    word = word//"'"
+  end function shell_word
 
 end module gravier_text

@@ -5,10 +5,11 @@ module gravier_output_lock
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_loc, c_short, c_size_t
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
-  use gravier_text, only: to_text
+  use gravier_pause, only: pause_for
+  use gravier_text, only: to_text, shell_word
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: place_of, place_of_open, is_device, host_name, remove_file
-  use gravier_system_calls, only: c_close, c_fcntl, c_ftruncate, c_getpid, c_open, c_read, c_usleep, c_write, c_text, &
+  use gravier_system_calls, only: c_close, c_fcntl, c_ftruncate, c_getpid, c_open, c_read, c_write, c_text, &
     & last_error, reason, range_lock_t, set_lock, lock_exclusive, lock_shared, o_rdonly, o_rdwr, o_creat, o_cloexec, &
     & file_mode, eacces, eagain, eintr, enolck, enosys, eopnotsupp
   implicit none
@@ -77,7 +78,7 @@ contains
     character(len=*), intent(in) :: place, path
     character(len=*), intent(in) :: program
     type(error_t), allocatable, intent(inout) :: error
-    integer(c_int) :: number, ignored
+    integer(c_int) :: number
     integer :: look
 
     if (allocated(error)) return
@@ -87,7 +88,7 @@ contains
       do look = 1, looks
         call try(self, number)
         if (number /= eagain) exit
-        ignored = c_usleep(pause)
+        call pause_for(pause)
       end do
       if (number == eagain) then
         call raise(error, status_input, place//": "//holder(path))
@@ -197,7 +198,7 @@ contains
       text = "another program writes here: "//program
     else
       text = "another program writes here: "//program//" on "//host//"; if that one is no more, this clears its lock: rm "// &
-        & quoted(path)
+        & shell_word(path)
     end if
     text = text//"; expected a place that no other program writes to"
   end function holder
@@ -217,23 +218,6 @@ contains
     if (length > 0) note = buffer(1:length)
     ignored = c_close(descriptor)
   end function note_of
-
-  !> A path as one word of the shell.
-  pure function quoted(path) result(word)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: word
-    integer :: i
-
-    word = "'"
-    do i = 1, len(path)
-      if (path(i:i) == "'") then
-        word = word//"'\''"
-      else
-        word = word//path(i:i)
-      end if
-    end do
-    word = word//"'"
-  end function quoted
 
   !> Release the lock and remove its file, once all ranks have come here; without effect where none is held.
   subroutine output_lock_release(self)

@@ -6,7 +6,7 @@ module gravier_system_calls
   private
   public :: c_mkdir, c_rename, c_unlink, c_rmdir, c_open, c_creat, c_close, c_write, c_lseek, c_fsync, c_ftruncate
   public :: c_fallocate, c_fstatvfs, c_glob, c_globfree, c_getpid, c_isatty, c_readlink, c_errno_location, c_strerror
-  public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_usleep, c_window_size
+  public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_window_size
   public :: ask_window_size, o_rdonly, o_wronly, o_rdwr, o_creat, o_nonblock, o_cloexec, file_mode, directory_mode
   public :: falloc_fl_keep_size, falloc_fl_punch_hole, seek_set, seek_end, statvfs_words, glob_words
   public :: at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word
@@ -224,12 +224,6 @@ module gravier_system_calls
       type(c_ptr), value :: name
       integer(c_size_t), value :: room
     end function c_gethostname
-
-    integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: microseconds
-    end function c_usleep
   end interface
 
 contains

@@ -11,6 +11,7 @@ module gravier_communicator
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, status_failure
+  use gravier_pause, only: pause_for
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -59,12 +60,6 @@ module gravier_communicator
       implicit none
       integer(c_int), value :: status
     end subroutine c_exit_now
-
-    integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: microseconds
-    end function c_usleep
   end interface
 
   !> between start_parallel and stop_parallel
@@ -140,14 +135,13 @@ contains
     class(communicator_t), intent(in) :: self
     integer(c_int), parameter :: nap = 2000_c_int
     type(MPI_Request) :: request
-    integer(c_int) :: ignored
     logical :: done
 
     call MPI_Ibarrier(self%mpi, request)
     do
       call MPI_Test(request, done, MPI_STATUS_IGNORE)
       if (done) exit
-      ignored = c_usleep(nap)
+      call pause_for(nap)
     end do
   end subroutine communicator_barrier_asleep
 

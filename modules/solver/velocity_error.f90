@@ -169,8 +169,8 @@ contains
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
-  !> Whether no contact violates its law by more than what is allowed, told by the velocities of the
-  !> bodies alone: where everything prescribed is at rest, a violation is at most twice the largest of them. Collective.
+  !> Whether no contact violates its law by more than what is allowed, told by the velocities of the bodies alone: where everything
+  !> prescribed is at rest, a violation is at most twice the largest of them. Collective.
   logical function velocity_error_excludes_violations(self, problem) result(excludes)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
@@ -241,6 +241,7 @@ contains
         end if
         part%local(:, :) = 0.0_dp
         part%recent(:, :) = 0.0_dp
+        if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
         if (sub%n_contacts == 0) cycle
         ! without earlier impulses the third test impulse is 0, which tells nothing
         if (scheme%momentum%on .and. iteration > 0) then
@@ -250,7 +251,6 @@ contains
         else
           call test(sub, part, sub%impulse)
         end if
-        if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
       end associate
     end do
     if (problem%n_subdomains > 1) call sum_motions(problem, self%part)
@@ -508,6 +508,7 @@ contains
     !> those of a pass over layers
     logical, intent(in) :: layered
 
+    self%is_assessed = .false.
     self%weight = merge(weight_after_layers, weight_of_projection, layered)
     self%taken_at = 0
     self%next_copy = iteration + first_copy
