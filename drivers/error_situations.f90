@@ -374,12 +374,12 @@ contains
       row%mass = velocity%mass
       if (.not. row%residual > 0.0_dp) return
       ! a solve finds the depths when it asks for them
-      velocity%most_depth = -1
+      velocity%levels%most_depth = -1
       call velocity%add_levels(problem)
       row%estimate = velocity%estimate()
       row%projection = velocity%projection
-      row%levels = velocity%levels
-      row%depth = velocity%most_depth
+      row%levels = velocity%levels%error
+      row%depth = velocity%levels%most_depth
     end associate
   end subroutine look
 

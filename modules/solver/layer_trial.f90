@@ -79,9 +79,9 @@ contains
     if (self%wants_first .and. iteration == copies_ready) &
       & call try(self, problem, scheme, velocity, iteration, much, deep, anew, error)
     if (allocated(error)) return
-    if (self%may_try .and. velocity%most_depth < 0 .and. iteration >= many) call velocity%find_depth(problem)
-    if (self%may_try .and. velocity%most_depth > very_deep .and. iteration >= self%ends .and. &
-      & (self%layered .or. iteration > late*velocity%most_depth)) &
+    if (self%may_try .and. velocity%levels%most_depth < 0 .and. iteration >= many) call velocity%levels%find_depth(problem)
+    if (self%may_try .and. velocity%levels%most_depth > very_deep .and. iteration >= self%ends .and. &
+      & (self%layered .or. iteration > late*velocity%levels%most_depth)) &
       & call try(self, problem, scheme, velocity, iteration, allowed, very_deep, anew, error)
   end subroutine layer_trial_advance
 
@@ -99,8 +99,8 @@ contains
     real(dp) :: sweeps
     integer :: s
 
-    if (velocity%most_depth < 0) call velocity%find_depth(problem)
-    if (velocity%most_depth < nearly*least_way) then
+    if (velocity%levels%most_depth < 0) call velocity%levels%find_depth(problem)
+    if (velocity%levels%most_depth < nearly*least_way) then
       self%may_try = .false.
       return
     end if
@@ -135,7 +135,7 @@ contains
     call velocity%complete(problem, scheme, iteration)
     if (velocity%criterion() < worth_keeping*self%error_before) then
       ! what errors of the layers have left, another pass lowers again
-      self%may_try = velocity%most_depth > very_deep
+      self%may_try = velocity%levels%most_depth > very_deep
       return
     end if
     self%layered = .false.

@@ -242,14 +242,14 @@ contains
       if (is_met) return
       if (.not. velocity%is_assessed) then
         if (velocity%rests()) then
-          is_met = velocity%excludes_violations(problem)
+          is_met = velocity%all_are_slow(problem)
           if (is_met) return
         else if (report%iterations < copies_ready) then
           return
         end if
         call velocity%assess(problem, scheme, report%iterations, report%residual, defect)
       end if
-      if (velocity%criterion() <= limit .and. .not. velocity%rests()) call velocity%add_levels(problem)
+      if (velocity%criterion() <= limit) call velocity%add_levels(problem)
       report%velocity_error = velocity%estimate()
       is_met = velocity%criterion() <= limit
     end function velocity_is_met
@@ -338,8 +338,8 @@ contains
       call stagnation%note(problem, report%iterations, report%figure, scheme%momentum%on, &
         & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
       if (.not. due) return
-      if (velocity%most_depth < 0) call velocity%find_depth(problem)
-      call stagnation%judge(problem, report%iterations, velocity%most_depth, has_stagnated, in_vain)
+      if (velocity%levels%most_depth < 0) call velocity%levels%find_depth(problem)
+      call stagnation%judge(problem, report%iterations, velocity%levels%most_depth, has_stagnated, in_vain)
       if (in_vain) then
         report%status = solve_unbounded
       else

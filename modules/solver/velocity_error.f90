@@ -6,34 +6,35 @@
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
 !>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those one
 !>      iteration before with momentum, which keeps them; else those of some iterations before.
-!>   L  sum over levels. The depth of a body is the number of contacts to the nearest boundary that supports it. The power
-!>      of the violations between two levels over the force that crosses, 0.65 being the mean cosine between a normal and the
-!>      way down, is the velocity by which all that lies above sinks: s_l = sum r . w/(0.65 sum r_n), e_l = s_1 + ... + s_l,
-!>      L^2 = sum m_l e_l^2.
+!>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
 !>      (gravier_layered_start) long waves are gone, and a = 1.7.
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
-!> All are divided by the root of the mass. See doc/theory.md, section 24.
+!> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its law by
+!> much, and no body sink by much onto what is below it. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes
   use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
   use gravier_scheme, only: scheme_t
-  use gravier_supports, only: supports_t, find_supports
-  use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
+  use gravier_levels, only: levels_t
   implicit none
   private
   public :: velocity_error_t, copies_ready, violations_allowed
 
-  !> weight of Y in the estimate; mean cosine between normals and the way down
-  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp, cosine = 0.65_dp
+  !> weight of Y in the estimate
+  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp
   !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
   real(dp), parameter :: violations_allowed = 5.0_dp
+  !> times the error allowed by which a body may sink, and by which bodies may on average, each counting the same
+  real(dp), parameter :: body_allowed = 5.0_dp, bodies_allowed = 1.0_dp
+  !> share of the bodies that have as much mass as all, were they as heavy as the mean of the mass, below which masses are uneven
+  real(dp), parameter :: even_share = 0.25_dp
   !> times the error allowed by which what lies above a level may sink where what moves is at most so many times the error allowed
   real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
   !> share of the square of a test's velocity below which what the others have left of it counts as 0
@@ -47,23 +48,15 @@ module gravier_velocity_error
     & n_sums = at_products + n_tests*(n_tests + 1)/2
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
-  !> rows that take turns in sums by level
-  integer, parameter :: turns = 4
-  !> depth of what no way leads to a boundary from
-  integer, parameter :: afloat = -1
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
 
   !> What the estimate holds for one subdomain.
   type :: error_part_t
-    !> r . w of each contact (lanes, blocks) [J]
-    real(dp), allocatable :: power(:, :)
     !> H y of the tests w/W and r less earlier impulses, summed over copies of bodies (nv, n_columns) [N s, N m s]
     real(dp), allocatable :: local(:, :), recent(:, :)
     !> earlier impulses where the method keeps none (lanes, nc, blocks) [N s]
     real(dp), allocatable :: previous(:, :, :)
-    !> contacts to a support, of each body (n_columns)
-    integer, allocatable :: depth(:)
   end type error_part_t
 
   type :: velocity_error_t
@@ -73,18 +66,20 @@ module gravier_velocity_error
     real(dp), private :: allowed = 0.0_dp
     !> whether Y and the largest violation are known
     logical :: is_assessed = .false.
-    !> C, Y and L, as far as they are known, by the last `bound` or `assess` and `add_levels` [m/s]
-    real(dp) :: bound_by_rest = unknown, projection = unknown, levels = 0.0_dp
+    !> C and Y, as far as they are known, by the last `bound` or `assess` [m/s]
+    real(dp) :: bound_by_rest = unknown, projection = unknown
+    !> L and how fast bodies sink, by the last `add_levels`; 0 since `bound`
+    type(levels_t) :: levels
     !> weight of Y
     real(dp) :: weight = weight_of_projection
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
-    !> largest |e_l| of a level, by the last `add_levels`; 0 since `bound` [m/s]
-    real(dp) :: fastest_level = 0.0_dp
-    !> largest depth; negative while it is not known
-    integer :: most_depth = -1
     !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
     integer, private :: taken_at = 0, next_copy = first_copy
+    !> whether few heavy bodies have most of the mass
+    logical, private :: is_uneven = .false.
+    !> whether it is known how fast bodies sink
+    logical, private :: has_followed = .false.
     type(error_part_t), allocatable, private :: part(:)
   contains
     procedure :: start => velocity_error_start
@@ -97,8 +92,7 @@ module gravier_velocity_error
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
     procedure, private :: wave => velocity_error_wave
-    procedure :: excludes_violations => velocity_error_excludes_violations
-    procedure :: find_depth => velocity_error_find_depth
+    procedure :: all_are_slow => velocity_error_all_are_slow
     procedure :: begin_anew => velocity_error_begin_anew
   end type velocity_error_t
 
@@ -110,22 +104,26 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     !> error [m/s]
     real(dp), intent(in) :: allowed
-    !> mass of the grains, of all bodies that can move
-    real(dp) :: parts(2, size(problem%sub)), sums(2), heavy
+    !> mass of the grains, of all bodies that can move; squares of the grains' masses, number of grains
+    real(dp) :: parts(4, size(problem%sub)), sums(4), heavy
     logical :: moves
     integer :: s, b
 
     self%allowed = allowed
     allocate (self%part(size(problem%sub)))
+    call self%levels%start(problem)
     parts(:, :) = 0.0_dp
     moves = .false.
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), nd => problem%kernels%nd)
         do b = 1, sub%n_bodies
           if (.not. any(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
-          heavy = 1.0_dp/(maxval(sub%inverse_mass(1:nd, b))*sub%multiplicity(b))
-          if (b <= sub%n_grains) parts(1, s) = parts(1, s) + heavy
-          parts(2, s) = parts(2, s) + heavy
+          heavy = 1.0_dp/maxval(sub%inverse_mass(1:nd, b))
+          parts(2, s) = parts(2, s) + heavy/sub%multiplicity(b)
+          if (b > sub%n_grains) cycle
+          parts(1, s) = parts(1, s) + heavy/sub%multiplicity(b)
+          parts(3, s) = parts(3, s) + heavy**2/sub%multiplicity(b)
+          parts(4, s) = parts(4, s) + 1.0_dp/sub%multiplicity(b)
         end do
         moves = moves .or. any(abs(sub%v_free(:, sub%n_bodies + 1:)) > 0.0_dp)
         if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
@@ -135,6 +133,7 @@ contains
     end do
     call problem%comm%sum_parts(parts, sums)
     self%mass = merge(sums(1), sums(2), sums(1) > 0.0_dp)
+    self%is_uneven = sums(1)**2 < even_share*sums(3)*sums(4)
     problem%rest_is_admissible = .not. problem%comm%any_true(moves)
   end subroutine velocity_error_start
 
@@ -162,19 +161,19 @@ contains
     self%is_assessed = .false.
     self%bound_by_rest = unknown
     self%projection = unknown
-    self%levels = 0.0_dp
+    call self%levels%forget()
+    self%has_followed = .false.
     self%largest_violation = 0.0_dp
-    self%fastest_level = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
   end subroutine velocity_error_bound
 
-  !> Whether no contact violates its law by more than what is allowed, told by the velocities of the bodies alone: where everything
-  !> prescribed is at rest, a violation is at most twice the largest of them. Collective.
-  logical function velocity_error_excludes_violations(self, problem) result(excludes)
+  !> Whether no contact violates its law and no body sinks by more than what is allowed, told by the velocities of the bodies alone:
+  !> where everything prescribed is at rest, a violation is at most twice the largest of them. Collective.
+  logical function velocity_error_all_are_slow(self, problem) result(are_slow)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp) :: fastest, rim
+    real(dp) :: fastest, rim, limit
     integer :: s, b
 
     fastest = 0.0_dp
@@ -187,16 +186,20 @@ contains
         end do
       end associate
     end do
-    excludes = 2.0_dp*problem%comm%highest(fastest) <= violations_allowed*self%allowed
-  end function velocity_error_excludes_violations
+    limit = merge(bodies_allowed, min(violations_allowed, body_allowed), self%is_uneven)*self%allowed
+    are_slow = 2.0_dp*problem%comm%highest(fastest) <= limit
+  end function velocity_error_all_are_slow
 
   !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
-  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much.
+  !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much,
+  !> and no body sink by much.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
     criterion = max(self%largest_violation/violations_allowed, &
       & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
-    if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%fastest_level/sinking_allowed)
+    if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%levels%fastest/sinking_allowed)
+    if (self%has_followed) criterion = max(criterion, self%levels%fastest_body/body_allowed, &
+      & self%levels%mean_of_bodies/bodies_allowed)
   end function velocity_error_criterion
 
   !> E with a weight on L [m/s].
@@ -204,7 +207,7 @@ contains
     class(velocity_error_t), intent(in) :: self
     real(dp), intent(in) :: weight_of_levels
 
-    wave = hypot(self%weight*self%projection, weight_of_levels*self%levels)
+    wave = hypot(self%weight*self%projection, weight_of_levels*self%levels%error)
   end function velocity_error_wave
 
   !> Whether C alone says that what moves is no more than what may where all could rest.
@@ -237,7 +240,7 @@ contains
       associate (sub => problem%sub(s), part => self%part(s))
         if (.not. allocated(part%local)) then
           allocate (part%local(problem%kernels%nv, sub%n_columns), part%recent(problem%kernels%nv, sub%n_columns))
-          allocate (part%power(lanes, size(sub%hot, 3)))
+          allocate (self%levels%part(s)%power(lanes, size(sub%hot, 3)))
         end if
         part%local(:, :) = 0.0_dp
         part%recent(:, :) = 0.0_dp
@@ -292,7 +295,8 @@ contains
       real(dp) :: found(3 + n_tests)
 
       call problem%kernels%make_tests(sub%pair(:, (a - 1)*lanes + 1:z*lanes), sub%hot(:, :, a:z), sub%inverse_mass, &
-        & sub%v_global, sub%impulse(:, :, a:z), previous(:, :, a:z), part%power(:, a:z), part%local, part%recent, found, largest(1))
+        & sub%v_global, sub%impulse(:, :, a:z), previous(:, :, a:z), self%levels%part(s)%power(:, a:z), part%local, part%recent, &
+        & found, largest(1))
       parts(at + 1:at + 3, s) = found(1:3)
       parts(at_powers + 1:at_products, s) = parts(at_powers + 1:at_products, s) + found(4:)
     end subroutine test_blocks
@@ -396,55 +400,18 @@ contains
 
   end subroutine add_products
 
-  !> L, after `assess`. Collective.
+  !> L, after `assess`; and how fast each body sinks, where all else is within the error allowed and bounds do not tell enough. Where few
+  !> heavy bodies have most of the mass, E says little of the others. Collective.
   subroutine velocity_error_add_levels(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    !> of each level: power r . w, force sum r_n, mass of its bodies (3 levels, subdomains)
-    real(dp), allocatable :: parts(:, :), sums(:)
-    !> power and force of the levels from 0, for what lies in none, in rows that take turns: additions do not wait for each other
-    real(dp), allocatable :: crossing(:, :, :)
-    real(dp) :: sinking, squares
-    integer :: s, b, l, n, i, j, q, g, turn
 
-    if (self%most_depth < 0) call self%find_depth(problem)
-    self%levels = 0.0_dp
-    n = self%most_depth
-    if (n < 1) return
-    allocate (parts(3*n, size(problem%sub)), sums(3*n), crossing(2, turns, 0:n))
-    parts(:, :) = 0.0_dp
-    do s = 1, size(problem%sub)
-      crossing(:, :, :) = 0.0_dp
-      associate (sub => problem%sub(s), part => self%part(s))
-        do g = 1, size(sub%hot, 3)
-          do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
-            i = part%depth(sub%pair(1, (g - 1)*lanes + q))
-            j = part%depth(sub%pair(2, (g - 1)*lanes + q))
-            l = merge(max(i, j), 0, abs(i - j) == 1 .and. min(i, j) /= afloat)
-            turn = mod(q, turns) + 1
-            crossing(1, turn, l) = crossing(1, turn, l) + part%power(q, g)
-            crossing(2, turn, l) = crossing(2, turn, l) + sub%impulse(q, 1, g)
-          end do
-        end do
-        parts(1:n, s) = sum(crossing(1, :, 1:), dim=1)
-        parts(n + 1:2*n, s) = sum(crossing(2, :, 1:), dim=1)
-        do b = 1, sub%n_grains
-          l = part%depth(b)
-          if (l > 0) parts(2*n + l, s) = parts(2*n + l, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
-        end do
-      end associate
-    end do
-    call start_timer(phase_reduction)
-    call problem%comm%sum_parts(parts, sums)
-    call stop_timer(phase_reduction)
-    sinking = 0.0_dp
-    squares = 0.0_dp
-    do l = 1, n
-      if (sums(n + l) > 0.0_dp) sinking = sinking + sums(l)/(cosine*sums(n + l))
-      self%fastest_level = max(self%fastest_level, abs(sinking))
-      squares = squares + sums(2*n + l)*sinking**2
-    end do
-    if (self%mass > 0.0_dp) self%levels = sqrt(squares/self%mass)
+    call self%levels%add(problem, self%mass, self%largest_violation)
+    self%has_followed = .false.
+    if (self%criterion() > self%allowed) return
+    if (self%levels%fastest_body <= merge(bodies_allowed, body_allowed, self%is_uneven)*self%allowed) return
+    call self%levels%follow(problem, self%largest_violation)
+    self%has_followed = .true.
   end subroutine velocity_error_add_levels
 
   !> The whole estimate, with v_global and the reactions evaluated. Collective.
@@ -458,47 +425,6 @@ contains
     if (.not. self%is_assessed) call self%assess(problem, scheme, iteration, residual, defect)
     call self%add_levels(problem)
   end subroutine velocity_error_complete
-
-  !> Depth of every body: contacts to the nearest boundary that supports, over contacts that press or are closed; in parts without
-  !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks. Collective.
-  subroutine velocity_error_find_depth(self, problem)
-    class(velocity_error_t), intent(inout) :: self
-    type(contact_problem_t), intent(inout) :: problem
-    type(supports_t), allocatable :: supports(:)
-    type(ways_t) :: ways(size(self%part))
-    real(dp) :: most
-    integer :: s, b, round
-    logical :: starts
-
-    call find_supports(problem, supports)
-    call list_closed(problem, ways)
-    do round = 1, 3
-      starts = .false.
-      do s = 1, size(ways)
-        associate (sub => problem%sub(s), length => ways(s)%length)
-          do b = sub%n_grains + 1, sub%n_columns
-            if (length(b) < unreached) cycle
-            if (round == 1 .and. .not. supports(s)%column(b)) cycle
-            if (round == 2 .and. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) cycle
-            length(b) = 0.0_dp
-            starts = .true.
-          end do
-        end associate
-      end do
-      if (problem%comm%any_true(starts)) call shorten_ways(problem, ways)
-    end do
-    most = 0.0_dp
-    do s = 1, size(ways)
-      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
-      do b = 1, size(ways(s)%length)
-        self%part(s)%depth(b) = afloat
-        if (.not. ways(s)%length(b) < unreached) cycle
-        self%part(s)%depth(b) = nint(ways(s)%length(b))
-        most = max(most, ways(s)%length(b))
-      end do
-    end do
-    self%most_depth = nint(problem%comm%highest(most))
-  end subroutine velocity_error_find_depth
 
   !> The iterations begin anew from other impulses.
   subroutine velocity_error_begin_anew(self, iteration, layered)

@@ -131,9 +131,12 @@ contains
     ! the disk on the ground violates its law by what it falls with, the others by nothing
     call check_close(velocity%largest_violation, expected, 1e-9_dp*expected, "largest violation")
     call velocity%add_levels(sim%problem)
-    call check_equal(velocity%most_depth, count, "depth")
+    call check_equal(velocity%levels%most_depth, count, "depth")
     ! the power at the ground over 0.65 of its force is what all sink with
-    call check_close(velocity%levels, expected/0.65_dp, 1e-9_dp*expected, "L of a uniform velocity")
+    call check_close(velocity%levels%error, expected/0.65_dp, 1e-9_dp*expected, "L of a uniform velocity")
+    call velocity%levels%follow(sim%problem, velocity%largest_violation)
+    call check_close(velocity%levels%fastest_body, expected/0.65_dp, 1e-9_dp*expected, "each disk sinks by as much")
+    call check_close(velocity%levels%mean_of_bodies, expected/0.65_dp, 1e-9_dp*expected, "mean over disks that sink by as much")
     call check_close(velocity%estimate(), expected, 1e-9_dp*expected, "estimate")
     ! the residual of an assessment is that of the problem
     call sim%problem%residual(alone, alone_defect)
@@ -144,7 +147,7 @@ contains
 
   !> Impulses that are wrong from contact to contact: all parts of the estimate are the same in one subdomain and in several.
   subroutine test_decomposition()
-    real(dp) :: one(4), four(4)
+    real(dp) :: one(6), four(6)
     integer :: k
 
     call assess_wrong(1, one)
@@ -154,10 +157,10 @@ contains
     end do
   end subroutine test_decomposition
 
-  !> Y, L, the largest violation and the residual.
+  !> Y, L, the largest violation, the residual, how fast the fastest body sinks and how fast bodies do in the mean.
   subroutine assess_wrong(n_subdomains, found)
     integer, intent(in) :: n_subdomains
-    real(dp), intent(out) :: found(4)
+    real(dp), intent(out) :: found(6)
     integer, parameter :: count = 40
     type(simulation_t) :: sim
     type(velocity_error_t) :: velocity
@@ -181,8 +184,11 @@ contains
     call velocity%assess(sim%problem, sim%scheme, 0, found(4), defect)
     call velocity%add_levels(sim%problem)
     found(1) = velocity%projection
-    found(2) = velocity%levels
+    found(2) = velocity%levels%error
     found(3) = velocity%largest_violation
+    call velocity%levels%follow(sim%problem, velocity%largest_violation)
+    found(5) = velocity%levels%fastest_body
+    found(6) = velocity%levels%mean_of_bodies
     call sim%free()
   end subroutine assess_wrong
 
