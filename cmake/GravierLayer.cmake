@@ -11,12 +11,11 @@ endfunction()
 
 set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds; empty: none")
 
-# gravier_layer(NAME [USES LOWER] [LIBRARIES ...]): the static library gravier_NAME of modules/NAME/*.f90 and modules/NAME/*/*.f90,
-# with a module directory of its own. USES names the next layer below, whose modules and those beneath it are seen.
+# gravier_layer(NAME [USES LOWER] [LIBRARIES ...]): the static library gravier_NAME of all sources in modules/NAME and its rooms, the
+# folders in it, with a module directory of its own. USES names the next layer below, whose modules and those beneath it are seen.
 function(gravier_layer name)
   cmake_parse_arguments(LAYER "" "USES" "LIBRARIES" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.f90 ${PROJECT_SOURCE_DIR}/modules/${name}/*.F90
-    ${PROJECT_SOURCE_DIR}/modules/${name}/*/*.f90)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.f90 ${PROJECT_SOURCE_DIR}/modules/${name}/*.F90)
   set(target gravier_${name})
   add_library(${target} STATIC ${sources})
   add_library(gravier::${name} ALIAS ${target})

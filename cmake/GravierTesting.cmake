@@ -35,7 +35,7 @@ set(gravier_test_environment
 function(gravier_test name)
   cmake_parse_arguments(TEST "" "TIMEOUT;EXPECT" "SOURCES;RANKS;LIBRARIES;LABELS" ${ARGN})
   if(NOT TEST_LIBRARIES)
-    set(TEST_LIBRARIES $<IF:$<TARGET_EXISTS:gravier_app>,gravier_app,gravier_ddm>)
+    set(TEST_LIBRARIES $<IF:$<TARGET_EXISTS:gravier_app>,gravier_app,gravier_step>)
   endif()
   if(NOT TEST_RANKS)
     set(TEST_RANKS 1)

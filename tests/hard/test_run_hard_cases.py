@@ -1,5 +1,5 @@
 """All hard cases by a selection of methods: NSCDD on two ranks, and one of the other methods in turn on one. The table of all
-methods is drivers/study_hard.py."""
+methods is drivers/studies/study_hard.py."""
 import unittest
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Integers of 64 bits become those of 32 in modules/base/narrow.f90 alone: no other source has int() without a kind, and int(x, i4) is for
+"""Integers of 64 bits become those of 32 in modules/base/core/narrow.f90 alone: no other source has int() without a kind, and int(x, i4) is for
 reals, in the files that are named here."""
 import glob
 import os
@@ -7,10 +7,10 @@ import unittest
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
 #: files that make whole numbers of reals, or take bits of a word or an int of C, and how often
-OTHERS = {"modules/base/sorting.f90": 2, "modules/bodies/loose_packing.f90": 1, "modules/bodies/placed_grains.f90": 2,
-          "modules/contact/cell_grid.f90": 1, "modules/ddm/cell_levels.f90": 1, "modules/ddm/cell_map.f90": 4,
-          "modules/ddm/contact_structure.f90": 1, "modules/ddm/graph_partition.f90": 1, "modules/ddm/partition.f90": 2,
-          "modules/io/file_system.f90": 1}
+OTHERS = {"modules/base/core/sorting.f90": 2, "modules/bodies/generation/loose_packing.f90": 1, "modules/bodies/generation/placed_grains.f90": 2,
+          "modules/contact/broad_phase/cell_grid.f90": 1, "modules/domain/partition/cell_levels.f90": 1, "modules/domain/partition/cell_map.f90": 4,
+          "modules/step/diagnostics/contact_structure.f90": 1, "modules/domain/partition/graph_partition.f90": 1, "modules/domain/partition/partition.f90": 2,
+          "modules/io/files/file_system.f90": 1}
 
 
 def conversions(path):
@@ -36,7 +36,7 @@ class Narrowing(unittest.TestCase):
         for folder in ("modules", "src", "drivers"):
             for path in sorted(glob.glob(os.path.join(SOURCE, folder, "**", "*.[fF]90"), recursive=True)):
                 name = os.path.relpath(path, SOURCE)
-                if name == "modules/base/narrow.f90" or name.startswith("modules/solver/"):
+                if name == "modules/base/core/narrow.f90" or name.startswith("modules/solver/"):
                     continue
                 for line, kind in conversions(path):
                     if kind == "":

@@ -19,7 +19,7 @@ from gravier_runs import SOURCE, RunTestCase
 
 import gravier
 
-sys.path.insert(0, os.path.join(SOURCE, "drivers"))
+sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
 import gravier_plot  # noqa: E402
 
 GROUND = {"name": "it's the ground", "shape": "plane", "normal": [0.0, 1.0]}
@@ -54,7 +54,7 @@ class Package(RunTestCase):
         return status, said.getvalue()
 
     def test_command(self):
-        done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/gravier_plot.py"), "--help"], capture_output=True,
+        done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "--help"], capture_output=True,
                               text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("convergence", done.stdout)

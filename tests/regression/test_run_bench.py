@@ -38,7 +38,7 @@ def read(path):
 
 
 def uniform(seed, counter, stream):
-    """hash_uniform of modules/base/random_hash.f90."""
+    """hash_uniform of modules/base/numerics/random_hash.f90."""
     low_half, factor = 0xFFFFFFFF, (0x6C62272E, 0x5BD1E995)
 
     def mix(z):
@@ -58,7 +58,7 @@ def uniform(seed, counter, stream):
 
 def packing(dimension, grains):
     """Centres and radii of the packing of about so many grains, lengths in units of the largest radius, and the grains along
-    each axis, from the description in drivers/bench_packing.f90."""
+    each axis, from the description in drivers/bench/bench_packing.f90."""
     edge = math.sqrt(grains * math.sqrt(0.75)) if dimension == 2 else (grains * math.sqrt(0.5)) ** (1 / 3)
     count = [max(2, round(edge))] * (dimension - 1)
     count.append(max(2, math.ceil(grains / count[0] ** (dimension - 1))))
@@ -241,7 +241,7 @@ class Bench(RunTestCase):
     def test_figures(self):
         """plot_bench.py draws and prints the table, and refuses another."""
         self.table(2)
-        script = os.path.join(SOURCE, "drivers/plot_bench.py")
+        script = os.path.join(SOURCE, "drivers/bench/plot_bench.py")
         done = subprocess.run([sys.executable, script, self.runs[2].path("table.csv"), "--out", self.here("figures")],
                               stderr=subprocess.PIPE)
         self.assertEqual((done.returncode, done.stderr), (0, b""))

@@ -1,4 +1,4 @@
-"""The estimated velocity error beside the true one: the small scenes of drivers/study_error.py that need no packing, with their
+"""The estimated velocity error beside the true one: the small scenes of drivers/studies/study_error.py that need no packing, with their
 bounds, and what gravier_error promises: the program's own estimates, the same table on any number of ranks, refusals in one line.
 
 Estimates are made of a projection and a sum over levels, each good to a factor of about 2; the bounds are those of the study. Where
@@ -9,7 +9,7 @@ import unittest
 
 from gravier_runs import PROGRAMS, SOURCE, RunTestCase, gravier, namelist, write
 
-sys.path.insert(0, os.path.join(SOURCE, "drivers"))
+sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
 os.environ.setdefault("GRAVIER_BIN_DIR", PROGRAMS)
 
 COLUMN = {"scene": {"bodies": "column", "column_count": 30, "radius": 0.005, "mass": 0.2, "friction": 0.5},

@@ -1,4 +1,4 @@
-"""The checksums of Gravier (modules/base/random_hash.f90): of each dataset that it writes whole, as an attribute of it, and of tables in
+"""The checksums of Gravier (modules/base/numerics/random_hash.f90): of each dataset that it writes whole, as an attribute of it, and of tables in
 CSV whose first line has one."""
 import numpy as np
 

@@ -1,0 +1,219 @@
+#!/usr/bin/env python3
+"""Biaxial compression of 5000 disks, Rmax/Rmin = 3 (CEGEO benchmark, 2012): isotropic compaction without friction between
+smooth walls, then compression at constant lateral pressure with friction 0.5.
+
+    python3 drivers/studies/study_biaxial.py OUT        about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+
+leaves OUT/study_biaxial.csv (the stress-strain curve), OUT/study_biaxial_summary.csv and OUT/study_biaxial.png."""
+import argparse
+from pathlib import Path
+
+import numpy as np
+from study_support import draw_disks, loose, plt, radii_by_volume, read_bodies, read_history, run, states, write_csv, write_hdf5
+from whole_file import save_figure
+
+PRESSURE = 1000.0  # N/m
+DENSITY = 2500.0  # kg/m^2
+SMALLEST = 0.005  # m
+STEP = 1.0e-3  # s, to compact
+# A rigid sample that yields runs ahead of its walls and is caught again, with a period of about the speed of the lid over
+# pressure / (density length): a step not far below that period damps it, and the compression is quasi-static. A residual of
+# 1e-3 is too much then: the errors that it leaves in the velocities are to be small beside the speed of the lid, or the disks
+# are pressed into each other, and taken apart by projections, step by step: they creep and bear less.
+SLOW_STEP = 1.0e-2  # s, to come to rest and to compress
+LAYER = 6.0 * SMALLEST  # m, along the walls, where disks lie less densely
+SOLVER = {"acceleration": "none", "criterion": "residual", "tolerance": 1.0e-3, "max_iterations": 400, "check_every": 10}
+
+
+def walls(size, mass, lid):
+    """Floor and left side stay, the right side bears the pressure, the lid is as told."""
+    return [
+        {"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
+        {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
+        {"name": "right", "shape": "plane", "point": [size[0], 0.0], "normal": [-1.0, 0.0], "free": [True, False],
+         "pressure": PRESSURE, "mass": mass},
+        {"name": "lid", "shape": "plane", "point": [0.0, size[1]], "normal": [0.0, -1.0], **lid}]
+
+
+def scene(path, friction, alert):
+    """Without gravity; the walls are smooth."""
+    return {"dimension": 2, "gravity": [0.0, 0.0], "bodies": "file", "bodies_file": path, "density": DENSITY,
+            "friction": friction, "wall_friction": 0.0, "alert_distance": alert}
+
+
+def size_of(state):
+    """Of the box between the walls."""
+    position = state["boundaries/position"][:]
+    return np.array([position[2, 0], position[3, 1]])
+
+
+def pressures(state):
+    """Mean normal stress of the grains on the right side and on the lid."""
+    force, size = state["boundaries/force"][:], size_of(state)
+    return abs(force[2, 0]) / size[1], abs(force[3, 1]) / size[0]
+
+
+def inner_fraction(centres, radii, size, layer):
+    """Share of the box less a layer along its walls that disks fill, by counting points."""
+    steps = 600
+    grid = np.stack(np.meshgrid(*[np.linspace(layer, size[d] - layer, steps) for d in (0, 1)], indexing="ij"), -1).reshape(-1, 2)
+    filled = np.zeros((steps, steps), bool)
+    spacing = (size - 2.0 * layer) / (steps - 1)
+    for centre, radius in zip(centres, radii):
+        low = np.maximum(((centre - radius - layer) / spacing).astype(int), 0)
+        high = np.minimum(((centre + radius - layer) / spacing).astype(int) + 2, steps)
+        if np.any(high <= low):
+            continue
+        view = tuple(slice(low[d], high[d]) for d in (0, 1))
+        points = grid.reshape(steps, steps, 2)[view]
+        filled[view] |= ((points - centre)**2).sum(-1) < radius**2
+    return filled.mean()
+
+
+def coordination(state, n, layer):
+    """Of the grains farther than `layer` from the walls: mean number of loaded contacts, that number without the rattlers,
+    grains that fewer than three others hold (once rattlers are away), and the share of these."""
+    position, size = state["bodies/position"][:], size_of(state)
+    inner = np.all((position > layer) & (position < size - layer), axis=1)
+    impulse = state["contacts/impulse"][:, 0]
+    loaded = impulse > 1e-3 * impulse[impulse > 0.0].mean()
+    a, b = state["contacts/candidate"][:][loaded], state["contacts/antagonist"][:][loaded]
+    number = np.bincount(a, minlength=n + 6) + np.bincount(b, minlength=n + 6)
+    everyone = number[1:n + 1][inner].mean()
+    alive = np.ones(n + 6, bool)
+    while True:
+        keep = alive[a] & alive[b]
+        number = np.bincount(a[keep], minlength=n + 6) + np.bincount(b[keep], minlength=n + 6)
+        lost = alive & (number < 3)
+        lost[0] = lost[n + 1:] = False
+        if not lost[1:n + 1].any():
+            break
+        alive[lost] = False
+    held = alive[1:n + 1] & inner
+    if not held.any():
+        return everyone, 0.0, 1.0
+    return everyone, number[1:n + 1][held].mean(), 1.0 - held.sum() / inner.sum()
+
+
+def compact(options, size, mass):
+    """Press the loose disks of OUT/loose.h5 together, then let them come to rest with exact solves."""
+    free_lid = {"free": [False, True], "pressure": PRESSURE, "mass": mass}
+    run(options.out / "compaction", {
+        "scene": scene("../loose.h5", 0.0, 0.4 * SMALLEST),
+        "time": {"step": STEP, "steps": options.compaction_steps},
+        "solver": SOLVER,
+        "output": {"directory": ".", "every": 0, "final_bodies": True}}, walls(size, mass, free_lid))
+    size = [size_of(state) for _, _, state in states(options.out / "compaction/results.h5")][-1]
+    run(options.out / "rest", {
+        "scene": scene("../compaction/final_bodies.h5", 0.0, 0.2 * SMALLEST),
+        "time": {"step": SLOW_STEP, "steps": 200},
+        "solver": {**SOLVER, "tolerance": 1.0e-5, "max_iterations": 4000},
+        "output": {"directory": ".", "every": 0, "final_bodies": True}}, walls(size, mass, free_lid))
+
+
+def compress(options, centres, radii, size, mass):
+    """Bring the lid down at constant lateral pressure."""
+    write_hdf5(options.out / "compact.h5", centres, radii)
+    speed = options.rate * size[1]
+    steps = int(options.strain / options.rate / SLOW_STEP)
+    run(options.out / "shear", {
+        "scene": scene("../compact.h5", 0.5, 0.2 * SMALLEST),
+        "time": {"step": SLOW_STEP, "steps": steps},
+        "solver": {**SOLVER, "tolerance": options.tolerance, "max_iterations": options.max_iterations,
+                   "acceleration": options.acceleration},
+        "output": {"directory": ".", "every": max(1, steps // 250), "final_bodies": True}},
+        walls(size, mass, {"velocity": [0.0, -speed]}))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--grains", type=int, default=5000)
+    parser.add_argument("--compaction-steps", type=int, default=1500)
+    parser.add_argument("--compacted", action="store_true", help="start from the disks that an earlier run left in OUT/rest")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    parser.add_argument("--rate", type=float, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
+    parser.add_argument("--tolerance", type=float, default=3.0e-5, help="of the solves while the lid comes down")
+    parser.add_argument("--max-iterations", type=int, default=1000)
+    parser.add_argument("--acceleration", choices=["none", "momentum"], default="momentum", help="of the same solves")
+    parser.add_argument("--strain", type=float, default=0.15, help="vertical strain at the end")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    n = options.grains
+    rng = np.random.default_rng(2012)
+    radii = radii_by_volume(n, SMALLEST, 3.0 * SMALLEST, 2, rng)
+    volume = np.pi * (radii**2).sum()
+    size = np.full(2, np.sqrt(volume / 0.58))
+    mass = 10.0 * DENSITY * size[0] * 2.0 * radii.mean()
+    if not (options.compacted or options.measure):
+        write_hdf5(options.out / "loose.h5", loose(radii, [0.0, 0.0], size, rng), radii)
+        compact(options, size, mass)
+    for _, _, state in states(options.out / "rest/results.h5"):
+        if "contacts" in state:
+            last = {"size": size_of(state), "pressure": pressures(state), "coordination": coordination(state, n, LAYER)}
+    centres, _, _ = read_bodies(options.out / "rest/final_bodies.h5")
+    size = last["size"]
+    inner = inner_fraction(centres, radii, size, LAYER)
+    summary = {"solid_fraction_inner": inner, "solid_fraction_box": volume / size.prod(),
+               "coordination_mu0": last["coordination"][1], "coordination_mu0_all": last["coordination"][0],
+               "rattlers_mu0": last["coordination"][2],
+               "pressure_right": last["pressure"][0] / PRESSURE, "pressure_lid": last["pressure"][1] / PRESSURE}
+    print(summary, flush=True)
+
+    if not options.measure:
+        compress(options, centres, radii, size, mass)
+    rows = []
+    for _, _, state in states(options.out / "shear/results.h5"):
+        box = size_of(state)
+        if "contacts" in state and len(state["contacts/impulse"]) > 0:
+            side, top = pressures(state)
+            rows.append((1.0 - box[1] / size[1], box[0] / size[0] - 1.0, top / PRESSURE, side / PRESSURE,
+                         (top - side) / (top + side), volume / box.prod(), coordination(state, n, LAYER)[1]))
+    strain, lateral, top, side, sine, fraction, number = np.array(rows).T
+    write_csv(options.out / "study_biaxial.csv", {"axial_strain": strain, "lateral_strain": lateral, "axial_stress": top,
+        "lateral_stress": side, "sin_phi": sine, "solid_fraction": fraction, "coordination": number})
+    smooth = np.convolve(sine, np.ones(9) / 9.0, "valid")
+    history = read_history(options.out / "shear")
+    # the volume has become constant
+    late = strain > 0.75 * options.strain
+    mean_top, mean_side = top[late].mean(), side[late].mean()
+    summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(),
+                   sin_phi_mean_stresses=(mean_top - mean_side) / (mean_top + mean_side),
+                   solid_fraction_least=fraction.min(), solid_fraction_most=fraction.max(), solid_fraction_last=fraction[-1],
+                   largest_overlap_over_radius=history["max_overlap"].max() / radii.mean(),
+                   median_overlap_over_radius=np.median(history["max_overlap"]) / radii.mean(),
+                   sweeps=history["sweeps"].mean(), converged=history["converged"].mean(),
+                   projected=history["projected"].mean(),
+                   inertial_number=options.rate * 2.0 * radii.mean() * np.sqrt(DENSITY / PRESSURE))
+    write_csv(options.out / "study_biaxial_summary.csv", {"quantity": list(summary),
+              "value": [float(value) for value in summary.values()]})
+    print(summary)
+    draw(options.out, strain, sine, fraction, centres, radii)
+
+
+def draw(out, strain, sine, fraction, start, radii):
+    """Stress and solid fraction against strain; how far the disks have turned shows where shear has gone."""
+    end, _, _ = read_bodies(out / "shear/final_bodies.h5")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.6), layout="constrained")
+    left.axhspan(0.25, 0.30, color="0.9", label="CEGEO, large strain")
+    left.plot(strain, sine, linewidth=0.8, color="#08519c")
+    left.set_xlabel("axial strain")
+    left.set_ylabel(r"$\sin\varphi = (\sigma_1 - \sigma_2)/(\sigma_1 + \sigma_2)$", color="#08519c")
+    left.set_ylim(0.0, None)
+    left.legend(loc="lower right", frameon=False)
+    twin = left.twinx()
+    twin.plot(strain, fraction, color="#b2182b", linewidth=1.0)
+    twin.set_ylabel("solid fraction", color="#b2182b")
+    # way of each disk relative to the mean way of its place in the box
+    design = np.column_stack([np.ones(len(start)), start])
+    odd = end - design @ np.linalg.lstsq(design, end, rcond=None)[0]
+    way = np.linalg.norm(odd, axis=1) / radii.mean()
+    disks = draw_disks(right, end, radii, way, "magma_r", (0.0, np.quantile(way, 0.98)))
+    figure.colorbar(disks, ax=right, label="way besides the mean strain / mean radius", shrink=0.8)
+    right.set_xlabel("x [m]")
+    right.set_ylabel("y [m]")
+    save_figure(figure, out / "study_biaxial.png", dpi=130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+"""Step and accuracy of five small scenes: what a user would publish, its error, and what it costs.
+
+    python3 drivers/studies/study_choice.py OUT                     some 15 minutes on two busy cores; GRAVIER_BIN_DIR says where gravier is
+    python3 drivers/studies/study_choice.py OUT --only shear drum   these alone
+
+leaves OUT/study_choice.csv, a row for each quantity of each run, and prints the tables of doc/choosing.md. Each scene is one of data/ with a shorter
+time or with fewer grains. Further runs with the second step and 0.1, and with the smallest step and 0.03, begin from places of the grains that
+differ by a millionth of a diameter (the lattice of the settling: from other radii). The mean of those with the smallest step is the reference;
+twice the standard deviation in either group, the root mean square of both, is the scatter. A value is right where it deviates by no more than 2 %, or than the scatter where that is larger. Seconds are processor seconds of a run on
+one rank; cost is seconds over those of the cheapest run that is right."""
+import argparse
+import resource
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from study_drum import surface_angle
+from study_support import BINARIES, SOURCE, gravier, read_history, states, write_hdf5, write_measured
+
+ACCURACIES = (0.3, 0.1, 0.03)
+RIGHT = 0.02  # deviation that counts as none
+SHIFT = 1.0e-6  # of a realisation, in mean diameters
+
+
+def settled(directory, groups):
+    """Solid fraction under a level surface: the centre of mass is at half of its height."""
+    for _, _, state in states(directory / "results.h5"):
+        centres, radii = state["bodies/position"][:], state["bodies/radius"][:]
+    scene = groups["scene"]
+    width = 2.05 * scene["radius_max"] * scene["lattice_count"][0]
+    area = np.pi * radii**2
+    return {"solid fraction": area.sum()**2 / (2.0 * width * (area @ centres[:, 1]))}
+
+
+def sheared(directory, _):
+    """Shear force over normal force on the top row in the second half of the time."""
+    history = read_history(directory)
+    late = history["time"] > 0.5 * history["time"][-1]
+    return {"stress ratio": abs(history["force_x:top"][late].mean() / history["force_y:top"][late].mean())}
+
+
+def compressed(directory, groups):
+    """Mean stress on the lid over that on the side at strains beyond 0.01, and dilation: volume at the end over that at the start, less 1."""
+    history = read_history(directory)
+    width, height = history["position_x:right"], history["position_y:lid"]
+    points = {boundary["name"]: boundary["point"] for boundary in groups["boundary"] if boundary["name"] in ("right", "lid")}
+    late = 1.0 - height / points["lid"][1] > 0.01
+    ratio = abs(history["force_y:lid"][late] / width[late]).mean() / abs(history["force_x:right"][late] / height[late]).mean()
+    return {"strength": ratio, "volume change": width[-1] * height[-1] / (points["right"][0] * points["lid"][1]) - 1.0}
+
+
+def discharged(directory, _):
+    """Disks a second that leave, while the hopper still holds 80 to 40 % of them."""
+    history = read_history(directory)
+    share = history["grains"] / history["grains"][0]
+    steady = (share < 0.8) & (share > 0.4)
+    return {"flow [1/s]": -np.polyfit(history["time"][steady], history["grains"][steady], 1)[0] if steady.sum() > 9 else np.nan}
+
+
+def turned(directory, _):
+    """Mean angle of the surface in the second half of the time."""
+    found = [(time, surface_angle(state["bodies/position"][:])) for _, time, state in states(directory / "results.h5")]
+    return {"angle [degrees]": np.mean([angle for time, angle in found if time > 0.5 * found[-1][0]])}
+
+
+def lower_disks(position):
+    """Grains of the hopper below a height."""
+    return position[:, 1] < 0.3
+
+
+# case, simulated time [s], steps [s], seconds between states (0: the last alone), what is measured, grains that are kept, changes of boundaries
+SCENES = {
+    "settling": SimpleNamespace(case="demo/settle", time=0.8, steps=(2.0e-3, 1.0e-3, 5.0e-4), every=0.8, measure=settled),
+    "shear": SimpleNamespace(case="scenes/shear", time=2.0, steps=(2.0e-3, 1.0e-3, 5.0e-4), every=0.0, measure=sheared),
+    "biaxial": SimpleNamespace(case="scenes/biaxial", time=1.0, steps=(2.0e-3, 1.0e-3, 5.0e-4), every=0.0, measure=compressed),
+    "discharge": SimpleNamespace(case="scenes/hopper", time=0.9, steps=(1.0e-3, 5.0e-4), every=0.0, measure=discharged,
+                                 keep=lower_disks, gate=0.3),
+    "drum": SimpleNamespace(case="scenes/drum", time=2.4, steps=(2.0e-3, 1.0e-3, 5.0e-4), every=0.04, measure=turned),
+}
+
+
+def groups_of(scene, directory, step, accuracy, realisation):
+    """The case of a run, with its grains where they are not a lattice."""
+    text = (SOURCE / f"data/{scene.case}.nml").read_text(encoding="utf-8")
+    groups = {name: several if name == "boundary" else several[0] for name, several in gravier.parse_namelist(text).items()}
+    steps = round(scene.time / step)
+    groups["time"].update(step=step, steps=steps)
+    groups["solver"].update(accuracy=accuracy)
+    groups["output"] = {"directory": ".", "every": round(scene.every / step), "contacts": False, "boundary_forces": "boundary" in groups}
+    for boundary in groups.get("boundary", ()):
+        if "remove_at" in boundary:
+            boundary["remove_at"] = scene.gate
+    if groups["scene"]["bodies"] == "lattice":
+        groups["scene"]["seed"] += realisation
+        return groups
+    table = np.genfromtxt(SOURCE / groups["scene"]["bodies_file"], delimiter=",", names=True, skip_header=1)
+    position = np.stack([table[axis] for axis in "xyz" if axis in table.dtype.names], 1)
+    radius, group = table["radius"], table["group"].astype(int) if "group" in table.dtype.names else None
+    if hasattr(scene, "keep"):
+        kept = scene.keep(position)
+        position, radius = position[kept], radius[kept]
+    # glued grains stay where they are
+    shift = np.random.default_rng(realisation).uniform(-SHIFT, SHIFT, position.shape) * 2.0 * radius.mean()
+    position = position + shift * (realisation > 0 if group is None else ((group == 0) & (realisation > 0))[:, None])
+    write_hdf5(directory / "start.h5", position, radius, group)
+    groups["scene"]["bodies_file"] = "start.h5"
+    return groups
+
+
+def run_one(job):
+    """What a run gives, what it costs, and the share of its solves that missed the accuracy; where `measure` is true of a run that was made."""
+    out, measure, name, step, accuracy, realisation = job
+    scene, directory = SCENES[name], out / f"{name}_{step:g}_{accuracy:g}_{realisation}"
+    directory.mkdir(parents=True, exist_ok=True)
+    groups = groups_of(scene, directory, step, accuracy, realisation)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if not measure:
+        gravier.run(groups, directory, 1, (BINARIES / "gravier").resolve())
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        (directory / "seconds").write_text(f"{seconds}\n", encoding="ascii")
+    seconds = float((directory / "seconds").read_text(encoding="ascii"))
+    history = read_history(directory)
+    found = SimpleNamespace(name=name, step=step, accuracy=accuracy, realisation=realisation, values=scene.measure(directory, groups),
+                            seconds=seconds, missed=1.0 - history["converged"].mean(), iterations=history["iterations"].sum())
+    print(f"{directory.name}: {seconds:.1f} s, {100.0 * found.missed:.1f} % of the solves missed, {found.values}", flush=True)
+    return found
+
+
+def repeated(name):
+    """Step and accuracy of the runs that are made several times; those of the reference come last."""
+    return (SCENES[name].steps[1], 0.1), (SCENES[name].steps[-1], ACCURACIES[-1])
+
+
+def jobs_of(options):
+    """All runs, the long ones first."""
+    jobs = [(name, step, accuracy, 0) for name in options.only for step in SCENES[name].steps for accuracy in ACCURACIES]
+    jobs += [(name, *kind, k) for name in options.only for kind in repeated(name) for k in range(1, options.realisations + 1)]
+    return [(options.out, options.measure, *job) for job in sorted(jobs, key=lambda job: job[1] * job[2])]
+
+
+def compare(runs):
+    """Rows of the table of one scene: each quantity of each run against the reference."""
+    main = sorted((one for one in runs if one.realisation == 0), key=lambda one: (-one.step, -one.accuracy))
+    rows, right = [], {}
+    for quantity in main[0].values:
+        again = [[one.values[quantity] for one in runs if (one.step, one.accuracy) == kind] for kind in repeated(main[0].name)]
+        reference = np.mean(again[-1])
+        scatter = 2.0 * np.sqrt(np.mean([np.var(values, ddof=1) if len(values) > 1 else 0.0 for values in again])) / abs(reference)
+        for one in main:
+            deviation = one.values[quantity] / reference - 1.0
+            is_right = abs(deviation) <= max(RIGHT, scatter)
+            right[id(one)] = right.get(id(one), True) and is_right
+            rows.append([one, quantity, deviation, scatter, is_right])
+    cheapest = min(one.seconds for one in main if right[id(one)])
+    return [{"scene": one.name, "step": one.step, "accuracy": one.accuracy, "quantity": quantity, "value": float(one.values[quantity]),
+             "deviation": float(deviation), "scatter": float(scatter), "right": int(is_right), "missed": float(one.missed),
+             "iterations": int(one.iterations), "seconds": float(one.seconds), "cost": float(one.seconds / cheapest)}
+            for one, quantity, deviation, scatter, is_right in rows]
+
+
+def print_table(rows):
+    """Of all scenes, a line a run."""
+    print("\n| scene | step [ms] | accuracy | value | deviation [%] | scatter [%] | solves that missed [%] | seconds | cost |")
+    print("|---|---:|---:|---|---:|---:|---:|---:|---:|")
+    runs = {}
+    for row in rows:
+        runs.setdefault((row["scene"], row["step"], row["accuracy"]), []).append(row)
+    for (name, step, accuracy), several in sorted(runs.items(), key=lambda one: (list(SCENES).index(one[0][0]), -one[0][1], -one[0][2])):
+        values = ", ".join(f"{row['quantity']} {row['value']:.4g}" for row in several)
+        deviations = ", ".join(f"{100.0 * row['deviation']:+.1f}" for row in several)
+        scatters = ", ".join(f"{100.0 * row['scatter']:.1f}" for row in several)
+        print(f"| {name} | {1e3 * step:g} | {accuracy:g} | {values} | {deviations} | {scatters} | {100.0 * several[0]['missed']:.1f} | "
+              f"{several[0]['seconds']:.1f} | {several[0]['cost']:.2g} |")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES), metavar="SCENE", help="scenes to run")
+    parser.add_argument("--realisations", type=int, default=3, help="further runs of each scene, for the scatter")
+    parser.add_argument("--jobs", type=int, default=2, help="runs at the same time")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    with ProcessPoolExecutor(options.jobs) as pool:
+        runs = list(pool.map(run_one, jobs_of(options)))
+    rows = [row for name in options.only for row in compare([one for one in runs if one.name == name])]
+    write_measured(options.out / "study_choice.csv", {key: [row[key] for row in rows] for key in rows[0]})
+    print_table(rows)
+
+
+if __name__ == "__main__":
+    main()

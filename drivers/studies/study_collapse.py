@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+"""Run-out of columns of many aspect ratios a, of disks between walls, a = height / width, or of spheres in a cylinder, a = height /
+radius.
+(r - r0)/r0 goes like a for flat columns, and for tall ones like a^(2/3) in 2D and a^(1/2) in 3D.
+
+    python3 drivers/studies/study_collapse.py OUT                   about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    python3 drivers/studies/study_collapse.py OUT --dimension 3     about 7 minutes
+
+leaves OUT/study_collapse.csv, OUT/study_collapse_summary.csv and OUT/study_collapse.png, or the same with _3d."""
+import argparse
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from study_support import draw_disks, lattice, plt, read_bodies, run, states, write_csv, write_hdf5
+from whole_file import save_figure
+
+STEP = 5.0e-4  # s
+# radii [m], grains of a column, aspect ratios aimed at, flat columns below the one and tall ones above the other measured
+# ratio, time until the gate is taken away [s], times that a fall from the height of the column is waited for, width of the bins in
+# which a heap is measured [mean radii], alert distance [m], about the way of the fastest grain in a step
+PLANE = SimpleNamespace(smallest=0.004, largest=0.006, grains=1000, aspects=(0.5, 0.75, 1.1, 1.6, 3.5, 5.0, 7.0, 10.0), flat=2.0,
+                        tall=3.0, settling=0.4, falls=5.0, bin=4.0, alert=1.5e-3, name="study_collapse",
+                        solver={"acceleration": "none", "tolerance": 2.0e-3, "max_iterations": 500})
+SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, grains=6000, aspects=(0.5, 0.75, 1.1, 1.5, 3.0, 5.0, 8.0, 12.0),
+                        flat=1.7, tall=1.7, settling=0.3, falls=4.0, bin=1.0, alert=2.0e-3, name="study_collapse_3d",
+                        solver={"tolerance": 2.0e-3, "max_iterations": 200, "acceleration": "momentum"})
+
+
+def column_2d(case, aspect, grains, rng):
+    """Width, centres and radii of loose disks, no bumps, walls."""
+    # the lattice comes down by about a seventh when it settles
+    cell = 2.05 * case.largest
+    width = cell * max(round(np.sqrt(grains / (1.17 * aspect))), 6)
+    centres, radii = lattice([0.0, 0.0], [width, cell * round(grains / (width / cell))], case.smallest, case.largest, rng)
+    return width, centres, radii, np.empty((0, 2)), [
+        {"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
+        {"name": "left", "shape": "plane", "normal": [1.0, 0.0], "friction": 0.0},
+        {"name": "gate", "shape": "plane", "point": [width, 0.0], "normal": [-1.0, 0.0], "friction": 0.0,
+         "remove_at": case.settling}]
+
+
+def column_3d(case, aspect, grains, rng):
+    """Radius of the cylinder, centres and radii of loose spheres, centres of bumps, walls."""
+    mean = 0.5 * (case.smallest + case.largest)
+    # solid fraction 0.58 when it has settled
+    radius = mean * np.cbrt(4.0 / 3.0 * grains / (0.58 * aspect))
+    high = 2.5 * aspect * radius + 4.0 * case.largest
+    centres, radii = lattice([-radius, -radius, 0.6 * mean], [radius, radius, 0.6 * mean + high], case.smallest,
+                             case.largest, rng, lambda x, largest: np.hypot(x[:, 0], x[:, 1]) < radius - 1.03 * largest)
+    centres, radii = centres[:grains], radii[:grains]
+    # a triangle of bumps 1.5 diameters apart, which no sphere passes without climbing, as far as the heap gets
+    reach, apart = radius * (1.0 + 2.0 * min(aspect, np.sqrt(aspect))), 3.0 * mean
+    k = np.arange(-int(1.2 * reach / apart) - 1, int(1.2 * reach / apart) + 2)
+    column, row = (a.ravel() for a in np.meshgrid(np.arange(2 * k[0], 2 * k[-1] + 1), k))
+    bumps = apart * np.column_stack([column + 0.5 * row, np.sqrt(0.75) * row, 0.0 * row])
+    bumps = bumps[np.hypot(bumps[:, 0], bumps[:, 1]) < reach]
+    bumps[:, 2] = -0.41 * mean
+    return radius, centres, radii, bumps, [
+        {"name": "floor", "shape": "plane", "normal": [0.0, 0.0, 1.0]},
+        {"name": "bumps", "shape": "grains", "group": 1},
+        {"name": "gate", "shape": "cylinder", "axis": [0.0, 0.0, 1.0], "radius": radius, "friction": 0.0,
+         "remove_at": case.settling}]
+
+
+def fall(folder, case, column):
+    """The run itself."""
+    _, centres, radii, bumps, walls = column
+    folder.mkdir(parents=True, exist_ok=True)
+    write_hdf5(folder / "column.h5", np.concatenate([centres, bumps]), np.concatenate([radii, np.full(len(bumps), radii.mean())]),
+               np.repeat([0, 1], [len(radii), len(bumps)]) if len(bumps) else None)
+    height = centres[:, -1].max()
+    steps = int((case.settling + case.falls * np.sqrt(height / 9.81)) / STEP)
+    run(folder, {
+        "scene": {"dimension": centres.shape[1], "bodies": "file", "bodies_file": "column.h5", "density": 2500.0, "friction": 0.5,
+                  "alert_distance": case.alert, "skin": 2.5e-3},
+        "time": {"step": STEP, "steps": steps},
+        "solver": case.solver,
+        "output": {"directory": ".", "every": int(case.settling / STEP), "contacts": False, "final_bodies": True}}, walls)
+
+
+def collapse(folder, case, column, measure):
+    """Settle a column, take the gate away: width and height before, length after, last state. With `measure`, the run was made
+    before."""
+    if not measure:
+        fall(folder, case, column)
+    width, n = column[0], len(column[2])
+    settled = [state["bodies/position"][:n] for number, _, state in states(folder / "results.h5")
+               if number == int(case.settling / STEP)][0]
+    # as high as a box of the same width and mean height of its centre
+    height = 2.0 * settled[:, -1].mean()
+    centres, radii, _ = read_bodies(folder / "final_bodies.h5")
+    return width, height, length_of(centres[:n], radii[:n], case.bin), (centres[:n], radii[:n])
+
+
+def length_of(centres, radii, wide):
+    """Where the heap ends: the grains beyond, in a bin or ring of width `wide` mean radii, are fewer than one full row or layer, a
+    grain on each square of its diameter."""
+    d, mean = centres.shape[1], radii.mean()
+    place = centres[:, 0] if d == 2 else np.hypot(centres[:, 0], centres[:, 1])
+    bins = np.arange(0.0, place.max() + 2.0 * wide * mean, wide * mean)
+    unit = {2: np.pi, 3: 4.0 / 3.0 * np.pi}[d]
+    ground = np.diff(bins) if d == 2 else np.pi * np.diff(bins**2)
+    thickness = np.histogram(place, bins, weights=unit * radii**d)[0] / ground
+    return bins[np.flatnonzero(thickness < unit * mean**d / (2.0 * mean)**(d - 1))[0]]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
+    parser.add_argument("--grains", type=int, help="in each column: 1000 disks or 6000 spheres, about")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    options = parser.parse_args()
+    case, make = {2: (PLANE, column_2d), 3: (SPACE, column_3d)}[options.dimension]
+    rng = np.random.default_rng(2005)
+    rows, heaps = [], []
+    for aspect in case.aspects:
+        column = make(case, aspect, options.grains or case.grains, rng)
+        width, height, length, heap = collapse(options.out / f"a{aspect}", case, column, options.measure)
+        rows.append((height / width, len(heap[1]), width, height, length, length / width - 1.0))
+        heaps.append((width, *heap))
+    ratio, number, width, height, length, out = np.array(rows).T
+    write_csv(options.out / f"{case.name}.csv", {"aspect": ratio, "grains": number, "width": width, "height": height,
+                                           "length": length, "run_out": out})
+    slopes = {}
+    for name, chosen in (("flat", ratio < case.flat), ("tall", ratio > case.tall)):
+        slopes[name] = np.polyfit(np.log(ratio[chosen]), np.log(out[chosen]), 1)
+    write_csv(options.out / f"{case.name}_summary.csv", {"quantity": ["exponent_flat", "exponent_tall"],
+                                                   "value": [float(slopes[name][0]) for name in ("flat", "tall")]})
+    print({name: slope[0] for name, slope in slopes.items()})
+    draw(options.out / f"{case.name}.png", ratio, out, slopes, heaps)
+
+
+def draw(path, ratio, run_out, slopes, heaps):
+    """Run-out against ratio, and the heaps of a flat and of a tall column, in units of the width of the column; spheres from the
+    side, the near ones last."""
+    figure, axes = plt.subplot_mosaic("ab;ac", figsize=(11.0, 4.6), layout="constrained")
+    axes["a"].loglog(ratio, run_out, "o", color="#08519c")
+    for name, x in (("flat", np.array([0.4, 2.5])), ("tall", np.array([2.5, 12.0]))):
+        power, factor = slopes[name]
+        axes["a"].loglog(x, np.exp(factor) * x**power, "--", color="0.4", label=f"{name}: $a^{{{power:.2f}}}$")
+    space = heaps[0][1].shape[1] == 3
+    axes["a"].set_xlabel("$a$ = height / " + ("radius" if space else "width"))
+    axes["a"].set_ylabel(r"run-out $(r - r_0)/r_0$")
+    axes["a"].legend(frameon=False)
+    for panel, k in (("b", 1), ("c", len(heaps) - 2)):
+        width, centres, radii = heaps[k]
+        if space:
+            order = np.argsort(-centres[:, 1])
+            centres, radii = centres[order][:, [0, 2]], radii[order]
+            axes[panel].axvline(-1.0, color="#b2182b", linewidth=0.8)
+        draw_disks(axes[panel], centres / width, radii / width)
+        if space:
+            # without the few that roll away
+            axes[panel].set_xlim(-1.3 * (1.0 + run_out[k]), 1.3 * (1.0 + run_out[k]))
+            axes[panel].locator_params(axis="y", nbins=3)
+        axes[panel].axvline(1.0, color="#b2182b", linewidth=0.8)
+        axes[panel].set_title(f"$a$ = {ratio[k]:.2g}", fontsize=10)
+        axes[panel].set_xlabel("$x/r_0$")
+    save_figure(figure, path, dpi=130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+"""Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
+tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius, disks under a piston.
+
+    python3 drivers/studies/study_drift.py --out DIR [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
+
+leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png."""
+import argparse
+from pathlib import Path
+
+import numpy as np
+from study_support import BINARIES, lattice, plt, read_bodies, read_history, run, states, write_csv, write_hdf5
+from whole_file import save_figure
+
+SMALLEST, LARGEST = 0.008, 0.012  # m
+RADIUS = 0.5 * (SMALLEST + LARGEST)
+ALLOWED = 0.01 * RADIUS
+DENSITY = 2500.0
+FRICTION = 0.3
+STEP = 1.0e-3  # s
+DRUM, RATE = 0.34, 0.3  # m, rad/s
+LOOSE = (1.0e-2, 1.0e-3, 1.0e-4)
+PRESSURE, LID_MASS = 2.0e4, 20.0  # N/m, kg
+GROWN = 1.1  # grains that touch overlap by a fifth of their radius once they are larger by a tenth
+
+
+def box(size):
+    """Floor and sides; no lid."""
+    dimension = len(size)
+    sides = []
+    for d in range(dimension):
+        up = [float(k == d) for k in range(dimension)]
+        sides.append({"name": f"low {d}", "shape": "plane", "normal": up})
+        if d < dimension - 1:
+            sides.append({"name": f"high {d}", "shape": "plane", "point": [size[d] * x for x in up],
+                          "normal": [-x for x in up]})
+    return sides
+
+
+def lid(centres, radii):
+    """A plane on the grains that a pressure moves, which bears several times their weight."""
+    return {"name": "lid", "shape": "plane", "normal": [0.0, -1.0], "point": [0.0, (centres[:, 1] + radii).max()],
+            "free": [False, True], "pressure": PRESSURE, "mass": LID_MASS}
+
+
+def groups(dimension, bodies, steps, tolerance, projection, every):
+    return {
+        "scene": {"dimension": dimension, "bodies": "file", "bodies_file": bodies, "density": DENSITY, "friction": FRICTION,
+                  "overlap_allowed": ALLOWED, "overlap_projection": projection},
+        "time": {"step": STEP, "steps": steps},
+        "solver": {"acceleration": "none", "criterion": "residual", "tolerance": tolerance, "max_iterations": 500, "check_every": 5},
+        "output": {"directory": ".", "every": every, "contacts": False, "final_bodies": True, "energy": True, "structure": True,
+                   "boundary_forces": True}}
+
+
+def settle(options, name, centres, radii, boundaries):
+    """Bodies file of the grains at rest, after exact solves."""
+    folder = options.out / name
+    folder.mkdir(parents=True, exist_ok=True)
+    write_hdf5(folder / "loose.h5", centres, radii)
+    case = groups(centres.shape[1], "loose.h5", 600, 1.0e-4, True, 0)
+    run(folder, case, boundaries, program=options.gravier)
+    return folder / "final_bodies.h5"
+
+
+def figures(folder, name, tolerance, projection, seconds, first, width):
+    """A row of the table: what the run says of its second half, energies against its start."""
+    history = read_history(folder)
+    half = len(history["step"]) // 2
+    radii = read_bodies(folder / "final_bodies.h5")[1]
+    dimension = first.shape[1]
+    mass = DENSITY * (np.pi * radii**2 if dimension == 2 else 4.0 / 3.0 * np.pi * radii**3)
+    last = read_bodies(folder / "final_bodies.h5")[0]
+    creep = (mass[:, None] * (last - first)).sum(0) / mass.sum()
+    weight = mass.sum() * 9.81
+    # what the loads, pressure included, do not account for: the work of the projection
+    given = history["potential_energy"] + history["load_work"]
+    if "position_y:lid" in history:
+        given = given + PRESSURE * width * history["position_y:lid"] + history["boundary_work"]
+    return {
+        "run": name, "tolerance": tolerance, "projection": int(projection), "grains": len(radii), "steps": len(history["step"]),
+        "largest_overlap": history["max_overlap"][half:].max() / RADIUS,
+        "last_overlap": history["max_overlap"][-1] / RADIUS,
+        "mean_overlap": history["overlap_mean"][-1] / RADIUS,
+        # of a grain, in units of m g R
+        "kinetic_energy": history["kinetic_energy"][half:].mean() / (weight * RADIUS),
+        "largest_kinetic_energy": history["kinetic_energy"].max() / (weight * RADIUS),
+        "potential_energy": (history["potential_energy"][-1] - history["potential_energy"][0]) / (weight * RADIUS),
+        "projection_work": (given[-1] - given[0]) / (weight * RADIUS),
+        "creep_up": creep[-1] / RADIUS, "creep_side": np.linalg.norm(creep[:-1]) / RADIUS,
+        "projected": history["projected"].mean(), "listed": history["listed"].sum(),
+        "sweeps": history["sweeps"].mean(), "seconds": seconds}, history
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True)
+    parser.add_argument("--gravier", metavar="PROGRAM", type=Path, default=BINARIES / "gravier")
+    parser.add_argument("--steps", type=int, default=20000)
+    options = parser.parse_args()
+    rng = np.random.default_rng(19)
+    cell = 2.05 * LARGEST
+    flat, cube, mouth = [20.1 * cell, 20.1 * cell], [7.1 * cell, 7.1 * cell, 8.1 * cell], [DRUM, DRUM]
+    drum = [{"name": "drum", "shape": "circle", "radius": DRUM, "friction": 0.8}]
+    disks = settle(options, "disks", *lattice([0.0, 0.0], flat, SMALLEST, LARGEST, rng), box(flat))
+    spheres = settle(options, "spheres", *lattice([0.0, 0.0, 0.0], cube, SMALLEST, LARGEST, rng), box(cube))
+    drummed = settle(options, "in_drum", *lattice([-DRUM, -DRUM], mouth, SMALLEST, LARGEST, rng, lambda x, r:
+                                                  (np.linalg.norm(x, axis=1) < DRUM - 1.05 * r) & (x[:, 1] < 0.02)), drum)
+    centres, radii, _ = read_bodies(disks)
+    pressed = [*box(flat), lid(centres, radii)]
+    write_hdf5(options.out / "grown.h5", centres, GROWN * radii)
+    turning = [{**drum[0], "rotation": RATE}]
+    runs = [("disks", 2, disks, t, options.steps, box(flat)) for t in LOOSE]
+    runs += [("spheres", 3, spheres, t, options.steps // 2, box(cube)) for t in LOOSE[:2]]
+    runs += [("drum", 2, drummed, t, options.steps // 2, turning) for t in LOOSE[:2]]
+    runs += [("grown", 2, options.out / "grown.h5", 1.0e-3, options.steps // 10, box(flat))]
+    runs += [("piston", 2, disks, t, options.steps // 2, pressed) for t in LOOSE[:2]]
+    rows, curves = [], {}
+    for name, dimension, bodies, tolerance, steps, boundaries in runs:
+        for projection in (False, True):
+            folder = options.out / f"{name}_{tolerance:.0e}_{'with' if projection else 'without'}"
+            seconds = run(folder, groups(dimension, str(Path(bodies).resolve()), steps, tolerance, projection, 0), boundaries,
+                          program=options.gravier)
+            row, history = figures(folder, name, tolerance, projection, seconds, read_bodies(bodies)[0]
+                                   if name != "grown" else centres, flat[0])
+            rows.append(row)
+            curves[name, tolerance, projection] = history
+            print(row, flush=True)
+            write_csv(options.out / "drift.csv", {key: [row[key] for row in rows] for key in rows[0]})
+    write_curves(options.out / "drift_curves.csv", curves)
+    draw(options.out / "drift.png", curves)
+
+
+def envelope(history, parts=200):
+    """Step, largest overlap and mean kinetic energy of so many parts of a run."""
+    cuts = np.array_split(np.arange(len(history["step"])), min(parts, len(history["step"])))
+    return (np.array([history["step"][cut[-1]] for cut in cuts]), np.array([history["max_overlap"][cut].max() for cut in cuts]),
+            np.array([history["kinetic_energy"][cut].mean() for cut in cuts]))
+
+
+def write_curves(path, curves):
+    columns = {key: [] for key in ("run", "tolerance", "projection", "step", "largest_overlap", "kinetic_energy")}
+    for (name, tolerance, projection), history in curves.items():
+        for values in zip(*envelope(history)):
+            for key, value in zip(columns, (name, tolerance, int(projection), int(values[0]), values[1] / RADIUS, values[2])):
+                columns[key].append(value)
+    write_csv(path, columns)
+
+
+def draw(path, curves):
+    """Largest overlap of each run, dashed without the projection."""
+    panels = {"disks": "disks at rest", "spheres": "spheres at rest", "drum": "slow drum", "grown": "initial overlaps",
+              "piston": "disks under a piston"}
+    colours = dict(zip(LOOSE, ("#b2182b", "#08519c", "#238b45")))
+    figure, axes = plt.subplots(2, 3, figsize=(14.0, 6.6), layout="constrained")
+    axes.flat[len(panels)].axis("off")
+    for panel, (name, title) in zip(axes.flat, panels.items()):
+        for (run_name, tolerance, projection), history in curves.items():
+            if run_name != name:
+                continue
+            step, overlap, _ = envelope(history)
+            panel.semilogy(step, np.maximum(overlap / RADIUS, 1.0e-6), "-" if projection else "--", color=colours[tolerance],
+                           linewidth=1.1, label=f"{tolerance:.0e}, {'with' if projection else 'without'}")
+        panel.axhline(ALLOWED / RADIUS, color="0.4", linewidth=0.7)
+        panel.set_title(title, fontsize=10)
+        panel.set_xlabel("step")
+        panel.locator_params(axis="x", nbins=5)
+        panel.set_ylabel("largest overlap / mean radius")
+        low, high = panel.get_ylim()
+        panel.set_ylim(low, high * (high / low)**0.2)
+        panel.legend(frameon=False, fontsize=7, loc="upper center", ncol=3 if name == "disks" else 2)
+    save_figure(figure, path, dpi=130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,213 @@
+!> Overlaps that errors of many steps have built up are taken back by moving grains, and boundaries that forces move, not by
+!> velocities: a projection of the places on the places without too much overlap. It gives nothing kinetic energy, whatever
+!> the time step.
+module gravier_overlap_projection
+  use gravier_kinds, only: dp
+  use gravier_timers, only: start_timer, stop_timer, phase_projection
+  use gravier_contact_kernels, only: lanes, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_nscdd, only: average_copies
+  use gravier_velocity_return, only: take_displacements
+  use gravier_boundary_loads, only: take_boundary_displacements
+  implicit none
+  private
+  public :: project_overlaps
+
+  !> sweeps between two looks at what is left, and at most in one projection: what they leave is for the next steps
+  integer, parameter :: check_every = 10, max_sweeps = 200
+  !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
+  real(dp), parameter :: remainder = 0.1_dp
+
+  !> What a projection borrows of a subproblem, and its work space; src/report/memory_report.f90 counts them.
+  type :: borrowed_t
+    !> shift and, with friction, mu of each contact (lanes, 1 or 2, blocks)
+    real(dp), allocatable :: law(:, :, :)
+    !> (lanes, nc, blocks)
+    real(dp), allocatable :: impulse(:, :, :), work(:, :, :)
+  end type borrowed_t
+
+contains
+
+  !> Move grains and boundaries that forces move so that no overlap exceeds `allowed`, as far as sweeps of nonlinear
+  !> Gauss-Seidel lead there: displacements in the metric of the masses, M d = H p with p >= 0 orthogonal to
+  !> n.(d_i - d_j) + gap + allowed >= 0, in all subdomains with shared masses as in NSCDD; for boundaries, see
+  !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
+  !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
+  !> The problem comes back as it was but for velocities and masses, with the lengths of the displacements of all grains summed up:
+  !> the same sum on any number of ranks. Collective.
+  subroutine project_overlaps(decomposition, problem, h, allowed, shifts)
+    type(decomposition_t), intent(inout) :: decomposition
+    !> of a step that is over; gaps at its q_m, velocities at its end
+    type(contact_problem_t), intent(inout) :: problem
+    !> [s], [m]
+    real(dp), intent(in) :: h, allowed
+    !> sum of the lengths by which grains are moved [m]
+    real(dp), intent(out) :: shifts
+    type(borrowed_t) :: borrowed(size(problem%sub))
+    real(dp) :: enough, factor, sums(2)
+    integer :: s, k
+    logical :: has_driven
+
+    call start_timer(phase_projection)
+    has_driven = any(decomposition%boundaries%free(1)) .or. any(decomposition%boundaries%free(2)) .or. &
+      & any(decomposition%boundaries%free(3))
+    do s = 1, size(problem%sub)
+      call lend(problem, s, h, allowed, borrowed(s))
+    end do
+    if (has_driven) call weigh_boundaries(problem, size(decomposition%boundaries))
+    enough = remainder*max(allowed, excess(problem, borrowed))
+    do k = 1, max_sweeps
+      do s = 1, size(problem%sub)
+        associate (sub => problem%sub(s))
+          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
+        end associate
+      end do
+      call average_copies(problem)
+      if (mod(k, check_every) > 0) cycle
+      if (excess(problem, borrowed) <= enough) exit
+    end do
+    factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
+    do s = 1, size(problem%sub)
+      problem%sub(s)%v_global(:, :) = factor*problem%sub(s)%velocity
+      call give_back(problem, s, borrowed(s))
+    end do
+    shifts = lengths(problem)
+    call take_displacements(decomposition, problem)
+    if (has_driven) call take_boundary_displacements(decomposition, problem)
+    call stop_timer(phase_projection)
+  end subroutine project_overlaps
+
+  !> Largest overlap beyond what is allowed under the displacements of now [m]. Collective.
+  real(dp) function excess(problem, borrowed)
+    type(contact_problem_t), intent(in) :: problem
+    type(borrowed_t), intent(inout) :: borrowed(:)
+    integer :: s, nd
+
+    nd = problem%kernels%nd
+    excess = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), work => borrowed(s)%work)
+        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
+        ! lanes without a contact hold zeros
+        excess = max(excess, -minval(work(:, 1, :) + sub%hot(:, nd + 1, :)))
+      end associate
+    end do
+    excess = problem%comm%highest(excess)
+  end function excess
+
+  !> Factor that brings all displacements within `limit` [m]. Collective.
+  real(dp) function reduction(problem, limit)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(in) :: limit
+    real(dp) :: longest
+    integer :: s, b, nd
+
+    nd = problem%kernels%nd
+    longest = 0.0_dp
+    do s = 1, size(problem%sub)
+      do b = 1, problem%sub(s)%n_bodies
+        longest = max(longest, norm2(problem%sub(s)%velocity(1:nd, b)))
+      end do
+    end do
+    longest = problem%comm%highest(longest)
+    reduction = 1.0_dp
+    if (longest > limit) reduction = limit/longest
+  end function reduction
+
+  !> Sum of the lengths by which grains are moved, a grain that several subdomains share counting in equal parts [m]. Collective.
+  real(dp) function lengths(problem)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: part(size(problem%sub))
+    integer :: s, b, nd
+
+    nd = problem%kernels%nd
+    part(:) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = 1, sub%n_grains
+          part(s) = part(s) + norm2(sub%v_global(1:nd, b))/sub%multiplicity(b)
+        end do
+      end associate
+    end do
+    lengths = problem%comm%sum_real(part)
+  end function lengths
+
+  !> Make a subproblem one of displacements: frictionless, from rest, with the gaps that the next step would find in the
+  !> place of velocities.
+  subroutine lend(problem, s, h, allowed, borrowed)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: s
+    real(dp), intent(in) :: h, allowed
+    type(borrowed_t), intent(out) :: borrowed
+    integer :: c, nd
+
+    nd = problem%kernels%nd
+    associate (sub => problem%sub(s))
+      borrowed%impulse = sub%impulse
+      allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nf > 1), size(sub%hot, 3)))
+      allocate (borrowed%work, mold=sub%impulse)
+      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
+      borrowed%law(:, 1, :) = sub%hot(:, nd + 1, :)
+      do c = 1, sub%n_contacts
+        sub%hot(lane_of(c), nd + 1, block_of(c)) = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
+      end do
+      if (problem%kernels%nf > 1) then
+        ! nothing turns then, and no moment is needed
+        borrowed%law(:, 2, :) = sub%hot(:, problem%kernels%friction_row, :)
+        sub%hot(:, problem%kernels%friction_row, :) = 0.0_dp
+      end if
+      sub%velocity(:, :) = 0.0_dp
+      sub%impulse(:, :, :) = 0.0_dp
+      call sub%share_masses(problem%kernels, .true.)
+    end associate
+  end subroutine lend
+
+  !> Undo `lend`, but for masses and velocities.
+  subroutine give_back(problem, s, borrowed)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: s
+    type(borrowed_t), intent(inout) :: borrowed
+    integer :: nd
+
+    nd = problem%kernels%nd
+    associate (sub => problem%sub(s))
+      sub%hot(:, nd + 1, :) = borrowed%law(:, 1, :)
+      if (problem%kernels%nf > 1) sub%hot(:, problem%kernels%friction_row, :) = borrowed%law(:, 2, :)
+      call move_alloc(borrowed%impulse, sub%impulse)
+    end associate
+  end subroutine give_back
+
+  !> Give each boundary that forces move the mass of the grains that it touches, on its free components. Its own, which its
+  !> inertia asks for, would hold a packing as a fixed wall does: the sweeps have to carry a displacement through it. As heavy
+  !> as one more layer of grains it gives way as they do. All subdomains give it the same one. Collective.
+  subroutine weigh_boundaries(problem, n_boundaries)
+    type(contact_problem_t), intent(inout) :: problem
+    integer, intent(in) :: n_boundaries
+    real(dp) :: parts(n_boundaries, size(problem%sub)), masses(n_boundaries)
+    integer :: s, c, k, b
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          do k = 1, 2
+            b = sub%pair(k, c)
+            if (b <= sub%n_grains .or. b > sub%n_bodies) cycle
+            parts(sub%boundary(b), s) = parts(sub%boundary(b), s) + 1.0_dp/sub%inverse_mass(1, sub%pair(3 - k, c))
+          end do
+        end do
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, masses)
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = sub%n_grains + 1, sub%n_bodies
+          where (sub%inverse_mass(:, b) > 0.0_dp) sub%weight(:, b) = sub%multiplicity(b)/masses(sub%boundary(b))
+        end do
+        call sub%update_local_operator(problem%kernels)
+      end associate
+    end do
+  end subroutine weigh_boundaries
+
+end module gravier_overlap_projection
