@@ -8,6 +8,8 @@ module gravier_config
                                   enriched_config_t, output_config_t, boundary_config_t, sample_config_t, material_config_t, &
                                   law_config_t, given_coefficients_t
   use gravier_config_table, only: groups, keys, fill_keys, kind_real
+  use gravier_method_options, only: method_features_t, default_always, default_on_active
+  use gravier_method_registry, only: features_of
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
   use gravier_config_slots, only: slot_t, slot_of, group_count
@@ -276,6 +278,7 @@ contains
     type(config_t), intent(inout) :: config
     type(report_t), intent(inout) :: report
     type(given_coefficients_t) :: given
+    type(method_features_t) :: features
     integer :: i
 
     report%instance = 1
@@ -292,12 +295,13 @@ contains
       if (grid_product(parts%grid) > 0 .and. .not. is_given(report, "decomposition", "subdomains")) &
         parts%subdomains = grid_product(parts%grid)
     end associate
-    if (config%solver%method == "nscdd_ep" .and. .not. config%enriched%direction_given) then
+    features = features_of(trim(config%solver%method))
+    if (features%active_by_default .and. .not. config%enriched%direction_given) then
       if (.not. is_given(report, "enriched", "contacts")) config%enriched%contacts = "active"
     end if
     if (.not. is_given(report, "solver", "acceleration")) then
-      if (any(config%solver%method == ["nlgs ", "nscdd"]) .or. &
-          (config%solver%method == "nscdd_ep" .and. config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
+      if (features%momentum_by_default == default_always .or. (features%momentum_by_default == default_on_active .and. &
+          config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
     end if
     if (.not. config%solver%tolerance_given .and. config%solver%criterion == "velocity_error") config%solver%tolerance = 1.0e-2_dp
     if (.not. config%solver%sleep_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)

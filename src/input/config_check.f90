@@ -6,6 +6,8 @@ module gravier_config_check
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_config_types, only: config_t
   use gravier_config_table, only: key_t, keys, kind_real, kind_logical
+  use gravier_method_options, only: method_features_t
+  use gravier_method_registry, only: features_of, quoted_names, that_decompose, with_sleeping
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
@@ -213,7 +215,9 @@ contains
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    type(method_features_t) :: features
 
+    features = features_of(trim(config%solver%method))
     associate (solver => config%solver)
       call expect(report, solver%criterion /= "error" .or. config%scene%bodies == "column", "solver", "criterion", error, &
                   "'residual': the exact solution, and so the error, is known for bodies = 'column' only")
@@ -222,14 +226,14 @@ contains
       call expect(report, solver%max_iterations >= 1, "solver", "max_iterations", error)
       call expect(report, solver%sweeps >= 1, "solver", "sweeps", error)
       call expect(report, solver%relaxation > 0.0_dp .and. solver%relaxation <= 1.0_dp, "solver", "relaxation", error)
-      call expect(report, solver%acceleration == "none" .or. index(solver%method, "schwarz") == 0 .or. &
+      call expect(report, solver%acceleration == "none" .or. .not. features%relaxes .or. &
                   .not. solver%relaxation_given, "solver", "acceleration", error, &
                   "'none' where relaxation is given: momentum needs a factor that adapts itself")
       call expect(report, solver%velocity_scale > 0.0_dp .or. .not. solver%velocity_scale_given, "solver", "velocity_scale", &
                   error)
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
-      call expect(report, any(solver%method == ["nlgs   ", "nscdd  ", "schwarz"]) .or. .not. solver%sleeping, "solver", &
-                  "sleeping", error, ".false. with this method: sleeping serves 'nlgs', 'nscdd' and 'schwarz'")
+      call expect(report, features%sleeping .or. .not. solver%sleeping, "solver", "sleeping", error, &
+                  ".false. with this method: sleeping serves "//quoted_names(with_sleeping, "'", "and"))
       call expect(report, solver%warm_start .or. .not. solver%sleeping, "solver", "sleeping", error, &
                   ".false. where warm_start = .false.: contacts that sleep keep their impulses from step to step")
       call expect(report, solver%sleep_after >= 1, "solver", "sleep_after", error)
@@ -259,28 +263,33 @@ contains
     end associate
   end subroutine check_decomposition
 
-  !> One domain for nlgs.
+  !> One domain where the method has no subdomains.
   subroutine check_method(report, config, error)
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    type(method_features_t) :: features
     character(len=:), allocatable :: key
 
-    if (config%solver%method /= "nlgs") return
+    features = features_of(trim(config%solver%method))
+    if (features%decomposes) return
     key = "subdomains"
     if (.not. is_given(report, "decomposition", key)) key = "grid"
     call expect(report, config%decomposition%subdomains == 1, "decomposition", key, error, &
-                "one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'")
+                "one subdomain where &solver method = '"//trim(config%solver%method)//"'; for several use method = "// &
+                & quoted_names(that_decompose, "'", "or"))
   end subroutine check_method
 
   subroutine check_enriched(report, config, error)
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    type(method_features_t) :: features
 
+    features = features_of(trim(config%solver%method))
     associate (enriched => config%enriched)
-      call expect(report, enriched%interface == "mumps" .or. config%solver%method /= "newton", "enriched", "interface", error, &
-                  "'mumps' where &solver method = 'newton': its interface problem is not symmetric")
+      call expect(report, enriched%interface == "mumps" .or. .not. features%direct_interface_only, "enriched", "interface", error, &
+                  "'mumps' where &solver method = '"//trim(config%solver%method)//"': its interface problem is not symmetric")
       call expect(report, enriched%direction >= 0.0_dp, "enriched", "direction", error)
       call expect(report, enriched%cg_tolerance > 0.0_dp .and. enriched%cg_tolerance < 1.0_dp, "enriched", "cg_tolerance", &
                   error)

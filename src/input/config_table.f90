@@ -1,8 +1,11 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
 !> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact come from
-!> their modules.
+!> their modules, the words of the methods from theirs.
 module gravier_config_table
   use gravier_law_registry, only: registered_key_t, registered_keys, kind_length
+  use gravier_method_options, only: method_features_t
+  use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
+    & with_momentum, with_momentum_on_active, with_sleeping
   implicit none
   private
   public :: group_t, key_t, groups, keys, fill_keys
@@ -39,7 +42,7 @@ module gravier_config_table
     character(len=16) :: default
     !> a choice: the words, separated by blanks; otherwise a rule that follows "a finite real number", "an integer"
     character(len=kind_length) :: allowed
-    character(len=200) :: meaning
+    character(len=400) :: meaning
     !> number of entries
     integer :: count = 1
     !> of several reals or logicals: the entries that may differ from 0 and .false. in 2D
@@ -271,9 +274,7 @@ module gravier_config_table
            "weight of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
 
   type(key_t), parameter :: solver_keys(*) = &
-    [key_t("solver", "method", kind_choice, "'nlgs'", "nlgs schwarz schwarz_ec nscdd nscdd_ep newton", &
-           "nonlinear Gauss-Seidel on one domain; Schwarz-NSCD; Schwarz-NSCD-EC; NSCDD; NSCDD-EP; "// &
-           "sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method"), &
+    [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &
      key_t("solver", "criterion", kind_choice, "'velocity_error'", "velocity_error residual error", &
            "what ends a solve: the estimated velocity error, with the residual as a guard; the residual alone; "// &
            "the known error on the impulses of `bodies = 'column'`"), &
@@ -286,10 +287,9 @@ module gravier_config_table
      key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
            "share of a change of the neighbours' impulses that is taken over", &
-           note="found while iterating, from 1 down", chooser="method", chosen="schwarz schwarz_ec"), &
+           note="found while iterating, from 1 down", chooser="method"), &
      key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
-           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. Default of "// &
-           "`nlgs`, `nscdd` and, on active contacts, `nscdd_ep`", &
+           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. Default of", &
            note="by the method"), &
      key_t("solver", "velocity_scale", kind_real, "-1", "> 0", "velocity against which errors of a solve are compared", &
            unit="m/s", note="by rule"), &
@@ -298,7 +298,7 @@ module gravier_config_table
      key_t("solver", "layered_start", kind_logical, ".true.", "", &
            "carry loads across in layers where a solve starts far from the solution (with `velocity_error` and gravity)"), &
      key_t("solver", "sleeping", kind_logical, ".false.", "", &
-           "contacts of bodies at rest leave the sweeps until these are disturbed (`nlgs`, `nscdd` and `schwarz` only)"), &
+           "contacts of bodies at rest leave the sweeps until these are disturbed"), &
      key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
      key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
            "momentum of a body at rest, at most, over the root mean square of the impulses; and over a tenth of those on it", &
@@ -386,6 +386,7 @@ contains
     end do
     call add(time_keys)
     call add(solver_keys)
+    call complete_solver_keys()
     call add(decomposition_keys)
     call add(enriched_keys)
     call add(output_keys)
@@ -403,6 +404,34 @@ contains
     end subroutine add
 
   end subroutine fill_keys
+
+  !> What the methods say of themselves.
+  subroutine complete_solver_keys()
+    type(method_holder_t), allocatable :: methods(:)
+    type(method_features_t) :: features
+    integer :: k, m
+
+    do k = 1, size(keys)
+      if (keys(k)%group /= "solver") cycle
+      select case (keys(k)%name)
+      case ("method")
+        keys(k)%allowed = method_words(all_methods)
+        call registered_methods(methods)
+        do m = 1, size(methods)
+          features = methods(m)%method%features()
+          if (m > 1) keys(k)%meaning = trim(keys(k)%meaning)//";"
+          keys(k)%meaning = adjustl(trim(keys(k)%meaning)//" "//features%meaning)
+        end do
+      case ("relaxation")
+        keys(k)%chosen = method_words(that_relax)
+      case ("acceleration")
+        keys(k)%meaning = trim(keys(k)%meaning)//" "//quoted_names(with_momentum, "`", "and")//" and, on active contacts, "// &
+          & quoted_names(with_momentum_on_active, "`", "and")
+      case ("sleeping")
+        keys(k)%meaning = trim(keys(k)%meaning)//" ("//quoted_names(with_sleeping, "`", "and")//" only)"
+      end select
+    end do
+  end subroutine complete_solver_keys
 
   !> The row of a key of some laws.
   pure type(key_t) function row_of(own) result(row)

@@ -3,7 +3,7 @@ module gravier_memory_report
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_newton, only: newton_t
+  use gravier_method_options, only: held_list_t
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -61,6 +61,7 @@ contains
   subroutine describe(simulation, items)
     type(simulation_t), intent(in) :: simulation
     type(item_t), intent(inout) :: items(5)
+    type(held_list_t) :: held
     integer :: nd, nv, nw, ni
 
     associate (kernels => simulation%problem%kernels)
@@ -81,14 +82,8 @@ contains
         call items(1)%add("impulse of projections", 8, kernels%nc)
         call items(1)%add("velocity of projections", 8, kernels%nc)
       end if
-      if (simulation%scheme%momentum%on) call items(1)%add("impulse of momentum", 8, kernels%nc)
-      select type (scheme => simulation%scheme)
-      class is (newton_t)
-        call items(1)%add("impulses of Newton's method", 8, 4*kernels%nc)
-        call items(1)%add("velocity of Newton's method", 8, kernels%nc)
-        call items(1)%add("law of Newton's method", 8, 3*kernels%nc + kernels%nc**2 + 5)
-        call items(1)%add("state of Newton's method", 4, 1)
-      end select
+      call simulation%scheme%held(kernels%nc, nv, held)
+      call add_held(items(1), of_contacts=.true.)
       items(2)%name = "near pair"
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
@@ -106,12 +101,7 @@ contains
       call items(3)%add("velocity", 8, nv)
       call items(3)%add("v_global", 8, nv)
       call items(3)%add("reaction", 8, nv)
-      if (simulation%scheme%momentum%on) call items(3)%add("velocity of momentum", 8, nv)
-      select type (scheme => simulation%scheme)
-      class is (newton_t)
-        call items(3)%add("velocity of the sweeps of Newton's method", 8, nv)
-        call items(3)%add("velocity of Newton's steps", 8, nv)
-      end select
+      call add_held(items(3), of_contacts=.false.)
       call items(3)%add("inverse_mass", 8, nw)
       call items(3)%add("weight", 8, nw)
       items(4)%name = "grain seen, ghosts included"
@@ -123,6 +113,19 @@ contains
     end associate
 
   contains
+
+    !> What the method holds for each contact, or for each body.
+    subroutine add_held(item, of_contacts)
+      type(item_t), intent(inout) :: item
+      logical, intent(in) :: of_contacts
+      integer :: k
+
+      do k = 1, held%n
+        associate (array => held%item(k))
+          if (array%of_contacts .eqv. of_contacts) call item%add(trim(array%name), array%bytes, array%values)
+        end associate
+      end do
+    end subroutine add_held
 
     subroutine add_grain(item)
       type(item_t), intent(inout) :: item

@@ -14,8 +14,9 @@ module gravier_scene
   use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_law_set, only: law_set_t
+  use gravier_method_options, only: method_features_t
+  use gravier_method_registry, only: features_of, quoted_names, with_moments
   use gravier_config_types, only: config_t, scene_config_t
-  use gravier_config_keys, only: has_word
   use gravier_config_laws, only: density_of, collect_laws
   use gravier_run_memory, only: check_planned_grains, check_read_grains
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
@@ -188,11 +189,12 @@ contains
     type(config_t), intent(in) :: config
     type(effects_t), intent(in) :: effects
     type(error_t), allocatable, intent(inout) :: error
+    type(method_features_t) :: features
 
     if (.not. effects%rolling) return
-    if (.not. has_word("nlgs nscdd schwarz", trim(config%solver%method))) call raise(error, status_input, config%file// &
-      & ": &solver method = '"//trim(config%solver%method)//"': expected 'nlgs', 'nscdd' or 'schwarz' with rolling or "// &
-      & "pivoting friction")
+    features = features_of(trim(config%solver%method))
+    if (.not. features%moments) call raise(error, status_input, config%file//": &solver method = '"//trim(config%solver%method)// &
+      & "': expected "//quoted_names(with_moments, "'", "or")//" with rolling or pivoting friction")
     if (config%output%fclib_step > 0) call raise(error, status_input, config%file//": &output fclib_step = "// &
       & to_text(config%output%fclib_step)//": expected 0 with rolling or pivoting friction, which a file of FCLIB cannot say")
   end subroutine check_moments

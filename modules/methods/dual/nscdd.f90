@@ -5,17 +5,25 @@ module gravier_nscdd
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t, start_sweeps, sweep_and_pass
+  use gravier_method_options, only: method_features_t, default_always
   implicit none
   private
   public :: nscdd_t, average_copies
 
   type, extends(scheme_t) :: nscdd_t
   contains
+    procedure, nopass :: features => nscdd_features
     procedure :: start => nscdd_start
     procedure :: iterate => nscdd_iterate
   end type nscdd_t
 
 contains
+
+  pure function nscdd_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="nscdd", meaning="NSCDD", moments=.true., sleeping=.true., &
+      & momentum_by_default=default_always)
+  end function nscdd_features
 
   subroutine nscdd_start(self, problem, error)
     class(nscdd_t), intent(inout) :: self

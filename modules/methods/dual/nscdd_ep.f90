@@ -12,7 +12,11 @@ module gravier_nscdd_ep
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve, phase_factorise
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: work_t, start_sweeps
+  use gravier_method_options, only: method_features_t, method_options_t, default_on_active
   use gravier_nscdd, only: nscdd_t, average_copies
+  use gravier_search_direction, only: chosen_direction
+  use gravier_interface_cg, only: interface_cg_t
+  use gravier_interface_direct, only: interface_direct_t
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
   use gravier_direction_guard, only: direction_guard_t
   use gravier_impulse_feedback, only: impulse_feedback_t
@@ -20,6 +24,9 @@ module gravier_nscdd_ep
   implicit none
   private
   public :: nscdd_ep_t
+
+  !> l where none is given, on active contacts and on all [1/W_aa]
+  real(dp), parameter :: direction_on_active = 100.0_dp, direction_on_all = 0.3_dp
 
   !> With l = 0 it is NSCDD, bit for bit.
   type, extends(nscdd_t) :: nscdd_ep_t
@@ -32,6 +39,8 @@ module gravier_nscdd_ep
     type(direction_guard_t), private :: guard
     logical, private :: prepared = .false.
   contains
+    procedure, nopass :: features => nscdd_ep_features
+    procedure :: set => nscdd_ep_set
     procedure :: start => nscdd_ep_start
     procedure :: iterate => nscdd_ep_iterate
     procedure :: free => nscdd_ep_free
@@ -39,6 +48,30 @@ module gravier_nscdd_ep
   end type nscdd_ep_t
 
 contains
+
+  pure function nscdd_ep_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="nscdd_ep", meaning="NSCDD-EP", momentum_by_default=default_on_active, &
+      & active_by_default=.true.)
+  end function nscdd_ep_features
+
+  subroutine nscdd_ep_set(self, options)
+    class(nscdd_ep_t), intent(inout) :: self
+    type(method_options_t), intent(in) :: options
+    type(interface_cg_t), allocatable :: cg
+
+    call self%nscdd_t%set(options)
+    self%matrix%direction = chosen_direction(options, direction_on_active, direction_on_all)
+    self%direction_text = self%matrix%direction%text()
+    if (options%interface_cg) then
+      allocate (cg)
+      cg%tolerance = options%cg_tolerance
+      cg%max_iterations = options%cg_max_iterations
+      call move_alloc(cg, self%interface_solver)
+    else
+      allocate (interface_direct_t :: self%interface_solver)
+    end if
+  end subroutine nscdd_ep_set
 
   subroutine nscdd_ep_start(self, problem, error)
     class(nscdd_ep_t), intent(inout) :: self

@@ -10,20 +10,10 @@ module gravier_enriched_matrix
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: scheme_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
+  use gravier_search_direction, only: search_direction_t
   implicit none
   private
-  public :: search_direction_t, enriched_matrix_t, enriched_part_t, sweep_all_recording, drop_inactive
-
-  !> The search direction r~ - r + l (v~ - v) = 0, l >= 0.
-  type :: search_direction_t
-    !> l, in units of 1/W_aa or in kg
-    real(dp) :: value = 1.0_dp
-    !> chosen here, not by the input
-    logical :: automatic = .false.
-    logical :: relative = .true.
-    !> l on active contacts only: r_n > 0 for the normal part, |r_t| < mu r_n for the tangential one
-    logical :: active_only = .false.
-  end type search_direction_t
+  public :: enriched_matrix_t, enriched_part_t, sweep_all_recording, drop_inactive
 
   !> What one subdomain adds to its contact problem.
   type :: enriched_part_t

@@ -13,6 +13,7 @@ module gravier_newton
   use gravier_contact_kernels, only: project_on_cones
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: work_t, start_sweeps
+  use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
   use gravier_enriched_matrix, only: enriched_matrix_t
@@ -79,6 +80,9 @@ module gravier_newton
     !> the least when the sweeps were left
     real(dp), private :: least_swept = 0.0_dp
   contains
+    procedure, nopass :: features => newton_features
+    procedure :: set => newton_set
+    procedure :: held => newton_held
     procedure :: start => newton_start
     procedure :: iterate => newton_iterate
     procedure :: conclude => newton_conclude
@@ -87,6 +91,34 @@ module gravier_newton
   end type newton_t
 
 contains
+
+  pure function newton_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="newton", &
+      & meaning="sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method", direct_interface_only=.true.)
+  end function newton_features
+
+  subroutine newton_set(self, options)
+    class(newton_t), intent(inout) :: self
+    type(method_options_t), intent(in) :: options
+
+    call self%nscdd_t%set(options)
+    self%momentum%on = .true.
+  end subroutine newton_set
+
+  pure subroutine newton_held(self, nc, nv, held)
+    class(newton_t), intent(in) :: self
+    integer, intent(in) :: nc, nv
+    type(held_list_t), intent(inout) :: held
+
+    call self%nscdd_t%held(nc, nv, held)
+    call held%add("impulses of Newton's method", .true., 8, 4*nc)
+    call held%add("velocity of Newton's method", .true., 8, nc)
+    call held%add("law of Newton's method", .true., 8, 3*nc + nc**2 + 5)
+    call held%add("state of Newton's method", .true., 4, 1)
+    call held%add("velocity of the sweeps of Newton's method", .false., 8, nv)
+    call held%add("velocity of Newton's steps", .false., 8, nv)
+  end subroutine newton_held
 
   subroutine newton_start(self, problem, error)
     class(newton_t), intent(inout) :: self

@@ -4,11 +4,12 @@ module gravier_schwarz
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
+  use gravier_scheme, only: scheme_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
+  use gravier_method_options, only: method_features_t, method_options_t
   implicit none
   private
   public :: schwarz_t, neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
-    & extrapolate_loads
+    & extrapolate_loads, chosen_relaxation
 
   !> a change not measured yet; its multiple by growth_allowed is a number still [J]
   real(dp), parameter :: unknown = 0.1_dp*huge(1.0_dp)
@@ -49,11 +50,33 @@ module gravier_schwarz
     type(relaxation_t) :: relaxation
     type(neighbour_load_t), allocatable :: load(:)
   contains
+    procedure, nopass :: features => schwarz_features
+    procedure :: set => schwarz_set
     procedure :: start => schwarz_start
     procedure :: iterate => schwarz_iterate
   end type schwarz_t
 
 contains
+
+  pure function schwarz_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="schwarz", meaning="Schwarz-NSCD", moments=.true., sleeping=.true., relaxes=.true.)
+  end function schwarz_features
+
+  subroutine schwarz_set(self, options)
+    class(schwarz_t), intent(inout) :: self
+    type(method_options_t), intent(in) :: options
+
+    call take_options(self, options)
+    self%relaxation = chosen_relaxation(options)
+  end subroutine schwarz_set
+
+  !> A given factor is fixed.
+  pure type(relaxation_t) function chosen_relaxation(options) result(relaxation)
+    type(method_options_t), intent(in) :: options
+    relaxation%automatic = .not. options%relaxation_given
+    if (options%relaxation_given) relaxation%factor = options%relaxation
+  end function chosen_relaxation
 
   subroutine schwarz_start(self, problem, error)
     class(schwarz_t), intent(inout) :: self

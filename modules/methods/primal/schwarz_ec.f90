@@ -4,14 +4,19 @@ module gravier_schwarz_ec
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, work_t, start_sweeps
+  use gravier_scheme, only: scheme_t, take_options, work_t, start_sweeps
+  use gravier_method_options, only: method_features_t, method_options_t
   use gravier_direction_guard, only: direction_guard_t
+  use gravier_search_direction, only: chosen_direction
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
   use gravier_schwarz, only: neighbour_load_t, relaxation_t, start_neighbour_loads, shared_reactions, take_neighbour_loads, &
-    & extrapolate_loads
+    & extrapolate_loads, chosen_relaxation
   implicit none
   private
   public :: schwarz_ec_t
+
+  !> l where none is given [1/W_aa]
+  real(dp), parameter :: usual_direction = 3.0_dp
 
   type, extends(scheme_t) :: schwarz_ec_t
     type(enriched_matrix_t) :: matrix
@@ -19,6 +24,8 @@ module gravier_schwarz_ec
     type(neighbour_load_t), allocatable :: load(:)
     type(direction_guard_t), private :: guard
   contains
+    procedure, nopass :: features => schwarz_ec_features
+    procedure :: set => schwarz_ec_set
     procedure :: start => schwarz_ec_start
     procedure :: iterate => schwarz_ec_iterate
     procedure :: free => schwarz_ec_free
@@ -26,6 +33,21 @@ module gravier_schwarz_ec
   end type schwarz_ec_t
 
 contains
+
+  pure function schwarz_ec_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="schwarz_ec", meaning="Schwarz-NSCD-EC", relaxes=.true.)
+  end function schwarz_ec_features
+
+  subroutine schwarz_ec_set(self, options)
+    class(schwarz_ec_t), intent(inout) :: self
+    type(method_options_t), intent(in) :: options
+
+    call take_options(self, options)
+    self%relaxation = chosen_relaxation(options)
+    self%matrix%direction = chosen_direction(options, usual_direction, usual_direction)
+    self%direction_text = self%matrix%direction%text()
+  end subroutine schwarz_ec_set
 
   subroutine schwarz_ec_start(self, problem, error)
     class(schwarz_ec_t), intent(inout) :: self

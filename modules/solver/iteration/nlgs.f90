@@ -4,17 +4,25 @@ module gravier_nlgs
   use gravier_errors, only: error_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
+  use gravier_method_options, only: method_features_t, default_always
   implicit none
   private
   public :: nlgs_t
 
   type, extends(scheme_t) :: nlgs_t
   contains
+    procedure, nopass :: features => nlgs_features
     procedure :: start => nlgs_start
     procedure :: iterate => nlgs_iterate
   end type nlgs_t
 
 contains
+
+  pure function nlgs_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="nlgs", meaning="nonlinear Gauss-Seidel on one domain", decomposes=.false., &
+      & moments=.true., sleeping=.true., momentum_by_default=default_always)
+  end function nlgs_features
 
   subroutine nlgs_start(self, problem, error)
     class(nlgs_t), intent(inout) :: self

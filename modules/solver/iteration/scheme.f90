@@ -6,9 +6,10 @@ module gravier_scheme
   use gravier_communicator, only: communicator_t
   use gravier_contact_kernels, only: lanes, n_blocks
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   implicit none
   private
-  public :: scheme_t, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
+  public :: scheme_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
     & end_sweeps, extrapolate
 
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
@@ -92,8 +93,11 @@ module gravier_scheme
     real(dp), allocatable :: seconds(:)
     type(work_t) :: work
   contains
+    procedure(describe_method), deferred, nopass :: features
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
+    procedure :: set => take_options
+    procedure :: held => scheme_held
     procedure :: conclude => scheme_conclude
     procedure :: mends_growth => scheme_mends_growth
     procedure :: free => scheme_free
@@ -103,6 +107,12 @@ module gravier_scheme
   end type scheme_t
 
   abstract interface
+    !> What the method is called and what it serves.
+    pure function describe_method() result(features)
+      import :: method_features_t
+      implicit none
+      type(method_features_t) :: features
+    end function describe_method
     !> Make ready for a new problem, from the impulses it holds, and evaluate v_global. Collective; an error is the same on all
     !> ranks.
     subroutine start_solve(self, problem, error)
@@ -127,6 +137,28 @@ module gravier_scheme
   end interface
 
 contains
+
+  !> Take what the input says to the method; methods with options of their own take these, too.
+  subroutine take_options(self, options)
+    class(scheme_t), intent(inout) :: self
+    type(method_options_t), intent(in) :: options
+
+    self%sweeps = options%sweeps
+    self%momentum%on = options%momentum
+    self%direction_text = ""
+  end subroutine take_options
+
+  !> The arrays that the method holds beside those of all methods; methods with arrays of their own add them.
+  pure subroutine scheme_held(self, nc, nv, held)
+    class(scheme_t), intent(in) :: self
+    !> components of a contact, of a body
+    integer, intent(in) :: nc, nv
+    type(held_list_t), intent(inout) :: held
+
+    if (.not. self%momentum%on) return
+    call held%add("impulse of momentum", .true., 8, nc)
+    call held%add("velocity of momentum", .false., 8, nv)
+  end subroutine scheme_held
 
   !> The end of a solve without success, with v_global evaluated: what is left are the impulses of the last iteration; methods
   !> that keep better ones override it. Collective.

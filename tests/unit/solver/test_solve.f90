@@ -6,6 +6,7 @@ module test_solve_schemes
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t
+  use gravier_method_options, only: method_features_t
   use gravier_solve, only: exact_solution_t
   implicit none
   private
@@ -18,6 +19,7 @@ module test_solve_schemes
     integer :: fails_at = 0, nan_at = 0
     integer :: done = 0, measured = 0
   contains
+    procedure, nopass :: features => growing_features
     procedure :: start => growing_start
     procedure :: iterate => growing_iterate
   end type growing_t
@@ -30,6 +32,11 @@ module test_solve_schemes
   end type first_impulse_t
 
 contains
+
+  pure function growing_features() result(features)
+    type(method_features_t) :: features
+    features = method_features_t(name="growing")
+  end function growing_features
 
   subroutine growing_start(self, problem, error)
     class(growing_t), intent(inout) :: self
