@@ -96,9 +96,9 @@ class Going:
         return self.process.returncode, said
 
 
-def compile_shim(directory):
-    """Path of the shim as a library."""
-    library, source = os.path.join(directory, "shim.so"), write(os.path.join(directory, "shim.c"), SHIM)
+def compile_shim(directory, text=SHIM):
+    """Path of a shim as a library."""
+    library, source = os.path.join(directory, "shim.so"), write(os.path.join(directory, "shim.c"), text)
     compiler = shutil.which("cc") or shutil.which("gcc")
     if not compiler:
         raise AssertionError("a C compiler is needed for this test")
