@@ -20,6 +20,8 @@ set(gravier_test_environment
   OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
   OMPI_MCA_btl_vader_single_copy_mechanism=none
+  # messages within one machine; a search for networks would take longer than most tests
+  OMPI_MCA_pml=ob1
   # MPI says on stderr where a chroot has no /sys; tests count the lines there
   HWLOC_HIDE_ERRORS=2
   OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
@@ -41,7 +43,7 @@ function(gravier_test name)
     set(TEST_RANKS 1)
   endif()
   if(NOT TEST_TIMEOUT)
-    set(TEST_TIMEOUT 300)
+    set(TEST_TIMEOUT 900)
   endif()
   set(target test_${name})
   if(NOT TARGET ${target})
@@ -75,7 +77,7 @@ function(gravier_python_test name file)
     return()
   endif()
   if(NOT TEST_TIMEOUT)
-    set(TEST_TIMEOUT 600)
+    set(TEST_TIMEOUT 1800)
   endif()
   get_filename_component(directory ${file} DIRECTORY)
   get_filename_component(script ${file} NAME)

@@ -9,7 +9,7 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, RunTestCase, each, namelist, write
+from gravier_runs import ENVIRONMENT, MPIEXEC, PATIENCE, PROGRAMS, RunTestCase, each, namelist, write
 from killed_runs import compile_shim
 
 #: as many as a reader of 32 bits would take for 2
@@ -47,7 +47,7 @@ def limited(program, *arguments, directory, addresses=None):
         if addresses:
             resource.setrlimit(resource.RLIMIT_AS, (addresses, addresses))
     return subprocess.run([os.path.join(PROGRAMS, program), *arguments], cwd=directory, env={**ENVIRONMENT, **os.environ}, text=True,
-                          stdin=subprocess.DEVNULL, capture_output=True, timeout=100, preexec_fn=limit, check=False)
+                          stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE, preexec_fn=limit, check=False)
 
 
 class TooLarge(RunTestCase):
@@ -60,7 +60,7 @@ class TooLarge(RunTestCase):
     @staticmethod
     def start(command, directory):
         return subprocess.run(command, cwd=directory, env={**ENVIRONMENT, **os.environ}, text=True, stdin=subprocess.DEVNULL,
-                              capture_output=True, timeout=100, check=False)
+                              capture_output=True, timeout=PATIENCE, check=False)
 
     def case(self, name, changes):
         write(self.here(name), namelist({group: {**keys, **changes.get(group, {})} for group, keys in {**{key: {} for key in changes}, **CASE}

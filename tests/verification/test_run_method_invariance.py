@@ -62,7 +62,7 @@ class MethodInvariance(RunTestCase):
             "decomposition": {"subdomains": subdomains, "partition": partition, "kind": kind},
             "output": {"directory": "results"},
         }, method)
-        return run_case(case, 1, self.here(f"{title} {friction} {subdomains} {partition} {kind}"), timeout=300)
+        return run_case(case, 1, self.here(f"{title} {friction} {subdomains} {partition} {kind}"))
 
     def compare(self, friction, jobs):
         """Run (title, method, part) and compare each with nonlinear Gauss-Seidel."""
