@@ -137,7 +137,8 @@ class MethodInvariance(RunTestCase):
         self.compare(0.0, [("nscdd_ep, mumps", nscdd_ep(30, "mumps"), part) for part in SOME])
 
     def test_nscdd_ep_by_cg_without_friction(self):
-        self.compare(0.0, [("nscdd_ep, cg", nscdd_ep(30, "cg"), part) for part in SOME])
+        # one subdomain has no interface to solve
+        self.compare(0.0, [("nscdd_ep, cg", nscdd_ep(30, "cg"), part) for part in SOME[1:]])
 
     def test_schwarz_ec_without_friction(self):
         self.compare(0.0, [("schwarz_ec", schwarz_ec(3, 0.7), part) for part in SOME])
