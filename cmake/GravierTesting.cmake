@@ -20,6 +20,8 @@ set(gravier_test_environment
   OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
   OMPI_MCA_btl_vader_single_copy_mechanism=none
+  # messages within one machine; a search for networks would take longer than most tests
+  OMPI_MCA_pml=ob1
   # MPI says on stderr where a chroot has no /sys; tests count the lines there
   HWLOC_HIDE_ERRORS=2
   OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
@@ -41,7 +43,7 @@ function(gravier_test name)
     set(TEST_RANKS 1)
   endif()
   if(NOT TEST_TIMEOUT)
-    set(TEST_TIMEOUT 300)
+    set(TEST_TIMEOUT 900)
   endif()
   set(target test_${name})
   if(NOT TARGET ${target})
@@ -67,22 +69,38 @@ function(gravier_test name)
   endforeach()
 endfunction()
 
-# gravier_python_test(NAME FILE [LABELS ...] [TIMEOUT seconds])
-# A unittest script. Its environment names GRAVIER_BIN_DIR, GRAVIER_SOURCE_DIR and MPIEXEC; tests/support is on its path.
+# gravier_python_test(NAME FILE [APART] [LABELS ...] [TIMEOUT seconds])
+# A unittest script. Its environment names GRAVIER_BIN_DIR, GRAVIER_SOURCE_DIR and MPIEXEC; tests/support is on its path. With APART
+# each of its methods test_X is a test by itself, NAME_X.
 function(gravier_python_test name file)
-  cmake_parse_arguments(TEST "" "TIMEOUT" "LABELS" ${ARGN})
+  cmake_parse_arguments(TEST "APART" "TIMEOUT" "LABELS" ${ARGN})
   if(NOT GRAVIER_PYTHON)
     return()
   endif()
   if(NOT TEST_TIMEOUT)
-    set(TEST_TIMEOUT 600)
+    set(TEST_TIMEOUT 1800)
   endif()
   get_filename_component(directory ${file} DIRECTORY)
   get_filename_component(script ${file} NAME)
-  gravier_add_test(${name} ${TEST_TIMEOUT} 1 "${TEST_LABELS}"
-    "${GRAVIER_PYTHON};-m;unittest;discover;-v;-s;${directory};-p;${script}")
-  # most of their runs are on one rank; the longest tests start first
-  set_tests_properties(${name} PROPERTIES COST 100)
+  set(command "${GRAVIER_PYTHON};-m;unittest;discover;-v;-s;${directory};-p;${script}")
+  set(methods "")
+  if(TEST_APART)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+    file(STRINGS ${file} lines REGEX "^    def test_[a-z0-9_]+\\(self")
+    foreach(line ${lines})
+      string(REGEX REPLACE "^    def test_([a-z0-9_]+).*" "\\1" method ${line})
+      list(APPEND methods ${method})
+    endforeach()
+  endif()
+  foreach(method IN LISTS methods)
+    gravier_add_test(${name}_${method} ${TEST_TIMEOUT} 1 "${TEST_LABELS}" "${command};-k;*.test_${method}")
+    set_tests_properties(${name}_${method} PROPERTIES COST 50)
+  endforeach()
+  if(NOT methods)
+    gravier_add_test(${name} ${TEST_TIMEOUT} 1 "${TEST_LABELS}" "${command}")
+    # most of their runs are on one rank; the longest tests start first
+    set_tests_properties(${name} PROPERTIES COST 100)
+  endif()
 endfunction()
 
 # gravier_add_test(NAME TIMEOUT RANKS LABELS COMMAND): in a directory of its own, with the environment of tests

@@ -25,7 +25,7 @@ except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from whole_file import give_names  # noqa: E402
+from whole_file import Locked, give_names, output_lock  # noqa: E402
 
 LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
 #: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
@@ -724,8 +724,9 @@ def main():
             raise Refused(f"--period {' '.join(f'{length:g}' for length in options.period)}: expected finite numbers >= 0")
         case = Case(bodies, density, gravity, laws, sees, options.planes, options.slip, options.period or [])
         case.build()
-        made = write_files(case, options.out, options, contacts)
-    except Refused as refused:
+        with output_lock(options.out + ".nml", "gravier_import"):
+            made = write_files(case, options.out, options, contacts)
+    except (Refused, Locked) as refused:
         print(f"gravier_import: error: {refused}", file=sys.stderr)
         return 2
     except (ValueError, IndexError) as problem:

@@ -1,6 +1,10 @@
-"""Files that are written aside and take their name when they are whole: whatever happens meanwhile, an older one stays."""
+"""Files that are written aside and take their name when they are whole: whatever happens meanwhile, an older one stays. And the lock by
+which one program at a time writes a file, that of modules/io/files/output_lock.f90."""
 import contextlib
+import errno
+import fcntl
 import os
+import socket
 import sys
 from pathlib import Path
 
@@ -25,6 +29,43 @@ def give_names(parts):
             os.fsync(file.fileno())
     for path, part in parts.items():
         os.replace(part, path)
+
+
+class Locked(Exception):
+    """Another program writes here; the words say which."""
+
+
+@contextlib.contextmanager
+def output_lock(path, program):
+    """Hold the lock of a file, which need not exist: two bytes of .NAME.lock beside it, which says who holds it. Raises Locked where
+    another program does. A file system without locks keeps none."""
+    path = Path(path)
+    lock = path.with_name(f".{path.name}.lock")
+    while True:
+        with open(lock, "a+", encoding="utf-8", errors="replace") as file:
+            try:
+                fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 2, 0)
+            except OSError as what:
+                if what.errno in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP):
+                    yield
+                    return
+                if what.errno not in (errno.EACCES, errno.EAGAIN):
+                    raise
+                file.seek(0)
+                said = file.read().splitlines()
+                raise Locked(f"{path}: another program writes here{': ' + said[1] if said[1:] else f', {lock} is locked'}; "
+                             "expected a place that no other program writes to") from None
+            # a program that has ended meanwhile has removed the file: others do not see a lock on that one
+            if not lock.exists() or not os.path.samestat(os.fstat(file.fileno()), os.stat(lock)):
+                continue
+            file.truncate(0)
+            file.write(f"{socket.gethostname()}\n{program}, process {os.getpid()}\n")
+            file.flush()
+            try:
+                yield
+            finally:
+                lock.unlink(missing_ok=True)
+            return
 
 
 def save_figure(figure, path, **options):

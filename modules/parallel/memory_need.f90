@@ -1,8 +1,5 @@
-!> Memory that is asked for before it is allocated, and the end of a program to which the system gives none.
+!> Memory that is asked for before it is allocated.
 module gravier_memory_need
-  use, intrinsic :: iso_c_binding, only: c_int
-  use, intrinsic :: iso_fortran_env, only: error_unit
-  use mpi_f08, only: MPI_COMM_WORLD, MPI_Abort, MPI_Comm_size, MPI_Finalized, MPI_Initialized
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_room, only: free_memory, process_limit, bytes_text
@@ -10,14 +7,6 @@ module gravier_memory_need
   implicit none
   private
   public :: check_memory
-
-  interface
-    subroutine c_exit_now(status) bind(C, name="_exit")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: status
-    end subroutine c_exit_now
-  end interface
 
 contains
 
@@ -58,46 +47,5 @@ contains
     end subroutine refuse
 
   end subroutine check_memory
-
-  !> What compiled code calls, in the place of the procedure of GNU Fortran's library, where an allocation without stat= fails: one
-  !> line and status_failure, instead of a backtrace and 1. Of other compilers nothing calls it.
-  subroutine allocation_failed(place, text, bytes) bind(C, name="_gfortran_os_error_at")
-    use, intrinsic :: iso_c_binding, only: c_associated, c_ptr, c_size_t
-    !> texts of the library, of no use to a reader
-    type(c_ptr), value :: place, text
-    integer(c_size_t), value :: bytes
-
-    ! they are there in any case
-    if (c_associated(place) .or. c_associated(text)) continue
-    call end_without_memory(bytes_text(real(bytes, dp))//" ")
-  end subroutine allocation_failed
-
-  !> The same for temporaries.
-  subroutine temporary_failed(text) bind(C, name="_gfortran_os_error")
-    use, intrinsic :: iso_c_binding, only: c_associated, c_ptr
-    type(c_ptr), value :: text
-
-    if (c_associated(text)) continue
-    call end_without_memory("")
-  end subroutine temporary_failed
-
-  !> End all ranks: one of them cannot go on.
-  subroutine end_without_memory(amount)
-    character(len=*), intent(in) :: amount
-    character(len=200) :: program_name
-    integer :: n_ranks
-    logical :: started, ended
-
-    call get_command_argument(0, program_name)
-    write (error_unit, "(a)") trim(program_name(index(program_name, "/", back=.true.) + 1:))//": error: out of memory: "//amount// &
-      & "cannot be had; more ranks on more machines share a scene out"
-    flush (error_unit)
-    n_ranks = 1
-    call MPI_Initialized(started)
-    call MPI_Finalized(ended)
-    if (started .and. .not. ended) call MPI_Comm_size(MPI_COMM_WORLD, n_ranks)
-    if (n_ranks > 1) call MPI_Abort(MPI_COMM_WORLD, status_failure)
-    call c_exit_now(int(status_failure, c_int))
-  end subroutine end_without_memory
 
 end module gravier_memory_need

@@ -20,7 +20,7 @@ import numpy as np
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from fault_trials import BOX, CRASH, Figure, kept  # noqa: E402
-from gravier_runs import ENVIRONMENT, PROGRAMS, SOURCE, contents, differences, merged, namelist, write  # noqa: E402
+from gravier_runs import ENVIRONMENT, PATIENCE, PROGRAMS, SOURCE, contents, differences, merged, namelist, write  # noqa: E402
 
 CASE = merged(BOX, {"time": {"steps": 4}, "output": {"every": 2, "trace": False, "checkpoint_every": 4, "final_bodies": True, "fclib_step": 4,
                                                      "energy": True}})
@@ -54,7 +54,7 @@ def start(arguments, directory):
     """Run a program by itself, on one rank."""
     try:
         done = subprocess.run(arguments, cwd=directory, env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True,
-                              timeout=20, check=False)
+                              timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
         return Said("a hang", "", "")
     return Said(done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace"))

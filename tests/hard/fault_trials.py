@@ -212,7 +212,7 @@ def full_disks(random_seed, trials, directory, kinds=KINDS):
             try:
                 problems, end = [], "no end"
                 try:
-                    run = gravier(*arguments, program=program, ranks=ranks, directory=place, timeout=60)
+                    run = gravier(*arguments, program=program, ranks=ranks, directory=place)
                     problems = what_is_said(run, (0, 2, 4)) + unreadable(disk, pattern)
                     end = f"status {run.status}"
                 except AssertionError as what:
@@ -260,14 +260,14 @@ def kills(random_seed, trials, directory, all_ranks=(1, 2, 4)):
             else:
                 begun = os.path.exists(results)
                 try:
-                    run.end(timeout=20)
+                    run.end(timeout=60)
                 except AssertionError as what:
                     # Open MPI's launcher may wait for ever for a rank that dies while it starts, before the program has begun
                     end = f"{ranks} ranks whose launcher hung before the program began"
                     problems = [str(what)] if begun else []
                 problems += unreadable(results, os.path.join(straight, "results"))
             try:
-                again = gravier("--restart", "case.nml", ranks=draw.choice((1, 2)), directory=place, timeout=60)
+                again = gravier("--restart", "case.nml", ranks=draw.choice((1, 2)), directory=place)
                 problems += what_is_said(again, (0,)) + unreadable(results, os.path.join(straight, "results"))
                 if again.status == 0:
                     problems += [f"differs: {name}" for name in differences(wanted, state(results))[:3]]
@@ -322,7 +322,7 @@ def at_once(random_seed, trials, directory):
             write(os.path.join(place, f"case_{k}.nml"), namelist(case))
             time.sleep(delay)
             try:
-                runs[k] = gravier(*options, f"case_{k}.nml", ranks=ranks, directory=place, timeout=100)
+                runs[k] = gravier(*options, f"case_{k}.nml", ranks=ranks, directory=place)
             except AssertionError as what:
                 runs[k] = what
 

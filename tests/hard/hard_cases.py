@@ -152,14 +152,14 @@ class Played:
         return wrong
 
 
-def play(case, title, method, ranks, directory, long=False, timeout=120):
+def play(case, title, method, ranks, directory, long=False):
     """Run a case by a method in a directory."""
     os.makedirs(directory, exist_ok=True)
     files = {"bodies.csv": bodies_csv(case.grains) if case.grains else NO_GRAINS[case.dimension], **case.files}
     for name, text in files.items():
         write(os.path.join(directory, name), text)
     groups = case.input_groups(method, long)
-    return Played(case, title, groups, run_case(groups, ranks, directory, timeout))
+    return Played(case, title, groups, run_case(groups, ranks, directory))
 
 
 def methods_of(case, titles=None):

@@ -102,6 +102,50 @@ class Drift(RunTestCase):
         self.assertGreater(heights[0][-1] - heights[0][0], 0.1)
         self.assertLess(np.abs(heights[0] - heights[1]).max(), 0.1 * (heights[0][-1] - heights[0][0]))
 
+    def frictionless(self, name, bodies, subdomains, steps, more=None):
+        """Places and velocities of grains on which nothing acts, by step, in so many subdomains."""
+        run = self.run_here(name, {
+            "scene": {"bodies_file": bodies, "friction": 0.0, "gravity": [0.0, 0.0]}, "time": {"steps": steps},
+            "solver": {"method": "nlgs" if subdomains == 1 else "nscdd", "tolerance": 1e-12},
+            "decomposition": {"subdomains": subdomains}, "output": {"every": 1}}, more)
+        self.assert_status(run, 0)
+        found = run.results()
+        return [[found[f"/steps/{step}/bodies/{what}"] for step in range(steps + 1)] for what in ("position", "velocity")]
+
+    def test_chain_on_any_partition(self):
+        """Disks in a row that push each other apart: however they are cut, their centre of mass stays, and they end where each gap
+        is what is allowed, within the tenth that sweeps may leave of it."""
+        rng = np.random.default_rng(7)
+        radii = RADIUS * rng.uniform(0.6, 1.4, 40)
+        x = np.append(0.0, np.cumsum(radii[1:] + radii[:-1] - rng.uniform(0.0, 0.1, 39) * RADIUS))
+        path = grains_file(self.here("chain.h5"), np.stack([x, np.zeros(40)], axis=1), radii)
+        runs = [places for places, _ in each(self.frictionless, [(f"chain {n}", path, n, 40, {"decomposition": {"grid": [n, 1]}})
+                                                                for n in (1, 4, 8)])]
+        centres = [[np.average(place[:, 0], weights=radii**2) for place in places] for places in runs]
+        np.testing.assert_allclose(centres, centres[0][0], rtol=0.0, atol=1e-14)
+        self.assertGreater(np.abs(runs[0][-1] - runs[0][0]).max(), 100.0 * ALLOWED)
+        for places in runs[1:]:
+            self.assertGreater(np.abs(places[1] - runs[0][1]).max(), 0.0, "the chain was not cut")
+            self.assertLess(np.abs(places[-1] - runs[0][-1]).max(), 0.1 * 39 * ALLOWED)
+
+    def test_packing_on_any_partition(self):
+        """Projections end before they are exact, and elsewhere on other partitions: by what is allowed or so, as theory.md says,
+        and not in velocities. Without them places are the same."""
+        grown = grains_file(self.here("grown by a hundredth.h5"), self.centres, 1.01 * self.radii, planes=self.planes)
+        # the figures of theory.md
+        allowed = {"scene": {"overlap_allowed": 0.01 * RADIUS}}
+        cases = [(f"places {n} {kind}", grown, n, 3, merged(allowed, more))
+                 for kind, more in (("with", {}), ("without", WITHOUT)) for n in (1, 4, 16)]
+        runs = each(self.frictionless, cases)
+        for places, velocities in runs:
+            np.testing.assert_array_equal(velocities, 0.0 * np.array(velocities))
+        for places, _ in runs[3:]:
+            np.testing.assert_array_equal(places, runs[3][0])
+        moved = np.abs(runs[0][0][1] - runs[0][0][0]).max()
+        self.assertGreater(moved, 5.0 * 0.01 * RADIUS)
+        for places, _ in runs[1:3]:
+            self.assertLess(np.linalg.norm(places[1] - runs[0][0][1], axis=1).max(), 1.5 * 0.01 * RADIUS)
+
     def test_deep_overlaps(self):
         """Overlaps of a fifth of the radius, in a box too narrow for the layers: they are undone within some hundred steps. On
         the way some may get deeper, by a half at most, since sweeps end before they are exact; grains fall into what opens, from

@@ -68,7 +68,7 @@ class FullDisk(RunTestCase):
     def fills_up(self, ranks):
         # a step takes 20 KiB of bodies and contacts, and as room for headers 64 KiB more
         directory = self.small_disk(f"small on {ranks}", 600)
-        run = run_case(CASE, ranks, directory, timeout=60)
+        run = run_case(CASE, ranks, directory)
         self.assert_stopped(run)
         steps = self.compare_with_free(run)
         # there was room for more than the start
@@ -85,7 +85,7 @@ class FullDisk(RunTestCase):
         """With one state at the end, it is a table that meets the full disk."""
         directory = self.small_disk("tables", 130)
         run = run_case(merged(CASE, {"output": {"every": 0}, "time": {"steps": 2000}, "solver": {"tolerance": 1e-3}}), 2,
-                       directory, timeout=100)
+                       directory)
         self.assert_stopped(run)
         self.assertEqual(steps_of(run.results("disk/results")), [])
         for table in (run.history("disk/results"), run.trace("disk/results")):
@@ -99,7 +99,7 @@ class FullDisk(RunTestCase):
         sizes = [os.path.getsize(free.path("disk/results", name)) // 1024 for name in ("results.h5", "final_bodies.h5")]
         # some disk is large enough for the state, which comes first, and not for the bodies file
         for kilobytes in range(sizes[0], sizes[0] + sizes[1] + 200, sizes[1] // 3):
-            run = run_case(case, 2, self.small_disk(f"disk of {kilobytes}", kilobytes), timeout=60)
+            run = run_case(case, 2, self.small_disk(f"disk of {kilobytes}", kilobytes))
             self.assert_stopped(run)
             if "final_bodies.h5" in run.stderr:
                 break
@@ -117,7 +117,7 @@ class FullDisk(RunTestCase):
             except OSError:
                 pass
         for ranks in (1, 2):
-            run = run_case(merged(CASE, {"output": {"directory": "disk"}}), ranks, directory, timeout=60)
+            run = run_case(merged(CASE, {"output": {"directory": "disk"}}), ranks, directory)
             self.assertIn(run.status, (2, 4), str(run))
             self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
             self.assertIn("no space left on device", run.stderr)
@@ -129,7 +129,7 @@ class FullDisk(RunTestCase):
         os.makedirs(os.path.join(directory, "disk", "results"))
         os.symlink("/dev/full", os.path.join(directory, "disk", "results", "history.csv"))
         for ranks in (1, 2):
-            run = run_case(CASE, ranks, directory, timeout=60)
+            run = run_case(CASE, ranks, directory)
             self.assert_stopped(run)
             self.assertIn("history.csv", run.stderr)
 

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import time
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase, gravier, namelist, read_csv, write
+from gravier_runs import ENVIRONMENT, MPIEXEC, PATIENCE, PROGRAMS, SOURCE, RunTestCase, gravier, namelist, read_csv, write
 
 JOBS = os.path.join(SOURCE, "drivers", "jobs")
 CASE = {
@@ -43,7 +43,7 @@ class Jobs(RunTestCase):
     def sh(self, *command, **variables):
         environment = {**ENVIRONMENT, **os.environ, "PATH": f"{self.bin}:{PROGRAMS}:{os.environ['PATH']}",
                        "QUEUE": os.path.join(self.work, "queue"), "GRAVIER_MARGIN": "0", **{k: str(v) for k, v in variables.items()}}
-        return subprocess.run(command, cwd=self.work, env=environment, capture_output=True, text=True, timeout=120, check=False)
+        return subprocess.run(command, cwd=self.work, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False)
 
     def queue(self):
         path = os.path.join(self.work, "queue")

@@ -1,6 +1,7 @@
 """Counts beyond 2^31 and scenes beyond the memory: one line with the figure, status 2 for a count and 4 for the memory, never another
 count, never a backtrace."""
 import os
+import re
 import resource
 import subprocess
 import unittest
@@ -8,12 +9,36 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, RunTestCase, namelist, write
+from gravier_runs import ENVIRONMENT, MPIEXEC, PATIENCE, PROGRAMS, RunTestCase, each, namelist, write
+from killed_runs import compile_shim
 
 #: as many as a reader of 32 bits would take for 2
 MANY = 2**32 + 2
 CASE = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [10, 8], "radius_min": 0.008, "radius_max": 0.012},
         "time": {"step": 1e-3, "steps": 1}, "output": {"directory": "results", "every": 0}}
+# a process whose own code, not that of libraries, gets no memory from its n-th allocation of some size on
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+extern void *__libc_malloc(size_t);
+extern void *__libc_realloc(void *, size_t);
+static long n = 0, at = -1;
+static int fails(size_t size, void *caller) {
+  Dl_info where;
+  if (at < 0) at = atol(getenv("FAILS_AT"));
+  if (size < 2000 || !dladdr(caller, &where) || !where.dli_fname || !strstr(where.dli_fname, "/gravier")) return 0;
+  if (++n < at) return 0;
+  errno = ENOMEM;
+  return 1;
+}
+__attribute__((destructor)) static void tell(void) { fprintf(stderr, "own allocations: %ld\n", n); }
+void *malloc(size_t size) { return fails(size, __builtin_return_address(0)) ? NULL : __libc_malloc(size); }
+void *realloc(void *old, size_t size) { return fails(size, __builtin_return_address(0)) ? NULL : __libc_realloc(old, size); }
+"""
 
 
 def limited(program, *arguments, directory, addresses=None):
@@ -22,7 +47,7 @@ def limited(program, *arguments, directory, addresses=None):
         if addresses:
             resource.setrlimit(resource.RLIMIT_AS, (addresses, addresses))
     return subprocess.run([os.path.join(PROGRAMS, program), *arguments], cwd=directory, env={**ENVIRONMENT, **os.environ}, text=True,
-                          stdin=subprocess.DEVNULL, capture_output=True, timeout=100, preexec_fn=limit, check=False)
+                          stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE, preexec_fn=limit, check=False)
 
 
 class TooLarge(RunTestCase):
@@ -35,7 +60,7 @@ class TooLarge(RunTestCase):
     @staticmethod
     def start(command, directory):
         return subprocess.run(command, cwd=directory, env={**ENVIRONMENT, **os.environ}, text=True, stdin=subprocess.DEVNULL,
-                              capture_output=True, timeout=100, check=False)
+                              capture_output=True, timeout=PATIENCE, check=False)
 
     def case(self, name, changes):
         write(self.here(name), namelist({group: {**keys, **changes.get(group, {})} for group, keys in {**{key: {} for key in changes}, **CASE}
@@ -98,6 +123,34 @@ class TooLarge(RunTestCase):
         self.assertEqual(run.returncode, 4, run)
         self.assertRegex(run.stderr.splitlines()[0], r"run\.nml: &scene lattice_count: 2000000 grains: at least 1\.1 GB of memory are needed "
                          r"on a rank, which may still have [\d.]+ MB \(ulimit -v\)$")
+
+    def test_no_memory_while_running(self):
+        """Whatever allocation fails, from the first to those of the last step: one line and status 4 on 1 and 2 ranks, of which one
+        gets no more memory. Before the program asked after each of its own, a quarter of these runs crashed."""
+        shim = compile_shim(self.scratch, SHIM)
+        case = self.case("without.nml", {"scene": {"lattice_count": [20, 20], "friction": 0.3}, "time": {"steps": 6},
+                                         "solver": {"method": "nscdd", "max_iterations": 20}, "decomposition": {"subdomains": 4},
+                                         "output": {"every": 3, "checkpoint_every": 3}})
+
+        def run(ranks, at):
+            folder = self.here(f"without {ranks} {at}")
+            os.makedirs(folder)
+            script = f'if [ "${{OMPI_COMM_WORLD_RANK:-$PMI_RANK}}" = {ranks - 1} ]; then export LD_PRELOAD={shim} FAILS_AT={at}; fi; ' \
+                     f"ulimit -c 0; exec {PROGRAMS}/gravier ../{case}"
+            return self.start([MPIEXEC, "-n", str(ranks), "sh", "-c", script], folder)
+
+        for ranks, count in ((1, 24), (2, 12)):
+            whole = run(ranks, 10**9)
+            self.assertEqual(whole.returncode, 0, whole)
+            number = int(re.search(r"own allocations: (\d+)", whole.stderr)[1])
+            self.assertGreater(number, 100)
+            points = [1 + number * k // count for k in range(count)]
+            for at, ended in zip(points, each(run, [(ranks, at) for at in points])):
+                with self.subTest(ranks=ranks, at=at):
+                    said = [line for line in ended.stderr.splitlines() if "gravier: error: " in line]
+                    self.assertEqual((ended.returncode, len(said)), (4, 1), ended)
+                    self.assertRegex(said[0], r"gravier: error: out of memory: [\d.]+ kB cannot be had; ")
+                    self.assertNotIn("Segmentation", ended.stderr)
 
 
 if __name__ == "__main__":

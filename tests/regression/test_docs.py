@@ -26,7 +26,7 @@ PAGES = [SOURCE / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.m
 BANNED = ["TODO", "FIXME", "XXX", "coming soon", "not yet implemented"]
 # pages whose blocks need no line to say why they are not run
 UNMARKED = {"README.md": "builds the program, or installs packages"}
-PATIENCE = 300  # seconds for one block
+PATIENCE = 900  # seconds for one block
 
 ENVIRONMENT = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",

@@ -1,4 +1,5 @@
 """gravier_import: DATBOX of LMGC90 written here become cases of Gravier that do what formulas say; what has no counterpart is named."""
+import fcntl
 import math
 import os
 import subprocess
@@ -104,6 +105,29 @@ class Import(RunTestCase):
             steps = [file[f"steps/{k}"] for k in sorted(map(int, file["steps"]))]
             return [{name: data[:] for name, data in each["bodies"].items()} for each in steps], \
                    [each["boundaries/force"][:] for each in steps]
+
+    def test_two_at_once(self):
+        """Where another program writes the case, one line says which, and nothing is written; a lock that nobody holds is none."""
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx")
+        box = self.box(2, body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.1))]), laws)
+        folder = self.fresh("both")
+        lock = os.path.join(folder, ".case.nml.lock")
+        command = [sys.executable, IMPORT, box, "--step", "1e-3", "--out", "case"]
+
+        def convert():
+            return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ})
+
+        write(lock, "elsewhere\ngravier_import, process 77\n")
+        with open(lock, "rb+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX, 2, 0)
+            done = convert()
+            self.assertEqual(done.returncode, 2, done)
+            self.assertEqual(done.stderr, "gravier_import: error: case.nml: another program writes here: gravier_import, process 77; "
+                             "expected a place that no other program writes to\n")
+            self.assertEqual(os.listdir(folder), [".case.nml.lock"])
+        done = convert()
+        self.assertEqual(done.returncode, 0, done)
+        self.assertEqual(sorted(os.listdir(folder)), ["case.h5", "case.nml"])
 
     def test_a_settled_packing_stays_settled(self):
         """300 disks at rest, as LMGC90 would have written them (reference places and displacements, walls that are rectangles with

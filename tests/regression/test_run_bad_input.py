@@ -359,7 +359,7 @@ class BadInput(RunTestCase):
         if earlier:
             shutil.copytree(self.here("earlier", "results"), results)
         before = snapshot(directory)
-        run = gravier("case.nml", ranks=ranks, directory=directory, timeout=60)
+        run = gravier("case.nml", ranks=ranks, directory=directory)
         after = snapshot(directory)
         return run, file, sorted(set(before.items()) ^ set(after.items()))
 
@@ -539,7 +539,7 @@ class BadInput(RunTestCase):
         for ranks in (1, 2):
             for arguments, words in cases:
                 with self.subTest(arguments, ranks=ranks):
-                    self.assert_refused(gravier(*arguments, ranks=ranks, directory=self.scratch, timeout=60), words)
+                    self.assert_refused(gravier(*arguments, ranks=ranks, directory=self.scratch), words)
         self.assertEqual(snapshot(self.scratch), before)
 
 

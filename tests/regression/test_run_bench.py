@@ -98,7 +98,7 @@ class Bench(RunTestCase):
         for ranks in (1, 2):
             os.makedirs(os.path.join(cls.scratch, str(ranks)))
             cls.runs[ranks] = gravier(*SMALL, "--csv", "table.csv", ranks=ranks, directory=os.path.join(cls.scratch, str(ranks)),
-                                      program="gravier_bench", timeout=300)
+                                      program="gravier_bench")
 
     def table(self, ranks):
         self.assert_status(self.runs[ranks], 0)

@@ -8,7 +8,7 @@ import subprocess
 import termios
 import threading
 
-from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, RunTestCase, merged, namelist, run_case, settled_disks, write
+from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, PATIENCE, RunTestCase, merged, namelist, run_case, settled_disks, write
 
 #: begin of the line of a step: number, time, contacts
 STEP = re.compile(r"^ +(\d+) +\d\.\d{6}E[+-]\d+ +\d+ ", re.M)
@@ -94,7 +94,7 @@ class Progress(RunTestCase):
                               stderr=subprocess.STDOUT) as process:
             os.close(slave)
             listener.start()
-            status = process.wait(timeout=120)
+            status = process.wait(timeout=PATIENCE)
         listener.join()
         os.close(master)
         return status, b"".join(said).decode()

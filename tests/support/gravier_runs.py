@@ -24,11 +24,15 @@ GRAVIER = os.path.join(PROGRAMS, "gravier")
 MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
 #: numbers of the runs of this process
 RUNS = itertools.count()
+#: seconds after which a run that does not end is taken for one that hangs, on whatever machine, with whatever else to do
+PATIENCE = 900
 ENVIRONMENT = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_hwloc_base_binding_policy": "none", "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1",
+    # messages within one machine; a search for networks would take longer than most runs
+    "OMPI_MCA_pml": "ob1",
     # after a rank that failed the launcher would wait seconds for ranks that have left
     "OMPI_MCA_odls_base_sigkill_timeout": "0",
 }
@@ -65,9 +69,9 @@ class Run:
                           self.launcher[-3000:]])
 
 
-def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
-    """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run not over after `timeout` seconds is ended and is an error:
-    one rank waits for another that has left, or a loop does not end."""
+def gravier(*arguments, ranks=1, directory=".", program="gravier"):
+    """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run not over after PATIENCE is ended and is an error: one
+    rank waits for another that has left, or a loop does not end."""
     # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure; each
     # run has its own names, since several may share a directory
     own = f"rank.{os.getpid()}_{next(RUNS)}"
@@ -76,7 +80,7 @@ def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
                                env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE)
     try:
-        stdout, launcher = process.communicate(timeout=timeout)
+        stdout, launcher = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
         # the launcher ends its ranks when it is told to stop
         process.terminate()
@@ -85,7 +89,7 @@ def gravier(*arguments, ranks=1, directory=".", timeout=120, program="gravier"):
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
-        raise AssertionError(f"{program} {' '.join(arguments)} on {ranks} ranks did not end in {timeout} s") from None
+        raise AssertionError(f"{program} {' '.join(arguments)} on {ranks} ranks did not end in {PATIENCE} s") from None
     said = {}
     for name in sorted(glob.glob(os.path.join(glob.escape(directory), own + ".*"))):
         with open(name, "rb") as file:
@@ -112,11 +116,11 @@ def merged(*parts):
             for group, keys in groups.items()}
 
 
-def run_case(groups, ranks=1, directory=".", timeout=120, options=()):
+def run_case(groups, ranks=1, directory=".", options=()):
     """Write `groups` to case.nml in `directory` (made if need be) and run it there."""
     os.makedirs(directory, exist_ok=True)
     write(os.path.join(directory, "case.nml"), namelist(groups))
-    return gravier(*options, "case.nml", ranks=ranks, directory=directory, timeout=timeout)
+    return gravier(*options, "case.nml", ranks=ranks, directory=directory)
 
 
 def write(path, text):

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import time
 
-from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, namelist, write
+from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, PATIENCE, namelist, write
 
 # a process that dies just before its n-th write to a file whose path holds a text
 SHIM = r"""
@@ -56,7 +56,7 @@ class Going:
                                          "case.nml"], cwd=directory, env=environment, stdin=subprocess.DEVNULL,
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
-    def wait_for(self, condition, what, timeout=30, pause=0.002):
+    def wait_for(self, condition, what, timeout=PATIENCE, pause=0.002):
         end = time.monotonic() + timeout
         while not condition():
             if self.process.poll() is not None or time.monotonic() > end:
@@ -85,7 +85,7 @@ class Going:
             except ProcessLookupError:
                 pass
 
-    def end(self, timeout=60):
+    def end(self, timeout=PATIENCE):
         """Status and what was said."""
         try:
             said = self.process.communicate(timeout=timeout)[0]
@@ -96,9 +96,9 @@ class Going:
         return self.process.returncode, said
 
 
-def compile_shim(directory):
-    """Path of the shim as a library."""
-    library, source = os.path.join(directory, "shim.so"), write(os.path.join(directory, "shim.c"), SHIM)
+def compile_shim(directory, text=SHIM):
+    """Path of a shim as a library."""
+    library, source = os.path.join(directory, "shim.so"), write(os.path.join(directory, "shim.c"), text)
     compiler = shutil.which("cc") or shutil.which("gcc")
     if not compiler:
         raise AssertionError("a C compiler is needed for this test")

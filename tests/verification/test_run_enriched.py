@@ -43,8 +43,7 @@ class Enriched(RunTestCase):
 
     def play(self, jobs, ranks=1):
         """{title: run} of {title: case}."""
-        return dict(zip(jobs, each(lambda title: run_case(jobs[title], ranks, self.here(f"{title} {ranks}".replace(" ", "_")),
-                                                          timeout=300), [(title,) for title in jobs])))
+        return dict(zip(jobs, each(lambda title: run_case(jobs[title], ranks, self.here(f"{title} {ranks}".replace(" ", "_"))), [(title,) for title in jobs])))
 
     def lowered(self, run):
         """How often the safeguard lowered l, as the closing table has it."""

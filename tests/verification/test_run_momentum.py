@@ -71,7 +71,7 @@ class Momentum(RunTestCase):
         """{title: (iterations to each tolerance, plain and with momentum)}."""
         jobs = [(title, plain) for title in cases for plain in (True, False)]
         runs = dict(zip(jobs, each(lambda title, plain: run_case(
-            merged(cases[title], PLAIN if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_")), timeout=300), jobs)))
+            merged(cases[title], PLAIN if plain else MOMENTUM), 1, self.here(f"{title}, {plain}".replace(" ", "_"))), jobs)))
         found = {}
         print()
         for title in cases:

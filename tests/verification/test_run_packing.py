@@ -68,7 +68,7 @@ class Packing(RunTestCase):
             "solver": {"tolerance": TOLERANCE, "max_iterations": 40000, "check_every": 20, "warm_start": False,
                        **METHODS.get(method, {"solver": {"method": method, "sweeps": 10}})["solver"]},
             "decomposition": {"subdomains": subdomains, "partition": partition, "kind": kind},
-        }, directory=os.path.join(cls.scratch, name), timeout=600)
+        }, directory=os.path.join(cls.scratch, name))
         return run
 
     def bound(self):

@@ -22,7 +22,7 @@ class Relaxation(RunTestCase):
         """{title: (run with the paper's factor 1, run with the automatic one)}."""
         jobs = [(title, paper) for title in cases for paper in (True, False)]
         runs = dict(zip(jobs, each(lambda title, paper: run_case(
-            merged(cases[title], PAPER if paper else {}), 1, self.here(f"{title}, {paper}".replace(" ", "_")), timeout=300), jobs)))
+            merged(cases[title], PAPER if paper else {}), 1, self.here(f"{title}, {paper}".replace(" ", "_"))), jobs)))
         return {title: (runs[title, True], runs[title, False]) for title in cases}
 
     def test_columns(self):

@@ -46,7 +46,7 @@ def make(name, directory, ranks=1):
     os.makedirs(directory, exist_ok=True)
     write(os.path.join(directory, "radii.csv"), "radius,share\n0.006,3\n0.012,1\n")
     write(os.path.join(directory, "sample.nml"), namelist(CASES.get(name, name) if isinstance(name, str) else name))
-    return gravier("sample.nml", ranks=ranks, directory=directory, program="gravier_sample", timeout=300)
+    return gravier("sample.nml", ranks=ranks, directory=directory, program="gravier_sample")
 
 
 def volume(dimension, radius):

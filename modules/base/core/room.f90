@@ -1,18 +1,12 @@
 !> Memory: what is left of it, arrays that may be too large for it, and how an amount is written.
 module gravier_room
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t
-  use gravier_kinds, only: dp, i4, i8
+  use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_int64_t, c_ptr, c_size_t
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
   implicit none
   private
-  public :: make_room, free_memory, process_limit, bytes_text, raise_no_room
-
-  !> make_room(array, n, what, error) and make_room(array, k, n, what, error): allocate (n) or (k, n) zeros. Failure
-  !> (status_failure): there is no memory for it; the array is then empty.
-  interface make_room
-    procedure :: room_for_integers, room_for_integer_rows, room_for_reals, room_for_real_rows, room_for_small_integers
-  end interface make_room
+  public :: room_for, free_memory, process_limit, bytes_text
 
   !> struct rlimit of the C library.
   type, bind(C) :: limit_t
@@ -26,6 +20,18 @@ module gravier_room
       integer(c_int), value :: resource
       type(limit_t), intent(out) :: limit
     end function c_getrlimit
+
+    type(c_ptr) function c_calloc(n, bytes_each) bind(C, name="calloc")
+      import :: c_ptr, c_size_t
+      implicit none
+      integer(c_size_t), value :: n, bytes_each
+    end function c_calloc
+
+    subroutine c_free(address) bind(C, name="free")
+      import :: c_ptr
+      implicit none
+      type(c_ptr), value :: address
+    end subroutine c_free
   end interface
 
   !> RLIMIT_AS of Linux: bytes of addresses of a process
@@ -39,87 +45,26 @@ module gravier_room
 
 contains
 
-  subroutine room_for_integers(array, n, what, error)
-    integer(i8), allocatable, intent(out) :: array(:)
+  !> n where there is memory for so many items, and 0 where there is none (status_failure), or an error already: what an array that
+  !> may be too large is allocated with. It is tried whether the system gives so much at once; the trial touches no memory.
+  integer(i8) function room_for(n, bytes_each, what, error)
     integer(i8), intent(in) :: n
-    !> for the message
+    integer, intent(in) :: bytes_each
+    !> that wants them, for the message
     character(len=*), intent(in) :: what
     type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
+    type(c_ptr) :: trial
 
-    allocate (array(n), source=0_i8, stat=stat)
-    if (stat == 0) return
-    call raise_no_room(what, 8*real(n, dp), error)
-    allocate (array(0))
-  end subroutine room_for_integers
-
-  subroutine room_for_integer_rows(array, k, n, what, error)
-    integer(i8), allocatable, intent(out) :: array(:, :)
-    integer, intent(in) :: k
-    integer(i8), intent(in) :: n
-    !> for the message
-    character(len=*), intent(in) :: what
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
-
-    allocate (array(k, n), source=0_i8, stat=stat)
-    if (stat == 0) return
-    call raise_no_room(what, 8*k*real(n, dp), error)
-    allocate (array(k, 0))
-  end subroutine room_for_integer_rows
-
-  subroutine room_for_reals(array, n, what, error)
-    real(dp), allocatable, intent(out) :: array(:)
-    integer(i8), intent(in) :: n
-    !> for the message
-    character(len=*), intent(in) :: what
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
-
-    allocate (array(n), source=0.0_dp, stat=stat)
-    if (stat == 0) return
-    call raise_no_room(what, 8*real(n, dp), error)
-    allocate (array(0))
-  end subroutine room_for_reals
-
-  subroutine room_for_real_rows(array, k, n, what, error)
-    real(dp), allocatable, intent(out) :: array(:, :)
-    integer, intent(in) :: k
-    integer(i8), intent(in) :: n
-    !> for the message
-    character(len=*), intent(in) :: what
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
-
-    allocate (array(k, n), source=0.0_dp, stat=stat)
-    if (stat == 0) return
-    call raise_no_room(what, 8*k*real(n, dp), error)
-    allocate (array(k, 0))
-  end subroutine room_for_real_rows
-
-  subroutine room_for_small_integers(array, n, what, error)
-    integer(i4), allocatable, intent(out) :: array(:)
-    integer(i8), intent(in) :: n
-    !> for the message
-    character(len=*), intent(in) :: what
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
-
-    allocate (array(n), source=0_i4, stat=stat)
-    if (stat == 0) return
-    call raise_no_room(what, 4*real(n, dp), error)
-    allocate (array(0))
-  end subroutine room_for_small_integers
-
-  !> Raise status_failure: there is no memory for so many bytes.
-  pure subroutine raise_no_room(what, bytes, error)
-    !> that wants them
-    character(len=*), intent(in) :: what
-    real(dp), intent(in) :: bytes
-    type(error_t), allocatable, intent(inout) :: error
-
-    call raise(error, status_failure, what//": out of memory: "//bytes_text(bytes)//" cannot be had")
-  end subroutine raise_no_room
+    room_for = 0
+    if (allocated(error)) return
+    trial = c_calloc(int(n, c_size_t), int(bytes_each, c_size_t))
+    if (n > 0 .and. .not. c_associated(trial)) then
+      call raise(error, status_failure, what//": out of memory: "//bytes_text(real(n, dp)*bytes_each)//" cannot be had")
+      return
+    end if
+    call c_free(trial)
+    room_for = n
+  end function room_for
 
   !> Bytes of memory that all processes of this machine together can still get, within the limits of the control group of this one;
   !> 0 where the system does not tell.

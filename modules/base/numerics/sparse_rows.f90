@@ -3,7 +3,7 @@ module gravier_sparse_rows
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: sparse_rows_t, compressed_rows, transposed, no_columns, half_of, mirrored
+  public :: sparse_rows_t, entries_t, compressed_rows, transposed, no_columns, half_of, mirrored
 
   !> Rows and columns are numbered from 1; entries of the same place add up, and the columns of a row come in any order.
   type :: sparse_rows_t
@@ -15,10 +15,39 @@ module gravier_sparse_rows
     real(dp), allocatable :: value(:)
   end type sparse_rows_t
 
+  !> Entries of a matrix, one after the other, the first n of those that there is room for.
+  type :: entries_t
+    integer :: n = 0
+    integer, allocatable :: row(:), column(:)
+    real(dp), allocatable :: value(:)
+  contains
+    procedure :: init => entries_init
+    procedure :: add => entries_add
+  end type entries_t
+
   !> what rounding may add to the square of an entry of a positive matrix, relative to the product of those on the diagonal
   real(dp), parameter :: rounding = 1.0e-6_dp
 
 contains
+
+  !> No entries, and room for so many.
+  subroutine entries_init(self, room)
+    class(entries_t), intent(out) :: self
+    integer, intent(in) :: room
+
+    allocate (self%row(room), self%column(room), self%value(room))
+  end subroutine entries_init
+
+  pure subroutine entries_add(self, i, j, x)
+    class(entries_t), intent(inout) :: self
+    integer, intent(in) :: i, j
+    real(dp), intent(in) :: x
+
+    self%n = self%n + 1
+    self%row(self%n) = i
+    self%column(self%n) = j
+    self%value(self%n) = x
+  end subroutine entries_add
 
   !> A matrix from entries in any order.
   pure function compressed_rows(n_rows, n_columns, row, column, value) result(matrix)
@@ -96,25 +125,25 @@ contains
     type(sparse_rows_t), intent(in) :: half
     type(sparse_rows_t), intent(out) :: whole
     integer, intent(out) :: bad_row
-    integer, allocatable :: row(:), column(:)
-    real(dp), allocatable :: value(:), diagonal(:), sums(:)
+    type(entries_t) :: entries
+    real(dp), allocatable :: diagonal(:), sums(:)
     integer :: i, k, n
 
-    n = size(half%value)
-    allocate (row(2*n), column(2*n), value(2*n), diagonal(half%n_rows), sums(half%n_rows))
-    n = 0
+    call entries%init(2*size(half%value))
+    allocate (diagonal(half%n_rows), sums(half%n_rows))
     diagonal(:) = 0.0_dp
     do i = 1, half%n_rows
       do k = half%start(i), half%start(i + 1) - 1
-        call add(i, half%column(k), half%value(k))
+        call entries%add(i, half%column(k), half%value(k))
         if (half%column(k) == i) then
           diagonal(i) = diagonal(i) + half%value(k)
         else
-          call add(half%column(k), i, half%value(k))
+          call entries%add(half%column(k), i, half%value(k))
         end if
       end do
     end do
-    whole = compressed_rows(half%n_rows, half%n_rows, row(1:n), column(1:n), value(1:n))
+    n = entries%n
+    whole = compressed_rows(half%n_rows, half%n_rows, entries%row(1:n), entries%column(1:n), entries%value(1:n))
     bad_row = 0
     sums(:) = 0.0_dp
     do i = 1, half%n_rows
@@ -129,19 +158,6 @@ contains
         sums(half%column(k)) = 0.0_dp
       end do
     end do
-
-  contains
-
-    subroutine add(i, j, x)
-      integer, intent(in) :: i, j
-      real(dp), intent(in) :: x
-
-      n = n + 1
-      row(n) = i
-      column(n) = j
-      value(n) = x
-    end subroutine add
-
   end subroutine mirrored
 
 end module gravier_sparse_rows

@@ -2,7 +2,7 @@
 module gravier_bodies_data
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow, take_count
-  use gravier_room, only: raise_no_room
+  use gravier_room, only: room_for
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
@@ -62,19 +62,16 @@ contains
     !> that has so many, for the message
     character(len=*), intent(in) :: what
     type(error_t), allocatable, intent(inout) :: error
-    integer :: nv, stat
+    integer :: nv
 
     if (allocated(error)) return
     nv = 3*(dimension - 1)
     bodies%dimension = dimension
     bodies%n = n
+    if (room_for(int(n, i8), data_bytes(dimension), what, error) < n) return
     allocate (bodies%id(n), bodies%position(dimension, n), bodies%radius(n), bodies%velocity(nv, n), bodies%group(n), &
-      & bodies%material(n), stat=stat)
-    if (stat == 0 .and. with_masses) allocate (bodies%mass(n), stat=stat)
-    if (stat /= 0) then
-      call raise_no_room(what, real(n, dp)*data_bytes(dimension), error)
-      return
-    end if
+      & bodies%material(n))
+    if (with_masses) allocate (bodies%mass(n))
     bodies%group(:) = 0
     bodies%material(:) = 1
     bodies%velocity(:, :) = 0.0_dp
@@ -87,12 +84,11 @@ contains
     !> that has so many, for the message
     character(len=*), intent(in) :: what
     type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
 
     if (allocated(error)) return
     bodies%n_walls = n
-    allocate (bodies%wall_id(n), bodies%wall_point(dimension, n), bodies%wall_normal(dimension, n), stat=stat)
-    if (stat /= 0) call raise_no_room(what, real(n, dp)*8*(1 + 2*dimension), error)
+    if (room_for(int(n, i8), 8*(1 + 2*dimension), what, error) < n) return
+    allocate (bodies%wall_id(n), bodies%wall_point(dimension, n), bodies%wall_normal(dimension, n))
   end subroutine allocate_walls
 
   !> The block of rows of this rank: `n` rows from `first` (from 0) on; blocks differ by one row at most. Failure: status_input

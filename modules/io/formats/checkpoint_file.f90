@@ -4,7 +4,7 @@ module gravier_checkpoint_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
-  use gravier_room, only: make_room
+  use gravier_room, only: room_for
   use gravier_narrow, only: check_counts
   use gravier_communicator, only: communicator_t
   use gravier_hdf5_file, only: h5_file_t
@@ -264,7 +264,7 @@ contains
     call self%file%row_count("/arrays/"//name, n, error)
     if (n < least .or. n > most) call self%refuse("/arrays/"//name//": "//to_text(n)//" words, but "//to_text(least)// &
       & " to "//to_text(most)//" were expected", error)
-    call make_room(values, merge(0_i8, n, allocated(error)), self%path//": /arrays/"//name, error)
+    allocate (values(room_for(n, 8, self%path//": /arrays/"//name, error)), source=0_i8)
     call self%comm%agree(error)
     call self%file%read_rows("/arrays/"//name, 0_i8, values, error)
   end subroutine checkpoint_read_array
@@ -311,7 +311,7 @@ contains
     end if
     if (allocated(error)) counts(:) = 0
     call check_counts(counts, self%path//": "//group//"/counts", error)
-    call make_room(records, words, sum(counts), self%path//": "//group, error)
+    allocate (records(words, room_for(sum(counts), 8*words, self%path//": "//group, error)), source=0_i8)
     call self%comm%agree(error)
     first = self%comm%offset(sum(counts))
     call self%file%read_rows(group//"/records", first, records, error)

@@ -5,7 +5,7 @@
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow, take_count
-  use gravier_room, only: make_room
+  use gravier_room, only: room_for
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns, half_of, mirrored
@@ -244,7 +244,7 @@ contains
     character(len=*), intent(in) :: dataset
     !> its length; negative: any
     integer, intent(in) :: n
-    real(dp), allocatable, intent(inout) :: values(:)
+    real(dp), allocatable, intent(out) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: found
     integer :: length
@@ -257,7 +257,7 @@ contains
     end if
     call take_count(found, source%path//": "//dataset//": numbers", length, error)
     if (allocated(error)) return
-    call make_room(values, found, source%path//": "//dataset, error)
+    allocate (values(room_for(found, 8, source%path//": "//dataset, error)), source=0.0_dp)
     call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return
@@ -294,7 +294,7 @@ contains
       call source%refuse(dataset//": "//to_text(length)//" numbers: expected "//to_text(n), error)
       return
     end if
-    call make_room(found, int(n, i8), source%path//": "//dataset, error)
+    allocate (found(room_for(int(n, i8), 8, source%path//": "//dataset, error)), source=0_i8)
     call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, found, error)
     if (allocated(error)) return
@@ -403,10 +403,10 @@ contains
     type(source_t), intent(inout) :: source
     character(len=*), intent(in) :: dataset
     integer, intent(in) :: n
-    real(dp), allocatable, intent(inout) :: values(:)
+    real(dp), allocatable, intent(out) :: values(:)
     type(error_t), allocatable, intent(inout) :: error
 
-    call make_room(values, int(n, i8), source%path//": "//dataset, error)
+    allocate (values(room_for(int(n, i8), 8, source%path//": "//dataset, error)), source=0.0_dp)
     call source%file%comm%agree(error)
     call source%file%read_rows(dataset, 0_i8, values, error)
     if (allocated(error)) return

@@ -5,6 +5,7 @@
 module gravier_enriched_matrix
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_sparse_rows, only: entries_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -109,8 +110,8 @@ contains
     !> whether some matrix of this rank was factorised anew
     logical, intent(out) :: changed
     type(error_t), allocatable, intent(inout) :: error
-    integer, allocatable :: row(:), column(:)
-    real(dp), allocatable :: value(:), block(:, :, :)
+    type(entries_t) :: entries
+    real(dp), allocatable :: block(:, :, :)
     integer(i8) :: before
     integer :: s
 
@@ -121,9 +122,9 @@ contains
         if (sub%n_bodies == 0) cycle
         call set_direction(self%direction, self%share, problem%kernels, sub, part%direction)
         call make_diagonal_blocks(part%direction, sub%n_contacts, block)
-        call assemble(problem%kernels, sub, block, .false., row, column, value)
+        call assemble(problem%kernels, sub, block, .false., entries)
         before = part%factor%factorisations
-        call part%factor%factorise(sub%n_bodies*problem%kernels%nv, row, column, value, error)
+        call part%factor%factorise(sub%n_bodies*problem%kernels%nv, entries%row, entries%column, entries%value, error)
         changed = changed .or. part%factor%factorisations > before
       end associate
     end do
@@ -182,12 +183,12 @@ contains
     !> (nc, nc, contacts) [kg]
     real(dp), intent(in), contiguous :: block(:, :, :)
     type(error_t), allocatable, intent(inout) :: error
-    integer, allocatable :: row(:), column(:)
-    real(dp), allocatable :: value(:)
+    type(entries_t) :: entries
 
     if (problem%sub(s)%n_bodies == 0) return
-    call assemble(problem%kernels, problem%sub(s), block, self%general, row, column, value)
-    call self%part(s)%factor%factorise(problem%sub(s)%n_bodies*problem%kernels%nv, row, column, value, error)
+    call assemble(problem%kernels, problem%sub(s), block, self%general, entries)
+    call self%part(s)%factor%factorise(problem%sub(s)%n_bodies*problem%kernels%nv, entries%row, entries%column, &
+      & entries%value, error)
   end subroutine enriched_matrix_factorise_blocks
 
   !> The blocks (nc, nc, contacts) of an l without coupling.
@@ -206,16 +207,15 @@ contains
     end do
   end subroutine make_diagonal_blocks
 
-  !> M + H l H^T with the masses in `weight`, as triplets, of a symmetric matrix the lower triangle; components that cannot
+  !> M + H l H^T with the masses in `weight`, as entries, of a symmetric matrix the lower triangle; components that cannot
   !> move eliminated.
-  subroutine assemble(kernels, sub, block, general, row, column, value)
+  subroutine assemble(kernels, sub, block, general, entries)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     !> l (nc, nc, contacts) [kg]
     real(dp), intent(in), contiguous :: block(:, :, :)
     logical, intent(in) :: general
-    integer, allocatable, intent(out) :: row(:), column(:)
-    real(dp), allocatable, intent(out) :: value(:)
+    type(entries_t), intent(out) :: entries
     real(dp) :: jacobian(kernels%nc, kernels%nv, 2)
     integer :: b, c, d, n, nv, side, on_wall, of_pair
 
@@ -227,14 +227,13 @@ contains
     end do
     of_pair = merge(2*nv*nv, nv*(nv + 1), general)
     n = sub%n_bodies*nv + on_wall*(of_pair/2) + (sub%n_contacts - on_wall)*(of_pair + merge(2, 1, general)*nv*nv)
-    allocate (row(n), column(n), value(n))
-    n = 0
+    call entries%init(n)
     do b = 1, sub%n_bodies
       do d = 1, nv
         if (sub%moves(d, b)) then
-          call add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp/sub%weight(min(d, kernels%nw), b))
+          call entries%add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp/sub%weight(min(d, kernels%nw), b))
         else
-          call add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp)
+          call entries%add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp)
         end if
       end do
     end do
@@ -263,19 +262,10 @@ contains
         do q = 1, merge(p, nv, i == j .and. .not. general)
           x = 0.0_dp
           if (sub%moves(p, i) .and. sub%moves(q, j)) x = sum(row_of*jacobian(:, q, b))
-          call add((i - 1)*nv + p, (j - 1)*nv + q, x)
+          call entries%add((i - 1)*nv + p, (j - 1)*nv + q, x)
         end do
       end do
     end subroutine add_block
-
-    subroutine add(i, j, x)
-      integer, intent(in) :: i, j
-      real(dp), intent(in) :: x
-      n = n + 1
-      row(n) = i
-      column(n) = j
-      value(n) = x
-    end subroutine add
 
   end subroutine assemble
 

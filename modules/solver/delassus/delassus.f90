@@ -1,6 +1,7 @@
 !> A contact problem in the velocities and impulses of its contacts alone, v = W r + q with any blocks W_ab, packed by contacts:
 !> the operator of Delassus, its evaluation, and two measures of how far impulses are from the law, both from r alone.
 module gravier_delassus
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
@@ -279,8 +280,13 @@ contains
 
     call self%measure(r, v, ignored, figure)
     call self%find_extremes(r, v, approach, impulse, contacts)
-    if (.not. approach <= approach_of_tolerance*figure) figure = approach/approach_of_tolerance
-    if (.not. impulse <= most_impulse .and. any(abs(self%q) > 0.0_dp)) figure = huge(figure)
+    ! what is not a number meets no tolerance, wherever it is
+    if (.not. (ieee_is_finite(figure) .and. ieee_is_finite(approach) .and. ieee_is_finite(impulse))) then
+      figure = huge(figure)
+      return
+    end if
+    figure = max(figure, approach/approach_of_tolerance)
+    if (impulse > most_impulse .and. any(abs(self%q) > 0.0_dp)) figure = huge(figure)
   end function delassus_figure
 
   !> A defect relative to its scale; 0 where there is none.

@@ -3,6 +3,7 @@ module gravier_sparse_direct
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_failure
+  use gravier_narrow, only: narrow
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
@@ -289,7 +290,7 @@ contains
     end do
     call sparse_exchange(comm, records, destination, received)
     do k = 1, size(received, 2)
-      b(int(received(1, k)) - first_row(comm%rank + 1) + 1) = transfer(received(2, k), 0.0_dp)
+      b(narrow(received(1, k)) - first_row(comm%rank + 1) + 1) = transfer(received(2, k), 0.0_dp)
     end do
   end subroutine return_rows
 

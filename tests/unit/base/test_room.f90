@@ -3,31 +3,24 @@ program test_room
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, status_failure
-  use gravier_room, only: make_room, free_memory, process_limit, bytes_text
+  use gravier_room, only: room_for, free_memory, process_limit, bytes_text
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   !> more than addresses reach
   integer(i8), parameter :: too_many = 2_i8**58
-  integer(i8), allocatable :: words(:), rows(:, :)
-  real(dp), allocatable :: reals(:), columns(:, :)
-  integer, allocatable :: numbers(:)
   type(error_t), allocatable :: error
 
   call MPI_Init()
-  call make_room(rows, 3, 4_i8, "rows", error)
-  call check_equal(size(rows), 12, "room for rows")
-  call check(all(rows == 0), "zeros")
-  call make_room(words, too_many, "file: words", error)
+  call check_equal(room_for(4_i8, 24, "rows", error), 4_i8, "room for rows")
+  call check_equal(room_for(0_i8, 8, "rows", error), 0_i8, "room for none")
+  call check(.not. allocated(error), "no error")
+  call check_equal(room_for(too_many, 8, "file: words", error), 0_i8, "no room")
+  call check_equal(room_for(4_i8, 24, "rows", error), 0_i8, "no room after an error")
   call expect("file: words: out of memory: 2.3 EB cannot be had")
-  call make_room(rows, 2, too_many/2, "rows", error)
-  call expect("rows: out of memory: 2.3 EB cannot be had")
-  call make_room(reals, too_many, "reals", error)
-  call expect("reals: out of memory: 2.3 EB cannot be had")
-  call make_room(columns, 2, too_many/2, "columns", error)
-  call expect("columns: out of memory: 2.3 EB cannot be had")
-  call make_room(numbers, too_many, "numbers", error)
+  call check_equal(room_for(too_many, 4, "numbers", error), 0_i8, "no room for small ones")
   call expect("numbers: out of memory: 1.2 EB cannot be had")
-  call check_equal(size(words) + size(rows) + size(reals) + size(columns) + size(numbers), 0, "what failed is empty")
+  call check_equal(room_for(huge(too_many), 16, "more than can be counted", error), 0_i8, "no room for so many")
+  call expect("more than can be counted: out of memory: 147.6 EB cannot be had")
   call check(free_memory() > 2_i8**20, "some memory is free")
   call check(process_limit() > 2_i8**20, "and a process may have it")
   call check_equal(bytes_text(0.0_dp), "0.0 kB", "none")

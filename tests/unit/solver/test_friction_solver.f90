@@ -1,6 +1,8 @@
 !> Packed contact problems with full blocks: evaluation, measures, and every method on a stack of boxes, whose contacts are more
 !> than its bodies can tell apart, and on random problems; problems without a solution.
 program test_friction_solver
+  use, intrinsic :: ieee_arithmetic, only: ieee_get_halting_mode, ieee_invalid, ieee_quiet_nan, ieee_set_flag, &
+    & ieee_set_halting_mode, ieee_value
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -504,6 +506,7 @@ contains
     type(error_t), allocatable :: error
     real(dp) :: q(2*n), one(2*n), mu(n), r(2, n), v(2, n), e, es, approach, impulse
     integer :: i, diagonal(2*n), contacts(2)
+    logical :: halts
 
     q = 0.0_dp
     q(1::2) = -1.0_dp
@@ -522,6 +525,13 @@ contains
     call check_close(approach, 1.0e-6_dp, 1.0e-14_dp, "its velocity of approach")
     call check_equal(contacts(1), 7, "the contact that approaches")
     call check_close(problem%figure(r, v), 1.0e-7_dp, 1.0e-14_dp, "what a tolerance is compared with")
+    ! a Debug build stops where one arises
+    call ieee_get_halting_mode(ieee_invalid, halts)
+    call ieee_set_halting_mode(ieee_invalid, .false.)
+    v(2, 3) = ieee_value(1.0_dp, ieee_quiet_nan)
+    call check(problem%figure(r, v) >= huge(1.0_dp), "what is no number meets no tolerance")
+    call ieee_set_flag(ieee_invalid, .false.)
+    call ieee_set_halting_mode(ieee_invalid, halts)
   end subroutine check_approach
 
   !> A method that does not exist, a budget too small, a contact that nothing moves.
