@@ -774,7 +774,8 @@ contains
   subroutine test_rules_of_decomposition()
     character(len=*), parameter :: nscdd = column // "&solver method = 'nscdd' / &decomposition "
     character(len=*), parameter :: one = &
-      "expected one subdomain where &solver method = 'nlgs'; for several use method = 'nscdd' or 'schwarz'"
+      "expected one subdomain where &solver method = 'nlgs'; for several use method = 'schwarz', 'schwarz_ec', 'nscdd', "// &
+      & "'nscdd_ep' or 'newton'"
 
     call refuse(nscdd // "subdomains = 0 /", "&decomposition subdomains = 0: expected an integer >= 1")
     call refuse(nscdd // "repartition_every = -1 /", "&decomposition repartition_every = -1: expected an integer >= 0")
