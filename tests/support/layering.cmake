@@ -1,4 +1,5 @@
-# Each module of MODULES is found from the directories UPPER (else this test could not fail) and not from LOWER.
+# Each module of MODULES is found from the directories UPPER (else this test could not fail) and not from LOWER. With ADJACENT the compiler
+# is asked; for layers farther below, whose directories are among those of the next layer, it is enough that no module file is there.
 file(GLOB modules ${MODULES}/*.mod)
 if(NOT modules)
   message(FATAL_ERROR "no module files in ${MODULES}")
@@ -13,6 +14,19 @@ function(compile source directories status output)
   set(${status} "${result}" PARENT_SCOPE)
   set(${output} "${text}" PARENT_SCOPE)
 endfunction()
+
+string(REPLACE "|" ";" lower "${LOWER}")
+if(NOT ADJACENT)
+  foreach(module ${modules})
+    get_filename_component(module ${module} NAME)
+    foreach(directory ${lower})
+      if(EXISTS ${directory}/${module})
+        message(FATAL_ERROR "${module} is in ${directory}, which a layer below sees")
+      endif()
+    endforeach()
+  endforeach()
+  return()
+endif()
 
 file(MAKE_DIRECTORY ${WORK})
 foreach(module ${modules})
