@@ -64,7 +64,7 @@ contains
     run%iterations = simulation%effort%iterations
     run%solve_seconds = comm%highest(simulation%effort%seconds)
     run%run_seconds = comm%highest(run%run_seconds)
-    if (config%scene%bodies == "column" .and. .not. run%diverged) run%force_error = simulation%column%error(simulation%problem)
+    if (config%scene%bodies == "column" .and. .not. run%diverged) run%force_error = simulation%exact%error(simulation%problem)
     call simulation%free()
   end subroutine run_case_in_memory
 

@@ -567,7 +567,7 @@ contains
 
     do k = 1, repetitions
       call set_impulses(simulation%problem)
-      call solve_contacts(simulation%problem, simulation%scheme, simulation%control, report, error, simulation%column)
+      call solve_contacts(simulation%problem, simulation%scheme, simulation%control, report, error, simulation%exact)
       if (allocated(error)) return
       seconds = min(seconds, report%seconds)
     end do
@@ -613,7 +613,7 @@ contains
       end if
       call set_impulses(simulation%problem)
       relaxed = simulation%scheme%work%relaxations
-      call solve_contacts(simulation%problem, simulation%scheme, control, report, error, simulation%column)
+      call solve_contacts(simulation%problem, simulation%scheme, control, report, error, simulation%exact)
       if (allocated(error)) return
       seen(k)%sweeps = real(simulation%scheme%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
       if (k == size(seen)) call time_again(simulation, report%seconds, error)

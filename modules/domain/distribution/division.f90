@@ -1,4 +1,4 @@
-!> When space is divided into subdomains, and how &decomposition wants it.
+!> When space is divided into subdomains, and how.
 module gravier_division
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -6,10 +6,22 @@ module gravier_division
   use gravier_partition, only: partition_t, choose_boxes, check_subdomains
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
-  use gravier_config_types, only: config_t, decomposition_config_t
   implicit none
   private
-  public :: divide, divide_again, division_is_due
+  public :: division_rule_t, divide, divide_again, division_is_due
+
+  !> How space is to be divided, and how often.
+  type :: division_rule_t
+    !> cells with grains in them, shared out by METIS; else boxes
+    logical :: by_graph = .false.
+    !> boxes along each axis; where some are 0, they are chosen by the number of subdomains
+    integer :: grid(3) = 0
+    integer :: subdomains = 1
+    !> steps between two divisions, 0 for never
+    integer :: every = 0
+    !> largest over mean number of contacts of a subdomain that asks for a new division, 0 for none
+    real(dp) :: imbalance = 0.0_dp
+  end type division_rule_t
 
   !> times the imbalance that the last division reached: one that is worth another division
   real(dp), parameter :: worth_dividing = 1.1_dp
@@ -18,22 +30,21 @@ contains
 
   !> Whether step `step` starts from a new partition: by schedule, or because contacts lie unevenly, and more so than just after
   !> the last one: what that could not cure is not tried again.
-  pure logical function division_is_due(config, step, imbalance, reached) result(due)
-    type(decomposition_config_t), intent(in) :: config
+  pure logical function division_is_due(rule, step, imbalance, reached) result(due)
+    type(division_rule_t), intent(in) :: rule
     integer, intent(in) :: step
     !> largest over mean number of contacts of a subdomain: in the last step, and just after the last division
     real(dp), intent(in) :: imbalance, reached
 
     due = .false.
-    if (step == 0 .or. config%subdomains == 1) return
-    if (config%repartition_every > 0) due = mod(step, config%repartition_every) == 0
-    if (config%repartition_imbalance > 0.0_dp) due = due .or. &
-      & imbalance > max(config%repartition_imbalance, worth_dividing*reached)
+    if (step == 0 .or. rule%subdomains == 1) return
+    if (rule%every > 0) due = mod(step, rule%every) == 0
+    if (rule%imbalance > 0.0_dp) due = due .or. imbalance > max(rule%imbalance, worth_dividing*reached)
   end function division_is_due
 
   !> Divide space for the grains given. Collective.
-  subroutine divide(config, neighbourhoods, bodies, decomposition, error)
-    type(config_t), intent(in) :: config
+  subroutine divide(rule, neighbourhoods, bodies, decomposition, error)
+    type(division_rule_t), intent(in) :: rule
     !> near pairs as far as they are known
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     !> of this rank, however grouped
@@ -46,27 +57,26 @@ contains
     edge = 2.0_dp*decomposition%rule%largest_radius + decomposition%rule%range()
     ! without grains any edge serves
     if (.not. edge > 0.0_dp) edge = 1.0_dp
-    call check_subdomains(lower, upper, edge, config%decomposition%subdomains, error)
+    call check_subdomains(lower, upper, edge, rule%subdomains, error)
     if (.not. allocated(error)) call cut()
-    if (allocated(error)) error%message = config%file//": "//error%message
     call decomposition%comm%agree(error)
 
   contains
 
-    !> Cut the box [lower, upper] as &decomposition says. Collective.
+    !> Cut the box [lower, upper] as the rule says. Collective.
     subroutine cut()
       real(dp), allocatable :: points(:, :)
       integer, allocatable :: weights(:)
       integer :: boxes(3)
 
-      associate (wanted => config%decomposition, partition => decomposition%partition)
+      associate (partition => decomposition%partition)
         partition%period(:) = decomposition%period%length
-        if (wanted%partition == "metis") then
+        if (rule%by_graph) then
           call collect_weights(decomposition%nd, neighbourhoods, bodies, points, weights)
-          call partition%init_graph(decomposition%comm, lower, upper, edge, points, weights, wanted%subdomains, error)
+          call partition%init_graph(decomposition%comm, lower, upper, edge, points, weights, rule%subdomains, error)
         else
-          boxes(:) = wanted%grid
-          if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, wanted%subdomains, decomposition%period%length)
+          boxes(:) = rule%grid
+          if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, rule%subdomains, decomposition%period%length)
           call partition%init_grid(lower, upper, boxes, edge, error)
         end if
       end associate
@@ -76,8 +86,8 @@ contains
 
   !> Divide space anew; where the scene has come to fill fewer cells than there are subdomains, the old partition
   !> stays. Collective.
-  subroutine divide_again(config, neighbourhoods, decomposition, refused)
-    type(config_t), intent(in) :: config
+  subroutine divide_again(rule, neighbourhoods, decomposition, refused)
+    type(division_rule_t), intent(in) :: rule
     type(neighbourhoods_t), intent(in) :: neighbourhoods
     type(decomposition_t), intent(inout) :: decomposition
     logical, intent(out) :: refused
@@ -87,7 +97,7 @@ contains
 
     old = decomposition%partition
     call move_alloc(decomposition%home, bodies)
-    call divide(config, neighbourhoods, bodies, decomposition, error)
+    call divide(rule, neighbourhoods, bodies, decomposition, error)
     call move_alloc(bodies, decomposition%home)
     refused = allocated(error)
     if (refused) decomposition%partition = old

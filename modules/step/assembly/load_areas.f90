@@ -1,0 +1,69 @@
+!> Areas that loads on boundaries work on.
+module gravier_load_areas
+  use gravier_kinds, only: dp
+  use gravier_boundary, only: shape_plane, shape_segment, shape_rectangle
+  use gravier_facing_planes, only: find_facing_planes
+  use gravier_decomposition, only: decomposition_t
+  implicit none
+  private
+  public :: facing_area, find_load_areas
+
+contains
+
+  !> Area that a pressure on plane `b` works on [m^2, m in 2D].
+  pure real(dp) function facing_area(decomposition, b) result(area)
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: b
+
+    area = area_across(decomposition, maxloc(abs(decomposition%boundaries(b)%axis), dim=1))
+  end function facing_area
+
+  !> Area of the scene across axis `main`: along every other axis, the way between the two planes that face each other
+  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
+  pure real(dp) function area_across(decomposition, main) result(area)
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: main
+    real(dp) :: low, high
+    integer :: d
+
+    area = 1.0_dp
+    associate (boundaries => decomposition%boundaries, length => decomposition%period%length)
+      do d = 1, decomposition%nd
+        if (d == main) cycle
+        call find_facing_planes(boundaries, d, low, high)
+        if (length(d) > 0.0_dp) then
+          area = area*length(d)
+        else if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) then
+          area = area*max(high - low, 0.0_dp)
+        end if
+      end do
+    end associate
+  end function area_across
+
+  !> Areas that the loads on boundaries work on: of a plane that of its pressure, of a segment or rectangle its own, of another
+  !> shape that of the scene across its load.
+  pure subroutine find_load_areas(decomposition, area)
+    type(decomposition_t), intent(in) :: decomposition
+    !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary
+    real(dp), intent(out) :: area(:)
+    integer :: b
+
+    area(:) = 0.0_dp
+    do b = 1, size(area)
+      associate (boundary => decomposition%boundaries(b))
+        if (.not. boundary%is_driven()) cycle
+        select case (boundary%shape)
+        case (shape_plane)
+          area(b) = facing_area(decomposition, b)
+        case (shape_segment)
+          area(b) = norm2(boundary%edge(:, 1))
+        case (shape_rectangle)
+          area(b) = norm2(boundary%edge(:, 1))*norm2(boundary%edge(:, 2))
+        case default
+          area(b) = area_across(decomposition, boundary%load_axis())
+        end select
+      end associate
+    end do
+  end subroutine find_load_areas
+
+end module gravier_load_areas

@@ -1,0 +1,131 @@
+!> Motion of grains and boundaries over a step: to the middle, by drives, and to the end (gravier_motion has the rule).
+module gravier_body_motion
+  use gravier_kinds, only: dp, i8
+  use gravier_time_table, only: time_table_t
+  use gravier_motion, only: predict_position, advance_position
+  use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
+  use gravier_load_areas, only: facing_area
+  use gravier_boundary_loads, only: carry_glued, set_glued_velocities
+  implicit none
+  private
+  public :: move_to_middle, drive, count_fast, move_to_end
+
+contains
+
+  !> q_m of grains and boundaries; boundaries whose time has come are taken away.
+  subroutine move_to_middle(decomposition, physics, theta, time, some_glued, taken_away)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(physics_t), intent(in) :: physics
+    !> of the end of the step in positions; time at its start [s]
+    real(dp), intent(in) :: theta, time
+    !> grains are glued to boundaries
+    logical, intent(in) :: some_glued
+    !> whether a boundary was taken away
+    logical, intent(out) :: taken_away
+    real(dp) :: part
+    integer :: s, b, k, nd
+
+    taken_away = .false.
+    nd = decomposition%nd
+    part = (1.0_dp - theta)*physics%h
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) home%position(:, k) = predict_position(home%position(:, k), home%velocity(1:nd, k), &
+            & physics%h, theta)
+        end do
+      end associate
+    end do
+    if (some_glued) call carry_glued(decomposition, part)
+    do b = 1, size(decomposition%boundaries)
+      associate (boundary => decomposition%boundaries(b))
+        call boundary%move(part)
+        if (.not. boundary%present .or. time < boundary%remove_at) cycle
+        boundary%present = .false.
+        taken_away = .true.
+      end associate
+    end do
+  end subroutine move_to_middle
+
+  !> Gravity and the velocities of boundaries at the end of the step, without contacts.
+  subroutine drive(decomposition, physics, gravity_table, time, changed)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(physics_t), intent(inout) :: physics
+    type(time_table_t), intent(in) :: gravity_table
+    !> at the start of the step [s]
+    real(dp), intent(in) :: time
+    !> whether gravity has changed
+    logical, intent(out) :: changed
+    real(dp) :: force(decomposition%nd), end_time
+    integer :: b, d, nd
+
+    changed = .false.
+    nd = decomposition%nd
+    end_time = time + physics%h
+    if (allocated(gravity_table%has)) then
+      do d = 1, nd
+        if (.not. gravity_table%has(d)) cycle
+        physics%gravity(d) = gravity_table%at(d, end_time)
+        changed = changed .or. abs(physics%gravity(d) - gravity_table%at(d, time)) > 0.0_dp
+      end do
+    end if
+    do b = 1, size(decomposition%boundaries)
+      associate (boundary => decomposition%boundaries(b))
+        boundary%last_velocity(:) = boundary%velocity
+        boundary%last_spin(:) = boundary%spin
+        call boundary%prescribe(nd, end_time)
+        if (.not. boundary%is_driven()) cycle
+        call boundary%applied_force(nd, end_time, facing_area(decomposition, b), force)
+        do d = 1, nd
+          if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + physics%h*force(d)/boundary%mass
+        end do
+      end associate
+    end do
+  end subroutine drive
+
+  !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
+  integer(i8) function count_fast(decomposition, physics) result(fast)
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    integer(i8) :: counts(1)
+    integer :: s, k, nd
+
+    nd = decomposition%nd
+    counts(:) = 0
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (physics%h**2*sum(home%velocity(1:nd, k)**2) > home%radius(k)**2) counts(1) = counts(1) + 1
+        end do
+      end associate
+    end do
+    call decomposition%comm%sum_counts(counts)
+    fast = counts(1)
+  end function count_fast
+
+  !> q_{i+1} of grains and boundaries.
+  subroutine move_to_end(decomposition, physics, theta, some_glued)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(physics_t), intent(in) :: physics
+    real(dp), intent(in) :: theta
+    logical, intent(in) :: some_glued
+    integer :: s, b, k, nd
+
+    nd = decomposition%nd
+    do s = 1, size(decomposition%home)
+      associate (home => decomposition%home(s))
+        do k = 1, home%n
+          if (home%glued(k) == 0) home%position(:, k) = advance_position(home%position(:, k), home%velocity(1:nd, k), &
+            & physics%h, theta)
+        end do
+      end associate
+    end do
+    if (some_glued) call carry_glued(decomposition, theta*physics%h)
+    do b = 1, size(decomposition%boundaries)
+      call decomposition%boundaries(b)%move(theta*physics%h)
+    end do
+    if (some_glued) call set_glued_velocities(decomposition)
+  end subroutine move_to_end
+
+end module gravier_body_motion

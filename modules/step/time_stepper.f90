@@ -1,0 +1,382 @@
+!> The algorithm of a time step: what it takes to make one step after the other, without output. `advance` is the step.
+module gravier_time_stepper
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_text, only: to_text
+  use gravier_finite, only: is_finite
+  use gravier_communicator, only: communicator_t
+  use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
+  use gravier_time_table, only: time_table_t
+  use gravier_effects, only: effects_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_scheme, only: scheme_t
+  use gravier_descent, only: effort_t
+  use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
+    & solve_diverged, solve_unbounded
+  use gravier_decomposition, only: decomposition_t
+  use gravier_departures, only: some_leave, let_grains_out
+  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_division, only: division_rule_t, divide_again, division_is_due
+  use gravier_interface, only: interface_figures_t
+  use gravier_physics, only: physics_t
+  use gravier_load_areas, only: facing_area, find_load_areas
+  use gravier_problem_builder, only: build_problem
+  use gravier_pair_laws, only: conclude_pairs
+  use gravier_velocity_scale, only: velocity_scale_t
+  use gravier_body_motion, only: move_to_middle, drive, count_fast, move_to_end
+  use gravier_velocity_return, only: take_velocities
+  use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities
+  use gravier_overlap_projection, only: project_overlaps
+  use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
+  use gravier_impulse_memory, only: keep_impulses, recall_impulses, gather_impulses, spread_impulses
+  use gravier_diagnostics, only: diagnostics_t
+  use gravier_grain_balance, only: grain_balance_t
+  use gravier_failed_contact, only: find_divergence, find_largest_impulse
+  use gravier_run_tally, only: run_tally_t
+  implicit none
+  private
+  public :: time_stepper_t, step_figures_t
+
+  !> shifts of all grains by a projection, over the overlap allowed, that are rounding: grains that a projection has left at the
+  !> overlap allowed are projected again where it is exceeded by rounding
+  real(dp), parameter :: rounded_shift = 1.0e-6_dp
+
+  !> Figures of a step, the same on every rank.
+  type :: step_figures_t
+    type(solve_report_t) :: solve
+    type(interface_figures_t) :: sharing
+    integer(i8) :: contacts = 0
+    !> grains that left by an outlet; grains that move by more than their radius in a step
+    integer(i8) :: left = 0, fast = 0
+    !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
+    logical :: listed = .false., divided = .false., refused = .false.
+    !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
+    !> space was divided anew
+    real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
+    !> contacts that slept at the start of the solve; where they can
+    integer(i8) :: asleep = 0
+    !> places were projected, because some overlap exceeded what is allowed
+    logical :: projected = .false.
+    !> [m], 0 where nothing overlaps; [J]
+    real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
+    !> after a solve that diverged to NaN or infinity: a contact where it did; after one whose impulses grow without bound: the
+    !> contact with the largest
+    character(len=:), allocatable :: cause
+  end type step_figures_t
+
+  type :: time_stepper_t
+    type(communicator_t), pointer :: comm => null()
+    ! ---- what moves, and what acts on it
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: neighbourhoods
+    type(physics_t) :: physics
+    !> what the scene has
+    type(effects_t) :: effects
+    type(time_table_t) :: gravity_table
+    ! ---- how a step is made
+    !> weight of the new velocity in the positions
+    real(dp) :: theta = 0.5_dp
+    !> solves start from the impulses of the step before
+    logical :: warm_start = .true.
+    !> overlap beyond which places are projected; huge where that is off [m]
+    real(dp) :: overlap_allowed = huge(1.0_dp)
+    type(sleeping_rule_t) :: sleeping
+    type(division_rule_t) :: division
+    class(scheme_t), allocatable :: scheme
+    type(solve_control_t) :: control
+    !> where it is known
+    class(exact_solution_t), allocatable :: exact
+    ! ---- the present step
+    type(contact_problem_t) :: problem
+    !> velocity against which errors of the solve of the present step are compared
+    type(velocity_scale_t) :: velocity_scale
+    !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
+    real(dp), allocatable :: boundary_impulses(:, :)
+    integer :: step = 0
+    !> [s]
+    real(dp) :: time = 0.0_dp
+    !> grains of the scene now, and those of them that are glued to boundaries
+    integer(i8) :: n_grains = 0, n_glued = 0
+    !> largest over mean number of contacts of a subdomain in the last step
+    real(dp) :: imbalance = 1.0_dp
+    !> the same just after space was last divided in a step; 0 before
+    real(dp) :: reached_imbalance = 0.0_dp
+    !> of the last step [m]
+    real(dp) :: largest_overlap = 0.0_dp
+    ! ---- what is noted
+    !> figures that the user asked for
+    type(diagnostics_t) :: diagnostics
+    !> energies of the grains since this run began or went on from a checkpoint
+    type(grain_balance_t) :: balance
+    !> messages between ranks, and numbers in them, that iterations of this rank have sent
+    integer(i8) :: messages = 0, values = 0
+    !> over all steps: solves that missed their tolerance, grains that left by outlets, grains too fast for the step
+    integer(i8) :: failed = 0, left = 0, fast = 0
+    !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
+    real(dp) :: worst_overlap = 0.0_dp
+    type(effort_t) :: effort
+    !> how solves ended and what was mended, since this run began or went on from a checkpoint
+    type(run_tally_t) :: tally
+    !> over all steps of this run: contacts that slept at the start of a solve, and solves that woke them
+    integer(i8) :: slept = 0, woken = 0
+  contains
+    procedure :: assemble => time_stepper_assemble
+    procedure :: advance => time_stepper_advance
+    procedure :: facing_area => time_stepper_facing_area
+    procedure :: load_areas => time_stepper_load_areas
+    procedure :: free => time_stepper_free
+  end type time_stepper_t
+
+contains
+
+  !> One step. After a solve that diverged, velocities and places are not those of any step: the run must end.
+  !> Collective.
+  subroutine time_stepper_advance(self, figures, error, watch)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(out) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    !> is told how the solve goes on
+    class(solve_watch_t), intent(inout), optional :: watch
+    real(dp) :: shifts
+
+    if (allocated(error)) return
+    call self%assemble(figures)
+    call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%exact, watch)
+    call note_solve(self, figures, error)
+    if (allocated(error) .or. figures%solve%status == solve_diverged) return
+    call start_timer(phase_bodies)
+    call take_solution(self, figures)
+    call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
+      & self%time, figures%left > 0)
+    call self%balance%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, figures%left > 0)
+    call move_to_end(self%decomposition, self%physics, self%theta, self%n_glued > 0)
+    call stop_timer(phase_bodies)
+    figures%projected = figures%max_overlap > self%overlap_allowed
+    shifts = 0.0_dp
+    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed, shifts)
+    call note_step(self, figures, shifts)
+    call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
+      & self%n_grains - self%n_glued)
+    call check_numbers(self, figures, error)
+  end subroutine time_stepper_advance
+
+  !> Move grains and boundaries to q_m, bring the neighbour lists up to date, find the contacts and start them from the
+  !> impulses of the last step. Collective.
+  subroutine time_stepper_assemble(self, figures)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(out) :: figures
+    logical :: listed, changed
+    integer :: s
+
+    call start_timer(phase_bodies)
+    self%physics%first = self%step == 0
+    call move_to_middle(self%decomposition, self%physics, self%theta, self%time, self%n_glued > 0, listed)
+    call drive(self%decomposition, self%physics, self%gravity_table, self%time, changed)
+    if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%neighbourhoods)
+    figures%fast = count_fast(self%decomposition, self%physics)
+    call stop_timer(phase_bodies)
+    call start_timer(phase_neighbourhood)
+    if (.not. listed) listed = self%neighbourhoods%are_due(self%decomposition)
+    if (.not. listed) listed = some_leave(self%decomposition)
+    figures%divided = division_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
+    figures%listed = listed .or. figures%divided
+    call list_neighbours(self, figures)
+    call stop_timer(phase_neighbourhood)
+    call build_problem(self%decomposition, self%neighbourhoods, self%problem%kernels, self%physics, self%problem, figures%sharing)
+    call start_timer(phase_setup)
+    if (self%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
+    call stop_timer(phase_setup)
+    self%problem%load(:) = self%physics%h*self%physics%gravity
+    figures%contacts = self%problem%n_contacts
+    figures%asleep = self%problem%n_asleep
+    do s = 1, size(self%problem%sub)
+      if (self%problem%sub(s)%n_contacts > 0) figures%max_overlap = max(figures%max_overlap, -minval(self%problem%sub(s)%gap))
+    end do
+    figures%max_overlap = self%comm%highest(figures%max_overlap)
+    self%largest_overlap = figures%max_overlap
+    self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
+    if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
+      & real(figures%contacts, dp)
+    if (figures%divided) then
+      self%reached_imbalance = self%imbalance
+      call self%scheme%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
+      call self%scheme%forget_times()
+    end if
+    call measure_velocity_scale(self)
+  end subroutine time_stepper_assemble
+
+  !> From the impulses of a solve to velocities of grains and boundaries, and to what the next step starts from. Collective.
+  subroutine take_solution(self, figures)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(in) :: figures
+
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
+      & self%neighbourhoods, self%problem)
+    if (self%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
+    if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
+      & self%neighbourhoods)
+    call self%problem%shift_impulses(-1)
+    call take_velocities(self%decomposition, self%physics, self%problem)
+    call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
+    call take_boundary_velocities(self%decomposition, self%boundary_impulses)
+  end subroutine take_solution
+
+  !> Note how a solve ended, and the contact where it failed. Collective.
+  subroutine note_solve(self, figures, error)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    type(error_t), allocatable, intent(in) :: error
+
+    self%messages = self%messages + self%problem%shared%messages
+    self%values = self%values + self%problem%shared%values
+    if (allocated(error)) return
+    associate (solve => figures%solve)
+      if (solve%status /= solve_converged) self%failed = self%failed + 1
+      call self%tally%add_solve(solve, self%velocity_scale%kind)
+      if (solve%status == solve_diverged) then
+        call find_divergence(self%problem, figures%cause)
+        return
+      end if
+      if (solve%status == solve_unbounded) call find_largest_impulse(self%problem, figures%cause)
+      call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
+    end associate
+  end subroutine note_solve
+
+  !> Note what a step has done, and count it.
+  subroutine note_step(self, figures, shifts)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    !> sum of the lengths by which grains were shifted [m]
+    real(dp), intent(in) :: shifts
+    real(dp) :: free_grains
+
+    free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
+    call self%tally%add_step(figures%max_overlap, shifts/self%overlap_allowed > rounded_shift, shifts/free_grains, &
+      & self%physics%h*self%balance%speeds/free_grains)
+    self%step = self%step + 1
+    self%time = self%step*self%physics%h
+    figures%kinetic_energy = self%balance%kinetic
+    self%left = self%left + figures%left
+    self%fast = self%fast + figures%fast
+    self%slept = self%slept + figures%asleep
+    if (figures%solve%woken) self%woken = self%woken + 1
+  end subroutine note_step
+
+  !> Find the velocity against which errors of the solve to come are compared. Collective.
+  subroutine measure_velocity_scale(self)
+    class(time_stepper_t), intent(inout) :: self
+    real(dp) :: area(size(self%decomposition%boundaries))
+
+    call start_timer(phase_setup)
+    call find_load_areas(self%decomposition, area)
+    call self%velocity_scale%measure(self%decomposition, self%physics, self%problem, self%time + self%physics%h, area)
+    self%problem%error_scale = self%velocity_scale%value
+    call stop_timer(phase_setup)
+  end subroutine measure_velocity_scale
+
+  !> Bring views and lists up to date, or make them anew with the impulses carried over. Collective.
+  subroutine list_neighbours(self, figures)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    integer(i8), allocatable :: records(:, :)
+    integer(i8) :: n_glued
+    logical :: remembered
+
+    if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
+    if (.not. figures%listed) return
+    remembered = self%neighbourhoods%memory%words() > 0 .and. self%neighbourhoods%builds > 0
+    if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
+    call let_grains_out(self%decomposition, self%n_glued > 0, figures%left, n_glued)
+    self%n_grains = self%n_grains - figures%left - n_glued
+    self%n_glued = self%n_glued - n_glued
+    if (figures%divided) call divide_again(self%division, self%neighbourhoods, self%decomposition, figures%refused)
+    call self%decomposition%settle()
+    call self%neighbourhoods%build(self%decomposition)
+    if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)
+  end subroutine list_neighbours
+
+  !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
+  subroutine check_numbers(self, figures, error)
+    class(time_stepper_t), intent(in) :: self
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s, k, b
+
+    if (.not. is_finite(figures%kinetic_energy)) then
+      do s = 1, size(self%decomposition%home)
+        associate (home => self%decomposition%home(s))
+          do k = 1, home%n
+            if (.not. is_finite(home%mass(k)*sum(home%velocity(:, k)**2))) &
+              & call refuse("kinetic energy of body "//to_text(home%id(k)))
+          end do
+        end associate
+      end do
+      call self%comm%agree(error)
+    end if
+    do b = 1, size(self%decomposition%boundaries)
+      associate (boundary => self%decomposition%boundaries(b))
+        if (.not. (all(is_finite(boundary%point)) .and. all(is_finite(boundary%velocity)))) &
+          & call refuse("motion of boundary '"//boundary%name//"'")
+      end associate
+    end do
+    if (.not. is_finite(figures%kinetic_energy)) call refuse("kinetic energy")
+    if (.not. is_finite(figures%max_overlap)) call refuse("largest overlap")
+    if (.not. is_finite(figures%solve%residual)) call refuse("residual")
+    if (.not. is_finite(figures%solve%jump)) call refuse("jump")
+    do k = 1, self%diagnostics%n_columns
+      if (.not. is_finite(self%diagnostics%value(k))) call refuse(trim(self%diagnostics%name(k)))
+    end do
+
+  contains
+
+    subroutine refuse(what)
+      character(len=*), intent(in) :: what
+
+      call raise(error, status_failure, "step "//to_text(self%step)//": "//what//": not a finite number; expected speeds, "// &
+        & "loads and a &time step that give finite ones")
+    end subroutine refuse
+
+  end subroutine check_numbers
+
+  !> Area that a pressure on plane `b` works on [m^2, m in 2D].
+  pure real(dp) function time_stepper_facing_area(self, b) result(area)
+    class(time_stepper_t), intent(in) :: self
+    integer, intent(in) :: b
+    area = facing_area(self%decomposition, b)
+  end function time_stepper_facing_area
+
+  !> Areas that the loads on boundaries work on.
+  pure subroutine time_stepper_load_areas(self, area)
+    class(time_stepper_t), intent(in) :: self
+    !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary
+    real(dp), intent(out) :: area(:)
+    call find_load_areas(self%decomposition, area)
+  end subroutine time_stepper_load_areas
+
+  !> Give back what the method holds, and go back to step 0.
+  subroutine time_stepper_free(self)
+    class(time_stepper_t), intent(inout) :: self
+
+    if (allocated(self%scheme)) then
+      call self%scheme%free()
+      deallocate (self%scheme)
+    end if
+    if (allocated(self%exact)) deallocate (self%exact)
+    if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
+    if (allocated(self%neighbourhoods%view)) deallocate (self%neighbourhoods%view)
+    self%neighbourhoods%builds = 0
+    self%step = 0
+    self%time = 0.0_dp
+    self%failed = 0
+    self%left = 0
+    self%fast = 0
+    self%slept = 0
+    self%woken = 0
+    self%worst_overlap = 0.0_dp
+    self%effort = effort_t()
+    self%tally = run_tally_t()
+    self%imbalance = 1.0_dp
+    self%reached_imbalance = 0.0_dp
+  end subroutine time_stepper_free
+
+end module gravier_time_stepper
