@@ -11,7 +11,7 @@ import argparse
 
 import h5py
 import numpy as np
-from whole_file import whole_file
+from whole_file import hdf5_file, written
 
 
 def main():
@@ -36,7 +36,7 @@ def main():
     tiled["position"][:, 0] += width * np.repeat(np.arange(options.copies), len(bodies["id"]))
     walls["point"][high, 0] += (options.copies - 1) * width
     walls["id"] = np.arange(n + 1, n + 1 + len(walls["id"]))
-    with whole_file(options.target) as part, h5py.File(part, "w") as file:
+    with written(options.target) as part, hdf5_file(part) as file:
         for group, rows in (("bodies", tiled), ("walls", walls)):
             for name, data in rows.items():
                 file[f"{group}/{name}"] = data

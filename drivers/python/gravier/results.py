@@ -39,6 +39,17 @@ class Table(dict):
         return pandas.DataFrame(columns)
 
 
+@contextmanager
+def _opened(path, kind):
+    """An HDF5 file, open; what cannot be read of it is an error of one line."""
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as reason:
+        # h5py and numpy have all of these for what is not as a run wrote it
+        raise ResultsError(f"{path}: cannot read this file; expected {kind}: {_one_line(reason)}") from None
+
+
 def read_table(path):
     """A CSV file with one row of names: numbers by column."""
     try:
@@ -76,13 +87,10 @@ class Run:
 
     @contextmanager
     def _open(self):
-        """The file, open; what HDF5 cannot read of it is an error of one line."""
-        try:
-            with h5py.File(self.path, "r") as file:
-                self._check(file)
-                yield file
-        except (OSError, KeyError, RuntimeError, ValueError) as reason:
-            raise ResultsError(f"{self.path}: cannot read this file; expected {self._kind}: {_one_line(reason)}") from None
+        """The file, open."""
+        with _opened(self.path, self._kind) as file:
+            self._check(file)
+            yield file
 
     def _check(self, file):
         if "run" not in file or "steps" not in file:
@@ -104,10 +112,20 @@ class Run:
             return self._table(group[name]) if name in group else None
 
     def _table(self, group):
-        return Table({key: self._values(group[key]) for key in group})
+        table = Table({key: self._values(group[key]) for key in group})
+        for key, values in table.items():
+            if len(values) != len(table):
+                raise ResultsError(f"{self.path}: {group.name}/{key}: {len(values)} rows; expected {len(table)}, as in the others")
+            if key in ("position", "velocity", "normal", "impulse", "force", "point") and (values.ndim != 2 or values.shape[1] < self.dimension):
+                raise ResultsError(f"{self.path}: {group.name}/{key}: shape {values.shape}; expected (rows, {self.dimension} or more)")
+        return table
 
     def _values(self, dataset):
         """What a dataset holds, once it was found to be what was written."""
+        if not isinstance(dataset, h5py.Dataset) or not dataset.shape:
+            raise ResultsError(f"{self.path}: {dataset.name}: expected a dataset of rows")
+        if dataset.size > 0 and dataset.id.get_storage_size() == 0:
+            raise ResultsError(f"{self.path}: {dataset.name}: {len(dataset)} rows, of which none is in the file")
         values = dataset[()]
         if not is_whole(dataset, values):
             raise ResultsError(f"{self.path}: {dataset.name}: its attribute checksum is not that of what it holds: the file is damaged, or "
@@ -161,6 +179,8 @@ class Run:
         return read_table(self.directory / "trace.csv")
 
     def _split(self, rows):
+        if rows is None:
+            raise ResultsError(f"{self.path}: a step without bodies or boundaries; expected {self._kind}")
         if "velocity" in rows:
             rows["spin"] = rows["velocity"][:, self.dimension:]
             rows["velocity"] = rows["velocity"][:, :self.dimension]
@@ -196,11 +216,7 @@ class Run:
         """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""
         step = self.find_step(step)
         path = self.directory / "bodies.vtkhdf"
-        try:
-            file = h5py.File(path, "r")
-        except OSError:
-            raise ResultsError(f"{path}: cannot read this file; expected that of a run with &output vtk = .true.") from None
-        with file:
+        with _opened(path, "that of a run with &output vtk = .true.") as file:
             steps = file["VTKHDF/Steps"]
             count = int(steps.attrs["NSteps"])
             place = np.flatnonzero(file["step"][:count] == step)
