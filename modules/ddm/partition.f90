@@ -426,22 +426,26 @@ contains
   pure logical function is_sound_head(words, nd, n_subdomains) result(sound)
     integer(i8), intent(in), contiguous :: words(:)
     integer, intent(in) :: nd, n_subdomains
+    real(dp) :: cells
     integer :: k
 
     sound = size(words) >= head_words
     if (.not. sound) return
+    cells = product(real(words(8:10), dp))
     sound = words(2) == nd .and. words(3) == n_subdomains .and. words(4) > 0 .and. words(head_words) >= 0
     select case (words(1))
     case (kind_boxes)
-      sound = sound .and. abs(product(real(words(5:7), dp)) - n_subdomains) < 0.5_dp .and. size(words) == head_words
+      ! a cell is a box
+      sound = sound .and. all(words(8:10) == words(5:7)) .and. abs(cells - n_subdomains) < 0.5_dp .and. &
+        & size(words) == head_words
     case (kind_cells)
-      sound = sound .and. size(words) == head_words
+      sound = sound .and. cells <= real(words(4), dp) .and. size(words) == head_words
     case (kind_groups)
-      sound = sound .and. size(words) > head_words
+      sound = sound .and. size(words) == head_words + words(head_words) + 1 + nint(min(cells, real(huge(nd), dp)), i8)
     case default
       sound = .false.
     end select
-    sound = sound .and. all(words(5:11) >= 0 .and. words(5:11) <= huge(nd))
+    sound = sound .and. all(words(5:11) >= 1 .and. words(5:11) <= huge(nd))
     do k = 12, head_words - 1
       ! NaN is not
       sound = sound .and. abs(transfer(words(k), 1.0_dp)) <= huge(1.0_dp)

@@ -9,6 +9,7 @@ line naming the file, output that is no number, or status 0 where what was read 
 printed trial by trial and kept as directories with the files, the command and what it said; the last lines have the figures. Exit status 1
 where there was one. The suite makes a few trials of each kind (test_run_fuzz_inputs.py)."""
 import argparse
+import contextlib
 import io
 import multiprocessing
 import os
@@ -232,7 +233,7 @@ def csv_bodies(path):
     found = {}
     for row in rows:
         cells = dict(zip(names, row))
-        if cells.get("shape") in (None, "", "grain"):
+        if (cells.get("shape") or "grain").lower() == "grain":
             one = int(cells["id"])
             if cells.get("group") and number(cells["group"]) > 0:
                 cells = {name: cell for name, cell in cells.items() if name[0] not in "vwo"}
@@ -251,7 +252,7 @@ def hdf5_bodies(path, dimension=None):
                  "radius": ["radius"], "mass": ["mass"], "group": ["group"]}
         for name, columns in names.items():
             if name in bodies:
-                values = np.asarray(bodies[name][()]).reshape(len(ids), -1)
+                values = np.asarray(bodies[name][()]).reshape(len(ids), len(columns))
                 found.update({(int(one), column): float(values[row, k]) for row, one in enumerate(ids) for k, column in enumerate(columns)})
     glued = {one for (one, name), value in found.items() if name == "group" and value > 0}
     return {(one, name): value for (one, name), value in found.items() if one not in glued or name[0] not in "vwo"}
@@ -649,8 +650,10 @@ def fuzz(seed, count, directory, kinds=None, keep=None, workers=2, only=None):
     random.Random(seed).shuffle(tasks)
     figures = {kind: Figure(f"fuzz, {kind}") for kind in shares}
     with multiprocessing.get_context("fork").Pool(workers) as pool:
-        for kind, one, end, problems in pool.imap_unordered(one_trial, tasks, chunksize=4):
-            figures[kind].note(end, f"--kinds {kind} --seed {seed} --only {one}", problems)
+        # a command that is interrupted has figures of what it did
+        with contextlib.suppress(KeyboardInterrupt):
+            for kind, one, end, problems in pool.imap_unordered(one_trial, tasks, chunksize=4):
+                figures[kind].note(end, f"--kinds {kind} --seed {seed} --only {one}", problems)
     return list(figures.values())
 
 

@@ -11,7 +11,7 @@ from gravier_runs import PROGRAMS, SOURCE, RunTestCase, alone, write
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import fuzz_inputs  # noqa: E402
-from gravier import ResultsError, Run, checksum  # noqa: E402
+from gravier import ResultsError, Run, checksum, read_table  # noqa: E402
 
 GRAVIER = os.path.join(PROGRAMS, "gravier")
 
@@ -98,6 +98,7 @@ class Found(RunTestCase):
             return damage
         nan = np.array(np.nan).view("i8")
         self.refuse("checkpoint.h5", changed("arrays/partition", 4, 2**31), "partition is none of this scene in 2 subdomains")
+        self.refuse("checkpoint.h5", changed("arrays/partition", 7, 2**31 - 1), "partition is none of this scene in 2 subdomains")
         self.refuse("checkpoint.h5", changed("arrays/partition", 12, nan), "partition is none of this scene")
         self.refuse("checkpoint.h5", changed("arrays/boundaries", 3, nan), "the array boundaries: a number of at most 1e30")
         self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 3), 99), "table grains: grain")
@@ -132,6 +133,10 @@ class Found(RunTestCase):
                     Run(os.path.join(place, "results")).bodies(2)
                 self.assertNotIn("\n", str(caught.exception))
 
+        write(self.here("table.csv"), b"step,time\n1,\xff\n")
+        with self.assertRaises(ResultsError):
+            read_table(self.here("table.csv"))
+
     def test_messages(self):
         """What a message quotes does not steer a terminal."""
         write(self.here("case.nml"), "&scene bodies = 'file', bodies_file = 'bodies.csv' /\n&time step = 1, steps = 1 /\n")
@@ -147,6 +152,8 @@ class Found(RunTestCase):
             said = alone([sys.executable, os.path.join(SOURCE, fuzz_inputs.SCRIPTS[script]), *arguments], self.scratch)
             self.assertEqual((said.status, said.stderr.count("\n")), (2, 1), said.stderr)
             self.assertTrue(said.stderr.startswith(f"{script}: error: "), said.stderr)
+        said = alone(["sh", os.path.join(SOURCE, "drivers/jobs/gravier_job"), "a\nb\x1b.nml"], self.scratch)
+        self.assertEqual((said.status, said.stderr), (2, "gravier_job: error: a?b?.nml: cannot read this file; expected a case\n"))
 
 
 if __name__ == "__main__":

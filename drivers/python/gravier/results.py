@@ -57,6 +57,8 @@ def read_table(path):
             header, *rows = list(csv.reader(file)) or [[]]
     except OSError as reason:
         raise ResultsError(f"{path}: {reason.strerror}; expected a table that a run wrote") from None
+    except (ValueError, csv.Error) as reason:
+        raise ResultsError(f"{path}: {_one_line(reason)}; expected a table that a run wrote") from None
     # the last row of a run that is under way or was killed may be cut off
     rows = [row for row in rows if len(row) == len(header)]
     try:
