@@ -186,6 +186,8 @@ def same_value(given, found):
     if len(given) > len(found):
         return False
     for one, other in zip(given, found):
+        if one is None:
+            continue
         if isinstance(one, str):
             if not isinstance(other, str) or one.rstrip().lower() != other.rstrip().lower():
                 return False
