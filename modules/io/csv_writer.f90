@@ -173,7 +173,7 @@ contains
   pure logical function is_number(cell)
     character(len=*), intent(in) :: cell
 
-    is_number = number_size(cell) /= not_a_number
+    is_number = number_size(cell) /= not_a_number .and. scan(cell, "dD") == 0
     if (.not. is_number) is_number = cell == "nan" .or. cell == "inf" .or. cell == "-inf"
   end function is_number
 

@@ -208,9 +208,8 @@ def not_in_force(text, said):
                 name, _, place = key.partition("(")
                 found = force.get(group, [])
                 found = found[number].get(name) if number < len(found) else None
-                if place and found is not None:
-                    at = int(place.rstrip(") ")) - 1
-                    found = found[at] if isinstance(found, list) and at < len(found) else found
+                if place and isinstance(found, list):
+                    found = found[int(place.rstrip(") ").split(":")[0]) - 1:]
                 if found is None or not same_value(value, found):
                     problems.append(f"&{group} {key} = {value!r}, but in force is {found!r}")
     return problems[:2]

@@ -122,7 +122,10 @@ class Found(RunTestCase):
             values = file["steps/2/bodies/radius"][:-1]
             del file["steps/2/bodies/radius"]
             file["steps/2/bodies/radius"] = values
-        for damage in (checksums, texts, never_written, fewer):
+
+        def missing(file):
+            del file["steps/2/bodies/radius"]
+        for damage in (checksums, texts, never_written, fewer, missing):
             with self.subTest(damage.__name__):
                 place = self.here("python")
                 shutil.rmtree(place, ignore_errors=True)
@@ -136,6 +139,9 @@ class Found(RunTestCase):
         write(self.here("table.csv"), b"step,time\n1,\xff\n")
         with self.assertRaises(ResultsError):
             read_table(self.here("table.csv"))
+        write(self.here("table.csv"), "step,time\n1,2\n")
+        with self.assertRaisesRegex(ResultsError, "no column iteration"):
+            read_table(self.here("table.csv"), ("step", "iteration"))
 
     def test_messages(self):
         """What a message quotes does not steer a terminal."""

@@ -50,8 +50,8 @@ def _opened(path, kind):
         raise ResultsError(f"{path}: cannot read this file; expected {kind}: {_one_line(reason)}") from None
 
 
-def read_table(path):
-    """A CSV file with one row of names: numbers by column."""
+def read_table(path, columns=()):
+    """A CSV file with one row of names: numbers by column. `columns` are those that it must have."""
     try:
         with open(path, newline="", encoding="ascii") as file:
             header, *rows = list(csv.reader(file)) or [[]]
@@ -65,6 +65,9 @@ def read_table(path):
         values = np.array(rows, dtype=float).reshape(len(rows), len(header))
     except ValueError as reason:
         raise ResultsError(f"{path}: {reason}; expected numbers under a row of names") from None
+    for name in columns:
+        if name not in header:
+            raise ResultsError(f"{path}: no column {name}; expected a table that a run wrote")
     return Table({name: values[:, k] for k, name in enumerate(header)})
 
 
@@ -75,6 +78,9 @@ class Run:
     """
 
     _kind = "the results of a run"
+    #: columns that each table of a step has
+    _columns = {"bodies": ("id", "position", "velocity", "radius"), "boundaries": ("position", "normal", "velocity", "force"),
+                "contacts": ("candidate", "antagonist", "normal", "gap", "impulse")}
 
     def __init__(self, directory):
         self.directory = Path(directory)
@@ -111,10 +117,13 @@ class Run:
         step = self.find_step(step)
         with self._open() as file:
             group = file[f"steps/{step}"]
-            return self._table(group[name]) if name in group else None
+            return self._table(group[name], name) if name in group else None
 
-    def _table(self, group):
+    def _table(self, group, kind):
         table = Table({key: self._values(group[key]) for key in group})
+        for key in self._columns[kind]:
+            if key not in table:
+                raise ResultsError(f"{self.path}: {group.name}: no {key}; expected {', '.join(self._columns[kind])}")
         for key, values in table.items():
             if len(values) != len(table):
                 raise ResultsError(f"{self.path}: {group.name}/{key}: {len(values)} rows; expected {len(table)}, as in the others")
@@ -174,11 +183,11 @@ class Run:
 
     def history(self):
         """history.csv: a row a step."""
-        return read_table(self.directory / "history.csv")
+        return read_table(self.directory / "history.csv", ("step", "time"))
 
     def trace(self):
         """trace.csv: a row a check of a solve; written with `trace = .true.`."""
-        return read_table(self.directory / "trace.csv")
+        return read_table(self.directory / "trace.csv", ("step", "iteration", "residual"))
 
     def _split(self, rows):
         if rows is None:
@@ -247,6 +256,7 @@ class BodiesFile(Run):
     the walls as boundaries, which are planes. What is optional in the file is there only where the file has it."""
 
     _kind = "a bodies file"
+    _columns = {"bodies": ("id", "position", "radius"), "walls": ("id", "point", "normal")}
 
     def __init__(self, path):
         self.path = Path(path)
@@ -262,7 +272,7 @@ class BodiesFile(Run):
     def _group(self, step, name):
         self.find_step(step)
         with self._open() as file:
-            return self._table(file[name]) if name in file else None
+            return self._table(file[name], name) if name in file else None
 
     def boundaries(self, step=None):
         """id, name, shape, position, normal."""
