@@ -655,6 +655,9 @@ def fuzz(seed, count, directory, kinds=None, keep=None, workers=2, only=None):
         with contextlib.suppress(KeyboardInterrupt):
             for kind, one, end, problems in pool.imap_unordered(one_trial, tasks, chunksize=4):
                 figures[kind].note(end, f"--kinds {kind} --seed {seed} --only {one}", problems)
+                done = sum(figure.trials for figure in figures.values())
+                if done % 1000 == 0:
+                    print(f"fuzz: {done} of {len(tasks)} trials", flush=True)
     return list(figures.values())
 
 
