@@ -68,13 +68,20 @@ def styles(variants):
     return {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(variants)}
 
 
+def has_positive(axes, coordinate):
+    """Whether a curve has a number above 0 along x (0) or y (1)."""
+    return any(value > 0 for line in axes.lines for value in line.get_data()[coordinate])
+
+
 def finish(axes, x, y, log=True):
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    if log:
+    # where no iteration was made there is no number above 0, and no logarithmic scale
+    if log and has_positive(axes, 0):
         axes.set_xscale("log")
-        axes.set_yscale("log")
         axes.xaxis.set_minor_formatter(NullFormatter())
+    if log and has_positive(axes, 1):
+        axes.set_yscale("log")
     axes.grid(True, which="major", color="0.9", linewidth=0.6)
     axes.set_axisbelow(True)
 

@@ -25,7 +25,8 @@ except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from whole_file import Locked, give_names, output_lock  # noqa: E402
+from one_line import OneLineParser  # noqa: E402
+from whole_file import Locked, give_names, hdf5_file, output_lock  # noqa: E402
 
 LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
 #: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
@@ -606,7 +607,7 @@ def write_bodies(case, path):
         if grain[0] is None:
             grain[0], later = later, later + 1
     spins = 3 * d - 3
-    with h5py.File(path, "w") as file:
+    with hdf5_file(path) as file:
         file["bodies/id"] = np.array([grain[0] for grain in case.grains], dtype=np.int64)
         file["bodies/position"] = np.array([grain[1] for grain in case.grains])
         file["bodies/radius"] = np.array([grain[2] for grain in case.grains])
@@ -684,7 +685,7 @@ def check(case, folder, name, final):
 
 
 def parse():
-    parser = argparse.ArgumentParser(prog="gravier_import", description="Make a case of Gravier from a DATBOX of LMGC90.")
+    parser = OneLineParser(prog="gravier_import", description="Make a case of Gravier from a DATBOX of LMGC90.")
     parser.add_argument("datbox", type=Path, metavar="DATBOX", help="the directory, with BODIES.DAT and the other files")
     parser.add_argument("--step", type=float, required=True, metavar="H", help="time step [s]: the command script of LMGC90 has it")
     parser.add_argument("--steps", type=int, default=100, metavar="N", help="number of steps (100)")
@@ -733,7 +734,7 @@ def main():
         print(f"gravier_import: error: {box}: {problem}: expected the files of a DATBOX as LMGC90 writes them", file=sys.stderr)
         return 2
     except OSError as problem:
-        print(f"gravier_import: error: {problem}", file=sys.stderr)
+        print(f"gravier_import: error: {problem.filename or options.out}: {' '.join(str(problem.strerror or problem).split())}", file=sys.stderr)
         return 4
     for remark in dict.fromkeys(case.remarks):
         print(f"gravier_import: note: {remark}", file=sys.stderr)

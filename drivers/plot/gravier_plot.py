@@ -20,7 +20,8 @@ import matplotlib.animation
 import matplotlib.pyplot as plt
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
-from whole_file import whole_file
+from one_line import OneLineParser
+from whole_file import save_figure, written
 
 # slow is nearly white, so that the chains stand out; red on blue is safe for the colour-blind
 SPEEDS = LinearSegmentedColormap.from_list("speeds", ["#f4f8fc", "#9ecae1", "#4292c6", "#08519c", "#08306b"])
@@ -304,12 +305,7 @@ def draw_convergence(runs, step):
 
 def save(figure, path, dpi=200):
     """PNG or SVG, by the ending of the path, without what would tell when."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with whole_file(path) as part:
-            figure.savefig(part, dpi=dpi, bbox_inches="tight", metadata={"Software": None} if path.suffix == ".png" else {"Date": None})
-    except OSError as reason:
-        refuse(f"{path}: {reason.strerror}; expected a file that can be written")
+    save_figure(figure, path, dpi=dpi, bbox_inches="tight", metadata={"Software": None} if path.suffix == ".png" else {"Date": None})
     plt.close(figure)
     print(path)
 
@@ -361,8 +357,7 @@ def draw_movie(run, options):
         for k, step in enumerate(steps):
             figure = draw_packing(run, step, options, frame)
             # frames of one size
-            with whole_file(folder / f"frame_{k:05d}.png") as part:
-                figure.savefig(part, dpi=100, metadata={"Software": None})
+            save_figure(figure, folder / f"frame_{k:05d}.png", dpi=100, metadata={"Software": None})
             plt.close(figure)
         if movie:
             join_frames(sorted(folder.glob("frame_*.png")), out, options.fps)
@@ -377,17 +372,15 @@ def join_frames(paths, out, fps):
     image = figure.figimage(first)
     play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k]))], frames=len(paths))
     try:
-        with whole_file(out) as part:
+        with written(out) as part:
             play.save(part, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
-    except OSError as reason:
-        refuse(f"{out}: {reason.strerror}; expected a file that can be written")
     except subprocess.CalledProcessError as reason:
         refuse(f"{out}: ffmpeg ended with status {reason.returncode}; expected a movie .gif, or a directory for frames")
     plt.close(figure)
 
 
 def parse(arguments):
-    parser = argparse.ArgumentParser(prog="gravier_plot", description=__doc__)
+    parser = OneLineParser(prog="gravier_plot", description=__doc__)
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
     one, several, look = (argparse.ArgumentParser(add_help=False) for _ in range(3))
     one.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run (packing: or a bodies file .h5)")

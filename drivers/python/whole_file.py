@@ -68,10 +68,35 @@ def output_lock(path, program):
             return
 
 
+@contextlib.contextmanager
+def written(path):
+    """A path to write to, as whole_file has it, in a directory that is made if need be; what the system refuses ends the program with
+    one line: status 2 where there is no such place, 4 else, as on a full disk."""
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(path) as part:
+            yield part
+    except OSError as what:
+        print(f"{Path(sys.argv[0]).name.removesuffix('.py')}: error: {path}: {' '.join(str(what.strerror or what).split())}; expected a file that "
+              "can be written", file=sys.stderr)
+        nowhere = isinstance(what, (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError))
+        sys.exit(2 if nowhere else 4)
+
+
+@contextlib.contextmanager
+def hdf5_file(path):
+    """An HDF5 file to fill in, which is in memory and goes to `path` at the end: HDF5 itself can neither close nor forget a file whose
+    headers find no room on the disk, and crashes."""
+    import h5py
+
+    with h5py.File(path, "w", driver="core", backing_store=False) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    Path(path).write_bytes(image)
+
+
 def save_figure(figure, path, **options):
     """Save a figure of matplotlib, or end the program with one line that says why not."""
-    try:
-        with whole_file(path) as part:
-            figure.savefig(part, **options)
-    except OSError as what:
-        sys.exit(f"{Path(sys.argv[0]).name}: error: {path}: {what.strerror or what}")
+    with written(path) as part:
+        figure.savefig(part, **options)

@@ -20,7 +20,7 @@ except ImportError as missing:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.collections import EllipseCollection
-from whole_file import whole_file
+from whole_file import hdf5_file, whole_file
 
 SOURCE = Path(__file__).resolve().parents[2]
 BINARIES = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin"))
@@ -80,7 +80,7 @@ def lattice(lower, upper, smallest, largest, rng, inside=None):
 
 def write_hdf5(path, centres, radii, group=None, walls=()):
     """A bodies file of grains at rest; walls: (point, normal) of each plane."""
-    with whole_file(path) as part, h5py.File(part, "w") as file:
+    with whole_file(path) as part, hdf5_file(part) as file:
         file["bodies/id"] = np.arange(1, len(radii) + 1)
         file["bodies/position"] = np.asarray(centres, float)
         file["bodies/radius"] = np.asarray(radii, float)

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from whole_file import whole_file  # noqa: E402
+from whole_file import hdf5_file, written  # noqa: E402
 
 
 def main():
@@ -39,7 +39,7 @@ def main():
     tiled["position"][:, 0] += width * np.repeat(np.arange(options.copies), len(bodies["id"]))
     walls["point"][high, 0] += (options.copies - 1) * width
     walls["id"] = np.arange(n + 1, n + 1 + len(walls["id"]))
-    with whole_file(options.target) as part, h5py.File(part, "w") as file:
+    with written(options.target) as part, hdf5_file(part) as file:
         for group, rows in (("bodies", tiled), ("walls", walls)):
             for name, data in rows.items():
                 file[f"{group}/{name}"] = data

@@ -12,7 +12,8 @@ module gravier_checkpoint
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_impulse_memory, only: list_impulses, match_impulses, pair_record
   use gravier_energy_balance, only: energy_words, energy_record
-  use gravier_partition, only: head_words, head_record
+  use gravier_partition, only: head_words, head_record, is_sound_head
+  use gravier_magnitude, only: is_bounded, is_size, bounded_text
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
   implicit none
@@ -126,8 +127,8 @@ contains
     simulation%last_written = own_last - 1
     simulation%restarted = .true.
     call simulation%make_subdomains()
-    call load_partition(simulation, file, error)
-    call load_grains(simulation, file, builds, error)
+    call load_partition(simulation, file, path, error)
+    call load_grains(simulation, file, path, builds, error)
     call file%read_array("energy_balance", 0, energy_words, words, error)
     if (.not. allocated(error)) then
       ! a balance that begins now has no past
@@ -379,15 +380,20 @@ contains
     end associate
   end subroutine pack_grains
 
-  subroutine load_partition(simulation, file, error)
+  subroutine load_partition(simulation, file, path, error)
     type(simulation_t), intent(inout) :: simulation
     type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: head(:), records(:, :), counts(:), words(:)
     integer, allocatable :: lengths(:)
 
     call file%read_array("partition", head_words, huge(head_words), head, error)
     call file%read_table("cells", simulation%decomposition%n_subdomains, 1, records, counts, error)
+    if (allocated(error)) return
+    if (.not. is_sound_head(head, simulation%decomposition%nd, simulation%decomposition%n_subdomains)) &
+      & call raise(error, status_input, path//": the array partition is none of this scene in "// &
+      & to_text(simulation%decomposition%n_subdomains)//" subdomains: the file is damaged")
     if (allocated(error)) return
     words = records(1, :)
     lengths = narrow(counts)
@@ -396,9 +402,10 @@ contains
 
   !> Grains into their homes as when the lists were made, then the lists with their impulses, then everything to where it
   !> was when the checkpoint was written.
-  subroutine load_grains(simulation, file, builds, error)
+  subroutine load_grains(simulation, file, path, builds, error)
     type(simulation_t), intent(inout) :: simulation
     type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
     integer(i8), intent(in) :: builds
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:)
@@ -411,6 +418,10 @@ contains
       call file%read_table("grains", decomposition%n_subdomains, n_words + nd, records, counts, error)
       if (builds > 0) call file%read_array("boundaries_when_listed", n_boundary, n_boundary, words, error)
       call file%read_array("boundaries", n_boundary, n_boundary, now, error)
+      if (builds > 0 .and. .not. allocated(error)) call check_reals(path//": the array boundaries_when_listed", words, error)
+      if (.not. allocated(error)) call check_reals(path//": the array boundaries", now, error)
+      if (.not. allocated(error)) call check_grains(simulation, path, records, error)
+      call simulation%comm%agree(error)
       if (allocated(error)) return
       n = 0
       do s = 1, size(decomposition%home)
@@ -424,7 +435,7 @@ contains
         call unpack_boundaries(words, decomposition%boundaries)
         call simulation%neighbourhoods%build(decomposition)
         simulation%neighbourhoods%builds = builds
-        call load_impulses(simulation, file, error)
+        call load_impulses(simulation, file, path, error)
       end if
       n = 0
       do s = 1, size(decomposition%home)
@@ -439,9 +450,49 @@ contains
     end associate
   end subroutine load_grains
 
-  subroutine load_impulses(simulation, file, error)
+  !> Refuse grains of a file that no scene has. Errors may differ between ranks.
+  subroutine check_grains(simulation, path, records, error)
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: path
+    !> (words of a grain and its place now, grains of this rank)
+    integer(i8), intent(in), contiguous :: records(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k, nd, nv
+
+    nd = simulation%decomposition%nd
+    nv = simulation%decomposition%nv
+    do k = 1, size(records, 2)
+      associate (one => records(:, k), boundaries => size(simulation%decomposition%boundaries))
+        if (one(1) < 1 .or. .not. is_size(transfer(one(2), 0.0_dp)) .or. .not. is_size(transfer(one(3), 0.0_dp)) .or. &
+          & one(4) < 0 .or. one(4) > boundaries .or. one(5) < 0 .or. one(5) > max(1, size(simulation%config%materials))) &
+          & call raise(error, status_input, path//": table grains: grain "//to_text(one(1))// &
+          & " has an identifier, radius, mass, group or material that is none: the file is damaged")
+        call check_reals(path//": table grains: grain "//to_text(one(1)), one(place_word:place_word + nd + nv - 1), error)
+        call check_reals(path//": table grains: grain "//to_text(one(1)), one(size(one) - nd + 1:), error)
+      end associate
+      if (allocated(error)) return
+    end do
+  end subroutine check_grains
+
+  !> Refuse reals of a file that are none to reckon with.
+  subroutine check_reals(what, words, error)
+    !> file and place, for the message
+    character(len=*), intent(in) :: what
+    integer(i8), intent(in) :: words(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    do k = 1, size(words)
+      if (is_bounded(transfer(words(k), 0.0_dp))) cycle
+      call raise(error, status_input, what//": "//bounded_text//" was expected: the file is damaged")
+      return
+    end do
+  end subroutine check_reals
+
+  subroutine load_impulses(simulation, file, path, error)
     type(simulation_t), intent(inout) :: simulation
     type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:)
     integer(i8) :: n_impulse, law_row, rest_row
@@ -451,9 +502,9 @@ contains
     call file%read_scalar("impulse_entries", n_impulse, error)
     call file%read_scalar("law_row", law_row, error)
     call file%read_scalar("rest_row", rest_row, error)
-    call take_count(n_impulse, "impulse_entries of the checkpoint", kept%n_impulse, error)
-    call take_count(law_row, "law_row of the checkpoint", kept%law_row, error)
-    call take_count(rest_row, "rest_row of the checkpoint", kept%rest_row, error)
+    call take_count(n_impulse, path//": impulse_entries", kept%n_impulse, error)
+    call take_count(law_row, path//": law_row", kept%law_row, error)
+    call take_count(rest_row, path//": rest_row", kept%rest_row, error)
     call file%read_table("impulses", simulation%decomposition%n_subdomains, 2 + kept%words(), records, counts, error)
     if (allocated(error)) return
     n = 0

@@ -11,7 +11,6 @@ import os
 import random
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 
@@ -20,7 +19,7 @@ import numpy as np
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from fault_trials import BOX, CRASH, Figure, kept  # noqa: E402
-from gravier_runs import ENVIRONMENT, PATIENCE, PROGRAMS, SOURCE, contents, differences, merged, namelist, write  # noqa: E402
+from gravier_runs import PROGRAMS, SOURCE, alone, contents, differences, merged, namelist, write  # noqa: E402
 
 CASE = merged(BOX, {"time": {"steps": 4}, "output": {"every": 2, "trace": False, "checkpoint_every": 4, "final_bodies": True, "fclib_step": 4,
                                                      "energy": True}})
@@ -43,23 +42,6 @@ except gravier.ResultsError as reason:
 """
 
 
-class Said:
-    """What a program left: status and texts."""
-
-    def __init__(self, status, stdout, stderr):
-        self.status, self.stdout, self.stderr = status, stdout, stderr
-
-
-def start(arguments, directory):
-    """Run a program by itself, on one rank."""
-    try:
-        done = subprocess.run(arguments, cwd=directory, env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True,
-                              timeout=PATIENCE, check=False)
-    except subprocess.TimeoutExpired:
-        return Said("a hang", "", "")
-    return Said(done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace"))
-
-
 class Kind:
     """A kind of file: its name in the directory where the trial is, what reads it, and what it led to."""
 
@@ -70,7 +52,7 @@ class Kind:
 def prepare(directory):
     """One run, whose files are read in all the trials; kinds by name."""
     write(os.path.join(directory, "case.nml"), namelist(CASE))
-    run = start([os.path.join(PROGRAMS, "gravier"), "case.nml"], directory)
+    run = alone([os.path.join(PROGRAMS, "gravier"), "case.nml"], directory)
     if run.status != 0:
         raise AssertionError(run.stderr)
     results = os.path.join(directory, "results")
@@ -136,7 +118,7 @@ def flip(kind, source, directory, figure, draw, trials, refusals):
     """`trials` damaged files of one kind."""
     place = os.path.join(directory, "trial")
     shutil.copytree(source, place)
-    wanted = kind.result(place, start(kind.read, place))
+    wanted = kind.result(place, alone(kind.read, place))
     shutil.rmtree(place)
     for trial in range(trials):
         shutil.copytree(source, place)
@@ -147,7 +129,7 @@ def flip(kind, source, directory, figure, draw, trials, refusals):
         data[at] ^= 1 << bit
         with open(path, "wb") as file:
             file.write(data)
-        run = start(kind.read, place)
+        run = alone(kind.read, place)
         figure.note({0: "read as before", 2: "refused"}.get(run.status, "wrong"), f"{kind.name}: byte {at}, bit {bit}",
                     problems_of(kind, run, place, wanted))
         if run.status == 2:

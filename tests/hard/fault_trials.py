@@ -22,7 +22,7 @@ import time
 import h5py
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
-from gravier_runs import contents, differences, gravier, merged, namelist, read_csv, steps_of, write  # noqa: E402
+from gravier_runs import SOURCE, contents, differences, gravier, merged, namelist, read_csv, run_case, steps_of, write  # noqa: E402
 from killed_runs import Going  # noqa: E402
 
 BOX = {
@@ -63,7 +63,7 @@ def unreadable(directory, pattern=None):
     for folder, _, names in os.walk(directory):
         for name in sorted(names):
             path = os.path.join(folder, name)
-            if name.startswith(".") or name.endswith(".part"):
+            if name.startswith(".") or name.endswith(".part") or ".part." in name:
                 continue
             try:
                 if name.endswith((".h5", ".hdf5", ".vtkhdf")):
@@ -118,8 +118,9 @@ def what_is_said(run, allowed=(0, 4)):
         problems.append(f"status {run.status}")
     if CRASH.search(run.stdout + run.stderr):
         problems.append("a crash: " + CRASH.search(run.stdout + run.stderr)[0])
-    own = [line for line in run.stderr.splitlines() if not line.startswith("mca_fbtl")]
-    if run.status in (2, 4) and not (len(own) == 1 and re.match(r"gravier\w*: error: ", own[0])):
+    # the script of a figure says what was wrong before the program says that there is none
+    own = [line for line in run.stderr.splitlines() if not line.startswith(("mca_fbtl", "plot_"))]
+    if run.status in (2, 4) and not (len(own) == 1 and re.match(r"(gravier|tile)\w*: error: ", own[0])):
         problems.append(f"not one line of error: {run.stderr[:300]!r}")
     return problems
 
@@ -150,6 +151,28 @@ def write_study(directory):
     return "study.nml"
 
 
+def write_box(place):
+    """A DATBOX of two disks on a wall."""
+    os.makedirs(os.path.join(place, "DATBOX"))
+    body = "$bdyty\n RBDY2{0:7d}\n$blmty\n PLAIN      1  behav  stone  avrd= 0.0000000D+00  gyrd= 0.0000000D+00\n$nodty\n NO3xx      1                " \
+           "coo1= {1:13.7e}  coo2= {2:13.7e}  coo3= 0.0000000D+00\n$tacty\n {3}\n$$$$$$\n"
+    disk = "DISKx      1  color  BLUEx  byrd= 0.1000000D+00"
+    wall = "JONCx      1  color  WALLx  axe1= 0.1000000D+01  axe2= 0.1000000D-01"
+    files = {
+        "BODIES.DAT": "! File BODIES\n" + body.format(1, 0.0, 0.1, disk) + body.format(2, 0.3, 0.1, disk) + body.format(3, 0.0, -0.01, wall),
+        "BULK_BEHAV.DAT": "$gravy\n                   grv1= 0.0000000D+00  grv2=-9.8100000D+00  grv3= 0.0000000D+00\n\n$behav  lawty\n"
+                          " stone  RIGID                           Umas= 0.2500000D+04\n",
+        "TACT_BEHAV.DAT": "$behav  lawty\n iqsc0  IQS_CLB                         fric= 0.3000000D+00\n" + "".join(
+            "$seety\n cdbdy  cdtac  cdcol  behav  anbdy  antac  ancol\n RBDY2  DISKx  BLUEx  iqsc0  RBDY2  " + other + "  0.2000000D-02\n"
+            for other in ("DISKx  BLUEx", "JONCx  WALLx")),
+        "DRV_DOF.DAT": "! DOF\n$bdyty\n RBDY2      3\n$nodty\n NO3xx      1\n"
+                       "$dofty  numbr [CT......+......AMP..*..cos.(..OMEGA.*.time.+.PHI..)]...*...[RAMPI.....+.....RAMP.*.time]\n"
+                       + "".join(f" vlocy{k:7d}  0.0000000D+00  0.0000000D+00  0.0000000D+00  0.0000000D+00  0.1000000D+01  0.0000000D+00\n"
+                                 for k in (1, 2, 3)) + "$$$$$$\n"}
+    for name, text in files.items():
+        write(os.path.join(place, "DATBOX", name), text)
+
+
 def write_sample(directory, name, file, count):
     """A loose sample of disks in a square that is as large as they need."""
     write(os.path.join(directory, name), namelist({
@@ -176,10 +199,39 @@ def prepare(kind, directory):
         return "gravier_sample", ["sample.nml"]
     if kind == "fclib_write":
         return "gravier_fclib", ["--write", "disk/out", "--csv", "disk/table.csv", "--profile", "disk/profile.csv", write_fclib(directory)]
-    return "gravier_error", ["--out", "disk/error.csv", "--iterations", "1,2,4", write_error_case(directory)]
+    if kind == "error_table":
+        return "gravier_error", ["--out", "disk/error.csv", "--iterations", "1,2,4", write_error_case(directory)]
+    if kind == "accuracy":
+        name = write_study(directory)
+        with open(os.path.join(directory, name), encoding="utf-8") as file:
+            text = file.read()
+        write(os.path.join(directory, name), text.replace("'study'", "'disk/study'"))
+        return "gravier_accuracy", [name]
+    if kind == "columns":
+        return "gravier_columns", ["--count", "10", "--subdomains", "2", "--out", "disk/columns"]
+    if kind == "bench":
+        return "gravier_bench", ["--quick", "--rounds", "1", "--seconds", "0.001", "--contacts", "1000", "--spheres", "1000", "--iterations", "2",
+                                 "--triad", "1000", "--csv", "disk/bench.csv"]
+    return prepare_script(kind, directory)
 
 
-KINDS = ("run", "vtk", "checkpoint", "fclib_step", "final_bodies", "sample", "fclib_write", "error_table")
+def prepare_script(kind, directory):
+    """Input of a script, which this Python runs."""
+    if kind == "import":
+        write_box(directory)
+        return sys.executable, [os.path.join(SOURCE, "drivers/import/gravier_import.py"), "DATBOX", "--step", "1e-3", "--steps", "2", "--out", "disk/case"]
+    run = run_case(merged(BOX, {"scene": {"lattice_count": [20, 16]}, "time": {"steps": 4}, "output": {"final_bodies": True}}), 1, directory)
+    if run.status != 0:
+        raise AssertionError(str(run))
+    if kind == "tile":
+        return sys.executable, [os.path.join(SOURCE, "drivers/studies/tile_bodies.py"), "results/final_bodies.h5", "disk/tiled.h5", "--copies", "20"]
+    pictures = {"picture": ["packing", "results", "--out", "disk/packing.png"], "movie": ["movie", "results", "--out", "disk/frames"]}
+    return sys.executable, [os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), *pictures[kind]]
+
+
+#: kinds of output; those from `import` on are of scripts, on one rank
+KINDS = ("run", "vtk", "checkpoint", "fclib_step", "final_bodies", "sample", "fclib_write", "error_table", "accuracy", "columns", "bench", "import",
+         "tile", "picture", "movie")
 
 
 def used(directory):
@@ -206,7 +258,7 @@ def full_disks(random_seed, trials, directory, kinds=KINDS):
         for trial in range(trials):
             # small disks meet the beginnings of files, large ones their ends
             kilobytes = int(draw.uniform(8, most / 1024) if trial % 2 else 8 * (most / 8192) ** draw.random())
-            ranks = draw.choice((1, 2))
+            ranks = draw.choice((1, 2)) if program.startswith("gravier") else 1
             name = f"{kind} {trial}: {kilobytes} kB, {ranks} ranks"
             subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "gravier-trial", disk], check=True)
             try:

@@ -53,6 +53,12 @@ class Package(RunTestCase):
             os.chdir(place)
         return status, said.getvalue()
 
+    def test_namelists(self):
+        """Entries that nothing is said of keep their place, and only an end of a line ends a comment."""
+        read = gravier.parse_namelist("&boundary velocity = 0.0, , -0.02,\n force = ,1 ! a\u2028b c\n mass = 2*, 3.0 /\n")
+        self.assertEqual(read, {"boundary": [{"velocity": [0.0, None, -0.02], "force": [None, 1], "mass": [None, None, 3.0]}]})
+        self.assertEqual(gravier.value_text([0.0, None, -0.02]), "0.0, , -0.02")
+
     def test_command(self):
         done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "--help"], capture_output=True,
                               text=True, check=False)

@@ -7,7 +7,9 @@ import concurrent.futures
 import glob
 import itertools
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -36,6 +38,10 @@ ENVIRONMENT = {
     # after a rank that failed the launcher would wait seconds for ranks that have left
     "OMPI_MCA_odls_base_sigkill_timeout": "0",
 }
+#: bytes of a file that a program without a launcher may write: one that goes on for ever must not fill the disk
+LONGEST_FILE = 2**28
+#: of a program without a launcher: Open MPI starts no daemon and only what one rank needs, in a sixth of the time
+ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1", "OMPI_MCA_coll": "basic,libnbc,self"}
 
 
 class Run:
@@ -100,6 +106,41 @@ def gravier(*arguments, ranks=1, directory=".", program="gravier"):
         # a rank that crashed, or the launcher itself: Open MPI 4.1 sometimes does when several ranks leave with an error
         status = max((int(text) for text in said.get("status", []) if text), default=status)
     return Run(directory, status, stdout.decode(errors="replace"), stderr, launcher.decode(errors="replace"))
+
+
+class Said:
+    """What a program left that ran by itself: status, or "a hang", and texts."""
+
+    def __init__(self, status, stdout, stderr):
+        self.status, self.stdout, self.stderr = status, stdout, stderr
+
+
+def alone(command, directory, seconds=20):
+    """Run a program by itself, on one rank and without a launcher, for so many seconds of processor time: of wall time it may take ten
+    times as much, since a machine may be busy with other things. Signals that end it are in its status, with a minus."""
+    # programs that run at once each have a session directory of their own: all of them would be number 0 of job 0 there
+    session = tempfile.mkdtemp(prefix="gravier-alone-")
+    environment = {**ENVIRONMENT, **ALONE, "OMPI_MCA_orte_tmpdir_base": session, **os.environ}
+    try:
+        return _ended(command, directory, environment, seconds)
+    finally:
+        shutil.rmtree(session, ignore_errors=True)
+
+
+def _ended(command, directory, environment, seconds):
+    with subprocess.Popen(command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE) as process:
+        resource.prlimit(process.pid, resource.RLIMIT_CPU, (seconds, seconds))
+        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (LONGEST_FILE, LONGEST_FILE))
+        try:
+            texts = process.communicate(timeout=10 * seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            return Said("a hang", "", "")
+    if process.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return Said("a hang", "", "")
+    return Said(process.returncode, *(text.decode(errors="replace") for text in texts))
 
 
 def merged(*parts):

@@ -51,7 +51,8 @@ class Going:
             library, rank, count, *name = shim
             script += f'if [ "${{OMPI_COMM_WORLD_RANK:-$PMI_RANK}}" = {rank} ]; then export LD_PRELOAD={library} DIES_AT={count} '\
                       f'DIES_ON={(name or ["results.h5"])[0]}; fi; '
-        environment = {**ENVIRONMENT, **os.environ}
+        # what ranks that are killed leave of their shared memory goes with the directory
+        environment = {**ENVIRONMENT, "OMPI_MCA_btl_vader_backing_directory": os.path.abspath(directory), **os.environ}
         self.process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", script + 'exec "$0" "$@"', GRAVIER, *options,
                                          "case.nml"], cwd=directory, env=environment, stdin=subprocess.DEVNULL,
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -13,7 +13,9 @@ class CaseError(Exception):
 
 
 def value_text(value):
-    """A value as a namelist has it."""
+    """A value as a namelist has it; None, an entry of a list that nothing is said of, is empty."""
+    if value is None:
+        return ""
     if isinstance(value, (bool, np.bool_)):
         return ".true." if value else ".false."
     if isinstance(value, (str, Path)):
@@ -36,9 +38,13 @@ TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>'(?:[^']|'')*'|"(?:[^"]|"")*")|(?P<mar
 
 
 def parse_namelist(text):
-    """{group: [{key: value}, ...]} of an input file; a value is a bool, an int, a float, a text, or a list of these."""
-    tokens = [match for line in text.splitlines() for match in TOKEN.finditer(line) if match.lastgroup]
+    """{group: [{key: value}, ...]} of an input file; a value is a bool, an int, a float, a text, or a list of these, with None for an entry
+    that nothing is said of (`0.0, , 1.0`)."""
+    # not splitlines, which takes a few other characters for ends of lines
+    tokens = [match for line in text.split("\n") for match in TOKEN.finditer(line) if match.lastgroup]
     groups, keys, key, place = {}, None, None, 0
+    # commas before the next value, of which each but the first after a value stands for an entry
+    commas, first = 0, True
     while place < len(tokens):
         token = tokens[place]
         following = tokens[place + 1]["mark"] if place + 1 < len(tokens) else None
@@ -51,9 +57,13 @@ def parse_namelist(text):
         elif keys is not None and token["word"] and following == "=":
             key = token["word"].lower()
             keys[key] = []
+            commas, first = 0, True
             place += 1
+        elif key is not None and token["mark"] == ",":
+            commas += 1
         elif key is not None and token["mark"] is None:
-            keys[key] += _values(token)
+            keys[key] += [None] * (commas if first else max(0, commas - 1)) + _values(token)
+            commas, first = 0, False
         place += 1
     return {group: [{key: value[0] if len(value) == 1 else value for key, value in keys.items()} for keys in several]
             for group, several in groups.items()}
@@ -64,7 +74,9 @@ def _values(token):
     if token["text"]:
         quote = token["text"][0]
         return [token["text"][1:-1].replace(2 * quote, quote)]
-    count, _, word = token["word"].rpartition("*")
+    count, star, word = token["word"].rpartition("*")
+    if star and not word:
+        return [None] * (int(count) if count.isdigit() else 1)
     if re.fullmatch(r"\.?[tT](rue|RUE)?\.?", word) or re.fullmatch(r"\.?[fF](alse|ALSE)?\.?", word):
         value = word.strip(".")[0] in "tT"
     else:

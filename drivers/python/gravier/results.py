@@ -39,19 +39,35 @@ class Table(dict):
         return pandas.DataFrame(columns)
 
 
-def read_table(path):
-    """A CSV file with one row of names: numbers by column."""
+@contextmanager
+def _opened(path, kind):
+    """An HDF5 file, open; what cannot be read of it is an error of one line."""
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as reason:
+        # h5py and numpy have all of these for what is not as a run wrote it
+        raise ResultsError(f"{path}: cannot read this file; expected {kind}: {_one_line(reason)}") from None
+
+
+def read_table(path, columns=()):
+    """A CSV file with one row of names: numbers by column. `columns` are those that it must have."""
     try:
         with open(path, newline="", encoding="ascii") as file:
             header, *rows = list(csv.reader(file)) or [[]]
     except OSError as reason:
         raise ResultsError(f"{path}: {reason.strerror}; expected a table that a run wrote") from None
+    except (ValueError, csv.Error) as reason:
+        raise ResultsError(f"{path}: {_one_line(reason)}; expected a table that a run wrote") from None
     # the last row of a run that is under way or was killed may be cut off
     rows = [row for row in rows if len(row) == len(header)]
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), len(header))
     except ValueError as reason:
         raise ResultsError(f"{path}: {reason}; expected numbers under a row of names") from None
+    for name in columns:
+        if name not in header:
+            raise ResultsError(f"{path}: no column {name}; expected a table that a run wrote")
     return Table({name: values[:, k] for k, name in enumerate(header)})
 
 
@@ -62,6 +78,9 @@ class Run:
     """
 
     _kind = "the results of a run"
+    #: columns that each table of a step has
+    _columns = {"bodies": ("id", "position", "velocity", "radius"), "boundaries": ("position", "normal", "velocity", "force"),
+                "contacts": ("candidate", "antagonist", "normal", "gap", "impulse")}
 
     def __init__(self, directory):
         self.directory = Path(directory)
@@ -76,13 +95,10 @@ class Run:
 
     @contextmanager
     def _open(self):
-        """The file, open; what HDF5 cannot read of it is an error of one line."""
-        try:
-            with h5py.File(self.path, "r") as file:
-                self._check(file)
-                yield file
-        except (OSError, KeyError, RuntimeError, ValueError) as reason:
-            raise ResultsError(f"{self.path}: cannot read this file; expected {self._kind}: {_one_line(reason)}") from None
+        """The file, open."""
+        with _opened(self.path, self._kind) as file:
+            self._check(file)
+            yield file
 
     def _check(self, file):
         if "run" not in file or "steps" not in file:
@@ -101,13 +117,26 @@ class Run:
         step = self.find_step(step)
         with self._open() as file:
             group = file[f"steps/{step}"]
-            return self._table(group[name]) if name in group else None
+            return self._table(group[name], name) if name in group else None
 
-    def _table(self, group):
-        return Table({key: self._values(group[key]) for key in group})
+    def _table(self, group, kind):
+        table = Table({key: self._values(group[key]) for key in group})
+        for key in self._columns[kind]:
+            if key not in table:
+                raise ResultsError(f"{self.path}: {group.name}: no {key}; expected {', '.join(self._columns[kind])}")
+        for key, values in table.items():
+            if len(values) != len(table):
+                raise ResultsError(f"{self.path}: {group.name}/{key}: {len(values)} rows; expected {len(table)}, as in the others")
+            if key in ("position", "velocity", "normal", "impulse", "force", "point") and (values.ndim != 2 or values.shape[1] < self.dimension):
+                raise ResultsError(f"{self.path}: {group.name}/{key}: shape {values.shape}; expected (rows, {self.dimension} or more)")
+        return table
 
     def _values(self, dataset):
         """What a dataset holds, once it was found to be what was written."""
+        if not isinstance(dataset, h5py.Dataset) or not dataset.shape:
+            raise ResultsError(f"{self.path}: {dataset.name}: expected a dataset of rows")
+        if dataset.size > 0 and dataset.id.get_storage_size() == 0:
+            raise ResultsError(f"{self.path}: {dataset.name}: {len(dataset)} rows, of which none is in the file")
         values = dataset[()]
         if not is_whole(dataset, values):
             raise ResultsError(f"{self.path}: {dataset.name}: its attribute checksum is not that of what it holds: the file is damaged, or "
@@ -154,13 +183,15 @@ class Run:
 
     def history(self):
         """history.csv: a row a step."""
-        return read_table(self.directory / "history.csv")
+        return read_table(self.directory / "history.csv", ("step", "time"))
 
     def trace(self):
         """trace.csv: a row a check of a solve; written with `trace = .true.`."""
-        return read_table(self.directory / "trace.csv")
+        return read_table(self.directory / "trace.csv", ("step", "iteration", "residual"))
 
     def _split(self, rows):
+        if rows is None:
+            raise ResultsError(f"{self.path}: a step without bodies or boundaries; expected {self._kind}")
         if "velocity" in rows:
             rows["spin"] = rows["velocity"][:, self.dimension:]
             rows["velocity"] = rows["velocity"][:, :self.dimension]
@@ -196,11 +227,7 @@ class Run:
         """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""
         step = self.find_step(step)
         path = self.directory / "bodies.vtkhdf"
-        try:
-            file = h5py.File(path, "r")
-        except OSError:
-            raise ResultsError(f"{path}: cannot read this file; expected that of a run with &output vtk = .true.") from None
-        with file:
+        with _opened(path, "that of a run with &output vtk = .true.") as file:
             steps = file["VTKHDF/Steps"]
             count = int(steps.attrs["NSteps"])
             place = np.flatnonzero(file["step"][:count] == step)
@@ -229,6 +256,7 @@ class BodiesFile(Run):
     the walls as boundaries, which are planes. What is optional in the file is there only where the file has it."""
 
     _kind = "a bodies file"
+    _columns = {"bodies": ("id", "position", "radius"), "walls": ("id", "point", "normal")}
 
     def __init__(self, path):
         self.path = Path(path)
@@ -244,7 +272,7 @@ class BodiesFile(Run):
     def _group(self, step, name):
         self.find_step(step)
         with self._open() as file:
-            return self._table(file[name]) if name in file else None
+            return self._table(file[name], name) if name in file else None
 
     def boundaries(self, step=None):
         """id, name, shape, position, normal."""

@@ -34,7 +34,19 @@ contains
     if (allocated(error)) return
     allocate (error)
     error%status = status
-    error%message = message
+    error%message = printable(message)
   end subroutine raise
+
+  !> A text that quotes what a user wrote, on one line and without characters that steer a terminal: each becomes a question mark.
+  pure function printable(text) result(line)
+    character(len=*), intent(in) :: text
+    character(len=len(text)) :: line
+    integer :: k
+
+    line = text
+    do k = 1, len(line)
+      if (iachar(line(k:k)) < iachar(" ") .or. iachar(line(k:k)) == 127) line(k:k) = "?"
+    end do
+  end function printable
 
 end module gravier_errors

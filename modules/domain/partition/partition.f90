@@ -13,7 +13,7 @@ module gravier_partition
   use gravier_cell_levels, only: cut_levels, cells_per_subdomain
   implicit none
   private
-  public :: partition_t, choose_boxes, check_subdomains, head_words, head_record
+  public :: partition_t, choose_boxes, check_subdomains, is_sound_head, head_words, head_record
 
   !> kinds of a partition: boxes; cells with one map that every rank has; cells with a map for each group
   integer, parameter :: kind_boxes = 0, kind_cells = 1, kind_groups = 2
@@ -421,6 +421,36 @@ contains
       call restore_maps(self, comm, head, words, counts)
     end if
   end subroutine partition_restore
+
+  !> Whether words of a file may be the head of a partition of so many dimensions and subdomains.
+  pure logical function is_sound_head(words, nd, n_subdomains) result(sound)
+    integer(i8), intent(in), contiguous :: words(:)
+    integer, intent(in) :: nd, n_subdomains
+    real(dp) :: cells
+    integer :: k
+
+    sound = size(words) >= head_words
+    if (.not. sound) return
+    cells = product(real(words(8:10), dp))
+    sound = words(2) == nd .and. words(3) == n_subdomains .and. words(4) > 0 .and. words(head_words) >= 0
+    select case (words(1))
+    case (kind_boxes)
+      ! a cell is a box
+      sound = sound .and. all(words(8:10) == words(5:7)) .and. abs(cells - n_subdomains) < 0.5_dp .and. &
+        & size(words) == head_words
+    case (kind_cells)
+      sound = sound .and. cells <= real(words(4), dp) .and. size(words) == head_words
+    case (kind_groups)
+      sound = sound .and. size(words) == head_words + words(head_words) + 1 + nint(min(cells, real(huge(nd), dp)), i8)
+    case default
+      sound = .false.
+    end select
+    sound = sound .and. all(words(5:11) >= 1 .and. words(5:11) <= huge(nd))
+    do k = 12, head_words - 1
+      ! NaN is not
+      sound = sound .and. abs(transfer(words(k), 1.0_dp)) <= huge(1.0_dp)
+    end do
+  end function is_sound_head
 
   subroutine read_head(self, head)
     class(partition_t), intent(inout) :: self

@@ -5,6 +5,7 @@ module gravier_csv_writer
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
+  use gravier_number_text, only: number_size, not_a_number
   use gravier_finite, only: is_finite
   use gravier_file_system, only: check_readable, file_length
   use gravier_text_file, only: text_file_t
@@ -36,6 +37,8 @@ module gravier_csv_writer
   end type csv_writer_t
 
   integer, parameter :: block_length = 65536
+  !> characters of a cell that a message quotes
+  integer, parameter :: longest_quote = 40
 
 contains
 
@@ -55,7 +58,7 @@ contains
   !> Go on with a table whose first column counts steps: keep its rows up to step `last_step`, without a last line that
   !> has no end, and append to them. A table that is missing or died within its header is begun anew. What is kept
   !> replaces the older file in one indivisible operation; after a failure that file is as it was. Failure: status_input
-  !> for another header or a row without a step, status_failure where the system refuses.
+  !> for another header, or a row that has not a step and numbers under the names, status_failure where the system refuses.
   subroutine csv_resume(self, path, header, last_step, error)
     class(csv_writer_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -70,7 +73,7 @@ contains
     call begin(self, path, header)
     kept = 0
     inquire (file=path, exist=exists)
-    if (exists) call find_kept(path, header//new_line("a"), last_step, kept, error)
+    if (exists) call find_kept(path, header//new_line("a"), self%n_columns, last_step, kept, error)
     call self%file%begin(path, error)
     if (kept == 0) call self%file%append(header//new_line("a"), error)
     call copy(path, kept, self%file, error)
@@ -93,17 +96,16 @@ contains
   end subroutine begin
 
   !> Number of bytes up to the end of the last whole row of a step not above `last_step`; 0 for part of a header.
-  subroutine find_kept(path, first_line, last_step, kept, error)
+  subroutine find_kept(path, first_line, n_columns, last_step, kept, error)
     character(len=*), intent(in) :: path
     !> the header with its end
     character(len=*), intent(in) :: first_line
-    integer, intent(in) :: last_step
+    integer, intent(in) :: n_columns, last_step
     integer(i8), intent(out) :: kept
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: text, cell
+    character(len=:), allocatable :: text, row
     integer(i8) :: position, length, step
-    integer :: line, unit, i
-    logical :: in_cell
+    integer :: line, unit, first, last
 
     kept = 0
     call open_old(path, unit, length, error)
@@ -115,29 +117,65 @@ contains
     position = len(text)
     if (position == len(first_line)) kept = position
     line = 2
-    cell = ""
-    in_cell = .true.
+    row = ""
     rows: do while (position < length .and. .not. allocated(error))
       call read_text(path, unit, narrow(min(length - position, int(block_length, i8))), text, error)
-      do i = 1, len(text)
-        select case (text(i:i))
-        case (",")
-          in_cell = .false.
-        case (new_line("a"))
-          call read_step(path, line, cell, step, error)
-          if (allocated(error) .or. step > last_step) exit rows
-          kept = position + i
-          line = line + 1
-          cell = ""
-          in_cell = .true.
-        case default
-          if (in_cell .and. len(cell) < 40) cell = cell//text(i:i)
-        end select
+      first = 1
+      do
+        last = index(text(first:), new_line("a"))
+        if (last == 0) exit
+        last = first + last - 1
+        row = row//text(first:last - 1)
+        call check_row(path, line, n_columns, row, step, error)
+        if (allocated(error) .or. step > last_step) exit rows
+        kept = position + last
+        line = line + 1
+        row = ""
+        first = last + 1
       end do
+      row = row//text(first:)
       position = position + len(text)
     end do rows
     close (unit)
   end subroutine find_kept
+
+  !> Check that a row has numbers only, as many as the header has names; the first is the number of a step.
+  subroutine check_row(path, line, n_columns, row, step, error)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: line, n_columns
+    character(len=*), intent(in) :: row
+    integer(i8), intent(out) :: step
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: column, first, last
+
+    first = 1
+    column = 0
+    do
+      column = column + 1
+      last = index(row(first:), ",")
+      last = merge(len(row), first + last - 2, last == 0)
+      associate (cell => row(first:last))
+        if (column == 1) then
+          call read_step(path, line, cell, step, error)
+        else if (.not. is_number(cell)) then
+          call raise(error, status_input, path//": line "//to_text(line)//': "'//cell(1:min(len(cell), longest_quote))// &
+            & '", but a number was expected')
+        end if
+      end associate
+      first = last + 2
+      if (last == len(row) .or. allocated(error)) exit
+    end do
+    if (column /= n_columns) call raise(error, status_input, path//": line "//to_text(line)//": "//to_text(column)// &
+      & " cells, but the header has "//to_text(n_columns))
+  end subroutine check_row
+
+  !> Whether a cell is a number as `add` writes them.
+  pure logical function is_number(cell)
+    character(len=*), intent(in) :: cell
+
+    is_number = number_size(cell) /= not_a_number .and. scan(cell, "dD") == 0
+    if (.not. is_number) is_number = cell == "nan" .or. cell == "inf" .or. cell == "-inf"
+  end function is_number
 
   !> The number of a step from the first cell of a row.
   subroutine read_step(path, line, cell, step, error)
@@ -151,7 +189,8 @@ contains
     if (len(cell) > 0 .and. len(cell) <= 18 .and. verify(cell, "0123456789") == 0) then
       read (cell, "(i18)") step
     else
-      call raise(error, status_input, path//": line "//to_text(line)//': "'//cell//'", but the number of a step was expected')
+      call raise(error, status_input, path//": line "//to_text(line)//': "'//cell(1:min(len(cell), longest_quote))// &
+        & '", but the number of a step was expected')
     end if
   end subroutine read_step
 

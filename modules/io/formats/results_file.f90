@@ -141,15 +141,17 @@ contains
     if (allocated(error)) return
     self%comm = comm
     self%path = path
-    call self%file%reopen(comm, path, error)
+    ! for reading first: in a file open for writing HDF5 makes room for all rows that a damaged dataset says it has
+    call self%file%open(comm, path, error)
     if (allocated(error)) return
     call self%file%read_attribute("/run", "dimension", dimension, error)
     call find_later_steps(self, last_step, later, n_later, error)
+    call self%file%leave()
     if (allocated(error)) then
       error%status = status_input
-      call self%file%close(error)
       return
     end if
+    call self%file%reopen(comm, path, error)
     self%dimension = narrow(dimension)
     call self%file%reserve(bytes_of_headers, error)
     do i = 1, n_later
@@ -168,7 +170,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: name
     integer(i8) :: step, n_bodies
-    integer :: i, number, stat
+    integer :: i, number, members, stat
 
     n_later = 0
     if (allocated(error)) return
@@ -176,7 +178,12 @@ contains
       call raise(error, status_input, self%path//": /steps: missing, but the results of a run were expected")
       return
     end if
-    allocate (later(self%file%member_count("/steps")))
+    members = self%file%member_count("/steps")
+    if (members < 0) then
+      call raise(error, status_input, self%path//": /steps: damaged or no group, but the results of a run were expected")
+      return
+    end if
+    allocate (later(members))
     do i = 1, size(later)
       name = self%file%member("/steps", i)
       stat = 1

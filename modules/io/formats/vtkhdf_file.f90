@@ -6,6 +6,7 @@
 module gravier_vtkhdf_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_room, only: make_room
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: remove_file
@@ -88,7 +89,7 @@ contains
     call self%file%make_group(root, error)
     call self%file%write_attribute(root, "Version", [2_i8, 0_i8], error)
     call self%file%write_attribute(root, "Type", "PolyData", error)
-    call make_tables(self, error)
+    call make_tables(self, error, check=.false.)
     call self%file%flush(error)
     if (allocated(error)) call self%file%discard()
   end subroutine vtkhdf_open
@@ -117,40 +118,58 @@ contains
     if (self%n_points > 1) group = "CellData"
   end function data_group
 
-  subroutine make_tables(self, error)
+  !> Make the tables of the file, or check those of a file to go on with.
+  subroutine make_tables(self, error, check)
     type(vtkhdf_file_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
-    integer :: k
+    logical, intent(in) :: check
+    integer :: k, np
 
-    associate (file => self%file)
-      call file%make_table(root//"/NumberOfPoints", 0, table_integer, short_chunk, error)
-      call file%make_table(root//"/Points", 3, table_single, self%n_points*self%chunk, error)
-      do k = 1, size(topologies)
-        associate (group => root//"/"//trim(topologies(k)), drawn => k == self%n_points)
-          call file%make_table(group//"/NumberOfCells", 0, table_integer, short_chunk, error)
-          call file%make_table(group//"/NumberOfConnectivityIds", 0, table_integer, short_chunk, error)
-          call file%make_table(group//"/Connectivity", 0, table_integer, merge(self%n_points*self%chunk, short_chunk, drawn), error)
-          call file%make_table(group//"/Offsets", 0, table_integer, merge(self%chunk, short_chunk, drawn), error)
-        end associate
-      end do
-      call file%make_table(steps_group//"/Values", 0, table_double, short_chunk, error)
-      call file%write_attribute(steps_group, "NSteps", 0_i8, error)
-      call file%make_table(steps_group//"/PartOffsets", 0, table_integer, short_chunk, error)
-      call file%make_table(steps_group//"/NumberOfParts", 0, table_integer, short_chunk, error)
-      call file%make_table(steps_group//"/PointOffsets", 0, table_integer, short_chunk, error)
-      call file%make_table(steps_group//"/CellOffsets", size(topologies), table_integer, short_chunk, error)
-      call file%make_table(steps_group//"/ConnectivityIdOffsets", size(topologies), table_integer, short_chunk, error)
-      do k = 1, size(self%field)
-        associate (field => self%field(k), name => data_group(self)//"/"//trim(self%field(k)%name))
-          call file%make_table(root//"/"//name, merge(0, field%components, field%components == 1), &
-            & merge(table_integer, table_single, field%whole), self%chunk, error)
-          call file%make_table(steps_group//"/"//data_group(self)//"Offsets/"//trim(field%name), 0, table_integer, short_chunk, &
-            & error)
-        end associate
-      end do
-      ! for those who go on with the file: the numbers of the steps
-      call file%make_table(step_table, 0, table_integer, short_chunk, error)
-    end associate
+    np = self%n_points
+    call table(root//"/NumberOfPoints", 0, table_integer, short_chunk, self%steps)
+    call table(root//"/Points", 3, table_single, np*self%chunk, np*self%rows)
+    do k = 1, size(topologies)
+      associate (group => root//"/"//trim(topologies(k)), chunk => merge(self%chunk, short_chunk, k == np), &
+        & rows => merge(self%rows, 0_i8, k == np))
+        call table(group//"/NumberOfCells", 0, table_integer, short_chunk, self%steps)
+        call table(group//"/NumberOfConnectivityIds", 0, table_integer, short_chunk, self%steps)
+        call table(group//"/Connectivity", 0, table_integer, merge(np*chunk, chunk, k == np), np*rows)
+        call table(group//"/Offsets", 0, table_integer, chunk, rows + self%steps)
+      end associate
+    end do
+    call table(steps_group//"/Values", 0, table_double, short_chunk, self%steps)
+    if (.not. check) call self%file%write_attribute(steps_group, "NSteps", 0_i8, error)
+    call table(steps_group//"/PartOffsets", 0, table_integer, short_chunk, self%steps)
+    call table(steps_group//"/NumberOfParts", 0, table_integer, short_chunk, self%steps)
+    call table(steps_group//"/PointOffsets", 0, table_integer, short_chunk, self%steps)
+    call table(steps_group//"/CellOffsets", size(topologies), table_integer, short_chunk, self%steps)
+    call table(steps_group//"/ConnectivityIdOffsets", size(topologies), table_integer, short_chunk, self%steps)
+    do k = 1, size(self%field)
+      associate (field => self%field(k), name => data_group(self)//"/"//trim(self%field(k)%name))
+        call table(root//"/"//name, merge(0, field%components, field%components == 1), &
+          & merge(table_integer, table_single, field%whole), self%chunk, self%rows)
+        call table(steps_group//"/"//data_group(self)//"Offsets/"//trim(field%name), 0, table_integer, short_chunk, &
+          & self%steps)
+      end associate
+    end do
+    ! for those who go on with the file: the numbers of the steps
+    call table(step_table, 0, table_integer, short_chunk, self%steps)
+
+  contains
+
+    !> One table: its columns, what it holds, rows by which it grows, and rows that it has at least.
+    subroutine table(path, n_columns, kind, rows_a_chunk, n_rows)
+      character(len=*), intent(in) :: path
+      integer, intent(in) :: n_columns, kind
+      integer(i8), intent(in) :: rows_a_chunk, n_rows
+
+      if (check) then
+        call self%file%check_table(path, n_columns, kind, n_rows, error)
+      else
+        call self%file%make_table(path, n_columns, kind, rows_a_chunk, error)
+      end if
+    end subroutine table
+
   end subroutine make_tables
 
   !> Go on with a file that a run left, with its name or before it has one: steps above `last_step` are forgotten, and written over.
@@ -178,25 +197,33 @@ contains
       return
     end if
     call set_up(self, comm, path, n_points, field)
-    call self%file%reopen(comm, path, error, aside=.not. named)
+    ! for reading first: in a file open for writing HDF5 makes room for all rows that a damaged table says it has
+    if (named) then
+      call self%file%open(comm, path, error)
+    else
+      call self%file%open(comm, part_of(path), error)
+    end if
     call self%file%read_attribute(steps_group, "NSteps", written, error)
     do k = 1, size(field)
       if (allocated(error)) exit
       if (self%file%exists(root//"/"//data_group(self)//"/"//trim(field(k)%name))) cycle
       call raise(error, status_input, path//": no field "//trim(field(k)%name)//", but one was expected")
     end do
+    if (.not. allocated(error)) call self%file%check_table(step_table, 0, table_integer, written, error)
     if (.not. allocated(error)) then
-      allocate (step(written))
+      call make_room(step, written, path//": "//step_table, error)
       call self%file%read_rows(step_table, 0_i8, step, error)
     end if
+    if (.not. allocated(error)) self%steps = count(step <= last_step, kind=i8)
+    call find_rows(self, written, error)
+    call make_tables(self, error, check=.true.)
+    call self%file%leave()
     if (allocated(error)) then
       error%status = status_input
-      call self%file%leave()
       return
     end if
+    call self%file%reopen(comm, path, error, aside=.not. named)
     if (named) call self%file%hide(error)
-    self%steps = count(step <= last_step, kind=i8)
-    call find_rows(self, written, error)
     call self%file%change_attribute(steps_group, "NSteps", self%steps, error)
     call self%file%flush(error)
     call cut_steps(self, error)
@@ -237,7 +264,7 @@ contains
     integer(i8) :: last(1)
 
     self%rows = 0
-    if (self%steps == 0 .or. self%steps > written) return
+    if (allocated(error) .or. self%steps == 0 .or. self%steps > written) return
     call self%file%read_rows(steps_group//"/PointOffsets", self%steps - 1, last, error)
     self%rows = last(1)
     call self%file%read_rows(root//"/NumberOfPoints", self%steps - 1, last, error)

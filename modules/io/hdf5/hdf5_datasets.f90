@@ -13,7 +13,7 @@ module gravier_hdf5_datasets
   use gravier_hdf5_tree, only: h5_tree_t
   implicit none
   private
-  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, class_of, type_of
+  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, class_of, type_of
 
   !> Rows of this rank in memory.
   type :: rows_t
@@ -218,6 +218,31 @@ contains
     end if
     call h5dclose_f(dataset, stat)
   end subroutine get_extent
+
+  !> Whether a dataset of one or two dimensions takes more rows than it has.
+  logical function can_grow(self, path)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(hid_t) :: place, dataset, space
+    integer(hsize_t) :: extent(2), greatest(2)
+    character(len=:), allocatable :: name
+    integer :: n_dims, stat
+
+    can_grow = .false.
+    call self%locate(path, place, name)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat < 0) return
+    call h5dget_space_f(dataset, space, stat)
+    if (stat == 0) then
+      call h5sget_simple_extent_ndims_f(space, n_dims, stat)
+      if (n_dims == 1 .or. n_dims == 2) then
+        call h5sget_simple_extent_dims_f(space, extent(1:n_dims), greatest(1:n_dims), stat)
+        can_grow = greatest(n_dims) == H5S_UNLIMITED_F
+      end if
+      call h5sclose_f(space, stat)
+    end if
+    call h5dclose_f(dataset, stat)
+  end function can_grow
 
   !> Class of the elements of a dataset, one of the H5T_ class constants.
   integer function class_of(self, path) result(data_class)

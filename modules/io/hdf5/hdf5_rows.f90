@@ -11,7 +11,8 @@ module gravier_hdf5_rows
   use gravier_random_hash, only: hash_rows
   use gravier_hdf5_properties, only: text_type, is_ascii
   use gravier_hdf5_attributes, only: h5_attributes_t
-  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, class_of, type_of
+  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, class_of, &
+    & type_of
   implicit none
   private
   public :: h5_rows_t
@@ -33,6 +34,7 @@ module gravier_hdf5_rows
     !> put_rows(path, first_row, values, error): write the rows of all ranks into a table, in the order of the ranks, from row
     !> first_row (from 0) on; the table grows
     procedure :: make_table => h5_make_table
+    procedure :: check_table => h5_check_table
     procedure :: cut_rows => h5_cut_rows
     generic :: put_rows => put_integer_rows, put_real_rows
     procedure, private :: put_integer_rows => h5_put_integer_rows
@@ -53,6 +55,8 @@ module gravier_hdf5_rows
   !> attribute of a dataset: hash_rows of its words
   character(len=*), parameter :: checksum = "checksum"
   integer, parameter :: bytes_of_word = 8
+  !> of a number in single precision
+  integer, parameter :: least_bytes_of_row = 4
   !> words that a rank reads at a time to check them
   integer, parameter :: words_a_piece = 131072
 
@@ -249,6 +253,36 @@ contains
     end if
     call self%comm%agree(error)
   end subroutine h5_make_table
+
+  !> Check that a table of a file to go on with is one that make_table made, with n_rows rows at least.
+  subroutine h5_check_table(self, path, n_columns, kind, n_rows, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    !> as for make_table
+    integer, intent(in) :: n_columns, kind
+    integer(i8), intent(in) :: n_rows
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: total
+    integer :: found
+
+    call self%row_count(path, total, error)
+    if (allocated(error)) return
+    found = self%columns(path)
+    if (found /= n_columns) then
+      call self%fail(path, columns_text(found)//", but "//columns_text(n_columns)//" was expected", error)
+    else if (class_of(self, path) /= merge(H5T_INTEGER_F, H5T_FLOAT_F, kind == table_integer)) then
+      call self%fail(path, "not made of "//trim(merge("integers", "reals   ", kind == table_integer))// &
+        & ", which were expected", error)
+    else if (.not. can_grow(self, path)) then
+      call self%fail(path, "a table of a fixed length, but one that grows was expected", error)
+    else if (total > self%length()/least_bytes_of_row) then
+      ! HDF5 makes room for all of them when the file is opened for writing
+      call self%fail(path, to_text(total)//" rows, more than the file has room for", error)
+    else if (total < n_rows) then
+      call self%fail(path, to_text(total)//" rows, but at least "//to_text(n_rows)//" were expected", error)
+    end if
+    call self%comm%agree(error)
+  end subroutine h5_check_table
 
   !> Leave the first rows of a table alone.
   subroutine h5_cut_rows(self, path, n_rows, error)

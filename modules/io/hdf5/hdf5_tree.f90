@@ -57,6 +57,7 @@ module gravier_hdf5_tree
     procedure :: take_over => h5_take_over
 
     procedure :: exists => h5_exists
+    procedure :: length => h5_length
     procedure :: member_count => h5_member_count
     procedure :: member => h5_member
 
@@ -526,7 +527,13 @@ contains
     if (len(name) == 1 .and. name /= "/" .and. name /= ".") call h5lexists_f(place, name, exists, stat)
   end function h5_exists
 
-  !> Number of groups and datasets in a group. Not collective.
+  !> Bytes of the file on the disk. Not collective.
+  integer(i8) function h5_length(self) result(length)
+    class(h5_tree_t), intent(in) :: self
+    length = file_length(self%path)
+  end function h5_length
+
+  !> Number of groups and datasets in a group, -1 of anything else. Not collective.
   integer function h5_member_count(self, path) result(n)
     class(h5_tree_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -536,7 +543,7 @@ contains
 
     call self%locate(path, place, name)
     call h5gn_members_f(place, name, n, stat)
-    if (stat < 0) n = 0
+    if (stat < 0) n = -1
   end function h5_member_count
 
   !> Name of the i-th group or dataset in a group, in alphabetic order. Not collective.

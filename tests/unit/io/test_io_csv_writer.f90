@@ -120,7 +120,7 @@ contains
 
   !> Rows of steps up to the last one stay, a torn line goes, and new rows follow.
   subroutine test_resume()
-    character(len=*), parameter :: head = "step,x"//newline, rows = head//"1,a"//newline//"2,b"//newline//"2,c"//newline
+    character(len=*), parameter :: head = "step,x"//newline, rows = head//"1,0.5"//newline//"2,nan"//newline//"2,-1E+3"//newline
     type(csv_writer_t) :: table
     type(error_t), allocatable :: error
 
@@ -136,12 +136,12 @@ contains
     call check_resumed(5, head, "a header alone")
     call put(rows)
     call check_resumed(9, rows, "all rows")
-    call put(rows//"3,d"//newline//"4,e"//newline)
+    call put(rows//"3,7"//newline//"4,8"//newline)
     call check_resumed(2, rows, "rows of later steps")
-    call check_resumed(8, rows//"8,new"//newline, "resumed twice")
-    call put(rows//"3,d"//newline)
+    call check_resumed(8, rows//"8,9"//newline, "resumed twice")
+    call put(rows//"3,7"//newline)
     call check_resumed(0, head, "no row to keep")
-    call put(rows//"3,d")
+    call put(rows//"3,7")
     call check_resumed(3, rows, "a torn last line")
     call put(rows//"3")
     call check_resumed(3, rows, "a last line torn within the step")
@@ -167,9 +167,9 @@ contains
     inquire (file=path//".part", exist=exists)
     call check(.not. exists, name//": no part is left")
     call table%add(8)
-    call table%add("new")
+    call table%add(9)
     call table%end_row(error)
-    call check_equal(content(), kept//"8,new"//newline, name//": and a new row")
+    call check_equal(content(), kept//"8,9"//newline, name//": and a new row")
     call table%close(error)
     call check(.not. allocated(error), name//": no error at the end")
   end subroutine check_resumed
@@ -186,7 +186,7 @@ contains
     do i = 1, 3000
       if (i == 2001) before = content()
       call table%add(i)
-      call table%add(repeat("x", 97 + mod(7*i, 50)))
+      call table%add(repeat("1", 97 + mod(7*i, 50)))
       call table%end_row(error)
     end do
     call table%resume(path, "step,x", 2000, error)
@@ -198,7 +198,7 @@ contains
 
   !> What is refused stays as it was, and so does what a full disk keeps from being copied.
   subroutine test_resume_refused()
-    character(len=*), parameter :: rows = "step,x"//newline//"1,a"//newline//"two,b"//newline
+    character(len=*), parameter :: rows = "step,x"//newline//"1,1"//newline//"two,2"//newline
     type(csv_writer_t) :: table
     type(error_t), allocatable :: error
 
@@ -206,6 +206,13 @@ contains
     call table%resume(path, "step,x", 5, error)
     call expect(error, 'csv_writer.csv: line 3: "two", but the number of a step was expected', "a row without a step", status_input)
     call check(.not. table%is_open(), "not open after a refusal")
+    call put("step,x"//newline//"1,0*1"//newline)
+    call table%resume(path, "step,x", 5, error)
+    call expect(error, 'csv_writer.csv: line 2: "0*1", but a number was expected', "a cell that is no number", status_input)
+    call put("step,x"//newline//"1,2"//newline//"2"//newline)
+    call table%resume(path, "step,x", 5, error)
+    call expect(error, "csv_writer.csv: line 3: 1 cells, but the header has 2", "a row that is too short", status_input)
+    call put(rows)
     call table%resume(path, "step,y", 5, error)
     call expect(error, "csv_writer.csv: line 1: step,y was expected", "another header", status_input)
     call table%resume(path, "step,x,y", 5, error)
