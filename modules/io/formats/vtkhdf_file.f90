@@ -6,7 +6,7 @@
 module gravier_vtkhdf_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_room, only: make_room
+  use gravier_room, only: room_for
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: remove_file
@@ -211,7 +211,7 @@ contains
     end do
     if (.not. allocated(error)) call self%file%check_table(step_table, 0, table_integer, written, error)
     if (.not. allocated(error)) then
-      call make_room(step, written, path//": "//step_table, error)
+      allocate (step(room_for(written, storage_size(step)/8, path//": "//step_table, error)))
       call self%file%read_rows(step_table, 0_i8, step, error)
     end if
     if (.not. allocated(error)) self%steps = count(step <= last_step, kind=i8)
