@@ -53,6 +53,8 @@ program test_step_parts
   call check_falling_lid()
   call check_departures()
   call check_sleeping()
+  call check_moving_plane("0")
+  call check_moving_plane("0.5")
   call check_sleepers_last()
   call check_starting_boundary()
   call check_projection()
@@ -332,34 +334,38 @@ contains
   end subroutine check_state
 
   !> A grain of group 1 turns with a boundary about the origin at 2 rad/s; a free disk of 1 kg lies above it, at rest and without
-  !> gravity, and is carried up by its approach. The glued grain has identifier `glued`, so that it is candidate or antagonist.
+  !> gravity, and is carried up by its approach and along by friction. It overlaps with the glued grain, at whose surface the
+  !> boundary has the velocity that counts. The glued grain has identifier `glued`, so that it is candidate or antagonist.
   subroutine check_turning_glued(glued)
     integer, intent(in) :: glued
+    real(dp), parameter :: overlap = 0.02_dp, spin = 2.0_dp
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
     character(len=row_length) :: rows(2)
-    real(dp) :: turn, n(2), x(2), v, spin
+    real(dp) :: turn, x(2), u(2)
 
-    spin = 2.0_dp
     ! at q_m the glued grain has turned by half a step
     turn = 0.5_dp*h*spin
     x = [cos(turn), sin(turn)]
     rows(glued) = row(glued, 1.0_dp, 1, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
-    rows(3 - glued) = row(3 - glued, 1.0_dp, 0, x(1), x(2) + 0.2_dp, 0.0_dp, 0.0_dp, 0.0_dp)
-    call make(sim, rows, "gravity = 0, 0, overlap_projection = F, friction = 0 /"//newline// &
-      & "&boundary shape = 'grains', group = 1, rotation = 2.0, pivot = 0, 0 /"//newline// &
+    rows(3 - glued) = row(3 - glued, 1.0_dp, 0, x(1), x(2) + 0.2_dp - overlap, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, rows, "gravity = 0, 0, overlap_projection = F, friction = 0.5 /"//newline// &
+      & "&boundary shape = 'grains', group = 1, rotation = 2.0, pivot = 0, 0, friction = 0.5 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
     call check_equal(figures%contacts, 1_i8, "one contact with a glued grain")
-    n = [0.0_dp, 1.0_dp]
-    ! the point of contact, at x + (0, 0.1), moves with (-w y, w x)
-    v = spin*x(1)
-    call check_close(grain(sim, 3 - glued, 2), v, solved, "the free grain is carried up")
-    call check_close(grain(sim, 3 - glued, 1), 0.0_dp, solved, "and not along, without friction")
-    ! the boundary works p v; half of it is lost in the shock
-    call check_energy(sim%diagnostics%energy, [0.5_dp*v**2, 0.0_dp, 0.0_dp, v*v, 0.0_dp, 0.5_dp*v**2, 0.0_dp])
-    call check_balance(sim%balance, [0.5_dp*v**2, 0.0_dp, 0.5_dp*v**2])
-    call check_close(sim%boundary_impulses(2, 1), -v, solved, "the boundary bears the impulse")
+    ! (-w y, w x) at the surface of the glued grain, x + (0, 0.1)
+    u = [-spin*(x(2) + 0.1_dp), spin*x(1)]
+    call check_close(grain(sim, 3 - glued, 2), u(2), solved, "the free grain is carried up")
+    ! a force at the rim moves the disk by a third of the slip, and turns it by the rest
+    call check_close(grain(sim, 3 - glued, 1), u(1)/3.0_dp, solved, "and along by friction, which holds")
+    call check_close(grain(sim, 3 - glued, 3), u(1)*2.0_dp/3.0_dp/0.1_dp, solved, "which turns it, too")
+    ! the boundary works p u; half of it is lost in the shock
+    call check_energy(sim%diagnostics%energy, [0.5_dp*(u(2)**2 + u(1)**2/9.0_dp), u(1)**2/9.0_dp, 0.0_dp, &
+      & u(2)**2 + u(1)**2/3.0_dp, 0.0_dp, 0.5_dp*u(2)**2, u(1)**2/6.0_dp])
+    call check_balance(sim%balance, [0.5_dp*u(2)**2 + u(1)**2/6.0_dp, 0.0_dp, 0.5_dp*u(2)**2 + u(1)**2/6.0_dp])
+    call check_close(sim%boundary_impulses(1, 1), -u(1)/3.0_dp, solved, "the boundary bears the impulse along")
+    call check_close(sim%boundary_impulses(2, 1), -u(2), solved, "and the one across")
     call sim%free()
   end subroutine check_turning_glued
 
@@ -460,10 +466,11 @@ contains
       & newline)
   end subroutine make_resting
 
-  !> Steps at rest of the contact of grain `id` with the plane, the same on all ranks.
-  integer function counted(sim, id)
+  !> Steps at rest of the contact of grain `id` with the plane, or with grains of higher identifiers: the same on all ranks.
+  integer function counted(sim, id, with_grains)
     type(simulation_t), intent(in) :: sim
     integer, intent(in) :: id
+    logical, intent(in), optional :: with_grains
     integer :: s, p
     real(dp) :: most
 
@@ -471,7 +478,7 @@ contains
     do s = 1, size(sim%neighbourhoods%view)
       associate (view => sim%neighbourhoods%view(s))
         do p = 1, view%list%n
-          if (view%bodies%id(view%list%candidate(p)) == id .and. view%list%antagonist(p) < 0) &
+          if (view%bodies%id(view%list%candidate(p)) == id .and. (view%list%antagonist(p) > 0 .eqv. present(with_grains))) &
             & most = max(most, real(view%list%state(view%list%memory%rest_row, p), dp))
         end do
       end associate
@@ -530,6 +537,27 @@ contains
     call check_equal(figures%asleep, 0_i8, "and are awake")
     call sim%free()
   end subroutine check_sleeping
+
+  !> On a plane that moves, without friction, nothing changes, and yet the disks are not taken to rest on it: the contact of two
+  !> disks, one upon the other, counts no step while the plane moves, and counts them when it is at rest.
+  subroutine check_moving_plane(speed)
+    character(len=*), intent(in) :: speed
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: k
+
+    call make(sim, [row(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
+      & row(2, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp), row(3, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
+      & "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0, velocity = "//speed//", 0 /"//newline// &
+      & "&time step = 0.01, steps = 99 /"//newline//exact//", sleeping = T, sleep_after = 6, sleep_speed = 1e-3 /"//newline)
+    do k = 1, 5
+      call advance(sim, figures)
+    end do
+    call check_equal(counted(sim, 1, .true.), merge(4, 0, speed == "0"), "steps at rest of two disks on a plane")
+    call check_equal(counted(sim, 1), merge(4, 0, speed == "0"), "steps at rest of the lower one and the plane")
+    call sim%free()
+  end subroutine check_moving_plane
 
   !> Of contacts found, those asleep come last, and those before them fill whole blocks.
   subroutine check_sleepers_last()

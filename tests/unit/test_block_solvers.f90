@@ -174,7 +174,7 @@ contains
       call check(figure <= control%tolerance, "sweeps reach their tolerance")
       call check_close(maxval(abs(r - expected)), 0.0_dp, 1.0e-11_dp, "sweeps find the impulses")
       call check_equal(growth%kind, growth_none, "no growth")
-      call check(sweeps < 200, "in few sweeps")
+      call check(sweeps < 16, "in few sweeps: couplings are a tenth of the diagonal")
     end do
     r(:, :) = 0.0_dp
     growth = growth_t()
@@ -182,7 +182,7 @@ contains
     call newton%solve(problem, newton_control_t(tolerance=1.0e-13_dp, most_steps=300), r, steps, figure, growth)
     call check(.not. allocated(error), "Newton's method")
     call check_close(maxval(abs(r - expected)), 0.0_dp, 1.0e-11_dp, "Newton's method finds the impulses")
-    call check(steps < 80, "in few steps")
+    call check(steps < 7, "in few steps")
     call newton%solve(problem, newton_control_t(tolerance=1.0e-12_dp, most_steps=300), r, steps, figure, growth)
     call check_equal(steps, 0, "a solution takes no step")
     call newton%free()

@@ -110,18 +110,23 @@ contains
 
   !> Each coefficient is raised by itself.
   subroutine check_coefficients()
-    type(coefficients_t) :: a, b
+    type(coefficients_t) :: a, b, c
 
     a = coefficients_t(friction=0.1_dp, restitution=0.9_dp, tangential_restitution=0.2_dp, rolling_friction=0.8_dp, &
       & pivoting_friction=0.3_dp)
     b = coefficients_t(friction=0.7_dp, restitution=0.3_dp, tangential_restitution=0.6_dp, rolling_friction=0.4_dp, &
       & pivoting_friction=0.5_dp)
+    c = a
     call a%raise_to(b)
     call check_close(a%friction, 0.7_dp, 0.0_dp, "friction is raised")
     call check_close(a%restitution, 0.9_dp, 0.0_dp, "restitution stays")
     call check_close(a%tangential_restitution, 0.6_dp, 0.0_dp, "tangential restitution is raised")
     call check_close(a%rolling_friction, 0.8_dp, 0.0_dp, "rolling friction stays")
     call check_close(a%pivoting_friction, 0.5_dp, 0.0_dp, "pivoting friction is raised")
+    call b%raise_to(c)
+    call check(abs(b%friction - a%friction) + abs(b%restitution - a%restitution) + abs(b%tangential_restitution - &
+      & a%tangential_restitution) + abs(b%rolling_friction - a%rolling_friction) + abs(b%pivoting_friction - &
+      & a%pivoting_friction) <= 0.0_dp, "either way round")
   end subroutine check_coefficients
 
   !> Constant terms; without friction nothing sends a tangential velocity back.
