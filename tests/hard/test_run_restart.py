@@ -133,6 +133,58 @@ class Restart(RunTestCase):
             case = merged(case, {"output": {"every": 4, "trace": True}})
             self.one_restart(case, 10 + number, 1 + number % 2, 2 - number % 2, self.straight(name, case))
 
+    def test_another_layout_of_memory(self):
+        """What pairs keep is laid out by warm starts, laws with a memory and sleeping; a run that goes on with another layout finds
+        bonds and impulses in it. Nothing sleeps within so few steps, so that sleeping changes no bit of the motion; without warm
+        starts solves end elsewhere within their tolerance."""
+        rows = [f"{5 * j + i + 1},{0.1 * i:.3f},{0.1 * j + 0.1:.3f},0.05,{0.3 * (-1) ** i * j:.2f},{-0.1 * i:.2f},{i - 2}"
+                for j in range(4) for i in range(5)]
+        base = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "wall_material": "rock"},
+            "material": [{"name": "rock"}],
+            "law": [{"materials": "rock", "kind": "bonded", "friction": 0.3, "bond_strength": 300.0, "bond_friction": 0.8,
+                     "bond_distance": 1e-3, "rolling_friction": 0.1}],
+            "boundary": [{"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}],
+            "time": {"step": 1e-3, "steps": 60},
+            "solver": {"method": "nscdd", "criterion": "residual", "tolerance": 1e-10, "max_iterations": 5000},
+            "decomposition": {"subdomains": 2},
+            "output": {"every": 20, "checkpoint_every": 60},
+        }
+        layouts = {"plain": {}, "sleeping": {"solver": {"sleeping": True, "sleep_after": 1000}},
+                   "cold": {"solver": {"warm_start": False}}}
+
+        def prepare(directory):
+            os.makedirs(directory, exist_ok=True)
+            write(os.path.join(directory, "grains.csv"), "id,x,y,radius,vx,vy,omega\n" + "\n".join(rows) + "\n")
+
+        def motion(directory):
+            found = contents(os.path.join(directory, "results", "results.h5"))
+            return {name: found[f"/steps/60/bodies/{name}"] for name in ("id", "position", "velocity")}
+
+        straight = self.straight("bonds", base, prepare)
+        last = motion(straight)
+        # bonds hold some of the grains together, and others have broken
+        self.assertGreater(np.ptp(last["velocity"][:, 0]), 0.01)
+        for before, after in (("plain", "sleeping"), ("sleeping", "plain"), ("cold", "plain"), ("plain", "cold"), ("cold", "sleeping")):
+            with self.subTest(before=before, after=after):
+                directory = self.here(f"bonds {before} {after}")
+                prepare(directory)
+                stopped = merged(base, layouts[before], {"time": {"steps": 25}, "output": {"checkpoint_every": 25}})
+                self.assert_status(run_case(stopped, 2, directory), 0)
+                write(os.path.join(directory, "case.nml"), namelist(merged(base, layouts[after])))
+                # history has columns of its own where contacts sleep, and is refused as it is
+                if "sleeping" in (before, after):
+                    self.assert_refused(restart(directory, 1), r"history\.csv: line 1: step,time,.* was expected")
+                    os.remove(os.path.join(directory, "results", "history.csv"))
+                run = restart(directory, 1)
+                self.assert_status(run, 0)
+                self.assertIn("from the checkpoint of step 25\n", run.stdout)
+                found = motion(directory)
+                if "cold" in (before, after):
+                    self.assertLess(np.abs(found["position"] - last["position"]).max(), 1e-6)
+                else:
+                    self.assertEqual(differences(last, found), [])
+
     def test_signals(self):
         """SIGTERM, to one rank or to all, stops with status 4; SIGUSR1, to the launcher, writes a checkpoint and goes on."""
         straight = self.straight("signals", merged(BOX, {"time": {"steps": 400}, "output": {"every": 50, "checkpoint_every": 0,

@@ -21,6 +21,7 @@ program test_block_solvers
 
   call MPI_Init()
   call check_first_sweep()
+  call check_momentum()
   call check_solvers(2, 9)
   call check_solvers(3, 9)
   call check_system(2, 12)
@@ -105,6 +106,40 @@ contains
     call solve_by_sweeps(problem, control, r, sweeps, figure, growth)
     call check_equal(sweeps, 3, "no more sweeps than allowed")
   end subroutine check_first_sweep
+
+  !> A column of equal bodies, W_nn = 2 and -1 between neighbours: sweeps carry a change one contact further each and take a number
+  !> in proportion to the square of their number, with momentum one in proportion to their number.
+  subroutine check_momentum()
+    integer, parameter :: n = 60
+    type(delassus_t) :: problem
+    type(error_t), allocatable :: error
+    type(sweep_control_t) :: control
+    type(growth_t) :: growth
+    real(dp) :: w(2*n, 2*n), r(2, n), expected(2, n), mu(n), figure
+    integer :: k, sweeps(2)
+
+    w(:, :) = 0.0_dp
+    expected(:, :) = 0.0_dp
+    mu(:) = 0.0_dp
+    do k = 1, n
+      w(2*k - 1, 2*k - 1) = merge(1.0_dp, 2.0_dp, k == 1)
+      w(2*k, 2*k) = 2.0_dp
+      if (k < n) w(2*k - 1, 2*k + 1) = -1.0_dp
+      if (k < n) w(2*k + 1, 2*k - 1) = -1.0_dp
+      expected(1, k) = real(n + 1 - k, dp)
+    end do
+    call problem%init(2, sparse(w), -matmul(w, reshape(expected, [2*n])), mu, error)
+    call check(.not. allocated(error), "problem of a column")
+    control%tolerance = 1.0e-10_dp
+    do k = 1, 2
+      control%momentum = k == 2
+      r(:, :) = 0.0_dp
+      call solve_by_sweeps(problem, control, r, sweeps(k), figure, growth)
+      ! the smallest eigenvalue of W is (pi/(2 n))^2
+      call check_close(maxval(abs(r - expected)), 0.0_dp, 1.0e-6_dp, "impulses of a column")
+    end do
+    call check(sweeps(2) < sweeps(1)/5, "momentum takes a small part of the sweeps")
+  end subroutine check_momentum
 
   !> Contacts that open, stick and slip in turn: impulses and velocities are chosen, and q = v - W r. Couplings are weak against the
   !> blocks on the diagonal, so that there is one solution.
