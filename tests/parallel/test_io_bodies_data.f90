@@ -49,7 +49,8 @@ contains
     logical :: possible
 
     do k = 1, size(sizes)
-      v = sizes(k)*[-3.0_dp, 4.0_dp]
+      v(1) = -3.0_dp*sizes(k)
+      v(2) = 4.0_dp*sizes(k)
       call make_unit(v, possible)
       call check(possible, "a vector has a direction")
       call check_close(maxval(abs(v - [-0.6_dp, 0.8_dp])), 0.0_dp, 4*epsilon(1.0_dp), "its direction")

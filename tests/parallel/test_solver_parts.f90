@@ -8,7 +8,7 @@ program test_solver_parts
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_memory_need, only: check_memory
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: work_t
   use gravier_nlgs, only: nlgs_t
   use gravier_descent, only: descent_t
@@ -129,7 +129,9 @@ contains
     end do
     sim%problem%load(:) = 0.0_dp
     call find_supports(sim%problem, supports)
-    call check(.not. any([(any(supports(s)%column), s=1, size(supports))]), "without a load nothing supports")
+    do s = 1, size(supports)
+      call check(.not. any(supports(s)%column), "without a load nothing supports")
+    end do
     ! contacts that are open and carry nothing are no way
     do s = 1, size(ways)
       associate (sub => sim%problem%sub(s))
@@ -144,9 +146,23 @@ contains
       sim%problem%sub(s)%impulse(1, 1, :) = 1.0_dp
     end do
     call list_closed(sim%problem, ways)
-    call check_equal(sum(ways%n_closed), sum([(size(sim%problem%sub(s)%hot, 3), s=1, size(ways))]), "contacts that press are")
+    do s = 1, size(ways)
+      call check_equal(ways(s)%n_closed, size(sim%problem%sub(s)%hot, 3), "contacts that press are")
+    end do
     call sim%free()
   end subroutine check_ways
+
+  !> Number of the upper disk of contact `c` of a column.
+  pure integer function upper_of(sub, c) result(upper)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    integer :: k
+
+    upper = 0
+    do k = 1, 2
+      if (sub%pair(k, c) <= sub%n_grains) upper = max(upper, int(sub%id(sub%pair(k, c))))
+    end do
+  end function upper_of
 
   !> With powers r . w = 0.65 0.1 l r in the contacts of level l, level l sinks by 0.1 l against the one below, and disk k by
   !> 0.05 k (k + 1).
@@ -165,7 +181,7 @@ contains
         allocate (levels%part(s)%power(lanes, n_blocks(sub%n_contacts)), source=0.0_dp)
         do c = 1, sub%n_contacts
           ! the upper one of its disks
-          l = int(maxval(sub%id(sub%pair(:, c)), mask=sub%pair(:, c) <= sub%n_grains))
+          l = upper_of(sub, c)
           r = real(n + 1 - l, dp)
           sub%impulse(lane_of(c), 1, block_of(c)) = r
           levels%part(s)%power(lane_of(c), block_of(c)) = 0.65_dp*0.1_dp*l*r
@@ -208,7 +224,7 @@ contains
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
         do c = 1, sub%n_contacts
-          l = int(maxval(sub%id(sub%pair(:, c)), mask=sub%pair(:, c) <= sub%n_grains))
+          l = upper_of(sub, c)
           worst = max(worst, abs(sub%impulse(lane_of(c), 1, block_of(c)) - real(n + 1 - l, dp))/(n + 1 - l))
         end do
       end associate
@@ -246,7 +262,10 @@ contains
     if (.not. allocated(problem%progress)) allocate (problem%progress(2, size(problem%sub)))
     problem%progress(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
-      if (problem%sub(s)%subdomain == 1) problem%progress(:, s) = [change**2, 1.0_dp]
+      if (problem%sub(s)%subdomain == 1) then
+        problem%progress(1, s) = change**2
+        problem%progress(2, s) = 1.0_dp
+      end if
     end do
     problem%progress_is_summed = .false.
   end subroutine set_progress
@@ -430,7 +449,7 @@ contains
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
         do c = 1, sub%n_contacts
-          l = int(maxval(sub%id(sub%pair(:, c)), mask=sub%pair(:, c) <= sub%n_grains))
+          l = upper_of(sub, c)
           call check_close(sub%impulse(lane_of(c), 1, block_of(c)), real(n + 1 - l, dp), 1.0e-10_dp, "impulse of a column")
         end do
       end associate

@@ -33,7 +33,9 @@ program test_step_parts
     & "acceleration = 'none'"
   character(len=*), parameter :: all_figures = "&output energy = T, stress = T, structure = T, boundary_forces = T /"//newline
   type(communicator_t), target :: comm
-  integer, parameter :: row_length = 240
+  !> rows of the bodies file of the next scene
+  character(len=240) :: added(40)
+  integer :: n_added = 0
   !> scenes made so far
   integer :: n_scenes = 0
 
@@ -65,11 +67,9 @@ program test_step_parts
 
 contains
 
-  !> A plane scene of grains given as rows of a bodies file, in two subdomains along x.
-  subroutine make(sim, rows, groups)
+  !> A plane scene of the grains that add_grain has added since the last one, in two subdomains along x.
+  subroutine make(sim, groups)
     type(simulation_t), intent(inout) :: sim
-    !> each by `row`
-    character(len=*), intent(in) :: rows(:)
     !> the other groups of the input; &scene begins with what is common to all
     character(len=*), intent(in) :: groups
     type(config_t) :: config
@@ -82,11 +82,12 @@ contains
     if (comm%rank == 0) then
       open (newunit=unit, file=file, action="write", status="replace")
       write (unit, "(a)") "id,radius,mass,group,x,y,vx,vy,omega"
-      do k = 1, size(rows)
-        write (unit, "(a)") trim(rows(k))
+      do k = 1, n_added
+        write (unit, "(a)") trim(added(k))
       end do
       close (unit)
     end if
+    n_added = 0
     call MPI_Barrier(MPI_COMM_WORLD)
     call parse_config("parts", &
       & "&scene dimension = 2, bodies = 'file', start_overlap = 1, alert_distance = 0.02, bodies_file = '"// &
@@ -98,13 +99,15 @@ contains
     call finish_checks()
   end subroutine make
 
-  !> A row of a bodies file: a disk of radius 0.1 m.
-  character(len=row_length) function row(id, mass, group, x, y, vx, vy, spin)
+  !> Add a disk of radius 0.1 m to the next scene.
+  subroutine add_grain(id, mass, group, x, y, vx, vy, spin)
     integer, intent(in) :: id, group
     !> [kg], [m], [m/s], [rad/s]
     real(dp), intent(in) :: mass, x, y, vx, vy, spin
-    write (row, "(i0, ',0.1,', es25.17, ',', i0, 5(',', es25.17))") id, mass, group, x, y, vx, vy, spin
-  end function row
+
+    n_added = n_added + 1
+    write (added(n_added), "(i0, ',0.1,', es25.17, ',', i0, 5(',', es25.17))") id, mass, group, x, y, vx, vy, spin
+  end subroutine add_grain
 
   subroutine advance(sim, figures)
     type(simulation_t), intent(inout) :: sim
@@ -160,17 +163,17 @@ contains
 
     ! q_m is half a step on from here: the places are chosen for the overlap there
     branch = 0.2_dp - overlap
-    call make(sim, [row(1, 1.0_dp, 0, -0.5_dp*branch - 0.5_dp*h, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 2.0_dp, 0, 0.5_dp*branch + 0.25_dp*h, 0.0_dp, -0.5_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline// &
+    call add_grain(1, 1.0_dp, 0, -0.5_dp*branch - 0.5_dp*h, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 0.5_dp*branch + 0.25_dp*h, 0.0_dp, -0.5_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline// &
       & exact//" /"//newline//all_figures//law_text(kind))
     call check_close(sim%balance%kinetic, 0.75_dp, solved, "kinetic energy at the start")
     call advance(sim, figures)
     call check_close(figures%max_overlap, overlap, solved, "the overlap is as it was meant")
     call check_close(grain(sim, 1, 1), 0.0_dp, solved, "the first grain stops")
     call check_close(grain(sim, 2, 1), 0.0_dp, solved, "the second grain stops")
-    call check_energy(sim%diagnostics%energy, [0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.75_dp, 0.0_dp])
-    call check_balance(sim%balance, [0.0_dp, 0.0_dp, -0.75_dp])
+    call check_energy(sim%diagnostics%energy, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.75_dp, 0.0_dp)
+    call check_balance(sim%balance, 0.0_dp, 0.0_dp, -0.75_dp)
     ! 1 N s over a branch, in a box around both grains
     call check_close(sim%diagnostics%stress%stress(1, 1), branch/(h*0.2_dp*(0.2_dp + branch)), 1.0e-8_dp, "stress along the pair")
     call check_close(sim%diagnostics%stress%stress(2, 2), 0.0_dp, solved, "and none across it")
@@ -203,29 +206,29 @@ contains
     call check_equal(found, 3, "columns of all groups")
   end subroutine check_columns
 
-  !> translation, rotation, work of loads and of boundaries, carried away, dissipated by normal and by tangential impulses.
-  subroutine check_energy(energy, expected)
+  subroutine check_energy(energy, translation, rotation, load_work, boundary_work, carried_away, normal, tangential)
     type(energy_balance_t), intent(in) :: energy
-    real(dp), intent(in) :: expected(7)
+    !> [J], the last two dissipated by normal and by tangential impulses
+    real(dp), intent(in) :: translation, rotation, load_work, boundary_work, carried_away, normal, tangential
 
-    call check_close(energy%translation, expected(1), solved, "energy of translation")
-    call check_close(energy%rotation, expected(2), solved, "energy of rotation")
-    call check_close(energy%load_work, expected(3), solved, "work of loads")
-    call check_close(energy%boundary_work, expected(4), solved, "work of boundaries")
-    call check_close(energy%carried_away, expected(5), solved, "energy carried away")
-    call check_close(energy%dissipated_normal, expected(6), solved, "dissipated by normal impulses")
-    call check_close(energy%dissipated_friction, expected(7), solved, "dissipated by tangential impulses")
+    call check_close(energy%translation, translation, solved, "energy of translation")
+    call check_close(energy%rotation, rotation, solved, "energy of rotation")
+    call check_close(energy%load_work, load_work, solved, "work of loads")
+    call check_close(energy%boundary_work, boundary_work, solved, "work of boundaries")
+    call check_close(energy%carried_away, carried_away, solved, "energy carried away")
+    call check_close(energy%dissipated_normal, normal, solved, "dissipated by normal impulses")
+    call check_close(energy%dissipated_friction, tangential, solved, "dissipated by tangential impulses")
     call check_close(energy%error(), 0.0_dp, solved, "the balance closes")
   end subroutine check_energy
 
-  !> kinetic energy of the grains, work of loads, work of contacts.
-  subroutine check_balance(balance, expected)
+  subroutine check_balance(balance, kinetic, load_work, contact_work)
     type(grain_balance_t), intent(in) :: balance
-    real(dp), intent(in) :: expected(3)
+    !> of the grains; done on them by loads and by contacts [J]
+    real(dp), intent(in) :: kinetic, load_work, contact_work
 
-    call check_close(balance%kinetic, expected(1), solved, "balance of grains: kinetic energy")
-    call check_close(balance%load_work, expected(2), solved, "balance of grains: work of loads")
-    call check_close(balance%contact_work, expected(3), solved, "balance of grains: work of contacts")
+    call check_close(balance%kinetic, kinetic, solved, "balance of grains: kinetic energy")
+    call check_close(balance%load_work, load_work, solved, "balance of grains: work of loads")
+    call check_close(balance%contact_work, contact_work, solved, "balance of grains: work of contacts")
     call check_close(balance%error(), 0.0_dp, solved, "balance of grains: it closes")
   end subroutine check_balance
 
@@ -238,15 +241,15 @@ contains
     real(dp) :: branch
 
     branch = 0.2_dp - overlap
-    call make(sim, [row(1, 1.0_dp, 0, -0.5_dp*branch + 0.5e-2_dp*h, 0.0_dp, -0.01_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 2.0_dp, 0, 0.5_dp*branch - 0.25e-2_dp*h, 0.0_dp, 0.005_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline// &
+    call add_grain(1, 1.0_dp, 0, -0.5_dp*branch + 0.5e-2_dp*h, 0.0_dp, -0.01_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 0.5_dp*branch - 0.25e-2_dp*h, 0.0_dp, 0.005_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline// &
       & exact//" /"//newline//all_figures//law_text("adhesion"))
     call advance(sim, figures)
     call check_close(grain(sim, 1, 1), 0.0_dp, solved, "an attraction holds the first grain")
     call check_close(grain(sim, 2, 1), 0.0_dp, solved, "an attraction holds the second grain")
-    call check_energy(sim%diagnostics%energy, [0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.75e-4_dp, 0.0_dp])
-    call check_balance(sim%balance, [0.0_dp, 0.0_dp, -0.75e-4_dp])
+    call check_energy(sim%diagnostics%energy, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.75e-4_dp, 0.0_dp)
+    call check_balance(sim%balance, 0.0_dp, 0.0_dp, -0.75e-4_dp)
     call check_close(sim%diagnostics%stress%stress(1, 1), -0.01_dp*branch/(h*0.2_dp*(0.2_dp + branch)), 1.0e-8_dp, &
       & "a tension is a negative stress")
     associate (structure => sim%diagnostics%structure)
@@ -270,9 +273,9 @@ contains
     type(step_figures_t) :: figures
     real(dp) :: p, slip
 
-    call make(sim, [row(1, 2.0_dp, 0, -0.5_dp*h, 0.1_dp, 1.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 1.0_dp, 0, 1.0_dp, 5.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, -9.81, friction = 0.3, overlap_projection = F /"//newline// &
+    call add_grain(1, 2.0_dp, 0, -0.5_dp*h, 0.1_dp, 1.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 1.0_dp, 5.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, -9.81, friction = 0.3, overlap_projection = F /"//newline// &
       & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.3, velocity = "//to_text(speed)//", 0 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
@@ -282,9 +285,9 @@ contains
     call check_close(grain(sim, 1, 1), v - p/m, solved, "friction slows the disk down")
     call check_close(grain(sim, 1, 3), -2.0_dp*p/(m*0.1_dp), solved, "and turns it")
     ! the other disk falls
-    call check_energy(sim%diagnostics%energy, [0.5_dp*m*(v - p/m)**2 + 0.5_dp*(g*h)**2, p**2/m, 0.5_dp*(g*h)**2, -p*speed, &
-      & 0.0_dp, 0.0_dp, p*slip])
-    call check_balance(sim%balance, [0.5_dp*m*(v - p/m)**2 + p**2/m + 0.5_dp*(g*h)**2, 0.5_dp*(g*h)**2, -p*(slip + speed)])
+    call check_energy(sim%diagnostics%energy, 0.5_dp*m*(v - p/m)**2 + 0.5_dp*(g*h)**2, p**2/m, 0.5_dp*(g*h)**2, -p*speed, &
+      & 0.0_dp, 0.0_dp, p*slip)
+    call check_balance(sim%balance, 0.5_dp*m*(v - p/m)**2 + p**2/m + 0.5_dp*(g*h)**2, 0.5_dp*(g*h)**2, -p*(slip + speed))
     call check_close(sim%diagnostics%structure%sliding_fraction, 1.0_dp, 0.0_dp, "the contact slides")
     call check_close(sim%boundary_impulses(1, 1), p, solved, "the plane is dragged along")
     call check_close(sim%boundary_impulses(2, 1), -m*g*h, solved, "and pressed down")
@@ -298,17 +301,17 @@ contains
     real(dp), parameter :: pi = acos(-1.0_dp), volume = pi*0.01_dp, m = 2.0_dp
     real(dp) :: a(2), v(2), w(2), x(2)
 
-    call make(sim, [row(1, 2.0_dp, 0, 0.5_dp, 3.0_dp, 1.0_dp, 2.0_dp, 4.0_dp), &
-      & row(2, 2.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0.5, -9.81, body_force = 7, 3, overlap_projection = F /"//newline// &
+    call add_grain(1, 2.0_dp, 0, 0.5_dp, 3.0_dp, 1.0_dp, 2.0_dp, 4.0_dp)
+    call add_grain(2, 2.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0.5, -9.81, body_force = 7, 3, overlap_projection = F /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
     a = [0.5_dp + 7.0_dp*volume/m, -9.81_dp + 3.0_dp*volume/m]
     v = [1.0_dp, 2.0_dp]
     w = v + h*a
     x = [0.5_dp, 3.0_dp] + 0.5_dp*h*(v + w)
-    call check_energy(sim%diagnostics%energy, [0.5_dp*m*(sum(w**2) + sum((h*a)**2)), 0.5_dp*(0.5_dp*m*0.01_dp)*16.0_dp, &
-      & m*dot_product(h*a, 0.5_dp*(v + w)) + m*dot_product(h*a, 0.5_dp*h*a), 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
+    call check_energy(sim%diagnostics%energy, 0.5_dp*m*(sum(w**2) + sum((h*a)**2)), 0.5_dp*(0.5_dp*m*0.01_dp)*16.0_dp, &
+      & m*dot_product(h*a, 0.5_dp*(v + w)) + m*dot_product(h*a, 0.5_dp*h*a), 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     call check_close(sim%balance%load_work, m*dot_product(h*a, 0.5_dp*(v + w)) + m*dot_product(h*a, 0.5_dp*h*a), solved, &
       & "balance of grains: work of both loads")
     call check_close(sim%balance%speeds, norm2(w) + norm2(h*a), solved, "sum of speeds")
@@ -341,29 +344,30 @@ contains
     real(dp), parameter :: overlap = 0.02_dp, spin = 2.0_dp
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
-    character(len=row_length) :: rows(2)
     real(dp) :: turn, x(2), u(2)
 
     ! at q_m the glued grain has turned by half a step
     turn = 0.5_dp*h*spin
-    x = [cos(turn), sin(turn)]
-    rows(glued) = row(glued, 1.0_dp, 1, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
-    rows(3 - glued) = row(3 - glued, 1.0_dp, 0, x(1), x(2) + 0.2_dp - overlap, 0.0_dp, 0.0_dp, 0.0_dp)
-    call make(sim, rows, "gravity = 0, 0, overlap_projection = F, friction = 0.5 /"//newline// &
+    x(1) = cos(turn)
+    x(2) = sin(turn)
+    call add_grain(glued, 1.0_dp, 1, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3 - glued, 1.0_dp, 0, x(1), x(2) + 0.2_dp - overlap, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F, friction = 0.5 /"//newline// &
       & "&boundary shape = 'grains', group = 1, rotation = 2.0, pivot = 0, 0, friction = 0.5 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
     call check_equal(figures%contacts, 1_i8, "one contact with a glued grain")
     ! (-w y, w x) at the surface of the glued grain, x + (0, 0.1)
-    u = [-spin*(x(2) + 0.1_dp), spin*x(1)]
+    u(1) = -spin*(x(2) + 0.1_dp)
+    u(2) = spin*x(1)
     call check_close(grain(sim, 3 - glued, 2), u(2), solved, "the free grain is carried up")
     ! a force at the rim moves the disk by a third of the slip, and turns it by the rest
     call check_close(grain(sim, 3 - glued, 1), u(1)/3.0_dp, solved, "and along by friction, which holds")
     call check_close(grain(sim, 3 - glued, 3), u(1)*2.0_dp/3.0_dp/0.1_dp, solved, "which turns it, too")
     ! the boundary works p u; half of it is lost in the shock
-    call check_energy(sim%diagnostics%energy, [0.5_dp*(u(2)**2 + u(1)**2/9.0_dp), u(1)**2/9.0_dp, 0.0_dp, &
-      & u(2)**2 + u(1)**2/3.0_dp, 0.0_dp, 0.5_dp*u(2)**2, u(1)**2/6.0_dp])
-    call check_balance(sim%balance, [0.5_dp*u(2)**2 + u(1)**2/6.0_dp, 0.0_dp, 0.5_dp*u(2)**2 + u(1)**2/6.0_dp])
+    call check_energy(sim%diagnostics%energy, 0.5_dp*(u(2)**2 + u(1)**2/9.0_dp), u(1)**2/9.0_dp, 0.0_dp, &
+      & u(2)**2 + u(1)**2/3.0_dp, 0.0_dp, 0.5_dp*u(2)**2, u(1)**2/6.0_dp)
+    call check_balance(sim%balance, 0.5_dp*u(2)**2 + u(1)**2/6.0_dp, 0.0_dp, 0.5_dp*u(2)**2 + u(1)**2/6.0_dp)
     call check_close(sim%boundary_impulses(1, 1), -u(1)/3.0_dp, solved, "the boundary bears the impulse along")
     call check_close(sim%boundary_impulses(2, 1), -u(2), solved, "and the one across")
     call sim%free()
@@ -375,11 +379,11 @@ contains
     type(step_figures_t) :: figures
     real(dp) :: forces(2)
 
-    call make(sim, [row(1, 1.0_dp, 0, -0.3_dp - 1.5_dp*h, 0.0_dp, 3.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(3, 1.0_dp, 0, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(4, 1.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, overlap_projection = F, friction = 0 /"//newline// &
+    call add_grain(1, 1.0_dp, 0, -0.3_dp - 1.5_dp*h, 0.0_dp, 3.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3, 1.0_dp, 0, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(4, 1.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F, friction = 0 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
     ! all three end at 1 m/s: impulses 2 and 1
@@ -405,9 +409,10 @@ contains
     type(step_figures_t) :: figures
     real(dp) :: v
 
-    call make(sim, [row(1, 1.0_dp, 0, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 1.0_dp, 0, 2.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, overlap_projection = F /"//newline//"&boundary shape = 'plane', point = 0, 3, normal = 0, -1, "// &
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 2.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 3, normal = 0, -1, "// &
       & "free = F, T, mass = 4.0, force = 0, -8.0 /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact//" /"// &
       & newline//all_figures)
     call advance(sim, figures)
@@ -426,12 +431,12 @@ contains
     type(step_figures_t) :: figures
     integer(i8) :: n_free, n_glued
 
-    call make(sim, [row(1, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 2.0_dp, 0, 1.0_dp, 0.003_dp, 0.0_dp, -1.0_dp, 3.0_dp), &
-      & row(3, 1.0_dp, 0, 2.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(4, 1.0_dp, 1, 3.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(5, 1.0_dp, 1, 3.2_dp, -0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, overlap_projection = F /"//newline// &
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 1.0_dp, 0.003_dp, 0.0_dp, -1.0_dp, 3.0_dp)
+    call add_grain(3, 1.0_dp, 0, 2.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(4, 1.0_dp, 1, 3.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(5, 1.0_dp, 1, 3.2_dp, -0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline// &
       & "&boundary shape = 'outlet', point = 0, 0, normal = 0, 1 /"//newline//"&boundary shape = 'grains', group = 1 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call check(.not. some_leave(sim%decomposition), "nobody is behind the outlet, and glued grains stay there")
@@ -440,7 +445,9 @@ contains
     call advance(sim, figures)
     call check_equal(figures%left, 1_i8, "the falling grain leaves")
     call check(grain(sim, 2, 2) <= -huge(1.0_dp), "it is the one that is behind the outlet")
-    call check(grain(sim, 1, 2) > -1.0_dp .and. grain(sim, 3, 2) > -1.0_dp .and. grain(sim, 5, 2) > -1.0_dp, "the others stay")
+    call check(grain(sim, 1, 2) > -1.0_dp, "a free grain stays")
+    call check(grain(sim, 3, 2) > -1.0_dp, "and another one")
+    call check(grain(sim, 5, 2) > -1.0_dp, "and a glued one behind the outlet")
     ! m v^2/2 and I w^2/2, I = m R^2/2
     call check_close(sim%diagnostics%energy%carried_away, 1.0_dp + 0.5_dp*0.01_dp*9.0_dp, solved, "it takes its energy along")
     call check_close(sim%balance%carried_away, 1.0_dp + 0.5_dp*0.01_dp*9.0_dp, solved, "balance of grains: likewise")
@@ -458,9 +465,9 @@ contains
     type(simulation_t), intent(inout) :: sim
     character(len=*), intent(in) :: boundary, after
 
-    call make(sim, [row(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
       & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.5"//boundary//" /"//newline// &
       & "&time step = 0.01, steps = 99 /"//newline//exact//", sleeping = T, sleep_after = "//after//", sleep_speed = 1e-3 /"// &
       & newline)
@@ -546,9 +553,10 @@ contains
     type(step_figures_t) :: figures
     integer :: k
 
-    call make(sim, [row(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp), row(3, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
       & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0, velocity = "//speed//", 0 /"//newline// &
       & "&time step = 0.01, steps = 99 /"//newline//exact//", sleeping = T, sleep_after = 6, sleep_speed = 1e-3 /"//newline)
     do k = 1, 5
@@ -564,13 +572,12 @@ contains
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
     type(found_t) :: found
-    character(len=row_length) :: rows(40)
     integer :: k, s, c, awake, n_asleep
 
-    do k = 1, size(rows)
-      rows(k) = row(k, 1.0_dp, 0, 0.3_dp*k, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    do k = 1, 40
+      call add_grain(k, 1.0_dp, 0, 0.3_dp*k, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     end do
-    call make(sim, rows, "gravity = 0, -9.81, overlap_projection = F /"//newline// &
+    call make(sim, "gravity = 0, -9.81, overlap_projection = F /"//newline// &
       & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1 /"//newline//"&time step = 0.01, steps = 99 /"//newline// &
       & exact//", sleeping = T, sleep_after = 3 /"//newline)
     call advance(sim, figures)
@@ -642,9 +649,10 @@ contains
     real(dp) :: shifts, x(2)
     real(dp), parameter :: allowed = 1.0e-3_dp, overlap = 5.0e-3_dp
 
-    call make(sim, [row(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 3.0_dp, 0, 0.095_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call add_grain(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 3.0_dp, 0, 0.095_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
     call sim%assemble(figures)
     call sim%problem%evaluate()
     call project_overlaps(sim%decomposition, sim%problem, h, allowed, shifts)
@@ -654,9 +662,10 @@ contains
     call check_close(abs(grain(sim, 1, 1)) + abs(grain(sim, 2, 1)), 0.0_dp, 0.0_dp, "nothing gets a velocity")
     call sim%free()
     ! 0.08 too much: the light grain would move by 0.0585, and moves by 0.01
-    call make(sim, [row(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 3.0_dp, 0, 0.02_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, friction = 0.3, overlap_allowed = 2e-3 /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call add_grain(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 3.0_dp, 0, 0.02_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 2e-3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
     call advance(sim, figures)
     x(1) = grain(sim, 1, 1, .true.)
     x(2) = grain(sim, 2, 1, .true.)
@@ -674,10 +683,12 @@ contains
     real(dp), parameter :: allowed = 1.0e-3_dp, overlap = 5.0e-3_dp
     real(dp) :: top
 
-    call make(sim, [row(1, 2.0_dp, 0, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp), &
-      & row(2, 2.0_dp, 0, 4.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)], &
-      & "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline//"&boundary shape = 'plane', point = 0, 0.095, "// &
-      & "normal = 0, -1, free = F, T, mass = 50.0, force = 0, 0 /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call add_grain(1, 2.0_dp, 0, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 4.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0.095, "// &
+      & "normal = 0, -1, free = F, T, mass = 50.0, force = 0, 0 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
     call advance(sim, figures)
     top = sim%decomposition%boundaries(1)%point(2)
     call check_equal(figures%sharing%bodies, 1_i8, "two subdomains share the lid")

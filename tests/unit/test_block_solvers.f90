@@ -5,7 +5,7 @@ program test_block_solvers
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_random_hash, only: hash_uniform
-  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows
+  use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns
   use gravier_communicator, only: communicator_t
   use gravier_fclib_file, only: fclib_local_t, fclib_global_t, write_fclib_local, read_fclib
   use gravier_condensation, only: multipliers_t, condense, eliminate_constraints
@@ -53,6 +53,73 @@ contains
       end do
     end do
   end function dense_matrix
+
+  !> y = y + A x.
+  pure subroutine add_product(a, x, y)
+    real(dp), intent(in), contiguous :: a(:, :), x(:)
+    real(dp), intent(inout), contiguous :: y(:)
+    integer :: i, j
+
+    do j = 1, size(a, 2)
+      do i = 1, size(a, 1)
+        y(i) = y(i) + a(i, j)*x(j)
+      end do
+    end do
+  end subroutine add_product
+
+  !> y = y + A^T x.
+  pure subroutine add_transposed(a, x, y)
+    real(dp), intent(in), contiguous :: a(:, :), x(:)
+    real(dp), intent(inout), contiguous :: y(:)
+    integer :: i, j
+
+    do j = 1, size(a, 2)
+      do i = 1, size(a, 1)
+        y(j) = y(j) + a(i, j)*x(i)
+      end do
+    end do
+  end subroutine add_transposed
+
+  !> y = y + A x.
+  pure subroutine add_sparse(a, x, y)
+    type(sparse_rows_t), intent(in) :: a
+    real(dp), intent(in), contiguous :: x(:)
+    real(dp), intent(inout), contiguous :: y(:)
+    integer :: i, k
+
+    do i = 1, a%n_rows
+      do k = a%start(i), a%start(i + 1) - 1
+        y(i) = y(i) + a%value(k)*x(a%column(k))
+      end do
+    end do
+  end subroutine add_sparse
+
+  !> Columns one after the other, times a factor.
+  pure subroutine flatten(columns, factor, flat)
+    real(dp), intent(in), contiguous :: columns(:, :)
+    real(dp), intent(in) :: factor
+    real(dp), intent(out), contiguous :: flat(:)
+    integer :: j, n
+
+    n = size(columns, 1)
+    do j = 1, size(columns, 2)
+      flat((j - 1)*n + 1:j*n) = factor*columns(:, j)
+    end do
+  end subroutine flatten
+
+  !> Put a block that is given by columns into row i and column j of blocks of order d.
+  pure subroutine put_block(block, d, i, j, dense)
+    real(dp), intent(in), contiguous :: block(:)
+    integer, intent(in) :: d, i, j
+    real(dp), intent(inout), contiguous :: dense(:, :)
+    integer :: k, l
+
+    do l = 1, d
+      do k = 1, d
+        dense((i - 1)*d + k, (j - 1)*d + l) = block(k + (l - 1)*d)
+      end do
+    end do
+  end subroutine put_block
 
   function sparse(a) result(matrix)
     real(dp), intent(in) :: a(:, :)
@@ -115,20 +182,26 @@ contains
     type(error_t), allocatable :: error
     type(sweep_control_t) :: control
     type(growth_t) :: growth
-    real(dp) :: w(2*n, 2*n), r(2, n), expected(2, n), mu(n), figure
+    real(dp), allocatable :: w(:, :)
+    real(dp) :: r(2, n), expected(2, n), q(2*n), flat(2*n), mu(n), figure
     integer :: k, sweeps(2)
 
-    w(:, :) = 0.0_dp
+    allocate (w(2*n, 2*n), source=0.0_dp)
     expected(:, :) = 0.0_dp
     mu(:) = 0.0_dp
     do k = 1, n
       w(2*k - 1, 2*k - 1) = merge(1.0_dp, 2.0_dp, k == 1)
       w(2*k, 2*k) = 2.0_dp
-      if (k < n) w(2*k - 1, 2*k + 1) = -1.0_dp
-      if (k < n) w(2*k + 1, 2*k - 1) = -1.0_dp
       expected(1, k) = real(n + 1 - k, dp)
     end do
-    call problem%init(2, sparse(w), -matmul(w, reshape(expected, [2*n])), mu, error)
+    do k = 2, n
+      w(2*k - 3, 2*k - 1) = -1.0_dp
+      w(2*k - 1, 2*k - 3) = -1.0_dp
+    end do
+    call flatten(expected, -1.0_dp, flat)
+    q(:) = 0.0_dp
+    call add_product(w, flat, q)
+    call problem%init(2, sparse(w), q, mu, error)
     call check(.not. allocated(error), "problem of a column")
     control%tolerance = 1.0e-10_dp
     do k = 1, 2
@@ -148,11 +221,16 @@ contains
     type(delassus_t), intent(inout) :: problem
     real(dp), allocatable, intent(out) :: w(:, :), r(:, :)
     type(error_t), allocatable :: error
-    real(dp) :: v(dimension, n), way(dimension - 1), mu(n)
+    real(dp) :: v(dimension, n), way(dimension - 1), mu(n), flat(dimension*n), q(dimension*n)
     integer :: a, k
 
     w = dense_matrix(dimension, dimension*n, dimension*n)
-    w(:, :) = 0.02_dp*(w + transpose(w))
+    do a = 1, size(w, 1)
+      do k = 1, a
+        w(k, a) = 0.02_dp*(w(k, a) + w(a, k))
+        w(a, k) = w(k, a)
+      end do
+    end do
     ! contacts that are far apart are not coupled
     do a = 1, n - 4
       w((a + 3)*dimension + 1:, (a - 1)*dimension + 1:a*dimension) = 0.0_dp
@@ -183,7 +261,10 @@ contains
         v(2:, a) = -0.4_dp*way
       end select
     end do
-    call problem%init(dimension, sparse(w), reshape(v, [dimension*n]) - matmul(w, reshape(r, [dimension*n])), mu, error)
+    call flatten(r, -1.0_dp, flat)
+    call flatten(v, 1.0_dp, q)
+    call add_product(w, flat, q)
+    call problem%init(dimension, sparse(w), q, mu, error)
     call check(.not. allocated(error), "problem with a chosen solution")
   end subroutine make_problem
 
@@ -230,6 +311,7 @@ contains
     type(block_system_t) :: system
     type(error_t), allocatable :: error
     real(dp), allocatable :: w(:, :), r(:, :), own(:, :), coupling(:, :), dense(:, :), x(:, :), b(:, :)
+    real(dp) :: flat(dimension*n), rest(dimension*n)
     integer :: a, c, k, d
     logical :: regular
 
@@ -242,10 +324,10 @@ contains
       do k = 1, d
         own(1 + (k - 1)*(d + 1), a) = own(1 + (k - 1)*(d + 1), a) + 4.0_dp
       end do
-      dense((a - 1)*d + 1:a*d, (a - 1)*d + 1:a*d) = reshape(own(:, a), [d, d])
+      call put_block(own(:, a), d, a, a, dense)
       do k = problem%first(a), problem%first(a + 1) - 1
         c = problem%other(k)
-        dense((a - 1)*d + 1:a*d, (c - 1)*d + 1:c*d) = reshape(coupling(:, k), [d, d])
+        call put_block(coupling(:, k), d, a, c, dense)
       end do
     end do
     b = dense_matrix(23, d, n)
@@ -254,7 +336,10 @@ contains
     call check(.not. allocated(error), "linear system")
     call system%solve(own, coupling, x, regular)
     call check(regular, "a regular system")
-    call check_close(maxval(abs(matmul(dense, reshape(x, [d*n])) - reshape(b, [d*n]))), 0.0_dp, 1.0e-12_dp, "its solution")
+    call flatten(x, 1.0_dp, flat)
+    call flatten(b, -1.0_dp, rest)
+    call add_product(dense, flat, rest)
+    call check_close(maxval(abs(rest)), 0.0_dp, 1.0e-12_dp, "its solution")
     own(:, 1) = 0.0_dp
     coupling(:, problem%first(1):problem%first(2) - 1) = 0.0_dp
     x = b
@@ -272,7 +357,7 @@ contains
     type(fclib_local_t) :: local
     type(multipliers_t) :: multipliers
     type(error_t), allocatable :: error
-    real(dp) :: h(n, m), mass(n, n), v(m), big_v(n), r(m)
+    real(dp) :: h(n, m), mass(n, n), v(m), big_v(n), minus(n), impulses(3, contacts), r(m)
     real(dp), allocatable :: g(:, :), l(:)
     integer :: k, p
 
@@ -299,40 +384,34 @@ contains
       global%w(k) = draw(36, k)
       r(k) = draw(37, k)
     end do
+    do k = 1, contacts
+      impulses(:, k) = r(3*k - 2:3*k)
+    end do
     global%mu(:) = [0.3_dp, 0.7_dp]
     call condense(global, local, multipliers, error)
     call check(.not. allocated(error), "elimination of bodies")
-    call multipliers%evaluate(reshape(r, [3, contacts]), l)
+    call multipliers%evaluate(impulses, l)
     call check_equal(size(l), p, "multipliers")
-    v = local%q + product_of(local%w, r)
-    big_v = matmul(h, r) + global%f
-    if (p > 0) big_v = big_v + matmul(g, l)
+    big_v = global%f
+    call add_product(h, r, big_v)
+    call add_product(g, l, big_v)
     do k = 1, n
       big_v(k) = big_v(k)/mass(k, k)
     end do
-    call check_close(maxval(abs(v - matmul(transpose(h), big_v) - global%w)), 0.0_dp, 1.0e-12_dp, "v = H^T V + w")
+    v(:) = local%q - global%w
+    call add_sparse(local%w, r, v)
+    minus(:) = -big_v
+    call add_transposed(h, minus, v)
+    call check_close(maxval(abs(v)), 0.0_dp, 1.0e-12_dp, "v = H^T V + w")
     call check_close(maxval(abs(local%mu - [0.3_dp, 0.7_dp])), 0.0_dp, 0.0_dp, "friction stays")
     if (p == 0) return
-    call check_close(maxval(abs(matmul(transpose(g), big_v) + global%b)), 0.0_dp, 1.0e-12_dp, "G^T V + b = 0")
+    call add_transposed(g, big_v, global%b)
+    call check_close(maxval(abs(global%b)), 0.0_dp, 1.0e-12_dp, "G^T V + b = 0")
     g(:, 2) = g(:, 1)
     global%g = sparse(g)
     call condense(global, local, multipliers, error)
     call check(allocated(error), "constraints that say the same twice are refused")
   end subroutine check_condensation
-
-  function product_of(a, x) result(y)
-    type(sparse_rows_t), intent(in) :: a
-    real(dp), intent(in) :: x(:)
-    real(dp) :: y(a%n_rows)
-    integer :: i, k
-
-    y(:) = 0.0_dp
-    do i = 1, a%n_rows
-      do k = a%start(i), a%start(i + 1) - 1
-        y(i) = y(i) + a%value(k)*x(a%column(k))
-      end do
-    end do
-  end function product_of
 
   !> For any impulses, with the multipliers l that are found, V^T r + R l + s = 0, and v = W r + V l + q is what the eliminated
   !> problem says.
@@ -341,7 +420,7 @@ contains
     type(fclib_local_t) :: local
     type(multipliers_t) :: multipliers
     type(error_t), allocatable :: error
-    real(dp) :: w(m, m), v(m, p), r_matrix(p, p), q(m), r(m), velocity(m)
+    real(dp) :: w(m, m), v(m, p), r_matrix(p, p), q(m), r(m), velocity(m), impulses(2, 2), rest(p)
     real(dp), allocatable :: l(:)
     integer :: k
 
@@ -361,11 +440,20 @@ contains
     local%mu = [0.1_dp, 0.2_dp]
     call eliminate_constraints(local, multipliers, error)
     call check(.not. allocated(error), "elimination of constraints")
-    call multipliers%evaluate(reshape(r, [2, 2]), l)
-    call check_close(maxval(abs(matmul(transpose(v), r) + matmul(r_matrix, l) + [0.4_dp, -0.9_dp])), 0.0_dp, 1.0e-12_dp, &
-      & "V^T r + R l + s = 0")
-    velocity = matmul(w, r) + matmul(v, l) + q
-    call check_close(maxval(abs(local%q + product_of(local%w, r) - velocity)), 0.0_dp, 1.0e-12_dp, "v = W r + V l + q")
+    impulses(:, 1) = r(1:2)
+    impulses(:, 2) = r(3:4)
+    call multipliers%evaluate(impulses, l)
+    rest(:) = [0.4_dp, -0.9_dp]
+    call add_transposed(v, r, rest)
+    call add_product(r_matrix, l, rest)
+    call check_close(maxval(abs(rest)), 0.0_dp, 1.0e-12_dp, "V^T r + R l + s = 0")
+    ! W r + V l + q less what the eliminated problem says
+    velocity(:) = local%q
+    call add_sparse(local%w, r, velocity)
+    velocity(:) = q - velocity
+    call add_product(w, r, velocity)
+    call add_product(v, l, velocity)
+    call check_close(maxval(abs(velocity)), 0.0_dp, 1.0e-12_dp, "v = W r + V l + q")
   end subroutine check_elimination
 
   !> A problem that is written is read again as it was.
@@ -375,15 +463,15 @@ contains
     type(fclib_local_t), allocatable :: again
     type(fclib_global_t), allocatable :: global
     type(error_t), allocatable :: error
-    real(dp) :: w(4, 4), x(4)
+    real(dp) :: w(4, 4), x(4), y(4)
     integer :: k
 
     call comm%init()
     w = dense_matrix(51, 4, 4)
     local%dimension = 2
     local%w = sparse(w)
-    local%coupling = sparse(dense_matrix(52, 4, 0))
-    local%constraint = sparse(dense_matrix(53, 0, 0))
+    local%coupling = no_columns(4)
+    local%constraint = no_columns(0)
     local%q = [1.0_dp, -2.0_dp, 3.0_dp, -4.0_dp]
     allocate (local%s(0))
     local%mu = [0.25_dp, 0.5_dp]
@@ -400,7 +488,9 @@ contains
     do k = 1, 4
       x(:) = 0.0_dp
       x(k) = 1.0_dp
-      call check_close(maxval(abs(product_of(again%w, x) - w(:, k))), 0.0_dp, 0.0_dp, "a column of W")
+      y(:) = -w(:, k)
+      call add_sparse(again%w, x, y)
+      call check_close(maxval(abs(y)), 0.0_dp, 0.0_dp, "a column of W")
     end do
     call check(allocated(again%r), "it has a solution")
     if (allocated(again%r)) call check_close(maxval(abs(again%r - local%r)), 0.0_dp, 0.0_dp, "its impulses")

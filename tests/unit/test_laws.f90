@@ -11,6 +11,7 @@ program test_laws
   use gravier_bonded_law, only: bonded_law_t
   use gravier_law_registry, only: law_holder_t, registered_key_t, registered_laws, registered_keys, kind_length
   use gravier_law_set, only: law_set_t
+  use gravier_test_law_names, only: name_length, split_names, add_law
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -30,14 +31,17 @@ program test_laws
 contains
 
   !> Give the keys of a law values by their names; others get their defaults.
-  subroutine set_law(law, names, values)
+  subroutine set_law(law, text, values)
     class(contact_law_t), intent(inout) :: law
-    character(len=*), intent(in) :: names(:)
+    !> names with blanks between
+    character(len=*), intent(in) :: text
     real(dp), intent(in) :: values(:)
+    character(len=name_length), allocatable :: names(:)
     type(law_key_t), allocatable :: keys(:)
     real(dp), allocatable :: own(:)
     integer :: k, i
 
+    call split_names(text, names)
     call law%keys(keys)
     allocate (own(size(keys)))
     do k = 1, size(keys)
@@ -48,7 +52,7 @@ contains
       end do
     end do
     do i = 1, size(names)
-      call check(any(keys%name == names(i)), law%kind()//" has the key "//names(i))
+      call check(any(keys%name == names(i)), law%kind()//" has the key "//trim(names(i)))
     end do
     call law%set(own)
   end subroutine set_law
@@ -135,8 +139,8 @@ contains
     type(frictionless_law_t) :: frictionless
     type(contact_pair_t) :: pair
 
-    call set_law(coulomb, [character(len=24) :: "friction", "restitution", "tangential_restitution", "rolling_friction", &
-      & "pivoting_friction"], [0.4_dp, 0.5_dp, 0.6_dp, 0.7_dp, 0.8_dp])
+    call set_law(coulomb, "friction restitution tangential_restitution rolling_friction pivoting_friction", &
+      & [0.4_dp, 0.5_dp, 0.6_dp, 0.7_dp, 0.8_dp])
     pair = pair_at(0.0_dp)
     call coulomb%evaluate(pair)
     call check_terms(pair, 0.4_dp, 0.0_dp, 0.0_dp, "coulomb")
@@ -146,11 +150,11 @@ contains
     call check_close(coulomb%largest%rolling_friction, 0.7_dp, 0.0_dp, "coulomb: rolling friction")
     call check_close(coulomb%largest%pivoting_friction, 0.8_dp, 0.0_dp, "coulomb: pivoting friction")
     call check(.not. (coulomb%attracts .or. coulomb%remembers), "coulomb: no attraction, no memory")
-    call set_law(smooth, [character(len=24) :: "tangential_restitution"], [0.6_dp])
+    call set_law(smooth, "tangential_restitution", [0.6_dp])
     pair = pair_at(0.0_dp)
     call smooth%evaluate(pair)
     call check_close(pair%terms%tangential_restitution, 0.0_dp, 0.0_dp, "no tangential restitution without friction")
-    call set_law(frictionless, [character(len=24) :: "restitution"], [0.3_dp])
+    call set_law(frictionless, "restitution", [0.3_dp])
     pair = pair_at(0.0_dp)
     call frictionless%evaluate(pair)
     call check_terms(pair, 0.0_dp, 0.0_dp, 0.0_dp, "frictionless")
@@ -176,8 +180,8 @@ contains
     real(dp), parameter :: frictions(4) = [0.6_dp, 0.2_dp + 0.4_dp*exp(-0.2_dp), 0.2_dp + 0.4_dp*exp(-1.0_dp), 0.2_dp]
     integer :: k
 
-    call set_law(law, [character(len=24) :: "static_friction", "dynamic_friction", "slip_scale", "restitution", &
-      & "tangential_restitution"], [0.6_dp, 0.2_dp, 0.05_dp, 0.1_dp, 0.7_dp])
+    call set_law(law, "static_friction dynamic_friction slip_scale restitution tangential_restitution", &
+      & [0.6_dp, 0.2_dp, 0.05_dp, 0.1_dp, 0.7_dp])
     do k = 1, size(slips)
       pair = pair_at(0.0_dp)
       pair%slip = slips(k)
@@ -187,7 +191,7 @@ contains
       call check_close(pair%terms%tangential_restitution, 0.7_dp, 0.0_dp, "velocity: tangential restitution")
     end do
     call check_close(law%largest%friction, 0.6_dp, 0.0_dp, "velocity: the largest friction is the larger one")
-    call set_law(law, [character(len=24) :: "static_friction", "dynamic_friction", "slip_scale"], [0.1_dp, 0.3_dp, 1.0_dp])
+    call set_law(law, "static_friction dynamic_friction slip_scale", [0.1_dp, 0.3_dp, 1.0_dp])
     call check_close(law%largest%friction, 0.3_dp, 0.0_dp, "velocity: whichever that is")
   end subroutine check_velocity
 
@@ -198,7 +202,7 @@ contains
     real(dp), parameter :: gaps(5) = [-0.2_dp, 0.0_dp, 0.01_dp, 0.0100001_dp, 1.0_dp]
     integer :: k
 
-    call set_law(law, [character(len=24) :: "friction", "adhesion", "adhesion_range", "rolling_friction"], &
+    call set_law(law, "friction adhesion adhesion_range rolling_friction", &
       & [0.3_dp, 7.0_dp, 0.01_dp, 0.2_dp])
     do k = 1, size(gaps)
       pair = pair_at(gaps(k))
@@ -221,7 +225,7 @@ contains
     real(dp), parameter :: kappa = 20.0_dp, lambda = 0.002_dp, broken = 0.005_dp
     real(dp) :: force
 
-    call set_law(law, [character(len=24) :: "friction", "capillarity", "decay_length", "debonding_distance"], &
+    call set_law(law, "friction capillarity decay_length debonding_distance", &
       & [0.3_dp, kappa, lambda, broken])
     force = kappa*0.25_dp
     pair = pair_at(0.003_dp)
@@ -261,7 +265,7 @@ contains
     type(bonded_law_t) :: law
     type(contact_pair_t) :: pair
 
-    call set_law(law, [character(len=24) :: "friction", "bond_strength", "bond_friction", "bond_distance"], &
+    call set_law(law, "friction bond_strength bond_friction bond_distance", &
       & [0.3_dp, 9.0_dp, 0.8_dp, 0.01_dp])
     call check_close(law%largest%friction, 0.8_dp, 0.0_dp, "bonded: the larger friction")
     pair = pair_at(0.005_dp)
@@ -295,17 +299,15 @@ contains
 
   !> Pairs of materials in either order; what has no material, or no law, is under the scene's values.
   subroutine check_law_set()
-    character(len=24), parameter :: names(4) = [character(len=24) :: "adhesion_range", "friction", "restitution", "adhesion"]
+    character(len=*), parameter :: names = "adhesion_range friction restitution adhesion"
     type(law_set_t) :: laws
     type(contact_pair_t) :: pair
 
     call laws%init(3, 2)
     call check_equal(laws%number_of(1, 2), 0, "no law yet")
-    ! resistance has its defaults as the input would give them
-    call laws%add(1, 2, "adhesive", [names, "rolling_friction        ", "pivoting_friction       "], &
-      & [0.02_dp, 0.4_dp, 0.9_dp, 5.0_dp, 0.0_dp, 0.0_dp])
+    call add_law(laws, 1, 2, "adhesive", names, [0.02_dp, 0.4_dp, 0.9_dp, 5.0_dp])
     call check(laws%attracts .and. .not. laws%remembers, "the set attracts as its law")
-    call laws%add(3, 3, "frictionless", names, [0.5_dp, 0.6_dp, 0.25_dp, 1.0_dp])
+    call add_law(laws, 3, 3, "frictionless", names, [0.5_dp, 0.6_dp, 0.25_dp, 1.0_dp])
     call check_equal(laws%number_of(1, 2), 1, "the first law")
     call check_equal(laws%number_of(2, 1), 1, "the first law, the other way round")
     call check_equal(laws%number_of(3, 3), 2, "the second law")

@@ -12,12 +12,13 @@ program test_narrow_phase
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: found_t, find_contacts, scene_terms
   use gravier_test_scenes, only: plane
+  use gravier_test_law_names, only: add_law
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
   !> some roundings of places of the order of one
   real(dp), parameter :: rounding = 8*epsilon(1.0_dp)
-  character(len=24), parameter :: no_keys(3) = [character(len=24) :: "friction", "rolling_friction", "pivoting_friction"]
+  character(len=*), parameter :: coulomb_keys = "friction rolling_friction pivoting_friction restitution tangential_restitution"
 
   call check_gaps(2)
   call check_gaps(3)
@@ -38,17 +39,19 @@ contains
     real(dp), intent(in) :: places(:, :)
     type(neighbourhood_t), intent(out) :: view
     type(decomposition_t), intent(out) :: decomposition
-    real(dp) :: normal(nd)
+    real(dp) :: normal(nd), point(nd)
     integer :: k
 
     decomposition%nd = nd
     decomposition%nv = 3*nd - 3
     decomposition%rule%alert_distance = 0.01_dp
+    point(:) = 0.0_dp
     normal(:) = 0.0_dp
     normal(nd) = 1.0_dp
     allocate (decomposition%boundaries(2))
-    decomposition%boundaries(1) = plane(101, 0.0_dp*normal, normal)
-    decomposition%boundaries(2) = plane(102, -normal, normal)
+    decomposition%boundaries(1) = plane(101, point, normal)
+    point(nd) = -1.0_dp
+    decomposition%boundaries(2) = plane(102, point, normal)
     call view%bodies%init(nd, 3*nd - 3, 0, size(places, 2))
     do k = 1, size(places, 2)
       view%bodies%id(k) = k
@@ -129,10 +132,12 @@ contains
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
     type(found_t) :: found
+    integer :: codes(1)
 
+    codes(1) = shift_code([-1, 0, 0])
     call make(2, reshape([0.05_dp, 0.5_dp, 1.952_dp, 0.5_dp], [2, 2]), view, decomposition)
     decomposition%period%length(1) = 2.1_dp
-    call list(view, reshape([1, 2], [2, 1]), pair_memory_t(), [shift_code([-1, 0, 0])])
+    call list(view, reshape([1, 2], [2, 1]), pair_memory_t(), codes)
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 1, "a contact across a period")
     if (found%n < 1) return
@@ -185,9 +190,8 @@ contains
     call check_equal(boundary_of(view, 3), 0, "two free grains")
     call check_equal(boundary_of(view, 4), 1, "a boundary")
     call physics%laws%init(3, 3)
-    call physics%laws%add(1, 2, "coulomb", [no_keys, "restitution             ", "tangential_restitution  "], &
-      & [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
-    call physics%laws%add(1, 3, "frictionless", [character(len=24) :: "restitution"], [0.0_dp])
+    call add_law(physics%laws, 1, 2, "coulomb", coulomb_keys, [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
+    call add_law(physics%laws, 1, 3, "frictionless", "restitution", [0.0_dp])
     call check_equal(law_of(view, decomposition%boundaries, physics%laws, 1), 0, "both are of the first material, which has no law")
     call check_equal(law_of(view, decomposition%boundaries, physics%laws, 2), 2, "materials 1 and 3")
     decomposition%boundaries(2)%material = 2
@@ -212,8 +216,8 @@ contains
     memory%law_row = 1
     call list(view, reshape([1, 2], [2, 1]), memory)
     call physics%laws%init(1, 1)
-    call physics%laws%add(1, 1, "capillary", [character(len=24) :: no_keys, "capillarity", "decay_length", "debonding_distance"], &
-      & [0.3_dp, 0.0_dp, 0.0_dp, 50.0_dp, 0.02_dp, 0.05_dp])
+    call add_law(physics%laws, 1, 1, "capillary", "friction capillarity decay_length debonding_distance", &
+      & [0.3_dp, 50.0_dp, 0.02_dp, 0.05_dp])
     decomposition%rule%alert_distance = 0.001_dp
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 0, "a pair that has not touched is far")
@@ -244,8 +248,7 @@ contains
     real(dp) :: v(3), w(3), n(3), places(3, 2)
 
     call physics%laws%init(1, 1)
-    call physics%laws%add(1, 1, "coulomb", [character(len=24) :: no_keys, "restitution", "tangential_restitution"], &
-      & [0.3_dp, 0.11_dp, 0.12_dp, 0.0_dp, 0.0_dp])
+    call add_law(physics%laws, 1, 1, "coulomb", coulomb_keys, [0.3_dp, 0.11_dp, 0.12_dp, 0.0_dp, 0.0_dp])
     n = [0.6_dp, 0.0_dp, 0.8_dp]
     places(:, 1) = [0.0_dp, 0.0_dp, 1.0_dp]
     places(:, 2) = places(:, 1) - 0.2_dp*n
@@ -254,8 +257,8 @@ contains
     view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
     call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
     call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
-    v = [1.0_dp, 2.0_dp, 3.0_dp] + cross([4.0_dp, 5.0_dp, 6.0_dp], -0.1_dp*n)
-    w = [0.5_dp, -1.0_dp, 0.25_dp] + cross([-2.0_dp, 3.0_dp, 1.0_dp], 0.1_dp*n)
+    v = [1.0_dp, 2.0_dp, 3.0_dp] - 0.1_dp*cross([4.0_dp, 5.0_dp, 6.0_dp], n)
+    w = [0.5_dp, -1.0_dp, 0.25_dp] + 0.1_dp*cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
     v = v - w
     call check_close(pair%normal_velocity, dot_product(v, n), 10*rounding, "normal velocity: positive where they part")
     call check_close(pair%slip, norm2(v - dot_product(v, n)*n), 10*rounding, "slip")
@@ -277,7 +280,9 @@ contains
   pure function cross(a, b) result(c)
     real(dp), intent(in) :: a(3), b(3)
     real(dp) :: c(3)
-    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
+    c(1) = a(2)*b(3) - a(3)*b(2)
+    c(2) = a(3)*b(1) - a(1)*b(3)
+    c(3) = a(1)*b(2) - a(2)*b(1)
   end function cross
 
   !> A glued grain moves with the boundary that turns, and not with a spin of its own, whether it is candidate or antagonist.
@@ -286,11 +291,11 @@ contains
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
     type(contact_pair_t) :: pair
+    real(dp) :: n(2)
     integer :: order
 
     call physics%laws%init(1, 1)
-    call physics%laws%add(1, 1, "coulomb", [character(len=24) :: no_keys, "restitution", "tangential_restitution"], &
-      & [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
+    call add_law(physics%laws, 1, 1, "coulomb", coulomb_keys, [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
     ! the free grain at (1, 0.2) lies on the glued one at (1, 0); the boundary turns about the origin by 3 rad/s
     do order = 1, 2
       if (order == 1) then
@@ -305,8 +310,9 @@ contains
       decomposition%boundaries(2)%last_spin(3) = 3.0_dp
       decomposition%boundaries(2)%pivot(:) = 0.0_dp
       call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
-      call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, &
-        & [0.0_dp, merge(-1.0_dp, 1.0_dp, order == 1)], pair)
+      n(1) = 0.0_dp
+      n(2) = merge(-1.0_dp, 1.0_dp, order == 1)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
       ! at (1, 0.1) the boundary has the velocity (-0.3, 3)
       call check_close(pair%slip, 0.8_dp, 10*rounding, "slip against a glued grain, in either order")
       call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")
