@@ -13,29 +13,9 @@ import unittest
 import h5py
 import numpy as np
 
+from busy_scene import DRUM, write_drum
 from gravier_runs import RunTestCase, contents, differences, each, gravier, merged, namelist, read_csv, run_case, steps_of, write
 from killed_runs import Going, compile_shim
-
-# what moves grains in every way: periods, a belt, a lid moved by a force, an outlet, a boundary that goes, tables, glued
-# grains that turn, METIS by schedule and by imbalance
-DRUM = {
-    "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "friction": 0.3, "period": [0.504, 0.0, 0.0],
-              # the paddle stands in the grains
-              "gravity_table": "gravity.csv", "skin": 0.008, "start_overlap": 1.0},
-    "boundary": [
-        {"shape": "plane", "name": "belt", "point": [0.0, -0.01], "normal": [0.0, 1.0], "velocity": [0.3, 0.0]},
-        {"shape": "plane", "name": "lid", "point": [0.0, 0.31], "normal": [0.0, -1.0], "free": [False, True], "mass": 2.0,
-         "force": [0.0, -50.0]},
-        {"shape": "segment", "name": "paddle", "point": [0.46, 0.18], "end": [0.54, 0.2], "table": "drive.csv"},
-        {"shape": "segment", "name": "blade", "point": [0.1, 0.05], "end": [0.15, 0.12], "remove_at": 0.065},
-        {"shape": "grains", "name": "stirrer", "group": 1, "rotation": [3.0], "pivot": [0.3, 0.1]},
-        {"shape": "outlet", "name": "hole", "point": [0.0, 0.27], "normal": [0.0, -1.0]},
-    ],
-    "time": {"step": 2e-3, "steps": 60},
-    "solver": {"criterion": "residual", "tolerance": 2e-2, "method": "nscdd", "max_iterations": 1000},
-    "decomposition": {"partition": "metis", "subdomains": 6, "repartition_every": 13, "repartition_imbalance": 1.3},
-    "output": {"every": 6, "trace": True, "checkpoint_every": 1},
-}
 
 BOX = {
     "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [10, 8], "radius_min": 0.008, "radius_max": 0.012,
@@ -48,20 +28,6 @@ BOX = {
 
 BOX_3D = merged(BOX, {"scene": {"dimension": 3, "lattice_count": [5, 4, 4], "wall_friction": 0.5},
                       "time": {"steps": 24}, "decomposition": {"subdomains": 4}})
-
-def write_drum(directory):
-    """The files that DRUM reads: 200 grains, of which five are glued."""
-    os.makedirs(directory, exist_ok=True)
-    draw = random.Random(1)
-    rows = []
-    for k in range(200):
-        i, j = k % 20, k // 20
-        glued = 1 if j == 3 and 8 <= i < 13 else 0
-        rows.append(f"{k + 1},{0.012 + 0.0252 * i:.6f},{0.012 + 0.0252 * j:.6f},{draw.uniform(0.011, 0.0125):.6f},{glued},"
-                    f"{draw.uniform(-0.5, 0.5):.6f},{1.5 * (j - 4.5) / 4.5:.6f},0")
-    write(os.path.join(directory, "grains.csv"), "id,x,y,radius,group,vx,vy,omega\n" + "\n".join(rows) + "\n")
-    write(os.path.join(directory, "drive.csv"), "time,vx,omega\n0,0,0\n0.05,0.2,1\n0.12,-0.2,2\n")
-    write(os.path.join(directory, "gravity.csv"), "time,gx,gy\n0,0,-9.81\n0.06,2,-9\n0.12,-2,-9.81\n")
 
 
 def content(path):
@@ -166,6 +132,58 @@ class Restart(RunTestCase):
         for number, (name, case) in enumerate(cases.items()):
             case = merged(case, {"output": {"every": 4, "trace": True}})
             self.one_restart(case, 10 + number, 1 + number % 2, 2 - number % 2, self.straight(name, case))
+
+    def test_another_layout_of_memory(self):
+        """What pairs keep is laid out by warm starts, laws with a memory and sleeping; a run that goes on with another layout finds
+        bonds and impulses in it. Nothing sleeps within so few steps, so that sleeping changes no bit of the motion; without warm
+        starts solves end elsewhere within their tolerance."""
+        rows = [f"{5 * j + i + 1},{0.1 * i:.3f},{0.1 * j + 0.1:.3f},0.05,{0.3 * (-1) ** i * j:.2f},{-0.1 * i:.2f},{i - 2}"
+                for j in range(4) for i in range(5)]
+        base = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "wall_material": "rock"},
+            "material": [{"name": "rock"}],
+            "law": [{"materials": "rock", "kind": "bonded", "friction": 0.3, "bond_strength": 300.0, "bond_friction": 0.8,
+                     "bond_distance": 1e-3, "rolling_friction": 0.1}],
+            "boundary": [{"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}],
+            "time": {"step": 1e-3, "steps": 60},
+            "solver": {"method": "nscdd", "criterion": "residual", "tolerance": 1e-10, "max_iterations": 5000},
+            "decomposition": {"subdomains": 2},
+            "output": {"every": 20, "checkpoint_every": 60},
+        }
+        layouts = {"plain": {}, "sleeping": {"solver": {"sleeping": True, "sleep_after": 1000}},
+                   "cold": {"solver": {"warm_start": False}}}
+
+        def prepare(directory):
+            os.makedirs(directory, exist_ok=True)
+            write(os.path.join(directory, "grains.csv"), "id,x,y,radius,vx,vy,omega\n" + "\n".join(rows) + "\n")
+
+        def motion(directory):
+            found = contents(os.path.join(directory, "results", "results.h5"))
+            return {name: found[f"/steps/60/bodies/{name}"] for name in ("id", "position", "velocity")}
+
+        straight = self.straight("bonds", base, prepare)
+        last = motion(straight)
+        # bonds hold some of the grains together, and others have broken
+        self.assertGreater(np.ptp(last["velocity"][:, 0]), 0.01)
+        for before, after in (("plain", "sleeping"), ("sleeping", "plain"), ("cold", "plain"), ("plain", "cold"), ("cold", "sleeping")):
+            with self.subTest(before=before, after=after):
+                directory = self.here(f"bonds {before} {after}")
+                prepare(directory)
+                stopped = merged(base, layouts[before], {"time": {"steps": 25}, "output": {"checkpoint_every": 25}})
+                self.assert_status(run_case(stopped, 2, directory), 0)
+                write(os.path.join(directory, "case.nml"), namelist(merged(base, layouts[after])))
+                # history has columns of its own where contacts sleep, and is refused as it is
+                if "sleeping" in (before, after):
+                    self.assert_refused(restart(directory, 1), r"history\.csv: line 1: step,time,.* was expected")
+                    os.remove(os.path.join(directory, "results", "history.csv"))
+                run = restart(directory, 1)
+                self.assert_status(run, 0)
+                self.assertIn("from the checkpoint of step 25\n", run.stdout)
+                found = motion(directory)
+                if "cold" in (before, after):
+                    self.assertLess(np.abs(found["position"] - last["position"]).max(), 1e-6)
+                else:
+                    self.assertEqual(differences(last, found), [])
 
     def test_signals(self):
         """SIGTERM, to one rank or to all, stops with status 4; SIGUSR1, to the launcher, writes a checkpoint and goes on."""

@@ -189,8 +189,8 @@ def steps_of(results):
                   and "@" not in name)
 
 
-def read_csv(path):
-    """A table as {column: array}; every line must be whole."""
+def read_cells(path):
+    """A table as {column: array of texts}; every line must be whole."""
     with open(path, encoding="ascii") as file:
         text = file.read()
     if not text.endswith("\n"):
@@ -200,7 +200,12 @@ def read_csv(path):
     cells = [row.split(",") for row in rows]
     if any(len(row) != len(names) for row in cells):
         raise AssertionError(f"{path}: a row has not as many cells as the header")
-    return {name: np.array([float(row[k]) for row in cells]) for k, name in enumerate(names)}
+    return {name: np.array([row[k] for row in cells], dtype=str) for k, name in enumerate(names)}
+
+
+def read_csv(path):
+    """A table as {column: array of numbers}; every line must be whole."""
+    return {name: cells.astype(float) for name, cells in read_cells(path).items()}
 
 
 def differences(first, second):

@@ -8,6 +8,7 @@ program test_velocity_scale
   use gravier_random_hash, only: hash_uniform
   use gravier_motion, only: grain_mass
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_velocity_scale, only: velocity_scale_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -153,9 +154,17 @@ contains
     real(dp), intent(in) :: value
     character(len=*), intent(in) :: kind, name
 
-    call check_close(sim%velocity_scale%value, value, rounding*value, name)
-    call check_equal(trim(sim%velocity_scale%kind), kind, name//": which rules")
+    call check_value(sim%velocity_scale, value, kind, name)
   end subroutine check_scale
+
+  subroutine check_value(scale, value, kind, name)
+    type(velocity_scale_t), intent(in) :: scale
+    real(dp), intent(in) :: value
+    character(len=*), intent(in) :: kind, name
+
+    call check_close(scale%value, value, rounding*value, name)
+    call check_equal(trim(scale%kind), kind, name//": which rules")
+  end subroutine check_value
 
   subroutine test_loads(nd)
     integer, intent(in) :: nd

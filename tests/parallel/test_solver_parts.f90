@@ -1,0 +1,564 @@
+!> Parts of a solve on columns of disks and on single disks, whose answers are known: supports and ways to them, levels that sink,
+!> a start layer by layer, impulses in vain, checks, the law as an equation, impulses that are fed back, the safeguard.
+program test_solver_parts
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_random_hash, only: hash_uniform
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_memory_need, only: check_memory
+  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_scheme, only: work_t
+  use gravier_nlgs, only: nlgs_t
+  use gravier_descent, only: descent_t
+  use gravier_supports, only: supports_t, find_supports
+  use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
+  use gravier_levels, only: levels_t
+  use gravier_layered_start, only: carry_loads
+  use gravier_layer_trial, only: layer_trial_t
+  use gravier_velocity_error, only: copies_ready
+  use gravier_check_schedule, only: check_schedule_t
+  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, normals_are_in_vain
+  use gravier_proximal_law, only: proximal_law_t
+  use gravier_newton, only: newton_t
+  use gravier_enriched_matrix, only: enriched_matrix_t
+  use gravier_interface_problem, only: interface_field_t, make_field
+  use gravier_impulse_feedback, only: impulse_feedback_t
+  use gravier_direction_guard, only: direction_guard_t
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  character(len=*), parameter :: newline = new_line("a")
+  !> some roundings of numbers of the order of ten
+  real(dp), parameter :: rounding = 1.0e-13_dp
+  type(communicator_t), target :: comm
+  integer :: k
+
+  call start_parallel()
+  call comm%init()
+  do k = 1, 3
+    call check_ways(k)
+    call check_levels(k)
+  end do
+  call check_layers()
+  call check_layer_trial()
+  call test_schedule(.false.)
+  call test_schedule(.true.)
+  call check_vain_impulses()
+  call check_law(2)
+  call check_law(3)
+  call check_newton()
+  call check_feedback(0.0_dp, 0.8125_dp)
+  call check_feedback(2.0_dp, 1.0_dp)
+  call check_guard()
+  call test_memory_need()
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> A column of disks of radius 1 and mass 1 under gravity 1, in a step of 1: the contact below disk k of n bears n + 1 - k.
+  subroutine make_column(n, subdomains, more, sim, dimension)
+    integer, intent(in) :: n, subdomains
+    !> other groups
+    character(len=*), intent(in) :: more
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in), optional :: dimension
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    integer :: nd
+
+    nd = 2
+    if (present(dimension)) nd = dimension
+    call parse_config("column", "&scene dimension = "//to_text(nd)//", bodies = 'column', column_count = "//to_text(n)// &
+      & ", gravity = 0, "//trim(merge("-1   ", "0, -1", nd == 2))//", friction = 0.3 /"//newline// &
+      & "&time step = 1.0, steps = 1 /"//newline//"&decomposition subdomains = "//to_text(subdomains)//" /"//newline//more, &
+      & config, error)
+    if (.not. allocated(error)) call sim%init(comm, config, error)
+    call check(.not. allocated(error), "the column is made")
+    if (allocated(error)) then
+      if (comm%rank == 0) print "(a)", error%message
+      call finish_checks()
+    end if
+    call sim%assemble(figures)
+    call sim%problem%evaluate()
+  end subroutine make_column
+
+  !> The floor supports, a wall beside the column and a plane that loads hardly press against do not; ways count contacts and
+  !> diameters from the floor.
+  subroutine check_ways(subdomains)
+    integer, intent(in) :: subdomains
+    integer, parameter :: n = 5
+    type(simulation_t) :: sim
+    type(supports_t), allocatable :: supports(:)
+    type(ways_t), allocatable :: ways(:)
+    integer :: s, b, round
+
+    ! the slope touches the lowest disk, and its normal is at 0.28 to the way up
+    call make_column(n, subdomains, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0 /"//newline// &
+      & "&boundary shape = 'plane', point = 0.96, 0.72, normal = -0.96, 0.28 /"//newline//"&solver method = 'nscdd' /", sim)
+    call find_supports(sim%problem, supports)
+    do s = 1, size(supports)
+      associate (sub => sim%problem%sub(s))
+        do b = sub%n_grains + 1, sub%n_columns
+          call check(supports(s)%column(b) .eqv. abs(sim%decomposition%boundaries(sub%boundary(b))%axis(2)) > 0.9_dp, &
+            & "the floor alone supports")
+        end do
+        call check(.not. any(supports(s)%column(1:sub%n_grains)), "grains do not")
+      end associate
+    end do
+    allocate (ways(size(supports)))
+    do round = 1, 2
+      if (round == 1) call list_closed(sim%problem, ways)
+      if (round == 2) call list_closed(sim%problem, ways, unit=2.0_dp)
+      do s = 1, size(ways)
+        where (supports(s)%column) ways(s)%length = 0.0_dp
+      end do
+      call shorten_ways(sim%problem, ways)
+      do s = 1, size(ways)
+        do b = 1, sim%problem%sub(s)%n_grains
+          call check_close(ways(s)%length(b), sim%problem%sub(s)%id(b) - merge(0.0_dp, 0.5_dp, round == 1), rounding, &
+            & "way from a disk to the floor")
+        end do
+      end do
+    end do
+    sim%problem%load(:) = 0.0_dp
+    call find_supports(sim%problem, supports)
+    do s = 1, size(supports)
+      call check(.not. any(supports(s)%column), "without a load nothing supports")
+    end do
+    ! contacts that are open and carry nothing are no way
+    do s = 1, size(ways)
+      associate (sub => sim%problem%sub(s))
+        sub%gap(:) = 0.5_dp
+        sub%hot(:, sim%problem%kernels%nd + 1, :) = 0.5_dp
+      end associate
+    end do
+    call list_closed(sim%problem, ways)
+    call check_equal(sum(ways%n_closed), 0, "open contacts are not closed")
+    do s = 1, size(ways)
+      call check(all(ways(s)%length >= unreached), "and lead nowhere")
+      sim%problem%sub(s)%impulse(1, 1, :) = 1.0_dp
+    end do
+    call list_closed(sim%problem, ways)
+    do s = 1, size(ways)
+      call check_equal(ways(s)%n_closed, size(sim%problem%sub(s)%hot, 3), "contacts that press are")
+    end do
+    call sim%free()
+  end subroutine check_ways
+
+  !> Number of the upper disk of contact `c` of a column.
+  pure integer function upper_of(sub, c) result(upper)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    integer :: k
+
+    upper = 0
+    do k = 1, 2
+      if (sub%pair(k, c) <= sub%n_grains) upper = max(upper, int(sub%id(sub%pair(k, c))))
+    end do
+  end function upper_of
+
+  !> With powers r . w = 0.65 0.1 l r in the contacts of level l, level l sinks by 0.1 l against the one below, and disk k by
+  !> 0.05 k (k + 1).
+  subroutine check_levels(subdomains)
+    integer, intent(in) :: subdomains
+    integer, parameter :: n = 4
+    type(simulation_t) :: sim
+    type(levels_t) :: levels
+    real(dp) :: r, sinks(n)
+    integer :: s, c, l
+
+    call make_column(n, subdomains, "&solver method = 'nscdd' /", sim)
+    call levels%start(sim%problem)
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        allocate (levels%part(s)%power(lanes, n_blocks(sub%n_contacts)), source=0.0_dp)
+        do c = 1, sub%n_contacts
+          ! the upper one of its disks
+          l = upper_of(sub, c)
+          r = real(n + 1 - l, dp)
+          sub%impulse(lane_of(c), 1, block_of(c)) = r
+          levels%part(s)%power(lane_of(c), block_of(c)) = 0.65_dp*0.1_dp*l*r
+        end do
+      end associate
+    end do
+    do l = 1, n
+      sinks(l) = 0.05_dp*l*(l + 1)
+    end do
+    call levels%add(sim%problem, real(n, dp), 1.0_dp)
+    call check_equal(levels%most_depth, n, "depth of the column")
+    call check_close(levels%fastest, sinks(n), rounding, "how fast the top sinks")
+    call check_close(levels%error, sqrt(sum(sinks**2)/n), rounding, "mean by mass")
+    call levels%follow(sim%problem, 1.0_dp)
+    call check_close(levels%fastest_body, sinks(n), rounding, "how fast the top disk sinks")
+    call check_close(levels%mean_of_bodies, sqrt(sum(sinks**2)/n), rounding, "mean over disks")
+    ! no contact violates its law by more than 0.05
+    call levels%follow(sim%problem, 0.05_dp)
+    call check_close(levels%fastest_body, n*0.05_dp/0.65_dp, rounding, "powers beyond the largest violation are cut")
+    call levels%forget()
+    call check_close(levels%error + levels%fastest, 0.0_dp, 0.0_dp, "nothing is known any more")
+    call sim%free()
+  end subroutine check_levels
+
+  !> A pass over layers brings a cold column near its impulses; it does nothing where the way is too short.
+  subroutine check_layers()
+    integer, parameter :: n = 40
+    type(simulation_t) :: sim
+    type(work_t) :: work
+    real(dp) :: sweeps, worst
+    integer :: s, c, l
+
+    call make_column(n, 3, "&solver method = 'nscdd' /", sim)
+    call carry_loads(sim%problem, 60.0_dp, work, sweeps)
+    call check_close(sweeps, 0.0_dp, 0.0_dp, "a way that is too short")
+    call check(.not. sim%problem%any_impulse(), "leaves impulses as they are")
+    call carry_loads(sim%problem, 10.0_dp, work, sweeps)
+    call check(sweeps > 0.0_dp, "a pass")
+    worst = 0.0_dp
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do c = 1, sub%n_contacts
+          l = upper_of(sub, c)
+          worst = max(worst, abs(sub%impulse(lane_of(c), 1, block_of(c)) - real(n + 1 - l, dp))/(n + 1 - l))
+        end do
+      end associate
+    end do
+    worst = comm%highest(worst)
+    ! each of seven layers ends at changes of 9e-4 a sweep, of which some tens are still to come
+    call check(worst < 0.15_dp, "brings loads down to the floor")
+    call sim%free()
+  end subroutine check_layers
+
+  !> A pass may be tried first where the residual at the start is large and there is a load.
+  subroutine check_layer_trial()
+    type(simulation_t) :: sim
+    type(layer_trial_t) :: trial
+
+    call make_column(3, 2, "&solver method = 'nscdd' /", sim)
+    call trial%start(sim%problem, 0.5_dp)
+    call check(trial%calls(copies_ready), "a check to try a pass")
+    call check(.not. trial%calls(copies_ready + 1), "and no other one")
+    call trial%start(sim%problem, 0.05_dp)
+    call check(.not. trial%calls(copies_ready), "none near the solution")
+    sim%problem%load(:) = 0.0_dp
+    call trial%start(sim%problem, 0.5_dp)
+    call check(.not. trial%calls(copies_ready), "none without a load")
+    call check(.not. trial%layered, "nothing was tried")
+    call sim%free()
+  end subroutine check_layer_trial
+
+  !> Sums of an iteration that has moved impulses by a part `change` of them.
+  subroutine set_progress(problem, change)
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp), intent(in) :: change
+    integer :: s
+
+    if (.not. allocated(problem%progress)) allocate (problem%progress(2, size(problem%sub)))
+    problem%progress(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      if (problem%sub(s)%subdomain == 1) then
+        problem%progress(1, s) = change**2
+        problem%progress(2, s) = 1.0_dp
+      end if
+    end do
+    problem%progress_is_summed = .false.
+  end subroutine set_progress
+
+  !> Checks come with check_every; where the schedule chooses, those are left out whose expected figure, the ratio at the last check
+  !> times the changes of the sweeps, is beyond 1.2 times the goal, nine in a row at most.
+  subroutine test_schedule(chooses)
+    logical, intent(in) :: chooses
+    type(simulation_t) :: sim
+    type(check_schedule_t) :: schedule
+    type(nlgs_t) :: scheme
+    integer :: iteration, made
+
+    call make_column(3, 2, "&solver method = 'nscdd' /", sim)
+    schedule%check_every = 10
+    schedule%chooses = chooses
+    scheme%momentum%on = .false.
+    call check_equal(schedule%first_check(scheme), 10, "the first check of plain sweeps")
+    call set_progress(sim%problem, 1.0e-2_dp)
+    call check(.not. calls(schedule, sim%problem, scheme, 9), "no check before it is due")
+    call check(calls(schedule, sim%problem, scheme, 10), "the first one is made")
+    call schedule%note_check(10, 0.05_dp)
+    ! the ratio is 5 from here on
+    call set_progress(sim%problem, 2.3e-4_dp)
+    call check(calls(schedule, sim%problem, scheme, 20), "1.15 times the goal is expected")
+    call set_progress(sim%problem, 2.5e-4_dp)
+    call check(calls(schedule, sim%problem, scheme, 30) .neqv. chooses, "1.25 times the goal is expected")
+    made = 0
+    do iteration = 40, 160, 10
+      if (calls(schedule, sim%problem, scheme, iteration)) made = made + 1
+      if (made == 1 .and. chooses) exit
+    end do
+    call check_equal(iteration, merge(120, 170, chooses), "nine checks in a row are left out, and no tenth")
+    call schedule%forget_ratio()
+    call check(calls(schedule, sim%problem, scheme, 200), "without a ratio a check is made")
+    scheme%momentum%on = .true.
+    call check_equal(schedule%first_check(scheme), merge(2, 10, chooses), "the first check of sweeps with momentum")
+    call sim%free()
+  end subroutine test_schedule
+
+  !> Whether a schedule calls for a check after an iteration, with the goal 1e-3.
+  logical function calls(schedule, problem, scheme, iteration)
+    type(check_schedule_t), intent(inout) :: schedule
+    type(contact_problem_t), intent(inout) :: problem
+    type(nlgs_t), intent(in) :: scheme
+    integer, intent(in) :: iteration
+    type(descent_t) :: descent
+    calls = schedule%calls(problem, scheme, iteration, 1.0e-3_dp, 1.0_dp, descent)
+  end function calls
+
+  !> A disk between two planes that close on it: equal impulses from both are in vain, and unequal ones, or those of planes that
+  !> open, are not.
+  subroutine check_vain_impulses()
+    type(simulation_t) :: sim
+    type(kept_impulses_t), allocatable :: none(:), now(:)
+    integer :: s, c, round
+    logical :: expected
+
+    do round = 1, 3
+      ! gravity is along the planes
+      call make_column(1, 1, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0, velocity = "// &
+        & trim(merge("-1", " 1", round == 2))//", 0 /"//newline//"&boundary shape = 'plane', point = 1, 0, normal = -1, 0, "// &
+        & "velocity = "//trim(merge(" 1", "-1", round == 2))//", 0 /"//newline//"&solver method = 'nscdd' /", sim)
+      expected = round == 1
+      if (allocated(none)) deallocate (none, now)
+      allocate (none(size(sim%problem%sub)), now(size(sim%problem%sub)))
+      do s = 1, size(sim%problem%sub)
+        associate (sub => sim%problem%sub(s))
+          none(s)%value = 0.0_dp*sub%impulse
+          do c = 1, sub%n_contacts
+            ! nothing from the floor
+            if (abs(sub%hot(lane_of(c), 2, block_of(c))) > 0.5_dp) cycle
+            sub%impulse(lane_of(c), 1, block_of(c)) = 1.0e3_dp
+            if (round == 3 .and. sub%hot(lane_of(c), 1, block_of(c)) > 0.0_dp) sub%impulse(lane_of(c), 1, block_of(c)) = 0.0_dp
+          end do
+          now(s)%value = sub%impulse
+        end associate
+      end do
+      call check(normals_are_in_vain(sim%problem) .eqv. expected, "impulses that walls press with: are they in vain?")
+      call check(are_in_vain(sim%problem, none) .eqv. expected, "impulses that have grown: have they in vain?")
+      call check(.not. are_in_vain(sim%problem, now), "impulses that have not grown are not in vain")
+      do s = 1, size(now)
+        call check(all(abs(sim%problem%sub(s)%impulse - now(s)%value) <= 0.0_dp), "impulses stay as they are")
+      end do
+      call sim%free()
+    end do
+  end subroutine check_vain_impulses
+
+  !> F is 0 where impulses and velocities obey the law, whether contacts are open, stick or slip; near by, the step dr = c - L dv
+  !> leaves of F what is of second order in its distance.
+  subroutine check_law(dimension)
+    integer, intent(in) :: dimension
+    real(dp), parameter :: alpha = 0.3_dp, away = 1.0e-5_dp
+    type(simulation_t) :: sim
+    type(proximal_law_t) :: law
+    real(dp), allocatable :: v(:, :, :), dv(:, :, :), dr(:, :, :)
+    real(dp) :: way(dimension - 1), square, before, mu
+    integer :: s, c, q, g, i, nc
+
+    call make_column(6, 1, "&boundary shape = 'plane', normal = "//trim(merge("1, 0   ", "1, 0, 0", dimension == 2))// &
+      & ", point = "//trim(merge("-1, 0   ", "-1, 0, 0", dimension == 2))//" /"//newline//"&solver method = 'nscdd' /", sim, &
+      & dimension)
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels)
+        nc = kernels%nc
+        call law%init(kernels, sub)
+        allocate (v, dv, dr, mold=sub%impulse)
+        v(:, :, :) = 0.0_dp
+        dv(:, :, :) = 0.0_dp
+        do c = 1, sub%n_contacts
+          q = lane_of(c)
+          g = block_of(c)
+          mu = sub%hot(q, kernels%friction_row, g)
+          ! shifts are those of no scene here
+          sub%hot(q, kernels%nd + 1, g) = 0.01_dp*c
+          do i = 1, dimension - 1
+            way(i) = hash_uniform(1, int(c, i8), i) - 0.5_dp
+          end do
+          way(:) = way/norm2(way)
+          sub%impulse(q, 1, g) = merge(0.0_dp, 1.0_dp + 0.1_dp*c, mod(c, 3) == 0)
+          sub%impulse(q, 2:, g) = 0.0_dp
+          v(q, 1, g) = -sub%hot(q, kernels%nd + 1, g)
+          select case (mod(c, 3))
+          case (0)
+            v(q, 1, g) = v(q, 1, g) + 0.5_dp
+            v(q, 2:, g) = 0.2_dp*way
+          case (1)
+            sub%impulse(q, 2:, g) = 0.5_dp*mu*sub%impulse(q, 1, g)*way
+          case (2)
+            sub%impulse(q, 2:, g) = mu*sub%impulse(q, 1, g)*way
+            v(q, 2:, g) = -0.2_dp*way
+          end select
+          do i = 1, nc
+            dv(q, i, g) = away*(hash_uniform(2, int(c, i8), i) - 0.5_dp)
+          end do
+        end do
+        law%centre(:, :, :) = sub%impulse
+        call law%evaluate(kernels, sub, v, alpha, square)
+        call check_close(sqrt(square), 0.0_dp, rounding, "F of impulses and velocities that obey the law")
+        v(:, :, :) = v + dv
+        call law%evaluate(kernels, sub, v, alpha, before)
+        call check(sqrt(before) > 0.1_dp*away, "F beside them")
+        ! velocities go on by as much
+        call law%linearise(kernels, sub, alpha)
+        call law%find_step(dv, dr)
+        sub%impulse(:, :, :) = sub%impulse + dr
+        v(:, :, :) = v + dv
+        call law%evaluate(kernels, sub, v, alpha, square)
+        call check(square <= (1.0e2_dp*away)**2*before, "a step leaves what is of second order")
+        deallocate (v, dv, dr)
+      end associate
+    end do
+    call sim%free()
+  end subroutine check_law
+
+  !> Newton's method finds the impulses of a column, to a tolerance that sweeps do not reach in so few iterations.
+  subroutine check_newton()
+    integer, parameter :: n = 100
+    type(simulation_t) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    integer :: s, c, l
+
+    call parse_config("column", "&scene bodies = 'column', column_count = 100, gravity = 0, -1, friction = 0.3 /"//newline// &
+      & "&time step = 1.0, steps = 1 /"//newline//"&decomposition subdomains = 2 /"//newline// &
+      & "&solver method = 'newton', criterion = 'residual', tolerance = 1e-13, max_iterations = 3000, check_every = 1 /", config, &
+      & error)
+    if (.not. allocated(error)) call sim%init(comm, config, error)
+    call check(.not. allocated(error), "a column for Newton's method")
+    if (allocated(error)) return
+    select type (scheme => sim%scheme)
+    type is (newton_t)
+      call check(scheme%sweeps > 0, "the method is Newton's")
+    class default
+      call check(.false., "the method is Newton's")
+    end select
+    call sim%advance(figures, error)
+    call check(.not. allocated(error), "a step by Newton's method")
+    call check(figures%solve%residual <= 1.0e-13_dp, "the residual reaches its tolerance")
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do c = 1, sub%n_contacts
+          l = upper_of(sub, c)
+          call check_close(sub%impulse(lane_of(c), 1, block_of(c)), real(n + 1 - l, dp), 1.0e-10_dp, "impulse of a column")
+        end do
+      end associate
+    end do
+    call sim%free()
+  end subroutine check_newton
+
+  !> One disk of 1 kg on a plane, W = 1, with the impulse 0.25 under a load of 1: V = -0.75. With l = 3 and the velocity v that
+  !> solved the law, Y = l (v - V)/(1 + l), r~ = 0.25 + l (v - V - Y). Beyond r = 1 the energy rises again: v = 0 gives 0.8125,
+  !> v = 2 would give 2.3125 and stops at 1.
+  subroutine check_feedback(v, expected)
+    real(dp), intent(in) :: v, expected
+    type(simulation_t) :: sim
+    type(enriched_matrix_t) :: matrix
+    type(impulse_feedback_t) :: feedback
+    type(interface_field_t), allocatable :: multipliers(:)
+    type(error_t), allocatable :: error
+    logical :: changed
+    integer :: s
+
+    call make_column(1, 1, "&solver method = 'nscdd' /", sim)
+    matrix%direction%value = 3.0_dp
+    matrix%direction%relative = .false.
+    matrix%direction%active_only = .true.
+    call put_impulse(sim%problem, 0.25_dp)
+    call sim%problem%evaluate()
+    do s = 1, size(sim%problem%sub)
+      call sim%problem%sub(s)%share_masses(sim%problem%kernels, .true.)
+    end do
+    call matrix%start(sim%problem, error)
+    call matrix%update(sim%problem, changed, error)
+    call feedback%start(sim%problem)
+    do s = 1, size(sim%problem%sub)
+      sim%problem%sub(s)%velocity(:, :) = sim%problem%sub(s)%v_global
+      matrix%part(s)%law_velocity(:, :, :) = 0.0_dp
+      matrix%part(s)%law_velocity(1, 1, 1) = v
+      call matrix%enrich(sim%problem, s, error)
+      call feedback%keep_lead(s, matrix)
+    end do
+    call make_field(sim%problem, multipliers)
+    call feedback%take(sim%problem, matrix, multipliers, error)
+    call check(.not. allocated(error), "impulses are fed back")
+    call check_close(feedback%share, min(1.0_dp, 0.75_dp/(0.75_dp*(0.75_dp + v))), rounding, "part of the way that is taken")
+    do s = 1, size(sim%problem%sub)
+      call check_close(sim%problem%sub(s)%impulse(1, 1, 1), expected, rounding, "the impulse that is fed back")
+      call check_close(sim%problem%sub(s)%velocity(2, 1), expected - 1.0_dp, rounding, "the velocity goes with it")
+    end do
+    call matrix%free()
+    call sim%free()
+  end subroutine check_feedback
+
+  !> Three windows of five iterations that grow, the last by more than a factor 2, halve the direction and bring back the impulses
+  !> from before the growth; an explosion takes it to a sixteenth at once; giving up takes it to 0.
+  subroutine check_guard()
+    type(simulation_t) :: sim
+    type(direction_guard_t) :: guard
+    real(dp) :: change
+    integer :: window, i, s
+    logical :: lowered
+
+    call make_column(3, 2, "&solver method = 'nscdd' /", sim)
+    call put_impulse(sim%problem, 1.0_dp)
+    call guard%start(sim%problem)
+    call check_close(guard%share, 1.0_dp, 0.0_dp, "the whole direction at the start")
+    change = 1.0e-3_dp
+    do window = 1, 4
+      do i = 1, 5
+        ! the impulses after the first window are those to come back to
+        call put_impulse(sim%problem, real(10*window + i, dp))
+        call set_progress(sim%problem, change)
+        call guard%watch(sim%problem, lowered)
+        call check(lowered .eqv. (window == 4 .and. i == 5), "three windows must grow")
+      end do
+      change = 1.2_dp*change
+    end do
+    call check_close(guard%share, 0.5_dp, 0.0_dp, "half of the direction")
+    call check_equal(guard%lowered, 1, "lowered once")
+    do s = 1, size(sim%problem%sub)
+      call check_close(sim%problem%sub(s)%impulse(1, 1, 1), 15.0_dp, 0.0_dp, "impulses from before the growth")
+    end do
+    call set_progress(sim%problem, 1.0e6_dp)
+    call guard%watch(sim%problem, lowered)
+    call check(lowered, "an explosion lowers it at once")
+    call check_close(guard%share, 0.5_dp/16.0_dp, 0.0_dp, "to a sixteenth")
+    call guard%give_up(sim%problem, lowered)
+    call check(lowered .and. guard%share <= 0.0_dp, "giving up leaves nothing of it")
+    call sim%free()
+  end subroutine check_guard
+
+  !> Give the first contact of each subdomain an impulse.
+  subroutine put_impulse(problem, r)
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp), intent(in) :: r
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      problem%sub(s)%impulse(1, 1, 1) = r
+    end do
+  end subroutine put_impulse
+
+  !> What no machine has is refused, on all ranks and with words that say what it is for; a little is not.
+  subroutine test_memory_need()
+    type(error_t), allocatable :: error
+
+    call check_memory(comm, "a small thing", 1.0e3_dp, 8, error)
+    call check(.not. allocated(error), "8 kB are there")
+    call check_memory(comm, "a large thing", 1.0e18_dp, 8, error)
+    call check(allocated(error), "8e18 bytes are not")
+    if (allocated(error)) call check(index(error%message, "a large thing") == 1, "the message says what they are for")
+  end subroutine test_memory_need
+
+end program test_solver_parts

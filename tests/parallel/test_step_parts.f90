@@ -1,0 +1,705 @@
+!> What a step does beside its solve, on scenes of a few grains whose answers are known: balances of energy, stress, structure,
+!> sleeping, projections of overlaps, departures. Attractions, boundaries that turn and boundaries that forces move take part.
+program test_step_parts
+  use mpi_f08, only: MPI_Barrier, MPI_COMM_WORLD
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_energy_balance, only: energy_balance_t
+  use gravier_grain_balance, only: grain_balance_t
+  use gravier_mean_stress, only: mean_stress_t
+  use gravier_contact_structure, only: contact_structure_t, bin_width
+  use gravier_diagnostics, only: diagnostics_t
+  use gravier_departures, only: some_leave, let_grains_out
+  use gravier_overlap_projection, only: project_overlaps
+  use gravier_sleeping, only: wake_all, put_sleepers_last
+  use gravier_narrow_phase, only: found_t, find_contacts
+  use gravier_contact_kernels, only: lanes
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  character(len=*), parameter :: newline = new_line("a")
+  !> solves of a contact or two end at a residual of 1e-12: what rounding and a condition of 100 leave of numbers of the order
+  !> of one
+  real(dp), parameter :: solved = 1.0e-10_dp
+  !> step [s], gravity [m/s^2]
+  real(dp), parameter :: h = 0.01_dp, g = 9.81_dp
+  !> keys that solve one contact exactly
+  character(len=*), parameter :: exact = "&solver criterion = 'residual', tolerance = 1e-12, check_every = 1, "// &
+    & "method = 'nscdd', "// &
+    & "acceleration = 'none'"
+  character(len=*), parameter :: all_figures = "&output energy = T, stress = T, structure = T, boundary_forces = T /"//newline
+  type(communicator_t), target :: comm
+  !> rows of the bodies file of the next scene
+  character(len=240) :: added(40)
+  integer :: n_added = 0
+  !> scenes made so far
+  integer :: n_scenes = 0
+
+  call start_parallel()
+  call comm%init()
+  call check_impact(0.0_dp, "")
+  call check_impact(0.0_dp, "adhesion")
+  call check_impact(0.01_dp, "adhesion")
+  call check_pull(0.0_dp)
+  call check_pull(0.01_dp)
+  call check_sliding(0.0_dp)
+  call check_sliding(0.5_dp)
+  call check_loads()
+  call check_turning_glued(1)
+  call check_turning_glued(2)
+  call check_structure()
+  call check_falling_lid()
+  call check_departures()
+  call check_sleeping()
+  call check_moving_plane("0")
+  call check_moving_plane("0.5")
+  call check_sleepers_last()
+  call check_starting_boundary()
+  call check_projection()
+  call check_shared_lid()
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> A plane scene of the grains that add_grain has added since the last one, in two subdomains along x.
+  subroutine make(sim, groups)
+    type(simulation_t), intent(inout) :: sim
+    !> the other groups of the input; &scene begins with what is common to all
+    character(len=*), intent(in) :: groups
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: file
+    integer :: unit, k
+
+    n_scenes = n_scenes + 1
+    file = "bodies_"//to_text(n_scenes)//".csv"
+    if (comm%rank == 0) then
+      open (newunit=unit, file=file, action="write", status="replace")
+      write (unit, "(a)") "id,radius,mass,group,x,y,vx,vy,omega"
+      do k = 1, n_added
+        write (unit, "(a)") trim(added(k))
+      end do
+      close (unit)
+    end if
+    n_added = 0
+    call MPI_Barrier(MPI_COMM_WORLD)
+    call parse_config("parts", &
+      & "&scene dimension = 2, bodies = 'file', start_overlap = 1, alert_distance = 0.02, bodies_file = '"// &
+      & file//"', "//groups//newline//"&decomposition grid = 2, 1 /", config, error)
+    if (.not. allocated(error)) call sim%init(comm, config, error)
+    call check(.not. allocated(error), "the scene is made")
+    if (.not. allocated(error)) return
+    if (comm%rank == 0) print "(a)", error%message
+    call finish_checks()
+  end subroutine make
+
+  !> Add a disk of radius 0.1 m to the next scene.
+  subroutine add_grain(id, mass, group, x, y, vx, vy, spin)
+    integer, intent(in) :: id, group
+    !> [kg], [m], [m/s], [rad/s]
+    real(dp), intent(in) :: mass, x, y, vx, vy, spin
+
+    n_added = n_added + 1
+    write (added(n_added), "(i0, ',0.1,', es25.17, ',', i0, 5(',', es25.17))") id, mass, group, x, y, vx, vy, spin
+  end subroutine add_grain
+
+  subroutine advance(sim, figures)
+    type(simulation_t), intent(inout) :: sim
+    type(step_figures_t), intent(out) :: figures
+    type(error_t), allocatable :: error
+
+    call sim%advance(figures, error)
+    call check(.not. allocated(error), "a step is made")
+  end subroutine advance
+
+  !> Component `d` of the velocity (1 to 3) or, with `of_place`, of the place of grain `id`: the same on all ranks; huge where
+  !> there is no such grain.
+  real(dp) function grain(sim, id, d, of_place)
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: id, d
+    logical, intent(in), optional :: of_place
+    integer :: s, k
+
+    grain = -huge(1.0_dp)
+    do s = 1, size(sim%decomposition%home)
+      associate (home => sim%decomposition%home(s))
+        do k = 1, home%n
+          if (home%id(k) /= id) cycle
+          if (present(of_place)) then
+            grain = home%position(d, k)
+          else
+            grain = home%velocity(d, k)
+          end if
+        end do
+      end associate
+    end do
+    grain = comm%highest(grain)
+  end function grain
+
+  !> The law of all pairs: friction, and an attraction on request.
+  pure function law_text(kind) result(text)
+    character(len=*), intent(in) :: kind
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (kind == "adhesion") text = "&material name = 'sticky' /"//newline// &
+      & "&law materials = 'sticky', kind = 'adhesive', adhesion = 3.0, adhesion_range = 0.005 /"//newline
+  end function law_text
+
+  !> Masses 1 and 2 kg meet head-on at 1 and -0.5 m/s and stay together: the impulse on them is 1 N s and 0.75 J are lost, with an
+  !> attraction or without, touching or overlapping.
+  subroutine check_impact(overlap, kind)
+    real(dp), intent(in) :: overlap
+    character(len=*), intent(in) :: kind
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: branch
+
+    ! q_m is half a step on from here: the places are chosen for the overlap there
+    branch = 0.2_dp - overlap
+    call add_grain(1, 1.0_dp, 0, -0.5_dp*branch - 0.5_dp*h, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 0.5_dp*branch + 0.25_dp*h, 0.0_dp, -0.5_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline// &
+      & exact//" /"//newline//all_figures//law_text(kind))
+    call check_close(sim%balance%kinetic, 0.75_dp, solved, "kinetic energy at the start")
+    call advance(sim, figures)
+    call check_close(figures%max_overlap, overlap, solved, "the overlap is as it was meant")
+    call check_close(grain(sim, 1, 1), 0.0_dp, solved, "the first grain stops")
+    call check_close(grain(sim, 2, 1), 0.0_dp, solved, "the second grain stops")
+    call check_energy(sim%diagnostics%energy, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.75_dp, 0.0_dp)
+    call check_balance(sim%balance, 0.0_dp, 0.0_dp, -0.75_dp)
+    ! 1 N s over a branch, in a box around both grains
+    call check_close(sim%diagnostics%stress%stress(1, 1), branch/(h*0.2_dp*(0.2_dp + branch)), 1.0e-8_dp, "stress along the pair")
+    call check_close(sim%diagnostics%stress%stress(2, 2), 0.0_dp, solved, "and none across it")
+    call check_close(sim%diagnostics%stress%pressure(), 0.5_dp*sim%diagnostics%stress%stress(1, 1), solved, "pressure")
+    call check_close(sim%diagnostics%structure%force_mean, 1.0_dp/h, 1.0e-8_dp, "force")
+    call check_close(sim%diagnostics%structure%force_max, 1.0_dp/h, 1.0e-8_dp, "largest force")
+    call check_columns(sim%diagnostics)
+    call sim%free()
+  end subroutine check_impact
+
+  !> Columns carry the values of the components that they are named after.
+  subroutine check_columns(diagnostics)
+    type(diagnostics_t), intent(in) :: diagnostics
+    integer :: k, found
+
+    found = 0
+    do k = 1, diagnostics%n_columns
+      select case (diagnostics%name(k))
+      case ("dissipated_normal")
+        call check_close(diagnostics%value(k), diagnostics%energy%dissipated_normal, 0.0_dp, "column of the energy")
+      case ("stress_xx")
+        call check_close(diagnostics%value(k), diagnostics%stress%stress(1, 1), 0.0_dp, "column of the stress")
+      case ("coordination")
+        call check_close(diagnostics%value(k), diagnostics%structure%coordination, 0.0_dp, "column of the structure")
+      case default
+        cycle
+      end select
+      found = found + 1
+    end do
+    call check_equal(found, 3, "columns of all groups")
+  end subroutine check_columns
+
+  subroutine check_energy(energy, translation, rotation, load_work, boundary_work, carried_away, normal, tangential)
+    type(energy_balance_t), intent(in) :: energy
+    !> [J], the last two dissipated by normal and by tangential impulses
+    real(dp), intent(in) :: translation, rotation, load_work, boundary_work, carried_away, normal, tangential
+
+    call check_close(energy%translation, translation, solved, "energy of translation")
+    call check_close(energy%rotation, rotation, solved, "energy of rotation")
+    call check_close(energy%load_work, load_work, solved, "work of loads")
+    call check_close(energy%boundary_work, boundary_work, solved, "work of boundaries")
+    call check_close(energy%carried_away, carried_away, solved, "energy carried away")
+    call check_close(energy%dissipated_normal, normal, solved, "dissipated by normal impulses")
+    call check_close(energy%dissipated_friction, tangential, solved, "dissipated by tangential impulses")
+    call check_close(energy%error(), 0.0_dp, solved, "the balance closes")
+  end subroutine check_energy
+
+  subroutine check_balance(balance, kinetic, load_work, contact_work)
+    type(grain_balance_t), intent(in) :: balance
+    !> of the grains; done on them by loads and by contacts [J]
+    real(dp), intent(in) :: kinetic, load_work, contact_work
+
+    call check_close(balance%kinetic, kinetic, solved, "balance of grains: kinetic energy")
+    call check_close(balance%load_work, load_work, solved, "balance of grains: work of loads")
+    call check_close(balance%contact_work, contact_work, solved, "balance of grains: work of contacts")
+    call check_close(balance%error(), 0.0_dp, solved, "balance of grains: it closes")
+  end subroutine check_balance
+
+  !> The same masses part at 0.01 and 0.005 m/s under an attraction of 3 N, which holds them: an impulse of -0.01 N s, less than
+  !> 0.03 N s. The contact carries a tension, touching or overlapping.
+  subroutine check_pull(overlap)
+    real(dp), intent(in) :: overlap
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: branch
+
+    branch = 0.2_dp - overlap
+    call add_grain(1, 1.0_dp, 0, -0.5_dp*branch + 0.5e-2_dp*h, 0.0_dp, -0.01_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 0.5_dp*branch - 0.25e-2_dp*h, 0.0_dp, 0.005_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline// &
+      & exact//" /"//newline//all_figures//law_text("adhesion"))
+    call advance(sim, figures)
+    call check_close(grain(sim, 1, 1), 0.0_dp, solved, "an attraction holds the first grain")
+    call check_close(grain(sim, 2, 1), 0.0_dp, solved, "an attraction holds the second grain")
+    call check_energy(sim%diagnostics%energy, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.75e-4_dp, 0.0_dp)
+    call check_balance(sim%balance, 0.0_dp, 0.0_dp, -0.75e-4_dp)
+    call check_close(sim%diagnostics%stress%stress(1, 1), -0.01_dp*branch/(h*0.2_dp*(0.2_dp + branch)), 1.0e-8_dp, &
+      & "a tension is a negative stress")
+    associate (structure => sim%diagnostics%structure)
+      call check_close(structure%force_mean, 0.01_dp/h, 1.0e-8_dp, "size of the tension")
+      call check_close(structure%force_max, 0.0_dp, solved, "no compression")
+      call check_close(structure%coordination, 1.0_dp, 0.0_dp, "a contact under tension carries")
+      call check_equal(structure%rattlers, 2_i8, "grains with one contact rattle")
+      call check_close(structure%fabric(1, 1), 1.0_dp, solved, "fabric along the pair")
+      call check_equal(structure%histogram(nint(1.0_dp/bin_width) + 1) + structure%histogram(nint(1.0_dp/bin_width)), 1_i8, &
+        & "a force of the mean is at the middle of the histogram")
+    end associate
+    call sim%free()
+  end subroutine check_pull
+
+  !> A disk slides on a plane that moves at `speed`: mu m g h acts against the slip v - speed, which falls by 3 mu g h in the step.
+  subroutine check_sliding(speed)
+    !> [m/s]
+    real(dp), intent(in) :: speed
+    real(dp), parameter :: mu = 0.3_dp, m = 2.0_dp, v = 1.0_dp
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: p, slip
+
+    call add_grain(1, 2.0_dp, 0, -0.5_dp*h, 0.1_dp, 1.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 1.0_dp, 5.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, -9.81, friction = 0.3, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.3, velocity = "//to_text(speed)//", 0 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    p = mu*m*g*h
+    ! I = m R^2/2: a force at the rim changes the slip three times as much as the velocity
+    slip = (v - speed) - 1.5_dp*p/m
+    call check_close(grain(sim, 1, 1), v - p/m, solved, "friction slows the disk down")
+    call check_close(grain(sim, 1, 3), -2.0_dp*p/(m*0.1_dp), solved, "and turns it")
+    ! the other disk falls
+    call check_energy(sim%diagnostics%energy, 0.5_dp*m*(v - p/m)**2 + 0.5_dp*(g*h)**2, p**2/m, 0.5_dp*(g*h)**2, -p*speed, &
+      & 0.0_dp, 0.0_dp, p*slip)
+    call check_balance(sim%balance, 0.5_dp*m*(v - p/m)**2 + p**2/m + 0.5_dp*(g*h)**2, 0.5_dp*(g*h)**2, -p*(slip + speed))
+    call check_close(sim%diagnostics%structure%sliding_fraction, 1.0_dp, 0.0_dp, "the contact slides")
+    call check_close(sim%boundary_impulses(1, 1), p, solved, "the plane is dragged along")
+    call check_close(sim%boundary_impulses(2, 1), -m*g*h, solved, "and pressed down")
+    call sim%free()
+  end subroutine check_sliding
+
+  !> Gravity and a body force work on grains in flight; the potential is that of both, from the origin.
+  subroutine check_loads()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp), parameter :: pi = acos(-1.0_dp), volume = pi*0.01_dp, m = 2.0_dp
+    real(dp) :: a(2), v(2), w(2), x(2)
+
+    call add_grain(1, 2.0_dp, 0, 0.5_dp, 3.0_dp, 1.0_dp, 2.0_dp, 4.0_dp)
+    call add_grain(2, 2.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0.5, -9.81, body_force = 7, 3, overlap_projection = F /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    a = [0.5_dp + 7.0_dp*volume/m, -9.81_dp + 3.0_dp*volume/m]
+    v = [1.0_dp, 2.0_dp]
+    w = v + h*a
+    x = [0.5_dp, 3.0_dp] + 0.5_dp*h*(v + w)
+    call check_energy(sim%diagnostics%energy, 0.5_dp*m*(sum(w**2) + sum((h*a)**2)), 0.5_dp*(0.5_dp*m*0.01_dp)*16.0_dp, &
+      & m*dot_product(h*a, 0.5_dp*(v + w)) + m*dot_product(h*a, 0.5_dp*h*a), 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call check_close(sim%balance%load_work, m*dot_product(h*a, 0.5_dp*(v + w)) + m*dot_product(h*a, 0.5_dp*h*a), solved, &
+      & "balance of grains: work of both loads")
+    call check_close(sim%balance%speeds, norm2(w) + norm2(h*a), solved, "sum of speeds")
+    call check_close(sim%diagnostics%energy%potential, -m*(dot_product(a, x) + dot_product(a, [3.0_dp, 0.0_dp] + 0.5_dp*h*h*a)), &
+      & 100*solved, "potential of both loads")
+    call check_state(sim%diagnostics%energy)
+    call sim%free()
+  end subroutine check_loads
+
+  !> A balance goes on from its state, bit for bit.
+  subroutine check_state(energy)
+    type(energy_balance_t), intent(in) :: energy
+    type(energy_balance_t) :: other
+    integer(i8) :: words(10), again(10)
+
+    call energy%get_state(words)
+    call other%set_state(words)
+    call other%get_state(again)
+    call check(all(words == again), "state of a balance")
+    call check_close(other%error(), energy%error(), 0.0_dp, "its error")
+    call check_close(other%turnover(), energy%turnover(), 0.0_dp, "its turnover")
+    call check_close(other%potential, energy%potential, 0.0_dp, "its potential")
+  end subroutine check_state
+
+  !> A grain of group 1 turns with a boundary about the origin at 2 rad/s; a free disk of 1 kg lies above it, at rest and without
+  !> gravity, and is carried up by its approach and along by friction. It overlaps with the glued grain, at whose surface the
+  !> boundary has the velocity that counts. The glued grain has identifier `glued`, so that it is candidate or antagonist.
+  subroutine check_turning_glued(glued)
+    integer, intent(in) :: glued
+    real(dp), parameter :: overlap = 0.02_dp, spin = 2.0_dp
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: turn, x(2), u(2)
+
+    ! at q_m the glued grain has turned by half a step
+    turn = 0.5_dp*h*spin
+    x(1) = cos(turn)
+    x(2) = sin(turn)
+    call add_grain(glued, 1.0_dp, 1, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3 - glued, 1.0_dp, 0, x(1), x(2) + 0.2_dp - overlap, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F, friction = 0.5 /"//newline// &
+      & "&boundary shape = 'grains', group = 1, rotation = 2.0, pivot = 0, 0, friction = 0.5 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    call check_equal(figures%contacts, 1_i8, "one contact with a glued grain")
+    ! (-w y, w x) at the surface of the glued grain, x + (0, 0.1)
+    u(1) = -spin*(x(2) + 0.1_dp)
+    u(2) = spin*x(1)
+    call check_close(grain(sim, 3 - glued, 2), u(2), solved, "the free grain is carried up")
+    ! a force at the rim moves the disk by a third of the slip, and turns it by the rest
+    call check_close(grain(sim, 3 - glued, 1), u(1)/3.0_dp, solved, "and along by friction, which holds")
+    call check_close(grain(sim, 3 - glued, 3), u(1)*2.0_dp/3.0_dp/0.1_dp, solved, "which turns it, too")
+    ! the boundary works p u; half of it is lost in the shock
+    call check_energy(sim%diagnostics%energy, 0.5_dp*(u(2)**2 + u(1)**2/9.0_dp), u(1)**2/9.0_dp, 0.0_dp, &
+      & u(2)**2 + u(1)**2/3.0_dp, 0.0_dp, 0.5_dp*u(2)**2, u(1)**2/6.0_dp)
+    call check_balance(sim%balance, 0.5_dp*u(2)**2 + u(1)**2/6.0_dp, 0.0_dp, 0.5_dp*u(2)**2 + u(1)**2/6.0_dp)
+    call check_close(sim%boundary_impulses(1, 1), -u(1)/3.0_dp, solved, "the boundary bears the impulse along")
+    call check_close(sim%boundary_impulses(2, 1), -u(2), solved, "and the one across")
+    call sim%free()
+  end subroutine check_turning_glued
+
+  !> Three disks in a row under 1 m/s from the left: chain of two contacts, figures of coordination.
+  subroutine check_structure()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: forces(2)
+
+    call add_grain(1, 1.0_dp, 0, -0.3_dp - 1.5_dp*h, 0.0_dp, 3.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3, 1.0_dp, 0, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(4, 1.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F, friction = 0 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    ! all three end at 1 m/s: impulses 2 and 1
+    forces = [2.0_dp, 1.0_dp]/h
+    associate (structure => sim%diagnostics%structure)
+      call check_close(structure%force_mean, sum(forces)/2, 1.0e-7_dp, "mean force")
+      call check_close(structure%force_max, forces(1), 1.0e-7_dp, "largest force")
+      call check_close(structure%force_deviation, 1.0_dp/3.0_dp, 1.0e-8_dp, "deviation over mean")
+      call check_close(structure%coordination, 4.0_dp/4.0_dp, 0.0_dp, "contacts of a grain: four ends, four grains")
+      call check_close(structure%mechanical_coordination, 2.0_dp, 0.0_dp, "of the one that two contacts hold")
+      call check_equal(structure%rattlers, 3_i8, "the other ones rattle")
+      call check_close(structure%carrying_fraction, 1.0_dp, 0.0_dp, "both contacts carry")
+      call check_equal(sum(structure%histogram), 2_i8, "both are in the histogram")
+      call check_equal(structure%histogram(7), 1_i8, "2/3 of the mean")
+      call check_equal(structure%histogram(14), 1_i8, "4/3 of the mean")
+    end associate
+    call sim%free()
+  end subroutine check_structure
+
+  !> A lid of 4 kg under 8 N that touches nothing: its energy is the work of the force.
+  subroutine check_falling_lid()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: v
+
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 2.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 3, normal = 0, -1, "// &
+      & "free = F, T, mass = 4.0, force = 0, -8.0 /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact//" /"// &
+      & newline//all_figures)
+    call advance(sim, figures)
+    call advance(sim, figures)
+    v = -2.0_dp*h*2.0_dp
+    call check_close(sim%decomposition%boundaries(1)%velocity(2), v, solved, "velocity of a lid under a force")
+    call check_close(sim%diagnostics%energy%boundaries, 2.0_dp*v**2, solved, "its kinetic energy")
+    call check_close(sim%diagnostics%energy%boundary_work, 2.0_dp*v**2, solved, "the work of the force")
+    call check_close(sim%diagnostics%energy%error(), 0.0_dp, solved, "the balance closes")
+    call sim%free()
+  end subroutine check_falling_lid
+
+  !> A grain behind an outlet leaves with its energy, and a glued one with its boundary; others stay.
+  subroutine check_departures()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer(i8) :: n_free, n_glued
+
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 1.0_dp, 0.003_dp, 0.0_dp, -1.0_dp, 3.0_dp)
+    call add_grain(3, 1.0_dp, 0, 2.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(4, 1.0_dp, 1, 3.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(5, 1.0_dp, 1, 3.2_dp, -0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'outlet', point = 0, 0, normal = 0, 1 /"//newline//"&boundary shape = 'grains', group = 1 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call check(.not. some_leave(sim%decomposition), "nobody is behind the outlet, and glued grains stay there")
+    call let_grains_out(sim%decomposition, .true., n_free, n_glued)
+    call check_equal(n_free + n_glued, 0_i8, "nobody leaves")
+    call advance(sim, figures)
+    call check_equal(figures%left, 1_i8, "the falling grain leaves")
+    call check(grain(sim, 2, 2) <= -huge(1.0_dp), "it is the one that is behind the outlet")
+    call check(grain(sim, 1, 2) > -1.0_dp, "a free grain stays")
+    call check(grain(sim, 3, 2) > -1.0_dp, "and another one")
+    call check(grain(sim, 5, 2) > -1.0_dp, "and a glued one behind the outlet")
+    ! m v^2/2 and I w^2/2, I = m R^2/2
+    call check_close(sim%diagnostics%energy%carried_away, 1.0_dp + 0.5_dp*0.01_dp*9.0_dp, solved, "it takes its energy along")
+    call check_close(sim%balance%carried_away, 1.0_dp + 0.5_dp*0.01_dp*9.0_dp, solved, "balance of grains: likewise")
+    call check_close(sim%balance%error(), 0.0_dp, solved, "balance of grains: it closes")
+    sim%decomposition%boundaries(2)%present = .false.
+    call check(some_leave(sim%decomposition), "glued grains leave with their boundary")
+    call let_grains_out(sim%decomposition, .true., n_free, n_glued)
+    call check_equal(n_free, 0_i8, "no free one leaves")
+    call check_equal(n_glued, 2_i8, "both glued ones leave")
+    call sim%free()
+  end subroutine check_departures
+
+  !> A disk on a plane.
+  subroutine make_resting(sim, boundary, after)
+    type(simulation_t), intent(inout) :: sim
+    character(len=*), intent(in) :: boundary, after
+
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.5"//boundary//" /"//newline// &
+      & "&time step = 0.01, steps = 99 /"//newline//exact//", sleeping = T, sleep_after = "//after//", sleep_speed = 1e-3 /"// &
+      & newline)
+  end subroutine make_resting
+
+  !> Steps at rest of the contact of grain `id` with the plane, or with grains of higher identifiers: the same on all ranks.
+  integer function counted(sim, id, with_grains)
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: id
+    logical, intent(in), optional :: with_grains
+    integer :: s, p
+    real(dp) :: most
+
+    most = -1.0_dp
+    do s = 1, size(sim%neighbourhoods%view)
+      associate (view => sim%neighbourhoods%view(s))
+        do p = 1, view%list%n
+          if (view%bodies%id(view%list%candidate(p)) == id .and. (view%list%antagonist(p) > 0 .eqv. present(with_grains))) &
+            & most = max(most, real(view%list%state(view%list%memory%rest_row, p), dp))
+        end do
+      end associate
+    end do
+    counted = nint(comm%highest(most))
+  end function counted
+
+  !> Multiply the impulse that the list keeps of the contact of grain `id` with the plane.
+  subroutine disturb(sim, id, factor)
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: id
+    real(dp), intent(in) :: factor
+    integer :: s, p
+
+    do s = 1, size(sim%neighbourhoods%view)
+      associate (view => sim%neighbourhoods%view(s))
+        do p = 1, view%list%n
+          if (view%bodies%id(view%list%candidate(p)) == id .and. view%list%antagonist(p) < 0) &
+            & view%list%impulse(1, p) = factor*view%list%impulse(1, p)
+        end do
+      end associate
+    end do
+  end subroutine disturb
+
+  !> Contacts count steps at rest, one a step; a change of an impulse by more than ten times the momentum allowed, 1e-3 of the
+  !> impulses, begins anew; so do all where they are woken.
+  subroutine check_sleeping()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: k
+
+    call make_resting(sim, "", "6")
+    ! the first step finds impulses that were not there before
+    call advance(sim, figures)
+    call check_equal(counted(sim, 1), 0, "a contact that is new is not at rest")
+    do k = 1, 3
+      call advance(sim, figures)
+      call check_equal(counted(sim, 1), k, "a step at rest counts")
+    end do
+    call disturb(sim, 1, 1.005_dp)
+    call advance(sim, figures)
+    call check_equal(counted(sim, 1), 4, "a change of half a percent is rest")
+    call disturb(sim, 1, 1.02_dp)
+    call advance(sim, figures)
+    call check_equal(counted(sim, 1), 0, "a change of two percent is not")
+    call check_equal(counted(sim, 2), 5, "the other contact goes on")
+    do k = 1, 7
+      call advance(sim, figures)
+    end do
+    call check_equal(counted(sim, 1), 6, "steps are counted as far as it takes to sleep")
+    call check_equal(figures%asleep, 2_i8, "both contacts sleep")
+    call check_close(grain(sim, 1, 2), 0.0_dp, 0.0_dp, "what sleeps does not move")
+    call wake_all(sim%neighbourhoods)
+    call check_equal(counted(sim, 1), 0, "woken contacts count from the start")
+    call advance(sim, figures)
+    call check_equal(figures%asleep, 0_i8, "and are awake")
+    call sim%free()
+  end subroutine check_sleeping
+
+  !> On a plane that moves, without friction, nothing changes, and yet the disks are not taken to rest on it: the contact of two
+  !> disks, one upon the other, counts no step while the plane moves, and counts them when it is at rest.
+  subroutine check_moving_plane(speed)
+    character(len=*), intent(in) :: speed
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: k
+
+    call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3, 1.0_dp, 0, 1.0_dp, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0, velocity = "//speed//", 0 /"//newline// &
+      & "&time step = 0.01, steps = 99 /"//newline//exact//", sleeping = T, sleep_after = 6, sleep_speed = 1e-3 /"//newline)
+    do k = 1, 5
+      call advance(sim, figures)
+    end do
+    call check_equal(counted(sim, 1, .true.), merge(4, 0, speed == "0"), "steps at rest of two disks on a plane")
+    call check_equal(counted(sim, 1), merge(4, 0, speed == "0"), "steps at rest of the lower one and the plane")
+    call sim%free()
+  end subroutine check_moving_plane
+
+  !> Of contacts found, those asleep come last, and those before them fill whole blocks.
+  subroutine check_sleepers_last()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    type(found_t) :: found
+    integer :: k, s, c, awake, n_asleep
+
+    do k = 1, 40
+      call add_grain(k, 1.0_dp, 0, 0.3_dp*k, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    end do
+    call make(sim, "gravity = 0, -9.81, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1 /"//newline//"&time step = 0.01, steps = 99 /"//newline// &
+      & exact//", sleeping = T, sleep_after = 3 /"//newline)
+    call advance(sim, figures)
+    do s = 1, size(sim%neighbourhoods%view)
+      associate (view => sim%neighbourhoods%view(s))
+        ! every contact but those of each third grain sleeps
+        do k = 1, view%list%n
+          view%list%state(view%list%memory%rest_row, k) = merge(0, 3, mod(view%bodies%id(view%list%candidate(k)), 3_i8) == 0)
+        end do
+        call find_contacts(view, sim%decomposition, sim%physics, found)
+        awake = 0
+        do k = 1, found%n
+          if (view%list%state(view%list%memory%rest_row, found%source(k)) == 0) awake = awake + 1
+        end do
+        call put_sleepers_last(view, sim%decomposition%boundaries, 3, found)
+        call check_equal(found%n_awake, min(found%n, lanes*((awake + lanes - 1)/lanes)), "awake contacts fill whole blocks")
+        n_asleep = 0
+        do c = 1, found%n
+          if (view%list%state(view%list%memory%rest_row, found%source(c)) == 0) then
+            call check(c <= found%n_awake, "a contact that is awake is among the first")
+          else if (c > found%n_awake) then
+            n_asleep = n_asleep + 1
+          end if
+          ! gaps and normals go with their contacts
+          k = view%list%candidate(found%source(c))
+          call check_close(found%gap(c), view%bodies%position(2, k) - view%bodies%radius(k), 0.0_dp, "gaps stay with their pairs")
+        end do
+        call check_equal(n_asleep, found%n - found%n_awake, "the others sleep")
+        if (found%n == 0) cycle
+        sim%decomposition%boundaries(1)%velocity(1) = 1.0_dp
+        call find_contacts(view, sim%decomposition, sim%physics, found)
+        call put_sleepers_last(view, sim%decomposition%boundaries, 3, found)
+        call check_equal(found%n_awake, found%n, "no contact with a boundary that moves sleeps")
+        sim%decomposition%boundaries(1)%velocity(1) = 0.0_dp
+      end associate
+    end do
+    call sim%free()
+  end subroutine check_sleepers_last
+
+  !> A plane on which disks sleep starts to move: they wake in that step and, with enough friction, roll with a third of its speed.
+  subroutine check_starting_boundary()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: k, unit
+
+    if (comm%rank == 0) then
+      open (newunit=unit, file="start.csv", action="write", status="replace")
+      write (unit, "(a)") "time,vx", "0,0", "0.095,0", "0.0951,0.03", "1,0.03"
+      close (unit)
+    end if
+    call make_resting(sim, ", table = 'start.csv'", "4")
+    do k = 1, 9
+      call advance(sim, figures)
+    end do
+    call check_equal(figures%asleep, 2_i8, "disks sleep on a plane at rest")
+    call advance(sim, figures)
+    call check_equal(figures%asleep, 0_i8, "they wake when it starts")
+    call check_equal(counted(sim, 2), 0, "and count no step at rest")
+    call check_close(grain(sim, 1, 1), 0.01_dp, solved, "a third of its speed")
+    call check_close(grain(sim, 1, 3), 0.2_dp, solved, "and roll: R w = 2 v against the plane")
+    call sim%free()
+  end subroutine check_starting_boundary
+
+  !> An overlap is taken back in inverse proportion to the masses, without a velocity; no grain moves by more than half the alert
+  !> distance.
+  subroutine check_projection()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: shifts, x(2)
+    real(dp), parameter :: allowed = 1.0e-3_dp, overlap = 5.0e-3_dp
+
+    call add_grain(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 3.0_dp, 0, 0.095_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call sim%assemble(figures)
+    call sim%problem%evaluate()
+    call project_overlaps(sim%decomposition, sim%problem, h, allowed, shifts)
+    call check_close(grain(sim, 1, 1, .true.), -0.1_dp - 0.75_dp*(overlap - allowed), solved, "the light grain gives way by 3/4")
+    call check_close(grain(sim, 2, 1, .true.), 0.095_dp + 0.25_dp*(overlap - allowed), solved, "the heavy one by 1/4")
+    call check_close(shifts, overlap - allowed, solved, "lengths of the shifts")
+    call check_close(abs(grain(sim, 1, 1)) + abs(grain(sim, 2, 1)), 0.0_dp, 0.0_dp, "nothing gets a velocity")
+    call sim%free()
+    ! 0.08 too much: the light grain would move by 0.0585, and moves by 0.01
+    call add_grain(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 3.0_dp, 0, 0.02_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 2e-3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call advance(sim, figures)
+    x(1) = grain(sim, 1, 1, .true.)
+    x(2) = grain(sim, 2, 1, .true.)
+    call check(figures%projected, "a step projects overlaps beyond what is allowed")
+    call check_close(x(1), -0.1_dp - 0.01_dp, solved, "half the alert distance at most")
+    call check_close(x(2), 0.02_dp + 0.01_dp/3.0_dp, solved, "the other grain in proportion")
+    call sim%free()
+  end subroutine check_projection
+
+  !> A lid that forces move overlaps with two disks in two subdomains, and is as heavy as both in a projection: lid and disks share
+  !> the excess in equal parts, whatever its own mass is. It moves alike on all ranks.
+  subroutine check_shared_lid()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp), parameter :: allowed = 1.0e-3_dp, overlap = 5.0e-3_dp
+    real(dp) :: top
+
+    call add_grain(1, 2.0_dp, 0, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 2.0_dp, 0, 4.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0.095, "// &
+      & "normal = 0, -1, free = F, T, mass = 50.0, force = 0, 0 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call advance(sim, figures)
+    top = sim%decomposition%boundaries(1)%point(2)
+    call check_equal(figures%sharing%bodies, 1_i8, "two subdomains share the lid")
+    call check_close(figures%max_overlap, overlap, solved, "the overlap of the lid")
+    call check_close(top, 0.095_dp + 0.5_dp*(overlap - allowed), solved, "the lid goes up by half of the excess")
+    call check_close(grain(sim, 1, 2, .true.), -0.5_dp*(overlap - allowed), solved, "the first disk goes down by the other half")
+    call check_close(grain(sim, 2, 2, .true.), -0.5_dp*(overlap - allowed), solved, "and so does the second one")
+    call check_close(sim%decomposition%boundaries(1)%velocity(2), 0.0_dp, 0.0_dp, "the lid gets no velocity")
+    call check_close(sim%decomposition%boundaries(1)%point(1), 0.0_dp, 0.0_dp, "and stays along what is prescribed")
+    call check_close(comm%highest(top) + comm%highest(-top), 0.0_dp, 0.0_dp, "all ranks have moved it alike")
+    call sim%free()
+  end subroutine check_shared_lid
+
+end program test_step_parts

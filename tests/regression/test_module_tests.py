@@ -1,0 +1,64 @@
+"""Every module of the library is used by name in a test program: one of tests/unit, tests/parallel or tests/verification."""
+import glob
+import os
+import re
+import unittest
+
+SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
+KINDS = ("unit", "parallel", "verification")
+#: modules that no test program uses by their own name, and the test of what they do
+EXCEPTIONS = {
+    # gravier_hdf5_file is made of them, by extension of types
+    **dict.fromkeys(("gravier_hdf5_tree", "gravier_hdf5_attributes", "gravier_hdf5_datasets", "gravier_hdf5_properties",
+                     "gravier_hdf5_rows"), "parallel/test_io_hdf5_file.f90"),
+    # gravier_bodies_file is the door to both formats
+    **dict.fromkeys(("gravier_bodies_csv", "gravier_bodies_hdf5"), "parallel/test_io_bodies_file.f90"),
+    # h5py reads what it writes
+    "gravier_vtkhdf_file": "hard/test_run_vtk.py",
+}
+
+
+def sources(folder):
+    """Texts of the Fortran sources below a folder, by path."""
+    found = {}
+    for path in sorted(glob.glob(os.path.join(SOURCE, folder, "**", "*.[fF]90"), recursive=True)):
+        with open(path, encoding="utf-8") as file:
+            found[os.path.relpath(path, SOURCE)] = file.read()
+    return found
+
+
+def modules():
+    """Names of the modules of the library, by their files."""
+    names = {}
+    for path, text in sources("modules").items():
+        for name in re.findall(r"^\s*module\s+(gravier_\w+)\s*$", text, re.M):
+            names[name] = path
+    return names
+
+
+def used():
+    """Names of the modules that test programs use directly."""
+    found = set()
+    for kind in KINDS:
+        for text in sources(os.path.join("tests", kind)).values():
+            found |= set(re.findall(r"^\s*use\s*(?:::)?\s*(gravier_\w+)", text, re.M))
+    return found
+
+
+class ModuleTests(unittest.TestCase):
+
+    def test_every_module_is_used(self):
+        names = modules()
+        self.assertGreater(len(names), 100, "modules are found")
+        without = [f"{name} ({names[name]})" for name in sorted(set(names) - used() - set(EXCEPTIONS))]
+        self.assertEqual(without, [], "modules without a direct test; write one (doc/developer_guide.md, 'A test')")
+
+    def test_exceptions_are_needed(self):
+        self.assertEqual(sorted(set(EXCEPTIONS) - set(modules())), [], "exceptions that are no modules")
+        self.assertEqual(sorted(set(EXCEPTIONS) & used()), [], "exceptions that have a direct test")
+        for test in EXCEPTIONS.values():
+            self.assertTrue(os.path.isfile(os.path.join(SOURCE, "tests", test)), test)
+
+
+if __name__ == "__main__":
+    unittest.main()

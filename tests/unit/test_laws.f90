@@ -1,0 +1,326 @@
+!> The laws of contact against their formulas: keys, terms of a pair, memories, and the laws of a scene by pairs of materials.
+program test_laws
+  use gravier_kinds, only: dp
+  use gravier_contact_coefficients, only: coefficients_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, unused
+  use gravier_coulomb_law, only: coulomb_law_t
+  use gravier_frictionless_law, only: frictionless_law_t
+  use gravier_velocity_law, only: velocity_law_t
+  use gravier_adhesive_law, only: adhesive_law_t
+  use gravier_capillary_law, only: capillary_law_t
+  use gravier_bonded_law, only: bonded_law_t
+  use gravier_law_registry, only: law_holder_t, registered_key_t, registered_laws, registered_keys, kind_length
+  use gravier_law_set, only: law_set_t
+  use gravier_test_law_names, only: name_length, split_names, add_law
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  !> some roundings of numbers of the order of one
+  real(dp), parameter :: rounding = 4*epsilon(1.0_dp)
+
+  call check_registry()
+  call check_coefficients()
+  call check_coulomb()
+  call check_velocity()
+  call check_adhesive()
+  call check_capillary()
+  call check_bonded()
+  call check_law_set()
+  call finish_checks()
+
+contains
+
+  !> Give the keys of a law values by their names; others get their defaults.
+  subroutine set_law(law, text, values)
+    class(contact_law_t), intent(inout) :: law
+    !> names with blanks between
+    character(len=*), intent(in) :: text
+    real(dp), intent(in) :: values(:)
+    character(len=name_length), allocatable :: names(:)
+    type(law_key_t), allocatable :: keys(:)
+    real(dp), allocatable :: own(:)
+    integer :: k, i
+
+    call split_names(text, names)
+    call law%keys(keys)
+    allocate (own(size(keys)))
+    do k = 1, size(keys)
+      own(k) = 0.0_dp
+      if (keys(k)%default /= "") read (keys(k)%default, *) own(k)
+      do i = 1, size(names)
+        if (keys(k)%name == names(i)) own(k) = values(i)
+      end do
+    end do
+    do i = 1, size(names)
+      call check(any(keys%name == names(i)), law%kind()//" has the key "//trim(names(i)))
+    end do
+    call law%set(own)
+  end subroutine set_law
+
+  !> An ordinary pair, as evaluate takes it.
+  type(contact_pair_t) function pair_at(gap) result(pair)
+    !> [m]
+    real(dp), intent(in) :: gap
+    pair%gap = gap
+    pair%radius = 0.25_dp
+    pair%terms%play = max(gap, 0.0_dp)
+  end function pair_at
+
+  !> Each law under its word, and every key once, with the laws that have it.
+  subroutine check_registry()
+    character(len=*), parameter :: words = "coulomb frictionless velocity adhesive capillary bonded"
+    type(law_holder_t), allocatable :: laws(:)
+    type(registered_key_t), allocatable :: keys(:)
+    type(law_key_t), allocatable :: own(:)
+    character(len=kind_length) :: kinds
+    integer :: n, l, k, i, holders
+
+    call registered_laws(laws)
+    call registered_keys(keys, n, kinds)
+    call check_equal(size(laws), 6, "laws")
+    call check_equal(kinds, words, "words of the laws, in the order of the registry")
+    do i = 1, n
+      call check_equal(count(keys(1:n)%key%name == keys(i)%key%name), 1, "a key is there once: "//keys(i)%key%name)
+      holders = 0
+      do l = 1, size(laws)
+        call laws(l)%law%keys(own)
+        do k = 1, size(own)
+          if (own(k)%name /= keys(i)%key%name) cycle
+          holders = holders + 1
+          call check(index(" "//keys(i)%kinds, " "//trim(laws(l)%law%kind())) > 0, "the key knows the laws that have it")
+          call check(own(k)%default == keys(i)%key%default .and. own(k)%allowed == keys(i)%key%allowed &
+            & .and. own(k)%unit == keys(i)%key%unit .and. own(k)%meaning == keys(i)%key%meaning, "a key is the same in all laws")
+        end do
+      end do
+      call check_equal(holders, words_in(keys(i)%kinds), "and no others: "//keys(i)%key%name)
+    end do
+    do i = 1, n
+      if (keys(i)%key%name == "restitution") call check_equal(keys(i)%kinds, "coulomb frictionless velocity", &
+        & "laws with restitution")
+      if (keys(i)%key%name == "rolling_friction") call check_equal(keys(i)%kinds, "coulomb velocity adhesive capillary bonded", &
+        & "laws that resist rolling")
+    end do
+  end subroutine check_registry
+
+  pure integer function words_in(text)
+    character(len=*), intent(in) :: text
+    integer :: k
+    words_in = 0
+    do k = 1, len_trim(text)
+      if (text(k:k) == " ") words_in = words_in + 1
+    end do
+    words_in = words_in + 1
+  end function words_in
+
+  !> Each coefficient is raised by itself.
+  subroutine check_coefficients()
+    type(coefficients_t) :: a, b, c
+
+    a = coefficients_t(friction=0.1_dp, restitution=0.9_dp, tangential_restitution=0.2_dp, rolling_friction=0.8_dp, &
+      & pivoting_friction=0.3_dp)
+    b = coefficients_t(friction=0.7_dp, restitution=0.3_dp, tangential_restitution=0.6_dp, rolling_friction=0.4_dp, &
+      & pivoting_friction=0.5_dp)
+    c = a
+    call a%raise_to(b)
+    call check_close(a%friction, 0.7_dp, 0.0_dp, "friction is raised")
+    call check_close(a%restitution, 0.9_dp, 0.0_dp, "restitution stays")
+    call check_close(a%tangential_restitution, 0.6_dp, 0.0_dp, "tangential restitution is raised")
+    call check_close(a%rolling_friction, 0.8_dp, 0.0_dp, "rolling friction stays")
+    call check_close(a%pivoting_friction, 0.5_dp, 0.0_dp, "pivoting friction is raised")
+    call b%raise_to(c)
+    call check(abs(b%friction - a%friction) + abs(b%restitution - a%restitution) + abs(b%tangential_restitution - &
+      & a%tangential_restitution) + abs(b%rolling_friction - a%rolling_friction) + abs(b%pivoting_friction - &
+      & a%pivoting_friction) <= 0.0_dp, "either way round")
+  end subroutine check_coefficients
+
+  !> Constant terms; without friction nothing sends a tangential velocity back.
+  subroutine check_coulomb()
+    type(coulomb_law_t) :: coulomb, smooth
+    type(frictionless_law_t) :: frictionless
+    type(contact_pair_t) :: pair
+
+    call set_law(coulomb, "friction restitution tangential_restitution rolling_friction pivoting_friction", &
+      & [0.4_dp, 0.5_dp, 0.6_dp, 0.7_dp, 0.8_dp])
+    pair = pair_at(0.0_dp)
+    call coulomb%evaluate(pair)
+    call check_terms(pair, 0.4_dp, 0.0_dp, 0.0_dp, "coulomb")
+    call check_close(pair%terms%restitution, 0.5_dp, 0.0_dp, "coulomb: restitution")
+    call check_close(pair%terms%tangential_restitution, 0.6_dp, 0.0_dp, "coulomb: tangential restitution")
+    call check_close(coulomb%largest%friction, 0.4_dp, 0.0_dp, "coulomb: largest friction")
+    call check_close(coulomb%largest%rolling_friction, 0.7_dp, 0.0_dp, "coulomb: rolling friction")
+    call check_close(coulomb%largest%pivoting_friction, 0.8_dp, 0.0_dp, "coulomb: pivoting friction")
+    call check(.not. (coulomb%attracts .or. coulomb%remembers), "coulomb: no attraction, no memory")
+    call set_law(smooth, "tangential_restitution", [0.6_dp])
+    pair = pair_at(0.0_dp)
+    call smooth%evaluate(pair)
+    call check_close(pair%terms%tangential_restitution, 0.0_dp, 0.0_dp, "no tangential restitution without friction")
+    call set_law(frictionless, "restitution", [0.3_dp])
+    pair = pair_at(0.0_dp)
+    call frictionless%evaluate(pair)
+    call check_terms(pair, 0.0_dp, 0.0_dp, 0.0_dp, "frictionless")
+    call check_close(pair%terms%restitution, 0.3_dp, 0.0_dp, "frictionless: restitution")
+    call check_close(frictionless%largest%restitution, 0.3_dp, 0.0_dp, "frictionless: largest restitution")
+  end subroutine check_coulomb
+
+  subroutine check_terms(pair, friction, attraction, play, what)
+    type(contact_pair_t), intent(in) :: pair
+    real(dp), intent(in) :: friction, attraction, play
+    character(len=*), intent(in) :: what
+
+    call check_close(pair%terms%friction, friction, rounding, what//": friction")
+    call check_close(pair%terms%attraction, attraction, rounding*max(attraction, 1.0_dp), what//": attraction")
+    call check_close(pair%terms%play, play, 0.0_dp, what//": play")
+  end subroutine check_terms
+
+  !> mu = mu_d + (mu_s - mu_d) exp(-v_t/v_s), mu_s at rest and mu_d far above v_s.
+  subroutine check_velocity()
+    type(velocity_law_t) :: law
+    type(contact_pair_t) :: pair
+    real(dp), parameter :: slips(4) = [0.0_dp, 0.01_dp, 0.05_dp, 100.0_dp]
+    real(dp), parameter :: frictions(4) = [0.6_dp, 0.2_dp + 0.4_dp*exp(-0.2_dp), 0.2_dp + 0.4_dp*exp(-1.0_dp), 0.2_dp]
+    integer :: k
+
+    call set_law(law, "static_friction dynamic_friction slip_scale restitution tangential_restitution", &
+      & [0.6_dp, 0.2_dp, 0.05_dp, 0.1_dp, 0.7_dp])
+    do k = 1, size(slips)
+      pair = pair_at(0.0_dp)
+      pair%slip = slips(k)
+      call law%evaluate(pair)
+      call check_terms(pair, frictions(k), 0.0_dp, 0.0_dp, "velocity")
+      call check_close(pair%terms%restitution, 0.1_dp, 0.0_dp, "velocity: restitution")
+      call check_close(pair%terms%tangential_restitution, 0.7_dp, 0.0_dp, "velocity: tangential restitution")
+    end do
+    call check_close(law%largest%friction, 0.6_dp, 0.0_dp, "velocity: the largest friction is the larger one")
+    call set_law(law, "static_friction dynamic_friction slip_scale", [0.1_dp, 0.3_dp, 1.0_dp])
+    call check_close(law%largest%friction, 0.3_dp, 0.0_dp, "velocity: whichever that is")
+  end subroutine check_velocity
+
+  !> A constant attraction up to the range, at overlaps as well.
+  subroutine check_adhesive()
+    type(adhesive_law_t) :: law
+    type(contact_pair_t) :: pair
+    real(dp), parameter :: gaps(5) = [-0.2_dp, 0.0_dp, 0.01_dp, 0.0100001_dp, 1.0_dp]
+    integer :: k
+
+    call set_law(law, "friction adhesion adhesion_range rolling_friction", &
+      & [0.3_dp, 7.0_dp, 0.01_dp, 0.2_dp])
+    do k = 1, size(gaps)
+      pair = pair_at(gaps(k))
+      call law%evaluate(pair)
+      call check_terms(pair, 0.3_dp, merge(7.0_dp, 0.0_dp, k <= 3), max(gaps(k), 0.0_dp), "adhesive")
+    end do
+    call check_close(law%range, 0.01_dp, 0.0_dp, "adhesive: range")
+    call check_close(law%largest%rolling_friction, 0.2_dp, 0.0_dp, "adhesive: rolling friction")
+    call check(law%attracts .and. .not. law%remembers, "adhesive: an attraction without a memory")
+    pair%state = 5
+    pair%normal = 1.0_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "a law without a memory keeps no state")
+  end subroutine check_adhesive
+
+  !> F = kappa R exp(-gap/lambda) once a bridge has formed, until it breaks; kappa R at overlaps.
+  subroutine check_capillary()
+    type(capillary_law_t) :: law
+    type(contact_pair_t) :: pair
+    real(dp), parameter :: kappa = 20.0_dp, lambda = 0.002_dp, broken = 0.005_dp
+    real(dp) :: force
+
+    call set_law(law, "friction capillarity decay_length debonding_distance", &
+      & [0.3_dp, kappa, lambda, broken])
+    force = kappa*0.25_dp
+    pair = pair_at(0.003_dp)
+    call law%evaluate(pair)
+    call check_terms(pair, 0.3_dp, 0.0_dp, 0.003_dp, "capillary: bodies that have not touched have no bridge")
+    pair = pair_at(-0.1_dp)
+    call law%evaluate(pair)
+    call check_terms(pair, 0.3_dp, force, 0.0_dp, "capillary: an overlap does not raise the attraction")
+    call check_equal(pair%state, 1, "capillary: bodies that touch have a bridge")
+    pair = pair_at(0.004_dp)
+    pair%state = 1
+    call law%evaluate(pair)
+    call check_terms(pair, 0.3_dp, force*exp(-2.0_dp), 0.004_dp, "capillary: a bridge that is stretched")
+    pair = pair_at(0.0051_dp)
+    pair%state = 1
+    call law%evaluate(pair)
+    call check_terms(pair, 0.3_dp, 0.0_dp, 0.0051_dp, "capillary: a bridge that breaks")
+    call check_equal(pair%state, 0, "capillary: it is broken")
+    ! a contact that carries an impulse has touched, and one that carries none keeps what it has
+    pair = pair_at(0.001_dp)
+    pair%normal = 1.0e-9_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 1, "capillary: an impulse makes a bridge")
+    pair%normal = 0.0_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 1, "capillary: a pair without an impulse keeps its bridge")
+    pair = pair_at(0.006_dp)
+    pair%normal = 1.0_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "capillary: none forms beyond the debonding distance")
+    call check(law%attracts .and. law%remembers, "capillary: an attraction with a memory")
+    call check_close(law%range, broken, 0.0_dp, "capillary: range")
+  end subroutine check_capillary
+
+  !> Bonds are made in the first step only; one that opens or slides is broken for good.
+  subroutine check_bonded()
+    type(bonded_law_t) :: law
+    type(contact_pair_t) :: pair
+
+    call set_law(law, "friction bond_strength bond_friction bond_distance", &
+      & [0.3_dp, 9.0_dp, 0.8_dp, 0.01_dp])
+    call check_close(law%largest%friction, 0.8_dp, 0.0_dp, "bonded: the larger friction")
+    pair = pair_at(0.005_dp)
+    call law%evaluate(pair)
+    call check_terms(pair, 0.3_dp, 0.0_dp, 0.005_dp, "bonded: no bond after the first step")
+    pair = pair_at(0.005_dp)
+    pair%first = .true.
+    call law%evaluate(pair)
+    call check_terms(pair, 0.8_dp, 9.0_dp, 0.0_dp, "bonded: a bond holds the distance, without play")
+    call check_equal(pair%state, 1, "bonded: the bond is remembered")
+    pair = pair_at(0.011_dp)
+    pair%first = .true.
+    call law%evaluate(pair)
+    call check_terms(pair, 0.3_dp, 0.0_dp, 0.011_dp, "bonded: no bond beyond the distance")
+    ! r~_n = r_n + h F: a bond under a tension less than h F has r~_n > 0
+    pair%state = 1
+    pair%terms%friction = 0.8_dp
+    pair%normal = 2.0_dp
+    pair%tangential = 1.6_dp*(1.0_dp - 2*unused)
+    call law%conclude(pair)
+    call check_equal(pair%state, 1, "bonded: a bond below its shear strength stays")
+    pair%tangential = 1.6_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "bonded: a bond at its shear strength breaks")
+    pair%state = 1
+    pair%normal = 0.0_dp
+    pair%tangential = 0.0_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "bonded: a bond at its strength breaks")
+  end subroutine check_bonded
+
+  !> Pairs of materials in either order; what has no material, or no law, is under the scene's values.
+  subroutine check_law_set()
+    character(len=*), parameter :: names = "adhesion_range friction restitution adhesion"
+    type(law_set_t) :: laws
+    type(contact_pair_t) :: pair
+
+    call laws%init(3, 2)
+    call check_equal(laws%number_of(1, 2), 0, "no law yet")
+    call add_law(laws, 1, 2, "adhesive", names, [0.02_dp, 0.4_dp, 0.9_dp, 5.0_dp])
+    call check(laws%attracts .and. .not. laws%remembers, "the set attracts as its law")
+    call add_law(laws, 3, 3, "frictionless", names, [0.5_dp, 0.6_dp, 0.25_dp, 1.0_dp])
+    call check_equal(laws%number_of(1, 2), 1, "the first law")
+    call check_equal(laws%number_of(2, 1), 1, "the first law, the other way round")
+    call check_equal(laws%number_of(3, 3), 2, "the second law")
+    call check_equal(laws%number_of(1, 1), 0, "a pair without a law")
+    call check_equal(laws%number_of(2, 3), 0, "another one")
+    call check_equal(laws%number_of(0, 2), 0, "a body without a material")
+    call check_equal(laws%number_of(3, 0), 0, "the other body")
+    call check_close(laws%largest%friction, 0.4_dp, 0.0_dp, "largest friction of all laws")
+    call check_close(laws%largest%restitution, 0.25_dp, 0.0_dp, "largest restitution of all laws")
+    call check_close(laws%range, 0.02_dp, 0.0_dp, "largest range of all laws")
+    pair = pair_at(0.01_dp)
+    call laws%of(1)%law%evaluate(pair)
+    call check_terms(pair, 0.4_dp, 5.0_dp, 0.01_dp, "values go to keys by their names")
+  end subroutine check_law_set
+
+end program test_laws

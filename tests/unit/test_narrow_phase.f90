@@ -1,0 +1,322 @@
+!> Which near pairs are contacts, with gaps, normals and terms; which law a pair has, and the velocities that it sees.
+!> The pairs are put together by hand, and what is expected follows from the places.
+program test_narrow_phase
+  use gravier_kinds, only: dp
+  use gravier_periodic, only: shift_code
+  use gravier_contact_coefficients, only: coefficients_t
+  use gravier_contact_law, only: contact_pair_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_neighbour_list, only: pair_memory_t
+  use gravier_neighbourhood, only: neighbourhood_t
+  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
+  use gravier_physics, only: physics_t
+  use gravier_narrow_phase, only: found_t, find_contacts, scene_terms
+  use gravier_test_scenes, only: plane
+  use gravier_test_law_names, only: add_law
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+
+  !> some roundings of places of the order of one
+  real(dp), parameter :: rounding = 8*epsilon(1.0_dp)
+  character(len=*), parameter :: coulomb_keys = "friction rolling_friction pivoting_friction restitution tangential_restitution"
+
+  call check_gaps(2)
+  call check_gaps(3)
+  call check_periods()
+  call check_restitution()
+  call check_materials()
+  call check_memory()
+  call check_velocities()
+  call check_turning_boundary()
+  call finish_checks()
+
+contains
+
+  !> Grains at rest of radius 0.1 at places, above a plane at height 0 and, of number 2, one that is turned on request.
+  subroutine make(nd, places, view, decomposition)
+    integer, intent(in) :: nd
+    !> (nd, n)
+    real(dp), intent(in) :: places(:, :)
+    type(neighbourhood_t), intent(out) :: view
+    type(decomposition_t), intent(out) :: decomposition
+    real(dp) :: normal(nd), point(nd)
+    integer :: k
+
+    decomposition%nd = nd
+    decomposition%nv = 3*nd - 3
+    decomposition%rule%alert_distance = 0.01_dp
+    point(:) = 0.0_dp
+    normal(:) = 0.0_dp
+    normal(nd) = 1.0_dp
+    allocate (decomposition%boundaries(2))
+    decomposition%boundaries(1) = plane(101, point, normal)
+    point(nd) = -1.0_dp
+    decomposition%boundaries(2) = plane(102, point, normal)
+    call view%bodies%init(nd, 3*nd - 3, 0, size(places, 2))
+    do k = 1, size(places, 2)
+      view%bodies%id(k) = k
+    end do
+    view%bodies%position(:, :) = places
+    view%bodies%velocity(:, :) = 0.0_dp
+    view%bodies%radius(:) = 0.1_dp
+    view%bodies%mass(:) = 1.0_dp
+    view%bodies%inertia(:) = 1.0_dp
+    view%bodies%glued(:) = 0
+  end subroutine make
+
+  !> A list of pairs; boundaries are negative.
+  subroutine list(view, pairs, memory, shifts)
+    type(neighbourhood_t), intent(inout) :: view
+    !> (2, n)
+    integer, intent(in) :: pairs(:, :)
+    type(pair_memory_t), intent(in) :: memory
+    !> codes of shifts (n)
+    integer, intent(in), optional :: shifts(:)
+    integer :: p, order(size(pairs, 2))
+
+    call view%list%init(present(shifts), 1)
+    do p = 1, size(pairs, 2)
+      order(p) = p
+      if (present(shifts)) then
+        call view%list%add(pairs(1, p), pairs(2, p), shifts(p))
+      else
+        call view%list%add(pairs(1, p), pairs(2, p), 0)
+      end if
+    end do
+    call view%list%finish(order, memory)
+  end subroutine list
+
+  !> Gaps within the alert distance, normals from antagonist to candidate; coincident centres; a plane that is gone.
+  subroutine check_gaps(nd)
+    integer, intent(in) :: nd
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(found_t) :: found
+    real(dp) :: places(nd, 6), along(nd), up(nd)
+
+    along(:) = 0.0_dp
+    along(1) = 0.6_dp
+    along(nd) = 0.8_dp
+    up(:) = 0.0_dp
+    up(nd) = 1.0_dp
+    places(:, 1) = 0.3_dp*up
+    places(:, 2) = places(:, 1) + 0.209_dp*along
+    places(:, 3) = places(:, 1) - 0.19_dp*along
+    places(:, 4) = places(:, 1) + 0.211_dp*along
+    places(:, 5) = 0.095_dp*up
+    places(:, 6) = places(:, 5)
+    call make(nd, places, view, decomposition)
+    call list(view, reshape([1, 2, 1, 3, 1, 4, 5, -1, 1, -1, 5, 6, 5, -2], [2, 7]), pair_memory_t())
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 4, "contacts: those within the alert distance")
+    call check_equal(found%n_awake, 4, "all are awake")
+    call check(all(found%source(1:4) == [1, 2, 4, 6]), "they are found at their places in the list")
+    call check_close(found%gap(1), 0.009_dp, rounding, "an open gap")
+    call check_close(found%gap(2), -0.01_dp, rounding, "an overlap")
+    call check_close(found%gap(3), -0.005_dp, rounding, "an overlap with a plane")
+    call check_close(found%gap(4), -0.2_dp, rounding, "coincident centres")
+    call check_close(maxval(abs(found%normal(:, 1) + along)), 0.0_dp, 100*rounding, "normal: from the antagonist to the candidate")
+    call check_close(maxval(abs(found%normal(:, 2) - along)), 0.0_dp, 100*rounding, "normal: the other way")
+    call check_close(maxval(abs(found%normal(:, 3) - up)), 0.0_dp, rounding, "normal of a plane")
+    call check_close(maxval(abs(found%normal(:, 4) - up)), 0.0_dp, 0.0_dp, "coincident centres are parted along the vertical")
+    call check_equal(size(found%terms), 0, "no laws, no terms")
+    decomposition%boundaries(1)%present = .false.
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 3, "a boundary that is removed has no contacts")
+  end subroutine check_gaps
+
+  !> The antagonist is shifted by whole periods to where it meets the candidate.
+  subroutine check_periods()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(found_t) :: found
+    integer :: codes(1)
+
+    codes(1) = shift_code([-1, 0, 0])
+    call make(2, reshape([0.05_dp, 0.5_dp, 1.952_dp, 0.5_dp], [2, 2]), view, decomposition)
+    decomposition%period%length(1) = 2.1_dp
+    call list(view, reshape([1, 2], [2, 1]), pair_memory_t(), codes)
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 1, "a contact across a period")
+    if (found%n < 1) return
+    call check_close(found%gap(1), -0.002_dp, rounding, "its gap")
+    call check_close(found%normal(1, 1), 1.0_dp, rounding, "its normal points from the image to the candidate")
+  end subroutine check_periods
+
+  !> A law with restitution acts from touching on, whatever the alert distance; boundaries have values of their own.
+  subroutine check_restitution()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(found_t) :: found
+
+    call make(2, reshape([0.0_dp, 0.105_dp, 0.205_dp, 0.105_dp], [2, 2]), view, decomposition)
+    call list(view, reshape([1, 2, 1, -1], [2, 2]), pair_memory_t())
+    physics%contact = coefficients_t(friction=0.2_dp, restitution=0.5_dp)
+    decomposition%boundaries(1)%contact = coefficients_t(friction=0.0_dp, tangential_restitution=0.7_dp)
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 1, "an open pair with restitution is no contact")
+    if (found%n == 1) call check_equal(found%source(1), 2, "tangential restitution without friction is none")
+    decomposition%boundaries(1)%contact%friction = 0.1_dp
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 0, "with friction the boundary's is")
+    view%bodies%position(1, 2) = 0.2_dp*(1.0_dp - epsilon(1.0_dp))
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 1, "a pair that touches is a contact")
+    associate (terms => scene_terms(view, decomposition%boundaries, physics, 1, -0.25_dp))
+      call check_close(terms%restitution, 0.5_dp, 0.0_dp, "grains have the coefficients of the scene")
+      call check_close(terms%play, 0.0_dp, 0.0_dp, "an overlap gives no play")
+    end associate
+    associate (terms => scene_terms(view, decomposition%boundaries, physics, 2, 0.25_dp))
+      call check_close(terms%friction, 0.1_dp, 0.0_dp, "a boundary has its own")
+      call check_close(terms%play, 0.25_dp, 0.0_dp, "an open gap is the play")
+    end associate
+  end subroutine check_restitution
+
+  !> The boundary and the law of pairs with glued grains, in either order of the two.
+  subroutine check_materials()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+
+    call make(2, reshape([0.0_dp, 0.2_dp, 0.2_dp, 0.2_dp, 0.4_dp, 0.2_dp], [2, 3]), view, decomposition)
+    view%bodies%glued(2) = 2
+    view%bodies%material(3) = 3
+    call list(view, reshape([1, 2, 2, 3, 1, 3, 1, -1], [2, 4]), pair_memory_t())
+    call check_equal(boundary_of(view, 1), 2, "the antagonist is glued")
+    call check_equal(boundary_of(view, 2), 2, "the candidate is glued")
+    call check_equal(boundary_of(view, 3), 0, "two free grains")
+    call check_equal(boundary_of(view, 4), 1, "a boundary")
+    call physics%laws%init(3, 3)
+    call add_law(physics%laws, 1, 2, "coulomb", coulomb_keys, [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
+    call add_law(physics%laws, 1, 3, "frictionless", "restitution", [0.0_dp])
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 1), 0, "both are of the first material, which has no law")
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 2), 2, "materials 1 and 3")
+    decomposition%boundaries(2)%material = 2
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 1), 1, "a glued grain is of the boundary's material")
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 2), 0, "the other pair has no law then")
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 4), 0, "the plane has no material")
+    decomposition%boundaries(1)%material = 3
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 4), 2, "materials of grain and plane")
+  end subroutine check_materials
+
+  !> Beyond the alert distance a pair is a contact while it remembers something: a bridge between grains that part.
+  subroutine check_memory()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(found_t) :: found
+    type(pair_memory_t) :: memory
+    real(dp) :: force
+
+    call make(2, reshape([0.0_dp, 0.5_dp, 0.23_dp, 0.5_dp], [2, 2]), view, decomposition)
+    view%bodies%radius(2) = 0.12_dp
+    memory%law_row = 1
+    call list(view, reshape([1, 2], [2, 1]), memory)
+    call physics%laws%init(1, 1)
+    call add_law(physics%laws, 1, 1, "capillary", "friction capillarity decay_length debonding_distance", &
+      & [0.3_dp, 50.0_dp, 0.02_dp, 0.05_dp])
+    decomposition%rule%alert_distance = 0.001_dp
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 0, "a pair that has not touched is far")
+    view%list%state(1, 1) = 1
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 1, "a bridge beyond the alert distance")
+    if (found%n < 1) return
+    ! the geometric mean of the radii, and a gap of half the decay length
+    force = 50.0_dp*sqrt(0.1_dp*0.12_dp)*exp(-0.5_dp)
+    call check_close(found%terms(1)%attraction, force, 100*rounding*force, "its force")
+    call check_close(found%terms(1)%play, 0.01_dp, rounding, "its play")
+    ! overlaps: the full force
+    view%bodies%position(1, 2) = 0.2_dp
+    call find_contacts(view, decomposition, physics, found)
+    call check_close(found%terms(1)%attraction, 50.0_dp*sqrt(0.1_dp*0.12_dp), rounding*force, "the force of an overlap")
+    view%bodies%position(1, 2) = 0.3_dp
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 0, "a bridge that breaks is no contact any more")
+    call check_equal(view%list%state(1, 1), 0, "and is forgotten")
+  end subroutine check_memory
+
+  !> Normal velocity and slip of two grains that move and turn, against velocities of their points of contact.
+  subroutine check_velocities()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(contact_pair_t) :: pair
+    real(dp) :: v(3), w(3), n(3), places(3, 2)
+
+    call physics%laws%init(1, 1)
+    call add_law(physics%laws, 1, 1, "coulomb", coulomb_keys, [0.3_dp, 0.11_dp, 0.12_dp, 0.0_dp, 0.0_dp])
+    n = [0.6_dp, 0.0_dp, 0.8_dp]
+    places(:, 1) = [0.0_dp, 0.0_dp, 1.0_dp]
+    places(:, 2) = places(:, 1) - 0.2_dp*n
+    call make(3, places, view, decomposition)
+    view%bodies%velocity(:, 1) = [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp, 5.0_dp, 6.0_dp]
+    view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
+    call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
+    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
+    v = [1.0_dp, 2.0_dp, 3.0_dp] - 0.1_dp*cross([4.0_dp, 5.0_dp, 6.0_dp], n)
+    w = [0.5_dp, -1.0_dp, 0.25_dp] + 0.1_dp*cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
+    v = v - w
+    call check_close(pair%normal_velocity, dot_product(v, n), 10*rounding, "normal velocity: positive where they part")
+    call check_close(pair%slip, norm2(v - dot_product(v, n)*n), 10*rounding, "slip")
+    call check_close(pair%terms%rolling_friction, 0.11_dp, 0.0_dp, "rolling friction of the law")
+    call check_close(pair%terms%pivoting_friction, 0.12_dp, 0.0_dp, "pivoting friction of the law")
+    call check_close(pair%radius, 0.1_dp, rounding, "radius of the pair")
+    ! in the plane a spin is about z: the point of contact below the disk goes to the right
+    call make(2, reshape([0.0_dp, 0.1_dp], [2, 1]), view, decomposition)
+    view%bodies%velocity(:, 1) = [0.3_dp, -0.2_dp, 5.0_dp]
+    call list(view, reshape([1, -1], [2, 1]), pair_memory_t())
+    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, [0.0_dp, 1.0_dp], pair)
+    call check_close(pair%normal_velocity, -0.2_dp, rounding, "a disk approaches a plane")
+    call check_close(pair%slip, 0.8_dp, rounding, "and slips: 0.3 + 5 0.1")
+    decomposition%boundaries(1)%last_velocity(1) = 0.8_dp
+    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, [0.0_dp, 1.0_dp], pair)
+    call check_close(pair%slip, 0.0_dp, rounding, "a plane that moves with it")
+  end subroutine check_velocities
+
+  pure function cross(a, b) result(c)
+    real(dp), intent(in) :: a(3), b(3)
+    real(dp) :: c(3)
+    c(1) = a(2)*b(3) - a(3)*b(2)
+    c(2) = a(3)*b(1) - a(1)*b(3)
+    c(3) = a(1)*b(2) - a(2)*b(1)
+  end function cross
+
+  !> A glued grain moves with the boundary that turns, and not with a spin of its own, whether it is candidate or antagonist.
+  subroutine check_turning_boundary()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(contact_pair_t) :: pair
+    real(dp) :: n(2)
+    integer :: order
+
+    call physics%laws%init(1, 1)
+    call add_law(physics%laws, 1, 1, "coulomb", coulomb_keys, [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
+    ! the free grain at (1, 0.2) lies on the glued one at (1, 0); the boundary turns about the origin by 3 rad/s
+    do order = 1, 2
+      if (order == 1) then
+        call make(2, reshape([1.0_dp, 0.0_dp, 1.0_dp, 0.2_dp], [2, 2]), view, decomposition)
+      else
+        call make(2, reshape([1.0_dp, 0.2_dp, 1.0_dp, 0.0_dp], [2, 2]), view, decomposition)
+      end if
+      view%bodies%glued(order) = 2
+      view%bodies%velocity(:, order) = 1.0e3_dp
+      view%bodies%velocity(:, 3 - order) = [0.5_dp, 0.0_dp, 0.0_dp]
+      decomposition%boundaries(2)%last_velocity(:) = 0.0_dp
+      decomposition%boundaries(2)%last_spin(3) = 3.0_dp
+      decomposition%boundaries(2)%pivot(:) = 0.0_dp
+      call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
+      n(1) = 0.0_dp
+      n(2) = merge(-1.0_dp, 1.0_dp, order == 1)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
+      ! at (1, 0.1) the boundary has the velocity (-0.3, 3)
+      call check_close(pair%slip, 0.8_dp, 10*rounding, "slip against a glued grain, in either order")
+      call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")
+    end do
+  end subroutine check_turning_boundary
+
+end program test_narrow_phase

@@ -1,0 +1,109 @@
+!> Modules of a few lines: what numbers a scene may have, pauses, memory that stays with the process, the planes that shut a scene in.
+program test_small_modules
+  use, intrinsic :: iso_fortran_env, only: int64
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf
+  use gravier_kinds, only: dp
+  use gravier_magnitude, only: is_bounded, is_size, sharpest
+  use gravier_pause, only: pause_for
+  use gravier_heap, only: keep_heap
+  use gravier_room, only: free_memory
+  use gravier_boundary, only: boundary_t, shape_circle
+  use gravier_facing_planes, only: find_facing_planes
+  use gravier_test_scenes, only: plane
+  use gravier_check, only: check, check_close, finish_checks
+  implicit none
+
+  call check_magnitudes()
+  call check_pause()
+  call check_heap()
+  call check_facing_planes()
+  call finish_checks()
+
+contains
+
+  subroutine check_magnitudes()
+    real(dp) :: infinity
+
+    infinity = ieee_value(infinity, ieee_positive_inf)
+    call check(all(is_bounded([0.0_dp, -1.0e30_dp, 1.0e30_dp, 1.0e-300_dp])), "numbers of at most 1e30 in size")
+    call check(.not. any(is_bounded([-1.1e30_dp, 1.1e30_dp])) .and. .not. is_bounded(infinity), &
+      & "numbers beyond it")
+    call check(all(is_size([1.0e-30_dp, 1.0_dp, 1.0e30_dp])), "sizes from 1e-30 to 1e30")
+    call check(.not. any(is_size([0.0_dp, -1.0_dp, 0.9e-30_dp, 1.1e30_dp])) .and. .not. is_size(infinity), &
+      & "numbers that are no sizes")
+    call check_close(sharpest, 1.0e10_dp, 0.0_dp, "radii of the smallest grain that a scene may extend over")
+  end subroutine check_magnitudes
+
+  !> A pause takes its time, and not seconds more.
+  subroutine check_pause()
+    integer(int64) :: before, after, rate
+
+    call system_clock(before, rate)
+    call pause_for(20000)
+    call system_clock(after)
+    call check(real(after - before, dp)/real(rate, dp) >= 0.02_dp, "a pause of 20 ms takes 20 ms")
+    call check(real(after - before, dp)/real(rate, dp) < 5.0_dp, "and not seconds")
+  end subroutine check_pause
+
+  !> What is given back stays: a second allocation of nearly as much takes no memory from the machine.
+  subroutine check_heap()
+    real(dp), allocatable :: a(:)
+    integer(int64) :: first, second
+
+    call keep_heap()
+    allocate (a(4000000))
+    a(:) = 1.0_dp
+    first = resident()
+    deallocate (a)
+    second = resident()
+    call check(free_memory() /= 0, "the machine says what is free")
+    if (first == 0) return
+    call check(second > first - 16000_int64, "memory of 32 MB that is given back stays with the process")
+    ! buffers of the files read since may lie in it
+    allocate (a(3900000))
+    a(:) = 2.0_dp
+    call check(resident() < first + 16000_int64, "and is used again")
+    call check_close(sum(a)/size(a), 2.0_dp, 0.0_dp, "it holds what was written")
+  end subroutine check_heap
+
+  !> Memory of the process that is in use [kB], 0 where the system does not say.
+  integer(int64) function resident()
+    character(len=120) :: line
+    integer :: unit, status
+
+    resident = 0
+    open (newunit=unit, file="/proc/self/status", status="old", action="read", iostat=status)
+    do while (status == 0)
+      read (unit, "(a)", iostat=status) line
+      if (status /= 0) exit
+      if (line(1:6) /= "VmRSS:") cycle
+      read (line(7:), *) resident
+      exit
+    end do
+    close (unit)
+  end function resident
+
+  !> The highest plane that faces up and the lowest one that faces down; slopes, circles and planes that are gone do not count.
+  subroutine check_facing_planes()
+    type(boundary_t) :: planes(6)
+    real(dp) :: low, high
+
+    planes(1) = plane(1, [0.0_dp, 0.1_dp], [0.0_dp, 1.0_dp])
+    planes(2) = plane(2, [5.0_dp, 0.3_dp], [0.0_dp, 1.0_dp])
+    planes(3) = plane(3, [0.0_dp, 2.0_dp], [0.0_dp, -1.0_dp])
+    planes(4) = plane(4, [0.0_dp, 0.9_dp], [0.6_dp, 0.8_dp])
+    planes(5) = plane(5, [0.0_dp, 1.5_dp], [0.0_dp, -1.0_dp])
+    planes(6) = plane(6, [-3.0_dp, 0.0_dp], [1.0_dp, 0.0_dp])
+    planes(5)%present = .false.
+    call find_facing_planes(planes, 2, low, high)
+    call check_close(low, 0.3_dp, 0.0_dp, "the highest floor")
+    call check_close(high, 2.0_dp, 0.0_dp, "the lowest lid that is there")
+    call find_facing_planes(planes, 1, low, high)
+    call check_close(low, -3.0_dp, 0.0_dp, "the plane that faces along x")
+    call check(high >= huge(high), "nothing faces against x")
+    planes(2)%shape = shape_circle
+    call find_facing_planes(planes, 2, low, high)
+    call check_close(low, 0.1_dp, 0.0_dp, "a circle is no plane")
+  end subroutine check_facing_planes
+
+end program test_small_modules
