@@ -142,11 +142,11 @@ class Restart(RunTestCase):
         base = {
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "wall_material": "rock"},
             "material": [{"name": "rock"}],
-            "law": [{"materials": "rock", "kind": "bonded", "friction": 0.3, "bond_strength": 300.0, "bond_friction": 0.8,
-                     "bond_distance": 1e-3, "rolling_friction": 0.1}],
+            "law": [{"materials": "rock", "kind": "bonded", "friction": 0.3, "bond_strength": 3000.0, "bond_friction": 0.8,
+                     "bond_distance": 1e-3}],
             "boundary": [{"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}],
             "time": {"step": 1e-3, "steps": 60},
-            "solver": {"method": "nscdd", "criterion": "residual", "tolerance": 1e-10, "max_iterations": 5000},
+            "solver": {"method": "nscdd", "criterion": "residual", "tolerance": 1e-9, "max_iterations": 20000},
             "decomposition": {"subdomains": 2},
             "output": {"every": 20, "checkpoint_every": 60},
         }

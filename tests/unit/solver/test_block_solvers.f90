@@ -318,7 +318,8 @@ contains
     d = dimension
     call make_problem(d, n, problem, w, r)
     own = dense_matrix(21, d**2, n)
-    coupling = 0.1_dp*dense_matrix(22, d**2, size(problem%other))
+    coupling = dense_matrix(22, d**2, size(problem%other))
+    coupling(:, :) = 0.1_dp*coupling
     allocate (dense(d*n, d*n), source=0.0_dp)
     do a = 1, n
       do k = 1, d

@@ -257,9 +257,10 @@ contains
     view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
     call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
     call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
-    v = [1.0_dp, 2.0_dp, 3.0_dp] - 0.1_dp*cross([4.0_dp, 5.0_dp, 6.0_dp], n)
-    w = [0.5_dp, -1.0_dp, 0.25_dp] + 0.1_dp*cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
-    v = v - w
+    ! V + w x (-0.1 n) of the first grain, less V + w x (0.1 n) of the second
+    v = cross([4.0_dp, 5.0_dp, 6.0_dp], n)
+    w = cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
+    v = [0.5_dp, 3.0_dp, 2.75_dp] - 0.1_dp*(v + w)
     call check_close(pair%normal_velocity, dot_product(v, n), 10*rounding, "normal velocity: positive where they part")
     call check_close(pair%slip, norm2(v - dot_product(v, n)*n), 10*rounding, "slip")
     call check_close(pair%terms%rolling_friction, 0.11_dp, 0.0_dp, "rolling friction of the law")
