@@ -415,6 +415,10 @@ def main(arguments=None):
         refuse(f"--out {options.out}: expected a path that ends in .png or .svg")
     if options.kind == "movie" and not (options.every >= 1 and 0.0 < options.fps < numpy.inf):
         refuse(f"--every {options.every} --fps {options.fps:g}: expected 1 or more, and a number > 0")
+    if options.kind in ("packing", "movie") and not (0.0 < options.size <= 1000.0 and numpy.isfinite(options.view).all()):
+        refuse(f"--size {options.size:g} --view {options.view[0]:g} {options.view[1]:g}: expected a size above 0, 1000 at most, and two numbers")
+    if options.kind == "packing" and not 1 <= options.dpi <= 10000:
+        refuse(f"--dpi {options.dpi}: expected 1 to 10000")
     directories = options.directory if isinstance(options.directory, list) else [options.directory]
     try:
         sample = options.kind == "packing" and directories[0].suffix == ".h5"

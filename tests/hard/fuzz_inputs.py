@@ -138,7 +138,7 @@ def forked(script, arguments, place):
     texts = []
     for path in (out, err):
         with open(path, "rb") as file:
-            texts.append(file.read().decode(errors="replace"))
+            texts.append(file.read().decode(errors="surrogateescape"))
         os.remove(path)
     return Said(status, *texts)
 
@@ -176,7 +176,7 @@ def problems_of(trial, said, place):
 
 def in_force(text):
     """[(group, {key: value})] of the options that a run says are in force."""
-    lines = text.split("options in force\n")[1].splitlines()
+    lines = text.split("options in force\n")[1].split("\n")
     end = next(k for k, line in enumerate(lines) if line and not line.startswith(" "))
     return parse_namelist("\n".join(lines[:end]))
 
@@ -229,7 +229,7 @@ def table_rows(text):
 
 def csv_bodies(path):
     """{(id, quantity): value} of the grains of a table; glued ones have no velocity of their own."""
-    with open(path, encoding="utf-8", newline="") as file:
+    with open(path, encoding="utf-8", errors="surrogateescape", newline="") as file:
         names, rows = table_rows(file.read())
     found = {}
     for row in rows:
@@ -482,7 +482,7 @@ class Kinds:
         def check(_):
             """The table as Python reads it, written anew, gives the same run."""
             found = kept(os.path.join(place, "results"))
-            names, rows = table_rows(read(path).decode("utf-8"))
+            names, rows = table_rows(read(path).decode("utf-8", errors="surrogateescape"))
             write(path, "\n".join([",".join(names), *(",".join(repr(number(cell)) for cell in row) for row in rows)]) + "\n")
             again = alone([program("gravier"), case + ".nml"], place)
             if again.status != 0:

@@ -127,6 +127,10 @@ class Run:
         for key, values in table.items():
             if len(values) != len(table):
                 raise ResultsError(f"{self.path}: {group.name}/{key}: {len(values)} rows; expected {len(table)}, as in the others")
+            if key not in ("name", "shape") and values.dtype.kind not in "iuf":
+                raise ResultsError(f"{self.path}: {group.name}/{key}: values of type {values.dtype}; expected numbers")
+            if key in ("position", "radius") and not np.isfinite(values).all():
+                raise ResultsError(f"{self.path}: {group.name}/{key}: a value that is not a finite number")
             if key in ("position", "velocity", "normal", "impulse", "force", "point") and (values.ndim != 2 or values.shape[1] < self.dimension):
                 raise ResultsError(f"{self.path}: {group.name}/{key}: shape {values.shape}; expected (rows, {self.dimension} or more)")
         return table

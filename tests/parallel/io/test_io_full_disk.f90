@@ -373,7 +373,7 @@ contains
     call table%open(disk//"/long.csv", "step,x", error)
     do row = 1, 5000
       call table%add(row)
-      call table%add("something")
+      call table%add(0.123456789_dp*row)
       call table%end_row(error)
     end do
     call table%close(error)
