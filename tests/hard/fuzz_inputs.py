@@ -138,7 +138,7 @@ def forked(script, arguments, place):
     texts = []
     for path in (out, err):
         with open(path, "rb") as file:
-            texts.append(file.read().decode(errors="surrogateescape"))
+            texts.append(file.read().decode(errors="replace"))
         os.remove(path)
     return Said(status, *texts)
 
@@ -393,7 +393,7 @@ class Kinds:
             self.change_text(draw, path, self.words, [text.encode() for text in self.cases.values()])
 
         def check(said):
-            problems = not_in_force(read(path).decode(errors="surrogateescape"), said)
+            problems = not_in_force(read(path).decode(errors="replace"), said)
             if same and not problems and self.base(name) != in_force(said.stdout):
                 problems = ["what is in force is not what was"]
             return problems
