@@ -47,7 +47,7 @@ def study(options, case):
             directory = options.out / "runs" / re.sub(r"\W+", "_", f"{case.name} {title} {ranks}")
             shutil.rmtree(directory, ignore_errors=True)
             long = case.long > 0 and title in LONG and ranks == 1 and not options.short
-            played = play(case, title, groups, ranks, str(directory), long, timeout=3600)
+            played = play(case, title, groups, ranks, str(directory), long)
             wrong = played.complaints()
             if reference is None:
                 reference = played

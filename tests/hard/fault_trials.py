@@ -312,7 +312,7 @@ def kills(random_seed, trials, directory, all_ranks=(1, 2, 4)):
             else:
                 begun = os.path.exists(results)
                 try:
-                    run.end(timeout=60)
+                    run.end(timeout=300)
                 except AssertionError as what:
                     # Open MPI's launcher may wait for ever for a rank that dies while it starts, before the program has begun
                     end = f"{ranks} ranks whose launcher hung before the program began"

@@ -54,7 +54,7 @@ class Failure(Exception):
 def run(programs, program, *arguments, ranks, directory, ended=ENDED):
     """Run a program of a build, or fail with its last words."""
     try:
-        done = gravier(*arguments, ranks=ranks, directory=directory, timeout=300, program=os.path.join(programs, program))
+        done = gravier(*arguments, ranks=ranks, directory=directory, program=os.path.join(programs, program))
     except AssertionError as reason:
         raise Failure(str(reason)) from None
     if done.status not in ended:
