@@ -43,7 +43,7 @@ METHODS = {
 
 #: methods that serve moments and sleeping contacts, and words of the others' refusals
 PLAIN = ("nlgs", "nscdd", "schwarz")
-MOMENTS, SLEEPING = "with rolling or pivoting friction", "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"
+MOMENTS, SLEEPING = "with rolling or pivoting friction", "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"
 
 
 def is_enriched(method):

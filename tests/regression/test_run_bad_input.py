@@ -115,7 +115,7 @@ FILES = [
     key("scene", "wall_rolling_friction", "Inf", ">= 0"),
     key("scene", "pivoting_friction", "0.1", "0 where dimension = 2"),
     key("scene", "wall_tangential_restitution", "1.1", "in [0, 1]"),
-    key("solver", "method", "'newton'", "'nlgs', 'nscdd' or 'schwarz' with rolling", also={"scene": {"rolling_friction": 0.1}}),
+    key("solver", "method", "'newton'", "'nlgs', 'schwarz' or 'nscdd' with rolling", also={"scene": {"rolling_friction": 0.1}}),
     key("solver", "method", "'nscdd_ep'", "with rolling", also={"scene": {"wall_rolling_friction": 0.1}}),
     key("solver", "method", "'schwarz_ec'", "with rolling", also={"boundary": {**PLANE, "rolling_friction": 0.1}}),
     key("output", "fclib_step", "1", "0 with rolling", also={"scene": {"rolling_friction": 0.1}}),

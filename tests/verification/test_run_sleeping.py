@@ -130,9 +130,9 @@ class Sleeping(RunTestCase):
 
     def test_refusals(self):
         """One line, status 2."""
-        for more, expected in [({"method": "newton"}, "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"),
-                               ({"method": "nscdd_ep"}, "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"),
-                               ({"method": "schwarz_ec"}, "sleeping serves 'nlgs', 'nscdd' and 'schwarz'"),
+        for more, expected in [({"method": "newton"}, "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"),
+                               ({"method": "nscdd_ep"}, "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"),
+                               ({"method": "schwarz_ec"}, "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"),
                                ({"warm_start": False}, "contacts that sleep keep their impulses"),
                                ({"sleep_after": 0}, "sleep_after = 0: expected an integer >= 1"),
                                ({"sleep_speed": 0.0}, "sleep_speed = 0.0: expected a finite real number > 0")]:
