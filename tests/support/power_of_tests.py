@@ -37,7 +37,7 @@ SOURCES = ("modules", "src", "drivers")
 #: share of the changes that have to be found
 GOAL = 0.95
 #: a test hangs where a process of it takes so many seconds of a processor, and so many times what all of them took without the change
-LEAST_LIMIT, TIMES = 60, 10
+LEAST_LIMIT, TIMES = 20, 10
 
 
 @dataclasses.dataclass
