@@ -153,14 +153,16 @@ contains
     real(dp), parameter :: rounding = 1.0e-12_dp
     type(simulation_t) :: sim
     real(dp), allocatable :: velocity(:, :), reaction(:, :)
-    integer :: s, b, d
+    integer :: s, b, c, d
     logical :: same
 
     call make(dimension, 3, 0.3_dp, sim)
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
         allocate (sub%attraction(size(sub%hot, 1), size(sub%hot, 3)), source=0.0_dp)
-        where (sub%hot(:, dimension + 2, :) > 0.0_dp) sub%attraction = 0.125_dp
+        do c = 1, sub%n_contacts
+          sub%attraction(lane_of(c), block_of(c)) = 0.125_dp
+        end do
       end associate
     end do
     call sim%problem%load_attraction()
