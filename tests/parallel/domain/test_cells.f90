@@ -58,6 +58,9 @@ contains
     call check(all(place == [1, 1, 0]), "along a period, to its image inside")
     call map%locate([-0.1_dp, 0.7_dp], place)
     call check(all(place == [3, 1, 0]), "on the other side, too")
+    call map%set_boxes([0.0_dp, 0.0_dp], [1.5_dp, 1.0_dp], [2.0_dp, 0.0_dp], [4, 2, 1])
+    call map%locate([1.4_dp, 0.7_dp], place)
+    call check(all(place == [2, 1, 0]), "boxes fill the period, not the extent of what is in it")
   end subroutine check_places
 
   !> Along a period a whole number of cells, none smaller than asked for.

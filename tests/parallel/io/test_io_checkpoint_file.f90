@@ -346,6 +346,8 @@ contains
     call file%read_array("partition", 5, 9, values, error)
     call expect(error, status_input, base//".h5: /arrays/partition: 4 words, but 5 to 9 were expected", "a longer array")
     call check_equal(size(values), 0, "no words after a failure")
+    call file%read_array("partition", 0, 3, values, error)
+    call expect(error, status_input, base//".h5: /arrays/partition: 4 words, but 0 to 3 were expected", "a shorter array")
     call file%read_table("grains", 5, words, records, counts, error)
     call expect_none(error, "reading after refusals")
     call file%close(error)

@@ -30,6 +30,7 @@ program test_schwarz
   call start_parallel()
   call comm%init()
   call alone%init(MPI_COMM_SELF)
+  call test_adapting()
   do dimension = 2, 3
     do k = 1, size(frictions)
       call test_loads(dimension, frictions(k))
@@ -167,6 +168,25 @@ contains
     end do
     call sim%free()
   end subroutine test_loads
+
+  !> The automatic factor falls by a fifth where changes alternate and grow to more than twice their lowest square, down to its
+  !> least.
+  subroutine test_adapting()
+    type(relaxation_t) :: relaxation
+    integer :: k
+
+    relaxation = relaxation_t(least=0.6_dp)
+    call relaxation%adapt(1.0_dp, 0.0_dp)
+    call relaxation%adapt(1.0_dp, -1.0_dp)
+    call check_close(relaxation%factor, 1.0_dp, 0.0_dp, "the whole of a change at first")
+    call relaxation%adapt(4.0_dp, -2.0_dp)
+    call check(relaxation%grows, "changes that alternate and grow")
+    call check_close(relaxation%factor, 0.8_dp, 4*epsilon(1.0_dp), "four fifths of a change")
+    do k = 2, 6
+      call relaxation%adapt(4.0_dp**k, -0.5_dp*4.0_dp**k)
+    end do
+    call check_close(relaxation%factor, 0.6_dp, 0.0_dp, "the least factor")
+  end subroutine test_adapting
 
   !> With relaxation w, R^ddm goes the share w of the way to the neighbours' reactions, and V = M^-1 (R^d + R^ddm + H r).
   subroutine test_relaxation(dimension, friction)

@@ -31,6 +31,7 @@ program test_contact_problem
     call test_masses(dimension, 0.0_dp)
     call test_jump(dimension)
     call test_no_impulse(dimension)
+    call test_attractions(dimension)
   end do
   call test_not_finite()
   call finish_checks()
@@ -125,11 +126,67 @@ contains
     call gather_velocities(many%problem, int(many%n_grains), other, same)
     call check(same, "one velocity in all copies, bit for bit")
     call check_close(maxval(abs(other - velocity)), 0.0_dp, rounding, "velocities of the undivided bodies")
+    call check_close(square_of(many%problem), square_of(one%problem), rounding*square_of(one%problem), "square of the velocities")
     call check(one%problem%any_impulse(), "some impulse in one subdomain")
     call check(many%problem%any_impulse(), "some impulse in several subdomains")
     call one%free()
     call many%free()
   end subroutine test_against_one
+
+  !> (V, V)_M over all subdomains.
+  real(dp) function square_of(problem)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: parts(size(problem%sub))
+    integer :: s
+
+    do s = 1, size(parts)
+      parts(s) = problem%sub(s)%product_of(problem%sub(s)%v_global, problem%sub(s)%v_global)
+    end do
+    square_of = comm%sum_real(parts)
+  end function square_of
+
+  !> Attractions as loads, and taken off again after a solve: velocities are the same, and the reactions are those of the impulses
+  !> that are left.
+  subroutine test_attractions(dimension)
+    integer, intent(in) :: dimension
+    !> as the roundings of `test_against_one`
+    real(dp), parameter :: rounding = 1.0e-12_dp
+    type(simulation_t) :: sim
+    real(dp), allocatable :: velocity(:, :), reaction(:, :)
+    integer :: s, b, c, d
+    logical :: same
+
+    call make(dimension, 3, 0.3_dp, sim)
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        allocate (sub%attraction(size(sub%hot, 1), size(sub%hot, 3)), source=0.0_dp)
+        do c = 1, sub%n_contacts
+          sub%attraction(lane_of(c), block_of(c)) = 0.125_dp
+        end do
+      end associate
+    end do
+    call sim%problem%load_attraction()
+    call set_impulses(sim%problem)
+    call sim%problem%evaluate()
+    call sim%problem%shift_impulses(-1)
+    same = .true.
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        velocity = sub%v_global
+        reaction = sub%reaction
+        call sim%problem%own_reactions(s)
+        do b = 1, sub%n_bodies
+          do d = 1, dimension
+            same = same .and. abs(sub%v_free(d, b) + sub%inverse_mass(d, b)*reaction(d, b) - velocity(d, b)) <= rounding
+            ! a body of one subdomain has no other reaction
+            if (sub%multiplicity(b) == 1) same = same .and. abs(reaction(d, b) - sub%reaction(d, b)) <= rounding
+          end do
+        end do
+      end associate
+    end do
+    call check(same, "velocities and reactions without attractions")
+    call sim%free()
+  end subroutine test_attractions
 
   !> v_global of every grain in contact, on all ranks, and whether all its copies have the same bits.
   subroutine gather_velocities(problem, n_grains, velocity, same)

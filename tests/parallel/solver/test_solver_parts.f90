@@ -19,6 +19,7 @@ program test_solver_parts
   use gravier_layer_trial, only: layer_trial_t
   use gravier_velocity_error, only: copies_ready
   use gravier_check_schedule, only: check_schedule_t
+  use gravier_stagnation, only: stagnation_t
   use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, normals_are_in_vain
   use gravier_proximal_law, only: proximal_law_t
   use gravier_newton, only: newton_t
@@ -48,6 +49,7 @@ program test_solver_parts
   call test_schedule(.false.)
   call test_schedule(.true.)
   call check_vain_impulses()
+  call check_stagnation()
   call check_law(2)
   call check_law(3)
   call check_newton()
@@ -99,15 +101,16 @@ contains
     type(ways_t), allocatable :: ways(:)
     integer :: s, b, round
 
-    ! the slope touches the lowest disk, and its normal is at 0.28 to the way up
+    ! two slopes touch the lowest disk, with normals at 0.6 and 0.28 to the way up
     call make_column(n, subdomains, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0 /"//newline// &
+      & "&boundary shape = 'plane', point = -0.8, 0.4, normal = 0.8, 0.6 /"//newline// &
       & "&boundary shape = 'plane', point = 0.96, 0.72, normal = -0.96, 0.28 /"//newline//"&solver method = 'nscdd' /", sim)
     call find_supports(sim%problem, supports)
     do s = 1, size(supports)
       associate (sub => sim%problem%sub(s))
         do b = sub%n_grains + 1, sub%n_columns
-          call check(supports(s)%column(b) .eqv. abs(sim%decomposition%boundaries(sub%boundary(b))%axis(2)) > 0.9_dp, &
-            & "the floor alone supports")
+          call check(supports(s)%column(b) .eqv. abs(sim%decomposition%boundaries(sub%boundary(b))%axis(2)) > 0.5_dp, &
+            & "the floor and the gentle slope support")
         end do
         call check(.not. any(supports(s)%column(1:sub%n_grains)), "grains do not")
       end associate
@@ -302,6 +305,13 @@ contains
     call schedule%forget_ratio()
     call check(calls(schedule, sim%problem, scheme, 200), "without a ratio a check is made")
     scheme%momentum%on = .true.
+    call set_progress(sim%problem, 1.0e-2_dp)
+    call check(calls(schedule, sim%problem, scheme, 210), "and so with momentum")
+    ! the figure has fallen, the ratio is 4, and no pause is longer than 0.06 of the iterations made
+    call schedule%note_check(210, 0.04_dp)
+    call set_progress(sim%problem, 2.0e-4_dp)
+    call check(.not. calls(schedule, sim%problem, scheme, 223), "0.8 times the goal is expected, but too soon")
+    call check(calls(schedule, sim%problem, scheme, 225) .eqv. chooses, "and late enough")
     call check_equal(schedule%first_check(scheme), merge(2, 10, chooses), "the first check of sweeps with momentum")
     call sim%free()
   end subroutine test_schedule
@@ -316,15 +326,33 @@ contains
     calls = schedule%calls(problem, scheme, iteration, 1.0e-3_dp, 1.0_dp, descent)
   end function calls
 
+  !> A solve has stagnated when waves have run to and fro, six times the depth, and not before; the impulses of a column are not in
+  !> vain.
+  subroutine check_stagnation()
+    type(simulation_t) :: sim
+    type(stagnation_t) :: stagnation
+    logical :: due, stagnates, in_vain
+
+    call make_column(3, 2, "&solver method = 'nscdd' /", sim)
+    call stagnation%note(sim%problem, 10, 1.0_dp, .true., 0.0_dp, due)
+    call check(.not. due, "the first figure is a gain")
+    call stagnation%note(sim%problem, 5000, 1.0_dp, .true., 0.0_dp, due)
+    call stagnation%judge(sim%problem, 5000, 834, stagnates, in_vain)
+    call check(.not. stagnates, "5000 iterations are too few for a depth of 834")
+    call stagnation%judge(sim%problem, 5000, 833, stagnates, in_vain)
+    call check(stagnates .and. .not. in_vain, "and enough for one of 833")
+    call sim%free()
+  end subroutine check_stagnation
+
   !> A disk between two planes that close on it: equal impulses from both are in vain, and unequal ones, or those of planes that
-  !> open, are not.
+  !> open, or that do not come to touch it in the step, are not.
   subroutine check_vain_impulses()
     type(simulation_t) :: sim
     type(kept_impulses_t), allocatable :: none(:), now(:)
     integer :: s, c, round
     logical :: expected
 
-    do round = 1, 3
+    do round = 1, 4
       ! gravity is along the planes
       call make_column(1, 1, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0, velocity = "// &
         & trim(merge("-1", " 1", round == 2))//", 0 /"//newline//"&boundary shape = 'plane', point = 1, 0, normal = -1, 0, "// &
@@ -339,6 +367,7 @@ contains
             ! nothing from the floor
             if (abs(sub%hot(lane_of(c), 2, block_of(c))) > 0.5_dp) cycle
             sub%impulse(lane_of(c), 1, block_of(c)) = 1.0e3_dp
+            if (round == 4) sub%hot(lane_of(c), 3, block_of(c)) = 2.0_dp
             if (round == 3 .and. sub%hot(lane_of(c), 1, block_of(c)) > 0.0_dp) sub%impulse(lane_of(c), 1, block_of(c)) = 0.0_dp
           end do
           now(s)%value = sub%impulse

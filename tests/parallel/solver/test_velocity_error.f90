@@ -119,6 +119,7 @@ contains
     type(simulation_t) :: sim
     type(velocity_error_t) :: velocity
     real(dp) :: residual, defect, alone, alone_defect
+    integer :: s
 
     call make(count, n_subdomains, sim)
     call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
@@ -138,10 +139,25 @@ contains
     call check_close(velocity%levels%fastest_body, expected/0.65_dp, 1e-9_dp*expected, "each disk sinks by as much")
     call check_close(velocity%levels%mean_of_bodies, expected/0.65_dp, 1e-9_dp*expected, "mean over disks that sink by as much")
     call check_close(velocity%estimate(), expected, 1e-9_dp*expected, "estimate")
+    ! Y counts 2.4 times and L 4 times where errors are compared with what is allowed
+    call check_close(velocity%criterion(), hypot(2.4_dp, 4.0_dp/0.65_dp)*expected, 1e-9_dp*expected, "criterion")
     ! the residual of an assessment is that of the problem
     call sim%problem%residual(alone, alone_defect)
     call check_close(residual, alone, 1e-12_dp*alone, "residual")
     call check_close(defect, alone_defect, 1e-12_dp*alone_defect, "defect")
+    ! with earlier impulses, which tell something else, Y is as large: the impulses alone see all of a uniform velocity
+    do s = 1, size(sim%problem%sub)
+      associate (impulse => sim%problem%sub(s)%impulse)
+        sim%scheme%momentum%part(s)%impulse = impulse*(1.0_dp + 0.5_dp*sin(impulse/(mass*gravity*step)))
+      end associate
+    end do
+    call velocity%assess(sim%problem, sim%scheme, 1, residual, defect)
+    call check_close(velocity%projection, expected, 1e-9_dp*expected, "Y with earlier impulses")
+    ! C of bodies at rest whose impulses work on shifts
+    sim%problem%kinetic = 0.0_dp
+    sim%problem%shift_power = 0.5_dp*count*mass*expected**2
+    call velocity%bound(sim%problem)
+    call check_close(velocity%bound_by_rest, expected, 1e-9_dp*expected, "C of shifts")
     call sim%free()
   end subroutine test_share
 

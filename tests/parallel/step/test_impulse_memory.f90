@@ -53,6 +53,7 @@ program test_impulse_memory
     call test_new_partition(dimension, 3, rule_primal)
   end do
   call test_turned_frames()
+  call test_rolling()
   call test_nothing_kept()
   call finish_checks()
   call comm%free()
@@ -352,6 +353,44 @@ contains
     call recall_impulses(seen, problem)
     call check_projected(problem, kept)
   end subroutine test_turned_frames
+
+  !> Moments of spheres come back as they were kept, to a few roundings of numbers of size 1.
+  subroutine test_rolling()
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(neighbourhoods_t) :: seen
+    type(kernels_t) :: kernels
+    type(physics_t) :: physics
+    type(contact_problem_t) :: problem
+    type(interface_figures_t) :: figures
+    real(dp), allocatable :: before(:, :, :)
+    real(dp) :: impulse(6)
+    integer :: s, c, e
+
+    call cloud%init(3, 220, 0.03_dp, 0.1_dp, 91)
+    decomposition%rule = cloud%rule(0.02_dp, 0.04_dp, rule_dual)
+    call make_decomposition(comm, cloud, 5, 6, .false., decomposition)
+    call kernels%choose(3, effects_t(friction=.true., rolling=.true.))
+    call check_equal(impulse_entries(kernels), 7, "entries of an impulse in space with rolling")
+    seen%memory%n_impulse = 7
+    call seen%build(decomposition)
+    call build_problem(decomposition, seen, kernels, physics, problem, figures)
+    do s = 1, size(problem%sub)
+      do c = 1, problem%sub(s)%n_contacts
+        do e = 1, 6
+          impulse(e) = 0.1_dp + hash_uniform(6, int(c, i8), e)
+        end do
+        call put_contact_column(impulse, c, problem%sub(s)%impulse)
+      end do
+    end do
+    call keep_impulses(problem, seen)
+    do s = 1, size(problem%sub)
+      before = problem%sub(s)%impulse
+      problem%sub(s)%impulse(:, :, :) = 0.0_dp
+      call recall_impulses(seen, problem)
+      call check(all(abs(problem%sub(s)%impulse - before) <= 32*epsilon(1.0_dp)), "forces and moments come back")
+    end do
+  end subroutine test_rolling
 
   subroutine set_tangential(problem, kept)
     type(contact_problem_t), intent(inout) :: problem

@@ -13,7 +13,7 @@ program test_step_parts
   use gravier_diagnostics, only: diagnostics_t
   use gravier_departures, only: some_leave, let_grains_out
   use gravier_overlap_projection, only: project_overlaps
-  use gravier_sleeping, only: wake_all, put_sleepers_last
+  use gravier_sleeping, only: wake_all, put_sleepers_last, count_rest
   use gravier_narrow_phase, only: found_t, find_contacts
   use gravier_contact_kernels, only: lanes
   use gravier_config, only: config_t, parse_config
@@ -192,6 +192,12 @@ contains
     found = 0
     do k = 1, diagnostics%n_columns
       select case (diagnostics%name(k))
+      case ("kinetic_translation")
+        call check_close(diagnostics%value(k), diagnostics%energy%translation, 0.0_dp, "column of the translation")
+      case ("potential_energy")
+        call check_close(diagnostics%value(k), diagnostics%energy%potential, 0.0_dp, "column of the potential")
+      case ("load_work")
+        call check_close(diagnostics%value(k), diagnostics%energy%load_work, 0.0_dp, "column of the work of loads")
       case ("dissipated_normal")
         call check_close(diagnostics%value(k), diagnostics%energy%dissipated_normal, 0.0_dp, "column of the energy")
       case ("stress_xx")
@@ -203,7 +209,7 @@ contains
       end select
       found = found + 1
     end do
-    call check_equal(found, 3, "columns of all groups")
+    call check_equal(found, 6, "columns of all groups")
   end subroutine check_columns
 
   subroutine check_energy(energy, translation, rotation, load_work, boundary_work, carried_away, normal, tangential)
@@ -289,6 +295,7 @@ contains
       & 0.0_dp, 0.0_dp, p*slip)
     call check_balance(sim%balance, 0.5_dp*m*(v - p/m)**2 + p**2/m + 0.5_dp*(g*h)**2, 0.5_dp*(g*h)**2, -p*(slip + speed))
     call check_close(sim%diagnostics%structure%sliding_fraction, 1.0_dp, 0.0_dp, "the contact slides")
+    call check_close(sim%diagnostics%structure%fabric(2, 2), 0.0_dp, 0.0_dp, "the fabric is that of grains among each other")
     call check_close(sim%boundary_impulses(1, 1), p, solved, "the plane is dragged along")
     call check_close(sim%boundary_impulses(2, 1), -m*g*h, solved, "and pressed down")
     call sim%free()
@@ -318,6 +325,7 @@ contains
     call check_close(sim%diagnostics%energy%potential, -m*(dot_product(a, x) + dot_product(a, [3.0_dp, 0.0_dp] + 0.5_dp*h*h*a)), &
       & 100*solved, "potential of both loads")
     call check_state(sim%diagnostics%energy)
+    call check_columns(sim%diagnostics)
     call sim%free()
   end subroutine check_loads
 
@@ -538,6 +546,11 @@ contains
     call check_equal(counted(sim, 1), 6, "steps are counted as far as it takes to sleep")
     call check_equal(figures%asleep, 2_i8, "both contacts sleep")
     call check_close(grain(sim, 1, 2), 0.0_dp, 0.0_dp, "what sleeps does not move")
+    do k = 1, size(sim%problem%sub)
+      sim%problem%sub(k)%v_global(3, 1:sim%problem%sub(k)%n_grains) = 1.0_dp
+    end do
+    call count_rest(sim%sleeping, sim%decomposition%boundaries, .true., sim%neighbourhoods, sim%problem)
+    call check_equal(counted(sim, 1), 0, "a disk that spins is not at rest")
     call wake_all(sim%neighbourhoods)
     call check_equal(counted(sim, 1), 0, "woken contacts count from the start")
     call advance(sim, figures)
@@ -660,6 +673,16 @@ contains
     call check_close(grain(sim, 2, 1, .true.), 0.095_dp + 0.25_dp*(overlap - allowed), solved, "the heavy one by 1/4")
     call check_close(shifts, overlap - allowed, solved, "lengths of the shifts")
     call check_close(abs(grain(sim, 1, 1)) + abs(grain(sim, 2, 1)), 0.0_dp, 0.0_dp, "nothing gets a velocity")
+    call sim%free()
+    ! an approach of 0.2 m/s adds 0.002 in the next step, and half of it has come about in the middle of this one
+    call add_grain(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.2_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 3.0_dp, 0, 0.095_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call sim%assemble(figures)
+    call sim%problem%evaluate()
+    call project_overlaps(sim%decomposition, sim%problem, h, allowed, shifts)
+    call check_close(shifts, overlap + 0.5_dp*h*0.2_dp + h*0.2_dp - allowed, solved, "lengths of the shifts with an approach")
     call sim%free()
     ! 0.08 too much: the light grain would move by 0.0585, and moves by 0.01
     call add_grain(1, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)

@@ -796,6 +796,8 @@ contains
       "&decomposition grid(1:2) = 2, 2: expected 3 integers >= 1 where dimension = 3")
     call refuse(nscdd // "grid(2) = 3 grid(1) = 2 subdomains = 5 /", &
       "&decomposition subdomains = 5: expected 6, the product of grid(2) = 3, grid(1) = 2")
+    call refuse(nscdd // "grid(2) = 3 grid(1) = 2 subdomains = 7 /", &
+      "&decomposition subdomains = 7: expected 6, the product of grid(2) = 3, grid(1) = 2")
     call refuse(column // "&decomposition subdomains = 4 /", "&decomposition subdomains = 4: " // one)
     call refuse(column // "&decomposition grid = 2, 3 /", "&decomposition grid = 2, 3: " // one)
   end subroutine test_rules_of_decomposition

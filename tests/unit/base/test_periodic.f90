@@ -3,7 +3,7 @@ program test_periodic
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_periodic, only: wrap
+  use gravier_periodic, only: wrap, shift_code, shift_of_code, no_shift
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -12,6 +12,7 @@ program test_periodic
   call test_rounding()
   call test_far()
   call test_random()
+  call test_codes()
   call finish_checks()
   call MPI_Finalize()
 
@@ -58,6 +59,28 @@ contains
       call check_equal(turns, merge(1, -1, far(k) > 0.0_dp)*huge(1), "far away: periods")
     end do
   end subroutine test_far
+
+  !> Every shift has a code of its own, and comes back from it.
+  subroutine test_codes()
+    integer :: x, y, z, shift(3), again(3)
+    logical :: same
+
+    same = .true.
+    do z = -1, 1
+      do y = -1, 1
+        do x = -1, 1
+          shift(1) = x
+          shift(2) = y
+          shift(3) = z
+          again(:) = shift_of_code(shift_code(shift))
+          same = same .and. all(again == shift)
+        end do
+      end do
+    end do
+    call check(same, "shifts and their codes")
+    shift(:) = 0
+    call check_equal(shift_code(shift), no_shift, "the code of no shift")
+  end subroutine test_codes
 
   !> Up to a million periods away: the roundings of coordinates below 1e7.
   subroutine test_random()

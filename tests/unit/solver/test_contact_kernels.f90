@@ -6,7 +6,7 @@ program test_contact_kernels
   use gravier_effects, only: effects_t
   use gravier_random_hash, only: hash_uniform
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, global_impulse, tangents, local_operator, lanes, n_blocks, &
-    & lane_of, block_of, rolling_radius
+    & lane_of, block_of, rolling_radius, global_moment
   use gravier_test_contact_columns, only: contact_column, put_contact_column, same_contacts
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -44,6 +44,7 @@ program test_contact_kernels
       call test_velocity(dimension, effects)
       if (.not. effects%rolling) call test_one_contact(dimension, effects)
       if (effects%rolling) call test_rolling_contact(dimension, effects)
+      if (effects%rolling) call test_moments(dimension, effects)
       call test_record(dimension, effects)
       call test_components(dimension, effects)
       call test_blocks(dimension, effects)
@@ -206,6 +207,33 @@ contains
       deallocate (reaction, contact_velocity)
     end do
   end subroutine test_adjoint
+
+  !> The moment of a contact on its candidate is what the rows of the Jacobian make of its last impulses; R* of two levers, and
+  !> of one.
+  subroutine test_moments(dimension, effects)
+    integer, intent(in) :: dimension
+    type(effects_t), intent(in) :: effects
+    type(case_t) :: problem
+    real(dp), allocatable :: candidate(:, :), antagonist(:, :), r(:), moment(:)
+    integer :: c, d
+
+    call make_case(dimension, effects, 20, 7, problem)
+    associate (kernels => problem%kernels)
+      allocate (candidate(kernels%nc, kernels%nv), antagonist(kernels%nc, kernels%nv), r(kernels%nc))
+      allocate (moment(kernels%nv - kernels%nd))
+      do c = 1, 20
+        call contact_jacobian(kernels, problem%hot, c, candidate, antagonist)
+        call global_moment(kernels, problem%hot, problem%impulse, c, moment)
+        r(:) = contact_column(problem%impulse, c)
+        do d = 1, size(moment)
+          call check_close(moment(d), sum(candidate(kernels%nf + 1:, kernels%nd + d)*r(kernels%nf + 1:)), rounding, &
+            & "moment of a contact")
+        end do
+      end do
+    end associate
+    call check_close(rolling_radius(1.0_dp, 3.0_dp), 0.75_dp, rounding, "effective radius of two grains")
+    call check_close(rolling_radius(2.0_dp, 0.0_dp), 2.0_dp, rounding, "effective radius of a grain on a wall")
+  end subroutine test_moments
 
   !> H^T V by the kernel, by the rows of the Jacobian, and by the motion of the two material points that touch:
   !> v = v_i + w_i x (-R_i n) - v_j - w_j x (R_j n), on (n, t, s).

@@ -110,7 +110,7 @@ contains
       call move_to_end(simulation%decomposition, simulation%physics, theta, .false.)
       call check_close(norm2(home%position(:, 1) - start - h*v), 0.0_dp, 1e-15_dp, "q_i+1")
       call check_close(ceiling%point(2), 9.0_dp - 2.0_dp*h, 1e-12_dp, "boundary at the end")
-      call move_to_middle(simulation%decomposition, simulation%physics, theta, 1.5_dp, .false., taken)
+      call move_to_middle(simulation%decomposition, simulation%physics, theta, 1.0_dp, .false., taken)
       call check(taken .and. .not. ceiling%present, "taken away when its time has come")
       call check_equal(int(count_fast(simulation%decomposition, simulation%physics)), 0, "none is fast")
       home%velocity(2, 2) = 1.01_dp*home%radius(2)/h
@@ -202,7 +202,7 @@ contains
     solve%status = solve_converged
     solve%velocity_error = 0.02_dp
     solve%velocity_scale = 0.1_dp
-    solve%residual = 1e-3_dp
+    solve%residual = 2e-2_dp
     call tally%add_solve(solve, "load of a step")
     solve%status = solve_stagnated
     solve%velocity_error = 0.06_dp
@@ -218,7 +218,7 @@ contains
     call check_equal(int(tally%diverged), 1, "diverged")
     call check_close(tally%worst_error, 0.6_dp, 1e-12_dp, "worst error over the scale, of those that are numbers")
     call check_equal(int(tally%far_off), 1, "beyond half of the scale")
-    call check_close(tally%worst_residual, 1e-2_dp, 0.0_dp, "worst residual")
+    call check_close(tally%worst_residual, 2e-2_dp, 0.0_dp, "worst residual")
     call check_close(tally%least_scale, 0.1_dp, 0.0_dp, "smallest scale")
     call check_close(tally%most_scale, 0.4_dp, 0.0_dp, "largest scale")
     call check_equal(tally%n_kinds, 2, "kinds of scales")
