@@ -2,6 +2,8 @@
 import glob
 import os
 import re
+import subprocess
+import sys
 import unittest
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
@@ -60,6 +62,12 @@ class ModuleTests(unittest.TestCase):
         self.assertEqual(sorted(set(EXCEPTIONS) & used()), [], "exceptions that have a direct test")
         for test in EXCEPTIONS.values():
             self.assertTrue(os.path.isfile(os.path.join(SOURCE, "tests", test)), test)
+
+    def test_changes_are_in_place(self):
+        """Each change by which the power of the tests is measured still applies to its file."""
+        listed = subprocess.run([sys.executable, os.path.join(SOURCE, "tests/support/power_of_tests.py"), "--list"], capture_output=True,
+                                text=True, check=False)
+        self.assertEqual(listed.returncode, 0, listed.stderr)
 
 
 if __name__ == "__main__":
