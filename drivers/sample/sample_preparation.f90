@@ -9,6 +9,7 @@ module gravier_sample_preparation
   use gravier_motion, only: grain_volume
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
+  use gravier_load_areas, only: facing_area
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_log, only: run_log_t
   use gravier_sample_rest, only: rest_t
@@ -99,7 +100,7 @@ contains
         boundaries(b)%free(1:nd) = boundaries(b)%axis(1:nd) < 0.0_dp
         ! at least as heavy as a layer of grains, and so heavy that a step does not add much to its speed
         boundaries(b)%mass = max(layer, 2.0_dp*simulation%physics%h*simulation%config%sample%pressure* &
-          & simulation%facing_area(b)/speed_limit(simulation))
+          & facing_area(simulation%decomposition, b)/speed_limit(simulation))
       end do
     end associate
   end subroutine free_planes
@@ -117,7 +118,7 @@ contains
     associate (boundaries => simulation%decomposition%boundaries)
       do b = 1, simulation%n_walls
         if (.not. boundaries(b)%is_driven()) cycle
-        boundaries(b)%given_force(:) = simulation%config%sample%pressure*simulation%facing_area(b)*boundaries(b)%axis
+        boundaries(b)%given_force(:) = simulation%config%sample%pressure*facing_area(simulation%decomposition, b)*boundaries(b)%axis
         where (boundaries(b)%free) boundaries(b)%velocity = keep*min(max(boundaries(b)%velocity, -limit), limit)
       end do
     end associate
@@ -265,7 +266,7 @@ contains
       end do
     end associate
     ! the first plane is the floor, where there is one
-    solid_fraction = simulation%comm%sum_real(volume)/(simulation%facing_area(1)*height())
+    solid_fraction = simulation%comm%sum_real(volume)/(facing_area(simulation%decomposition, 1)*height())
 
   contains
 

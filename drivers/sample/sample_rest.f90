@@ -3,6 +3,7 @@ module gravier_sample_rest
   use gravier_kinds, only: dp
   use gravier_motion, only: grain_volume
   use gravier_solve, only: solve_converged
+  use gravier_load_areas, only: facing_area
   use gravier_simulation, only: simulation_t, step_figures_t
   implicit none
   private
@@ -83,7 +84,7 @@ contains
     nd = simulation%decomposition%nd
     do b = 1, size(self%pressure)
       self%pressure(b) = -sum(simulation%boundary_impulses(:, b)*simulation%decomposition%boundaries(b)%axis(1:nd))/ &
-        & (simulation%physics%h*simulation%facing_area(b))
+        & (simulation%physics%h*facing_area(simulation%decomposition, b))
     end do
   end subroutine measure_pressures
 
@@ -101,7 +102,7 @@ contains
       do b = 1, size(self%pressure)
         if (.not. simulation%decomposition%boundaries(b)%is_driven()) cycle
         unbalanced = max(unbalanced, abs(self%pressure(b)/pressure - 1.0_dp))
-        largest_area = max(largest_area, simulation%facing_area(b))
+        largest_area = max(largest_area, facing_area(simulation%decomposition, b))
       end do
       unbalanced = max(unbalanced, norm2(sum(simulation%boundary_impulses, dim=2))/(simulation%physics%h*pressure*largest_area))
     end associate

@@ -11,7 +11,7 @@ module gravier_communicator
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, status_failure
-  use gravier_pause, only: pause_for
+  use gravier_process, only: pause_for, end_at_once
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -54,12 +54,6 @@ module gravier_communicator
       implicit none
       type(c_funptr), value :: action
     end function c_atexit
-
-    subroutine c_exit_now(status) bind(C, name="_exit")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: status
-    end subroutine c_exit_now
   end interface
 
   !> between start_parallel and stop_parallel
@@ -86,7 +80,7 @@ contains
 
   !> What the C library calls when the process ends.
   subroutine end_early() bind(C)
-    if (parallel) call c_exit_now(int(status_failure, c_int))
+    if (parallel) call end_at_once(status_failure)
   end subroutine end_early
 
   !> First line of what the MPI library says of itself.

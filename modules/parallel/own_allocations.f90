@@ -3,11 +3,12 @@
 !> allocate, assignments and temporaries, of which some are not checked. What must fail softly asks room_for first. What libraries
 !> allocate is theirs.
 module gravier_own_allocations
-  use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_ptr, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit
   use mpi_f08, only: MPI_COMM_WORLD, MPI_Abort, MPI_Comm_size, MPI_Finalized, MPI_Initialized
   use gravier_kinds, only: dp
   use gravier_errors, only: status_failure
+  use gravier_process, only: end_at_once
   use gravier_room, only: bytes_text
   implicit none
   private
@@ -26,12 +27,6 @@ module gravier_own_allocations
       type(c_ptr), value :: address
       integer(c_size_t), value :: bytes
     end function real_realloc
-
-    subroutine c_exit_now(status) bind(C, name="_exit")
-      import :: c_int
-      implicit none
-      integer(c_int), value :: status
-    end subroutine c_exit_now
   end interface
 
   !> the program is ending: its last line may want memory, too
@@ -62,7 +57,7 @@ contains
     integer :: n_ranks
     logical :: started, ended
 
-    if (is_ending) call c_exit_now(int(status_failure, c_int))
+    if (is_ending) call end_at_once(status_failure)
     is_ending = .true.
     ! C counts without a sign
     amount = real(bytes, dp)
@@ -76,7 +71,7 @@ contains
     call MPI_Finalized(ended)
     if (started .and. .not. ended) call MPI_Comm_size(MPI_COMM_WORLD, n_ranks)
     if (n_ranks > 1) call MPI_Abort(MPI_COMM_WORLD, status_failure)
-    call c_exit_now(int(status_failure, c_int))
+    call end_at_once(status_failure)
   end subroutine end_without_memory
 
 end module gravier_own_allocations

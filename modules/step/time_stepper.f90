@@ -19,7 +19,7 @@ module gravier_time_stepper
   use gravier_division, only: division_rule_t, divide_again, division_is_due
   use gravier_interface, only: interface_figures_t
   use gravier_physics, only: physics_t
-  use gravier_load_areas, only: facing_area, find_load_areas
+  use gravier_load_areas, only: find_load_areas
   use gravier_problem_builder, only: build_problem
   use gravier_pair_laws, only: conclude_pairs
   use gravier_velocity_scale, only: velocity_scale_t
@@ -122,8 +122,6 @@ module gravier_time_stepper
   contains
     procedure :: assemble => time_stepper_assemble
     procedure :: advance => time_stepper_advance
-    procedure :: facing_area => time_stepper_facing_area
-    procedure :: load_areas => time_stepper_load_areas
     procedure :: free => time_stepper_free
   end type time_stepper_t
 
@@ -337,21 +335,6 @@ contains
     end subroutine refuse
 
   end subroutine check_numbers
-
-  !> Area that a pressure on plane `b` works on [m^2, m in 2D].
-  pure real(dp) function time_stepper_facing_area(self, b) result(area)
-    class(time_stepper_t), intent(in) :: self
-    integer, intent(in) :: b
-    area = facing_area(self%decomposition, b)
-  end function time_stepper_facing_area
-
-  !> Areas that the loads on boundaries work on.
-  pure subroutine time_stepper_load_areas(self, area)
-    class(time_stepper_t), intent(in) :: self
-    !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary
-    real(dp), intent(out) :: area(:)
-    call find_load_areas(self%decomposition, area)
-  end subroutine time_stepper_load_areas
 
   !> Give back what the method holds, and go back to step 0.
   subroutine time_stepper_free(self)

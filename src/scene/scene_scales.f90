@@ -6,6 +6,7 @@ module gravier_scene_scales
     & shape_outlet
   use gravier_physics, only: physics_t
   use gravier_velocity_scale, only: imposed_motion_t
+  use gravier_load_areas, only: find_load_areas
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -193,7 +194,7 @@ contains
     nd = simulation%decomposition%nd
     boundaries(:) = simulation%decomposition%boundaries
     physics = simulation%physics
-    call simulation%load_areas(area)
+    call find_load_areas(simulation%decomposition, area)
     do k = 1, size(times)
       if (allocated(simulation%gravity_table%has)) then
         do d = 1, nd

@@ -5,7 +5,7 @@ module gravier_output_lock
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_loc, c_short, c_size_t
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
-  use gravier_pause, only: pause_for
+  use gravier_process, only: pause_for
   use gravier_text, only: to_text, shell_word
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: place_of, place_of_open, is_device, host_name, remove_file

@@ -3,7 +3,7 @@ module gravier_method_options
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: method_features_t, method_options_t, held_list_t, default_always, default_never, default_on_active, name_length
+  public :: method_features_t, method_options_t, held_list_t, default_always, default_on_active
 
   integer, parameter :: name_length = 16, meaning_length = 120
 

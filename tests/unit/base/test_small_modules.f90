@@ -4,7 +4,7 @@ program test_small_modules
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf
   use gravier_kinds, only: dp
   use gravier_magnitude, only: is_bounded, is_size, sharpest
-  use gravier_pause, only: pause_for
+  use gravier_process, only: pause_for
   use gravier_heap, only: keep_heap
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t, shape_circle

@@ -1,9 +1,9 @@
-!> A process that has nothing to do leaves its processor to others for a while.
-module gravier_pause
+!> What a process does with itself: it leaves its processor to others for a while, or ends at once.
+module gravier_process
   use, intrinsic :: iso_c_binding, only: c_int
   implicit none
   private
-  public :: pause_for
+  public :: pause_for, end_at_once
 
   interface
     integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
@@ -11,6 +11,12 @@ module gravier_pause
       implicit none
       integer(c_int), value :: microseconds
     end function c_usleep
+
+    subroutine c_exit_now(status) bind(C, name="_exit")
+      import :: c_int
+      implicit none
+      integer(c_int), value :: status
+    end subroutine c_exit_now
   end interface
 
 contains
@@ -22,4 +28,10 @@ contains
     ignored = c_usleep(microseconds)
   end subroutine pause_for
 
-end module gravier_pause
+  !> End with a status, without what libraries do at the end of a program.
+  subroutine end_at_once(status)
+    integer, intent(in) :: status
+    call c_exit_now(int(status, c_int))
+  end subroutine end_at_once
+
+end module gravier_process
