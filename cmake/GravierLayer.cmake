@@ -11,13 +11,31 @@ endfunction()
 
 set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds; empty: none")
 
+# gravier_expand(VARIABLE TEMPLATE...): the list of the Fortran files that fypp makes of templates, NAME.f90 of NAME.fypp. Messages of
+# the compiler name the lines of the template.
+find_program(FYPP_EXECUTABLE fypp REQUIRED)
+function(gravier_expand variable)
+  set(expanded)
+  foreach(template ${ARGN})
+    file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR} ${template})
+    string(REGEX REPLACE "\\.fypp$" ".f90" name ${name})
+    set(output ${PROJECT_BINARY_DIR}/expanded/${name})
+    add_custom_command(OUTPUT ${output} VERBATIM DEPENDS ${template}
+      COMMAND ${FYPP_EXECUTABLE} --line-numbering --create-parents ${template} ${output})
+    list(APPEND expanded ${output})
+  endforeach()
+  set(${variable} ${expanded} PARENT_SCOPE)
+endfunction()
+
 # gravier_layer(NAME [USES LOWER] [LIBRARIES ...]): the static library gravier_NAME of all sources in modules/NAME and its rooms, the
 # folders in it, with a module directory of its own. USES names the next layer below, whose modules and those beneath it are seen.
 function(gravier_layer name)
   cmake_parse_arguments(LAYER "" "USES" "LIBRARIES" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.f90 ${PROJECT_SOURCE_DIR}/modules/${name}/*.F90)
+  file(GLOB_RECURSE templates CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/${name}/*.fypp)
+  gravier_expand(expanded ${templates})
   set(target gravier_${name})
-  add_library(${target} STATIC ${sources})
+  add_library(${target} STATIC ${sources} ${expanded})
   add_library(gravier::${name} ALIAS ${target})
   set(mod_dir ${PROJECT_BINARY_DIR}/mod/${name})
   set_target_properties(${target} PROPERTIES Fortran_MODULE_DIRECTORY ${mod_dir} EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)

@@ -21,6 +21,7 @@ class Gravier(CMakePackage):
     depends_on("c", type="build")
     depends_on("fortran", type="build")
     depends_on("cmake@3.20:", type="build")
+    depends_on("py-fypp@3.1:", type="build")
     depends_on("mpi")
     depends_on("hdf5+mpi+fortran")
     depends_on("mumps+mpi+double~int64")
