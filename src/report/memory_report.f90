@@ -3,6 +3,7 @@ module gravier_memory_report
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
+  use gravier_body_store, only: body_layout_t
   use gravier_method_options, only: held_list_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -127,18 +128,21 @@ contains
       end do
     end subroutine add_held
 
+    !> The fields of a grain.
     subroutine add_grain(item)
       type(item_t), intent(inout) :: item
+      type(body_layout_t) :: layout
+      character(len=:), allocatable :: name
+      integer :: f, bytes, entries
 
-      call item%add("id", 8, 1)
-      call item%add("position", 8, nd)
-      call item%add("velocity", 8, nv)
-      call item%add("radius", 8, 1)
-      call item%add("mass", 8, 1)
-      call item%add("inertia", 8, merge(1, 0, simulation%decomposition%nv > nd))
-      call item%add("glued", 4, 1)
-      call item%add("material", 4, 1)
-      call item%add("image", 4, ni)
+      layout = simulation%decomposition%layout()
+      f = 0
+      do
+        f = f + 1
+        call layout%describe_field(f, name, bytes, entries)
+        if (len(name) == 0) exit
+        call item%add(name, bytes, entries)
+      end do
     end subroutine add_grain
 
   end subroutine describe

@@ -7,13 +7,13 @@ module gravier_checkpoint
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_time_table, only: time_table_t
   use gravier_narrow, only: narrow, take_count
-  use gravier_body_store, only: place_word, grain_record
+  use gravier_body_store, only: body_layout_t, place_word, body_record
   use gravier_boundary, only: boundary_t, boundary_words, boundary_record
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_impulse_memory, only: list_impulses, match_impulses, pair_record
   use gravier_energy_balance, only: energy_words, energy_record
   use gravier_partition, only: head_words, head_record, is_sound_head
-  use gravier_magnitude, only: is_bounded, is_size, bounded_text
+  use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
   implicit none
@@ -31,7 +31,7 @@ contains
   function records_text() result(text)
     character(len=:), allocatable :: text
 
-    text = "grain: "//grain_record//" position_now"//newline//"pair: "//pair_record//newline// &
+    text = "grain: "//body_record//" position_now"//newline//"pair: "//pair_record//newline// &
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
       & "energy: "//energy_record//", "//to_text(energy_words)//" words"//newline// &
       & "partition: "//head_record//", "//to_text(head_words)//" words"
@@ -356,10 +356,12 @@ contains
     integer(i8), allocatable, intent(out) :: records(:, :)
     !> (subdomains of this rank)
     integer(i8), intent(out) :: counts(:)
+    type(body_layout_t) :: layout
     integer :: s, k, n, d, words, nd
 
     nd = simulation%decomposition%nd
-    words = simulation%decomposition%grain_words()
+    layout = simulation%decomposition%layout()
+    words = layout%record_words()
     associate (home => simulation%decomposition%home)
       do s = 1, size(home)
         counts(s) = home(s)%n
@@ -409,11 +411,13 @@ contains
     integer(i8), intent(in) :: builds
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:)
+    type(body_layout_t) :: layout
     integer :: s, k, n, d, nd, n_words, n_boundary
 
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
-      n_words = decomposition%grain_words()
+      layout = decomposition%layout()
+      n_words = layout%record_words()
       n_boundary = boundary_words*size(decomposition%boundaries)
       call file%read_table("grains", decomposition%n_subdomains, n_words + nd, records, counts, error)
       if (builds > 0) call file%read_array("boundaries_when_listed", n_boundary, n_boundary, words, error)
@@ -457,19 +461,16 @@ contains
     !> (words of a grain and its place now, grains of this rank)
     integer(i8), intent(in), contiguous :: records(:, :)
     type(error_t), allocatable, intent(inout) :: error
-    integer :: k, nd, nv
+    type(body_layout_t) :: layout
+    character(len=:), allocatable :: field
+    integer :: k
 
-    nd = simulation%decomposition%nd
-    nv = simulation%decomposition%nv
+    layout = simulation%decomposition%layout()
     do k = 1, size(records, 2)
-      associate (one => records(:, k), boundaries => size(simulation%decomposition%boundaries))
-        if (one(1) < 1 .or. .not. is_size(transfer(one(2), 0.0_dp)) .or. .not. is_size(transfer(one(3), 0.0_dp)) .or. &
-          & one(4) < 0 .or. one(4) > boundaries .or. one(5) < 0 .or. one(5) > max(1, size(simulation%config%materials))) &
-          & call raise(error, status_input, path//": table grains: grain "//to_text(one(1))// &
-          & " has an identifier, radius, mass, group or material that is none: the file is damaged")
-        call check_reals(path//": table grains: grain "//to_text(one(1)), one(place_word:place_word + nd + nv - 1), error)
-        call check_reals(path//": table grains: grain "//to_text(one(1)), one(size(one) - nd + 1:), error)
-      end associate
+      field = layout%invalid_field(records(:, k), size(simulation%decomposition%boundaries), size(simulation%config%materials))
+      if (len(field) > 0) call raise(error, status_input, path//": table grains: grain "//to_text(records(1, k))// &
+        & " has a value of "//field//" that no grain has: the file is damaged")
+      call check_reals(path//": table grains: grain "//to_text(records(1, k)), records(layout%record_words() + 1:, k), error)
       if (allocated(error)) return
     end do
   end subroutine check_grains

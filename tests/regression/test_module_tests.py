@@ -25,7 +25,8 @@ EXCEPTIONS = {
 def sources(folder):
     """Texts of the Fortran sources below a folder, by path."""
     found = {}
-    for path in sorted(glob.glob(os.path.join(SOURCE, folder, "**", "*.[fF]90"), recursive=True)):
+    for path in sorted(path for kind in ("*.[fF]90", "*.fypp")
+                       for path in glob.glob(os.path.join(SOURCE, folder, "**", kind), recursive=True)):
         with open(path, encoding="utf-8") as file:
             found[os.path.relpath(path, SOURCE)] = file.read()
     return found

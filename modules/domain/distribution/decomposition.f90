@@ -6,7 +6,7 @@ module gravier_decomposition
   use gravier_periodic, only: period_t
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
-  use gravier_body_store, only: body_set_t, append_bodies, place_word
+  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, place_word
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_partition, only: partition_t
@@ -34,7 +34,7 @@ module gravier_decomposition
     procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
     procedure :: subdomain_of => decomposition_subdomain_of
-    procedure :: grain_words => decomposition_grain_words
+    procedure :: layout => decomposition_layout
     procedure :: find_home => decomposition_find_home
   end type decomposition_t
 
@@ -71,16 +71,12 @@ contains
     subdomain = self%first + s - 1
   end function decomposition_subdomain_of
 
-  !> Words of the record of a grain.
-  pure integer function decomposition_grain_words(self) result(words)
+  !> The layout of the bodies of all subdomains.
+  pure type(body_layout_t) function decomposition_layout(self) result(layout)
     class(decomposition_t), intent(in) :: self
-    type(body_set_t) :: grains
 
-    grains%nd = self%nd
-    grains%nv = self%nv
-    grains%ni = self%ni
-    words = grains%record_words()
-  end function decomposition_grain_words
+    layout = body_layout_t(self%nd, self%nv, self%ni)
+  end function decomposition_layout
 
   !> Subdomain of this rank and place in its home of a grain.
   pure subroutine decomposition_find_home(self, key, h, place)

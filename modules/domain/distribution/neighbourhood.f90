@@ -4,7 +4,7 @@ module gravier_neighbourhood
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sparse_exchange, only: sparse_exchange
-  use gravier_body_store, only: body_set_t, append_bodies
+  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies
   use gravier_boundary, only: boundary_t, shape_plane, shape_grains, shape_outlet
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_search, only: find_neighbours, sweep_order
@@ -109,9 +109,11 @@ contains
     class(neighbourhoods_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable, intent(out) :: records(:, :)
+    type(body_layout_t) :: layout
     integer :: n
 
-    allocate (records(2 + decomposition%grain_words(), size(self%seer)))
+    layout = decomposition%layout()
+    allocate (records(2 + layout%record_words(), size(self%seer)))
     do n = 1, size(self%seer)
       records(1, n) = self%seer(n)
       records(2, n) = decomposition%subdomain_of(self%sent(1, n))
@@ -193,43 +195,28 @@ contains
     end do
   end subroutine sort_views
 
-  !> Bring the places and velocities in the views up to date. Collective.
+  !> Bring the places, velocities and what else changes in every step up to date in the views. Collective.
   subroutine neighbourhoods_refresh(self, decomposition)
     class(neighbourhoods_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable :: records(:, :), received(:, :)
-    integer :: s, k, d, n, nd, nv
+    type(body_layout_t) :: layout
+    integer :: s, k, n
 
-    nd = decomposition%nd
-    nv = decomposition%nv
-    allocate (records(nd + nv, size(self%seer)))
+    layout = decomposition%layout()
+    allocate (records(layout%renewed_words(), size(self%seer)))
     do n = 1, size(self%seer)
-      associate (home => decomposition%home(self%sent(1, n)))
-        do d = 1, nd
-          records(d, n) = transfer(home%position(d, self%sent(2, n)), 0_i8)
-        end do
-        do d = 1, nv
-          records(nd + d, n) = transfer(home%velocity(d, self%sent(2, n)), 0_i8)
-        end do
-      end associate
+      call decomposition%home(self%sent(1, n))%get_renewed(self%sent(2, n), records(:, n))
     end do
     call sparse_exchange(decomposition%comm, records, self%destination, received)
     do n = 1, size(received, 2)
-      associate (bodies => self%view(self%arrival(1, n))%bodies)
-        do d = 1, nd
-          bodies%position(d, self%arrival(2, n)) = transfer(received(d, n), 0.0_dp)
-        end do
-        do d = 1, nv
-          bodies%velocity(d, self%arrival(2, n)) = transfer(received(nd + d, n), 0.0_dp)
-        end do
-      end associate
+      call self%view(self%arrival(1, n))%bodies%set_renewed(self%arrival(2, n), received(:, n))
     end do
     do s = 1, size(self%view)
       associate (view => self%view(s), home => decomposition%home(s))
         do k = 1, view%bodies%n
           if (view%origin(k) == 0) cycle
-          view%bodies%position(:, k) = home%position(:, view%origin(k))
-          view%bodies%velocity(:, k) = home%velocity(:, view%origin(k))
+          call view%bodies%renew(k, home, view%origin(k))
         end do
       end associate
     end do

@@ -1,9 +1,9 @@
-!> Grains in packed arrays: records that keep every bit, reordering, dropping, appending.
+!> Bodies in packed arrays: records that keep every bit, what is renewed and what is written, reordering, dropping, appending.
 program test_body_store
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_body_store, only: body_set_t, append_bodies, place_word
+  use gravier_body_store, only: body_set_t, body_field_t, append_bodies, written_fields, place_word, body_record
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   !> space dimensions, degrees of freedom with and without spin, entries of an image with and without periods
@@ -16,6 +16,10 @@ program test_body_store
     call test_reorder(kinds(:, k))
     call test_keep_only(kinds(:, k))
     call test_append(kinds(:, k))
+    call test_renewed(kinds(:, k))
+    call test_written(kinds(:, k))
+    call test_described(kinds(:, k))
+    call test_invalid(kinds(:, k))
   end do
   call finish_checks()
   call MPI_Finalize()
@@ -201,5 +205,139 @@ contains
     call append_bodies(fresh, more)
     call check_grains(fresh, sizes, behind, "to a set not made yet")
   end subroutine test_append
+
+  !> Copies get place and velocity, in messages or from a set beside them, and nothing else.
+  subroutine test_renewed(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
+    type(body_set_t) :: bodies, copies, beside
+    integer(i8), allocatable :: record(:)
+
+    call fill(bodies, sizes, 3, 1)
+    call fill(copies, sizes, 3, 31)
+    call fill(beside, sizes, 3, 31)
+    call check_equal(bodies%renewed_words(), sizes(1) + sizes(2), "words that are renewed")
+    allocate (record(bodies%renewed_words()))
+    call bodies%get_renewed(2, record)
+    call copies%set_renewed(3, record)
+    call beside%renew(3, bodies, 2)
+    call check(all(abs(copies%position(:, 3) - bodies%position(:, 2)) <= 0.0_dp) .and. &
+      & all(abs(copies%velocity(:, 3) - bodies%velocity(:, 2)) <= 0.0_dp), "place and velocity by message")
+    call check(all(abs(beside%position(:, 3) - bodies%position(:, 2)) <= 0.0_dp) .and. &
+      & all(abs(beside%velocity(:, 3) - bodies%velocity(:, 2)) <= 0.0_dp), "place and velocity of a neighbour set")
+    call check(is_grain(copies, 1, 31) .and. is_grain(copies, 2, 32) .and. is_grain(beside, 1, 31), "other copies stay")
+    copies%position(:, 3) = bodies%position(:, 3)
+    copies%velocity(:, 3) = bodies%velocity(:, 3)
+    call check(copies%id(3) == 33 .and. same(copies%radius(3), number(33_i8, 1)) .and. &
+      & same(copies%mass(3), number(33_i8, 2)) .and. copies%material(3) == 3 + image_of(33_i8, 1), &
+      & "identifier, radius, mass and material are not renewed")
+  end subroutine test_renewed
+
+  !> What files get beside identifier, place, velocity and radius.
+  subroutine test_written(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
+    type(body_set_t) :: bodies
+    type(body_field_t), allocatable :: fields(:)
+    real(dp), allocatable :: values(:, :)
+    integer :: f
+
+    call fill(bodies, sizes, 4, 1)
+    call written_fields(fields)
+    call check_equal(size(fields), 2, "fields that are written")
+    do f = 1, size(fields)
+      call bodies%get_written(f, values)
+      call check(all(shape(values) == [1, 4]), "shape of "//fields(f)%name)
+      select case (fields(f)%name)
+      case ("mass")
+        call check(.not. fields(f)%whole .and. fields(f)%unit == "kg", "what masses are")
+        call check(all(abs(values(1, :) - bodies%mass) <= 0.0_dp), "masses")
+      case ("material")
+        call check(fields(f)%whole .and. all(nint(values(1, :)) == bodies%material), "materials")
+      case default
+        call check(.false., "a field of another name: "//fields(f)%name)
+      end select
+    end do
+  end subroutine test_written
+
+  !> Names and bytes of the fields add up to the record that travels.
+  subroutine test_described(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
+    type(body_set_t) :: bodies
+    character(len=:), allocatable :: name, names
+    integer :: f, bytes, entries, words
+
+    call bodies%init(sizes(1), sizes(2), sizes(3), 2)
+    call check(all(bodies%material == 1), "the material of a new body")
+    names = ""
+    words = 0
+    f = 0
+    do
+      f = f + 1
+      call bodies%describe_field(f, name, bytes, entries)
+      if (len(name) == 0) exit
+      call check_equal(bytes, merge(4, 8, name == "glued" .or. name == "material" .or. name == "image"), "bytes of "//name)
+      names = names//name//" "
+      words = words + entries
+    end do
+    call check(trim(names) == body_record, "names of the fields")
+    call check_equal(words, bodies%record_words(), "entries of the fields")
+    call check(bytes == 0 .and. entries == 0, "nothing behind the last field")
+  end subroutine test_described
+
+  !> Each field that a file may hold wrongly is named.
+  subroutine test_invalid(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
+    type(body_set_t) :: bodies
+
+    call bodies%init(sizes(1), sizes(2), sizes(3), 1)
+    bodies%id = 7
+    bodies%radius = 0.5_dp
+    bodies%mass = 2.0_dp
+    bodies%glued = 2
+    bodies%position = -1.0_dp
+    bodies%velocity = 3.0_dp
+    bodies%image = -4
+    bodies%inertia = 0.25_dp
+    call expect_invalid(bodies, "", "a sound body")
+    bodies%id = 0
+    call expect_invalid(bodies, "id", "no identifier")
+    bodies%id = 7
+    bodies%radius = 0.0_dp
+    call expect_invalid(bodies, "radius", "no radius")
+    bodies%radius = transfer(-1_i8, 0.0_dp)
+    call expect_invalid(bodies, "radius", "a radius that is no number")
+    bodies%radius = 0.5_dp
+    bodies%mass = -2.0_dp
+    call expect_invalid(bodies, "mass", "a mass below 0")
+    bodies%mass = 2.0_dp
+    bodies%glued = 4
+    call expect_invalid(bodies, "glued", "a boundary that is not there")
+    bodies%glued = -1
+    call expect_invalid(bodies, "glued", "a boundary below 0")
+    bodies%glued = 0
+    bodies%material = 3
+    call expect_invalid(bodies, "material", "a material that is not there")
+    bodies%material = 2
+    bodies%position(sizes(1), 1) = transfer(-1_i8, 0.0_dp)
+    call expect_invalid(bodies, "position", "a place that is no number")
+    bodies%position = 0.0_dp
+    bodies%velocity(1, 1) = 1.0e31_dp
+    call expect_invalid(bodies, "velocity", "a velocity beyond bounds")
+    bodies%velocity = 0.0_dp
+    call expect_invalid(bodies, "", "a sound body again")
+  end subroutine test_invalid
+
+  !> The field of the first body that is named as invalid, among 3 boundaries and 2 materials.
+  subroutine expect_invalid(bodies, field, name)
+    type(body_set_t), intent(in) :: bodies
+    character(len=*), intent(in) :: field, name
+    integer(i8) :: record(bodies%record_words())
+
+    call bodies%get_record(1, record)
+    call check(bodies%invalid_field(record, n_boundaries=3, n_materials=2) == field, name)
+  end subroutine expect_invalid
 
 end program test_body_store
