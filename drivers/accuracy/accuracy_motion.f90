@@ -3,7 +3,6 @@ module gravier_accuracy_motion
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
-  use gravier_boundary, only: shape_plane
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -139,10 +138,10 @@ contains
     associate (boundaries => simulation%decomposition%boundaries, scene => simulation%config%scene)
       known = simulation%n_grains == 1 .and. simulation%n_glued == 0 .and. size(boundaries) == 1 .and. &
         & scene%gravity_table == "" .and. .not. any(abs(scene%body_force) > 0.0_dp) .and. .not. simulation%decomposition%period%on()
-      if (known) known = boundaries(1)%shape == shape_plane .and. .not. boundaries(1)%is_driven() .and. &
+      if (known) known = boundaries(1)%is_plane() .and. .not. boundaries(1)%is_driven() .and. &
         & .not. any(abs(boundaries(1)%velocity) > 0.0_dp) .and. .not. any(abs(boundaries(1)%spin) > 0.0_dp)
       if (.not. known) return
-      motion%normal(:) = boundaries(1)%axis(1:nd)
+      motion%normal(:) = boundaries(1)%surface%axis(1:nd)
       motion%gravity = -dot_product(scene%gravity(1:nd), motion%normal)
       motion%restitution = boundaries(1)%contact%restitution
       ! the rank that has the grain tells the others
@@ -150,7 +149,7 @@ contains
       do s = 1, size(simulation%decomposition%home)
         associate (home => simulation%decomposition%home(s))
           if (home%n == 0) cycle
-          gap = dot_product(home%position(:, 1) - boundaries(1)%point(1:nd), motion%normal) - home%radius(1)
+          gap = dot_product(home%position(:, 1) - boundaries(1)%surface%point(1:nd), motion%normal) - home%radius(1)
           speed = dot_product(home%velocity(1:nd, 1), motion%normal)
           along(1) = max(gap, 0.0_dp)
           along(2) = max(speed, 0.0_dp)

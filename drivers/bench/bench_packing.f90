@@ -162,7 +162,7 @@ contains
     associate (boundaries => simulation%decomposition%boundaries)
       do b = 1, size(boundaries)
         do d = 1, packing%nd
-          if (boundaries(b)%axis(d) < 0.0_dp) boundaries(b)%point(d) = radius*(packing%count(d) + 0.5_dp)*spacing
+          if (boundaries(b)%surface%axis(d) < 0.0_dp) boundaries(b)%surface%point(d) = radius*(packing%count(d) + 0.5_dp)*spacing
         end do
       end do
     end associate

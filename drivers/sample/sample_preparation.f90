@@ -97,7 +97,7 @@ contains
     layer = total_mass(simulation)/real(simulation%n_grains, dp)**(1.0_dp/nd)
     associate (boundaries => simulation%decomposition%boundaries)
       do b = 1, simulation%n_walls
-        boundaries(b)%free(1:nd) = boundaries(b)%axis(1:nd) < 0.0_dp
+        boundaries(b)%free(1:nd) = boundaries(b)%surface%axis(1:nd) < 0.0_dp
         ! at least as heavy as a layer of grains, and so heavy that a step does not add much to its speed
         boundaries(b)%mass = max(layer, 2.0_dp*simulation%physics%h*simulation%config%sample%pressure* &
           & facing_area(simulation%decomposition, b)/speed_limit(simulation))
@@ -118,7 +118,8 @@ contains
     associate (boundaries => simulation%decomposition%boundaries)
       do b = 1, simulation%n_walls
         if (.not. boundaries(b)%is_driven()) cycle
-        boundaries(b)%given_force(:) = simulation%config%sample%pressure*facing_area(simulation%decomposition, b)*boundaries(b)%axis
+        boundaries(b)%given_force(:) = simulation%config%sample%pressure*facing_area(simulation%decomposition, b)* &
+          & boundaries(b)%surface%axis
         where (boundaries(b)%free) boundaries(b)%velocity = keep*min(max(boundaries(b)%velocity, -limit), limit)
       end do
     end associate
@@ -253,7 +254,7 @@ contains
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
       allocate (volume(sum(decomposition%home%n)), moment(sum(decomposition%home%n)))
-      floor = decomposition%boundaries(1)%point(nd)
+      floor = decomposition%boundaries(1)%surface%point(nd)
       n = 0
       do s = 1, size(decomposition%home)
         associate (home => decomposition%home(s))
@@ -275,10 +276,10 @@ contains
       integer :: d, k
 
       associate (boundaries => simulation%decomposition%boundaries)
-        d = maxloc(abs(boundaries(1)%axis), dim=1)
+        d = maxloc(abs(boundaries(1)%surface%axis), dim=1)
         height = 0.0_dp
         do k = 1, simulation%n_walls
-          if (boundaries(k)%axis(d) < 0.0_dp) height = boundaries(k)%point(d) - boundaries(1)%point(d)
+          if (boundaries(k)%surface%axis(d) < 0.0_dp) height = boundaries(k)%surface%point(d) - boundaries(1)%surface%point(d)
         end do
         if (height > 0.0_dp) return
         height = 2.0_dp*simulation%comm%sum_real(moment)/simulation%comm%sum_real(volume)

@@ -83,7 +83,7 @@ contains
 
     nd = simulation%decomposition%nd
     do b = 1, size(self%pressure)
-      self%pressure(b) = -sum(simulation%boundary_impulses(:, b)*simulation%decomposition%boundaries(b)%axis(1:nd))/ &
+      self%pressure(b) = -sum(simulation%boundary_impulses(:, b)*simulation%decomposition%boundaries(b)%surface%axis(1:nd))/ &
         & (simulation%physics%h*facing_area(simulation%decomposition, b))
     end do
   end subroutine measure_pressures

@@ -298,6 +298,7 @@ contains
     class(time_stepper_t), intent(in) :: self
     type(step_figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: place(3)
     integer :: s, k, b
 
     if (.not. is_finite(figures%kinetic_energy)) then
@@ -313,7 +314,8 @@ contains
     end if
     do b = 1, size(self%decomposition%boundaries)
       associate (boundary => self%decomposition%boundaries(b))
-        if (.not. (all(is_finite(boundary%point)) .and. all(is_finite(boundary%velocity)))) &
+        call boundary%find_place(place)
+        if (.not. (all(is_finite(place)) .and. all(is_finite(boundary%velocity)))) &
           & call refuse("motion of boundary '"//boundary%name//"'")
       end associate
     end do

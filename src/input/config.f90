@@ -7,9 +7,10 @@ module gravier_config
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
                                   enriched_config_t, output_config_t, boundary_config_t, sample_config_t, material_config_t, &
                                   law_config_t, given_coefficients_t
-  use gravier_config_table, only: groups, keys, fill_keys, kind_real
+  use gravier_config_table, only: groups, keys, surface_rows, fill_keys, kind_real
   use gravier_method_options, only: method_features_t, default_always, default_on_active
   use gravier_method_registry, only: features_of
+  use gravier_config_surfaces, only: surface_value
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
   use gravier_config_slots, only: slot_t, slot_of, group_count
@@ -50,6 +51,9 @@ contains
     if (.not. allocated(error)) call check_names(file, found, error)
     if (allocated(error)) return
     allocate (config%boundaries(number_of_groups(found, "boundary")))
+    do k = 1, size(config%boundaries)
+      allocate (config%boundaries(k)%value(3, size(surface_rows%keys)), source=0.0_dp)
+    end do
     allocate (config%materials(number_of_groups(found, "material")), config%laws(number_of_groups(found, "law")))
     do k = 1, size(config%laws)
       allocate (config%laws(k)%value(count(keys%group == "law" .and. keys%kind == kind_real)))
@@ -320,9 +324,11 @@ contains
     !> of the instance of the boundary
     type(report_t), intent(in) :: report
     type(boundary_config_t), intent(inout) :: boundary
+    real(dp) :: point(3)
 
     if (.not. is_given(report, "boundary", "name")) boundary%name = "boundary "//to_text(report%instance)
-    where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = boundary%point
+    point = surface_value(boundary, "point")
+    where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = point
     call settle_contact(boundary%contact_given, scene%wall_contact, boundary%contact)
     if (.not. boundary%material_given) boundary%material = scene%wall_material
     if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)

@@ -2,24 +2,19 @@
 module gravier_config_check_boundary
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_magnitude, only: is_size
+  use gravier_surface, only: surface_t
+  use gravier_surface_registry, only: glued_grains
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, boundary_config_t
+  use gravier_config_surfaces, only: set_surface, surface_value, shapes_in
   use gravier_config_keys, only: choices_text, has_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, ordinal
   implicit none
   private
   public :: check_boundaries, check_contact
 
-  !> shapes of each dimension
-  character(len=*), parameter :: shapes_of(2:3) = ["plane segment circle grains outlet     ", &
-                                                   "plane rectangle cylinder grains outlet "]
   !> what `is_pivoting` wants
   character(len=*), parameter :: pivoting_text = "a finite real number >= 0; 0 where dimension = 2"
-  !> shortest edge
-  character(len=*), parameter :: shortest = "1e-30 m"
-  !> largest cosine of the angle between the edges of a rectangle
-  real(dp), parameter :: right_angle = 1.0e-6_dp
 
 contains
 
@@ -69,9 +64,9 @@ contains
     integer :: n, i
 
     n = size(boundaries)
-    if (boundaries(n)%shape /= "grains") return
+    if (boundaries(n)%shape /= glued_grains) return
     do i = 1, n - 1
-      if (boundaries(i)%shape /= "grains" .or. boundaries(i)%group /= boundaries(n)%group) cycle
+      if (boundaries(i)%shape /= glued_grains .or. boundaries(i)%group /= boundaries(n)%group) cycle
       call expect(report, .false., "boundary", "group", error, "a group of its own, but the "//ordinal(i)//" has it too")
     end do
   end subroutine check_group
@@ -83,10 +78,10 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: shapes
 
-    shapes = trim(shapes_of(config%scene%dimension))
+    shapes = shapes_in(config%scene%dimension)
     call expect(report, has_word(shapes, boundary%shape), "boundary", "shape", error, &
                 choices_text(shapes)//" where dimension = "//merge("2", "3", config%scene%dimension == 2))
-    call expect(report, boundary%shape /= "grains" .or. config%scene%bodies == "file", "boundary", "shape", error, &
+    call expect(report, boundary%shape /= glued_grains .or. config%scene%bodies == "file", "boundary", "shape", error, &
                 "another shape where bodies = '"//trim(config%scene%bodies)//"': the groups of grains come from a bodies file")
   end subroutine check_shape
 
@@ -95,32 +90,21 @@ contains
     type(report_t), intent(in) :: report
     type(boundary_config_t), intent(in) :: boundary
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: span(3)
+    class(surface_t), allocatable :: surface
+    character(len=:), allocatable :: wrong, expected
+    integer :: first, last
 
-    select case (boundary%shape)
-    case ("plane", "outlet")
-      call expect(report, is_vector(boundary%normal), "boundary", "normal", error)
-    case ("segment")
-      span(:) = boundary%end_point - boundary%point
-      call expect(report, is_vector(span), "boundary", "end", error, "another point than point")
-      call expect(report, is_length(span), "boundary", "end", error, &
-                  "a point at least "//shortest//" from point")
-    case ("rectangle")
-      call expect(report, is_vector(boundary%edge_a), "boundary", "edge_a", error)
-      call expect(report, is_vector(boundary%edge_b), "boundary", "edge_b", error)
-      call expect(report, is_length(boundary%edge_a), "boundary", "edge_a", error, "a length of at least "//shortest)
-      call expect(report, is_length(boundary%edge_b), "boundary", "edge_b", error, "a length of at least "//shortest)
-      if (allocated(error)) return
-      call expect(report, abs(cosine(boundary%edge_a, boundary%edge_b)) <= right_angle, "boundary", "edge_b", error, &
-                  "an edge at right angles to "//shown_text(report, "boundary", "edge_a")//", within 1e-6")
-    case ("circle")
-      call expect(report, boundary%radius > 0.0_dp, "boundary", "radius", error)
-    case ("cylinder")
-      call expect(report, is_vector(boundary%axis), "boundary", "axis", error)
-      call expect(report, boundary%radius > 0.0_dp, "boundary", "radius", error)
-    case ("grains")
-      call expect(report, boundary%group >= 1, "boundary", "group", error)
-    end select
+    if (allocated(error)) return
+    if (boundary%shape == glued_grains) call expect(report, boundary%group >= 1, "boundary", "group", error)
+    call set_surface(boundary, surface, wrong, expected)
+    if (wrong == "") return
+    ! a key in braces stands for its value
+    first = index(expected, "{")
+    last = index(expected, "}")
+    if (first > 0) expected = expected(:first - 1)//shown_text(report, "boundary", expected(first + 1:last - 1))// &
+      & expected(last + 1:)
+    if (expected == "") call expect(report, .false., "boundary", wrong, error)
+    if (expected /= "") call expect(report, .false., "boundary", wrong, error, expected)
   end subroutine check_size
 
   !> Mass and rotation of a boundary that forces move, and of others.
@@ -146,11 +130,13 @@ contains
     type(report_t), intent(in) :: report
     type(boundary_config_t), intent(in) :: boundary
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: normal(3)
 
     call expect(report, all(boundary%free .or. abs(boundary%force) <= 0.0_dp), "boundary", "force", error, &
                 "0 along each component that is not free")
-    call expect(report, any(abs(boundary%normal) > 0.0_dp .and. boundary%free) .or. abs(boundary%pressure) <= 0.0_dp, &
-                "boundary", "pressure", error, "0 where no component along normal is free")
+    normal = surface_value(boundary, "normal")
+    call expect(report, any(abs(normal) > 0.0_dp .and. boundary%free) .or. abs(boundary%pressure) <= 0.0_dp, "boundary", &
+                "pressure", error, "0 where no component along normal is free")
   end subroutine check_loads
 
   !> Whether a coefficient of pivoting friction makes sense: disks do not pivot.
@@ -176,29 +162,5 @@ contains
     call expect(report, is_pivoting(dimension, contact%pivoting_friction), group, prefix//"pivoting_friction", error, &
                 pivoting_text)
   end subroutine check_contact
-
-  !> Is it another vector than 0?
-  pure logical function is_vector(vector)
-    !> shape (3)
-    real(dp), intent(in) :: vector(:)
-    is_vector = any(abs(vector) > 0.0_dp)
-  end function is_vector
-
-  !> Is it long enough for its square to count?
-  pure logical function is_length(vector)
-    !> shape (3) [m]
-    real(dp), intent(in) :: vector(:)
-    is_length = is_size(maxval(abs(vector)))
-  end function is_length
-
-  !> Cosine of the angle between two vectors other than 0.
-  pure real(dp) function cosine(a, b)
-    !> shape (3); of any length that a number can say
-    real(dp), intent(in) :: a(:), b(:)
-    real(dp) :: u(size(a)), v(size(b))
-    u = a/maxval(abs(a))
-    v = b/maxval(abs(b))
-    cosine = dot_product(u, v)/(norm2(u)*norm2(v))
-  end function cosine
 
 end module gravier_config_check_boundary

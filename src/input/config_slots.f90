@@ -3,7 +3,7 @@ module gravier_config_slots
   use gravier_kinds, only: dp
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, text_length, choice_length
-  use gravier_config_table, only: key_t, groups, keys
+  use gravier_config_table, only: key_t, groups, keys, surface_rows
   use gravier_config_keys, only: find_group, find_key, has_word
   implicit none
   private
@@ -155,17 +155,17 @@ contains
     integer, intent(in) :: instance
     character(len=*), intent(in) :: name
     type(slot_t), intent(inout) :: slot
+    integer :: at
 
+    at = surface_rows%find(name)
+    if (at > 0) then
+      if (surface_rows%keys(at)%key%count == 1) slot%real => config%boundaries(instance)%value(1, at)
+      if (surface_rows%keys(at)%key%count > 1) slot%reals => config%boundaries(instance)%value(:, at)
+      return
+    end if
     select case (name)
     case ("name"); slot%text => config%boundaries(instance)%name
     case ("shape"); slot%choice => config%boundaries(instance)%shape
-    case ("point"); slot%reals => config%boundaries(instance)%point
-    case ("normal"); slot%reals => config%boundaries(instance)%normal
-    case ("end"); slot%reals => config%boundaries(instance)%end_point
-    case ("edge_a"); slot%reals => config%boundaries(instance)%edge_a
-    case ("edge_b"); slot%reals => config%boundaries(instance)%edge_b
-    case ("axis"); slot%reals => config%boundaries(instance)%axis
-    case ("radius"); slot%real => config%boundaries(instance)%radius
     case ("group"); slot%integer => config%boundaries(instance)%group
     case ("velocity"); slot%reals => config%boundaries(instance)%velocity
     case ("rotation"); slot%reals => config%boundaries(instance)%rotation

@@ -1,14 +1,17 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact come from
-!> their modules, the words of the methods from theirs.
+!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact and of the
+!> shapes of boundaries come from their modules, the words of the methods from theirs.
 module gravier_config_table
+  use gravier_declared_keys, only: collected_key_t, collected_keys_t
   use gravier_law_registry, only: registered_key_t, registered_keys, kind_length
+  use gravier_surface, only: surface_features_t
+  use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
     & with_momentum, with_momentum_on_active, with_sleeping
   implicit none
   private
-  public :: group_t, key_t, groups, keys, fill_keys
+  public :: group_t, key_t, groups, keys, surface_rows, fill_keys
   public :: kind_integer, kind_real, kind_logical, kind_choice, kind_text
 
   !> what a value is
@@ -58,9 +61,8 @@ module gravier_config_table
     logical :: required = .false.
   end type key_t
 
-  !> shapes of a boundary that carry forces, and those that have a point
-  character(len=*), parameter :: solid_shapes = "plane segment rectangle circle cylinder grains"
-  character(len=*), parameter :: shapes_with_point = "plane segment rectangle circle cylinder outlet"
+  !> stands for the shapes of a boundary that carry forces, until the table is complete
+  character(len=*), parameter :: solid_shapes = "(solid)"
   !> distributions of the radii that have bounds
   character(len=*), parameter :: bounded_radii = "uniform uniform_volume log_normal"
 
@@ -150,32 +152,17 @@ module gravier_config_table
            "largest overlap at the start: of two grains, as a share of the smaller radius; of a grain and a boundary, as a "// &
            "share of the grain's")]
 
-  type(key_t), parameter :: boundary_keys(*) = &
+  type(key_t), parameter :: shape_keys(*) = &
     [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
            note="`'boundary K'`, K its number"), &
-     key_t("boundary", "shape", kind_choice, "''", "plane segment rectangle circle cylinder grains outlet", &
+     key_t("boundary", "shape", kind_choice, "''", "", &
            "what it is: `segment` and `circle` in 2D, `rectangle` and `cylinder` in 3D only; `grains`: glued grains of the "// &
            "bodies file; `outlet`: a plane behind which grains leave the scene", &
-           note="required", required=.true.), &
-     key_t("boundary", "point", kind_real, "3*0", "", &
-           "a point of a plane, of an outlet or of the axis of a cylinder, the first end of a segment, a corner of a "// &
-           "rectangle, the centre of a circle", &
-           count=3, unit="m", chooser="shape", chosen=shapes_with_point), &
-     key_t("boundary", "normal", kind_real, "3*0", "not all 0", "direction towards the free side, of any length", &
-           count=3, note="required", chooser="shape", chosen="plane outlet"), &
-     key_t("boundary", "end", kind_real, "3*0", "", "the second end, another than `point`", &
-           count=3, unit="m", note="required", chooser="shape", chosen="segment"), &
-     key_t("boundary", "edge_a", kind_real, "3*0", "not all 0", "an edge, from the corner `point`", &
-           count=3, unit="m", note="required", chooser="shape", chosen="rectangle"), &
-     key_t("boundary", "edge_b", kind_real, "3*0", "not all 0", &
-           "the other edge from the corner `point`, at right angles to `edge_a` within 1e-6", &
-           count=3, unit="m", note="required", chooser="shape", chosen="rectangle"), &
-     key_t("boundary", "axis", kind_real, "3*0", "not all 0", "direction of the axis, of any length", &
-           count=3, note="required", chooser="shape", chosen="cylinder"), &
-     key_t("boundary", "radius", kind_real, "0", "> 0", "radius; the grains are inside", &
-           unit="m", note="required", chooser="shape", chosen="circle cylinder"), &
-     key_t("boundary", "group", kind_integer, "0", ">= 1", "number of the group of grains in the bodies file", &
-           note="required", chooser="shape", chosen="grains"), &
+           note="required", required=.true.)]
+
+  type(key_t), parameter :: boundary_keys(*) = &
+    [key_t("boundary", "group", kind_integer, "0", ">= 1", "number of the group of grains in the bodies file", &
+           note="required", chooser="shape", chosen=glued_grains), &
      key_t("boundary", "velocity", kind_real, "3*0", "", "prescribed velocity; its third component is 0 in 2D", &
            count=3, unit="m/s"), &
      key_t("boundary", "rotation", kind_real, "3*0", "", &
@@ -361,6 +348,8 @@ module gravier_config_table
 
   !> all keys, once `fill_keys` was called
   type(key_t), allocatable, protected :: keys(:)
+  !> the keys of the shapes of boundaries among them
+  type(collected_keys_t), protected :: surface_rows
 
 contains
 
@@ -374,7 +363,14 @@ contains
     if (allocated(keys)) return
     allocate (keys(0))
     call add(scene_keys)
+    call add(shape_keys)
+    call surface_keys(surface_rows)
+    do k = 1, size(surface_rows%keys)
+      row(1) = row_of_surface(surface_rows%keys(k))
+      call add(row)
+    end do
     call add(boundary_keys)
+    call complete_boundary_keys()
     call add(sample_keys)
     call add(material_keys)
     call add(law_keys)
@@ -405,6 +401,26 @@ contains
 
   end subroutine fill_keys
 
+  !> What the shapes of boundaries say of themselves.
+  subroutine complete_boundary_keys()
+    type(surface_holder_t), allocatable :: surfaces(:)
+    type(surface_features_t) :: features
+    character(len=kind_length) :: solid
+    integer :: k
+
+    call registered_surfaces(surfaces)
+    solid = ""
+    do k = 1, size(surfaces)
+      features = surfaces(k)%surface%features()
+      if (features%touches) solid = adjustl(trim(solid)//" "//features%kind)
+    end do
+    do k = 1, size(keys)
+      if (keys(k)%group /= "boundary") cycle
+      if (keys(k)%name == "shape") keys(k)%allowed = trim(surface_rows%kinds)//" "//glued_grains
+      if (keys(k)%chosen == solid_shapes) keys(k)%chosen = trim(solid)//" "//glued_grains
+    end do
+  end subroutine complete_boundary_keys
+
   !> What the methods say of themselves.
   subroutine complete_solver_keys()
     type(method_holder_t), allocatable :: methods(:)
@@ -432,6 +448,18 @@ contains
       end select
     end do
   end subroutine complete_solver_keys
+
+  !> The row of a key of some shapes of boundaries.
+  pure type(key_t) function row_of_surface(own) result(row)
+    type(collected_key_t), intent(in) :: own
+
+    row = key_t("boundary", own%key%name, kind_real, own%key%default, own%key%allowed, own%key%meaning, count=own%key%count, &
+      & unit=own%key%unit, chooser="shape", chosen=own%kinds)
+    if (own%key%default /= "") return
+    row%default = "0"
+    if (own%key%count == 3) row%default = "3*0"
+    row%note = "required"
+  end function row_of_surface
 
   !> The row of a key of some laws.
   pure type(key_t) function row_of(own) result(row)

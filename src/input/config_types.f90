@@ -168,20 +168,10 @@ module gravier_config_types
   type :: boundary_config_t
     !> unique; 'boundary K', K its number, when not given
     character(len=text_length) :: name
-    !> plane, segment, rectangle, circle, cylinder, grains or outlet
+    !> word of a registered shape, or grains
     character(len=choice_length) :: shape
-    !> m: a point of a plane, outlet or axis of a cylinder, first end of a segment, corner of a rectangle, centre of a circle
-    real(dp) :: point(3)
-    !> plane, outlet: towards the free side; not 0, of any length
-    real(dp) :: normal(3)
-    !> m: second end of a segment
-    real(dp) :: end_point(3)
-    !> m: the edges of a rectangle from its corner, at right angles within 1e-6
-    real(dp) :: edge_a(3), edge_b(3)
-    !> cylinder: not 0, of any length
-    real(dp) :: axis(3)
-    !> m: circle, cylinder
-    real(dp) :: radius
+    !> (3, keys of all shapes): of the keys of gravier_surface_registry, in their order; of one with a single value the first
+    real(dp), allocatable :: value(:, :)
     !> grains: the group of the bodies file
     integer :: group
     !> m/s

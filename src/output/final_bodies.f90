@@ -46,8 +46,8 @@ contains
       end do
       do w = 1, simulation%n_walls
         data%wall_id(w) = decomposition%boundaries(w)%id
-        data%wall_point(:, w) = decomposition%boundaries(w)%point(1:nd)
-        data%wall_normal(:, w) = decomposition%boundaries(w)%axis(1:nd)
+        data%wall_point(:, w) = decomposition%boundaries(w)%surface%point(1:nd)
+        data%wall_normal(:, w) = decomposition%boundaries(w)%surface%axis(1:nd)
       end do
       data%has_box = decomposition%period%on()
       data%origin(:) = decomposition%period%origin

@@ -5,7 +5,6 @@ module gravier_run_output
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
-  use gravier_boundary, only: shape_plane, shape_name
   use gravier_file_system, only: remove_file
   use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, figures_t, &
     & accuracy_t
@@ -122,9 +121,9 @@ contains
       do b = 1, size(boundaries)
         id(b) = boundaries(b)%id
         name(b) = boundaries(b)%name
-        shape(b) = shape_name(boundaries(b)%shape)
+        shape(b) = boundaries(b)%shape_name()
         normal(:, b) = 0.0_dp
-        if (boundaries(b)%shape == shape_plane) normal(:, b) = boundaries(b)%axis(1:size(normal, 1))
+        if (boundaries(b)%is_plane()) normal(:, b) = boundaries(b)%surface%axis(1:size(normal, 1))
       end do
       call self%results%write_boundaries(id, name, shape, normal, error)
     end associate
@@ -253,6 +252,7 @@ contains
   subroutine collect_boundaries(simulation, rows)
     type(simulation_t), intent(in) :: simulation
     type(boundary_rows_t), intent(out) :: rows
+    real(dp) :: place(3)
     integer :: b, nd, n
 
     nd = simulation%decomposition%nd
@@ -261,9 +261,10 @@ contains
       allocate (rows%id(n), rows%position(nd, n), rows%normal(nd, n), rows%velocity(3*nd - 3, n), rows%force(nd, n))
       do b = 1, n
         rows%id(b) = boundaries(b)%id
-        rows%position(:, b) = boundaries(b)%point(1:nd)
+        call boundaries(b)%find_place(place)
+        rows%position(:, b) = place(1:nd)
         rows%normal(:, b) = 0.0_dp
-        if (boundaries(b)%shape == shape_plane) rows%normal(:, b) = boundaries(b)%axis(1:nd)
+        if (boundaries(b)%is_plane()) rows%normal(:, b) = boundaries(b)%surface%axis(1:nd)
         rows%velocity(1:nd, b) = boundaries(b)%velocity(1:nd)
         rows%velocity(nd + 1:, b) = boundaries(b)%spin(merge(3, 1, nd == 2):)
         rows%force(:, b) = simulation%boundary_impulses(:, b)/simulation%physics%h

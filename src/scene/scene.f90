@@ -10,7 +10,7 @@ module gravier_scene
   use gravier_periodic, only: period_t
   use gravier_body_store, only: body_set_t
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_boundary, only: boundary_t, shape_outlet
+  use gravier_boundary, only: boundary_t
   use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_law_set, only: law_set_t
@@ -107,7 +107,7 @@ contains
     type(bodies_data_t), intent(in) :: data
     type(scene_t), intent(in) :: scene
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: far
+    real(dp) :: far, far_off
     integer :: k
 
     if (scene%n_grains == 0) return
@@ -115,8 +115,10 @@ contains
     if (scene%period%on()) call check("period", maxval(abs(scene%period%origin) + scene%period%length))
     do k = 1, size(scene%boundaries)
       associate (boundary => scene%boundaries(k))
-        call check("boundary '"//boundary%name//"'", max(maxval(abs(boundary%point)), maxval(abs(boundary%edge)), &
-          & maxval(abs(boundary%pivot)), boundary%radius))
+        far_off = maxval(abs(boundary%pivot))
+        if (allocated(boundary%surface)) far_off = max(far_off, maxval(abs(boundary%surface%point)), &
+          & maxval(abs(boundary%surface%edge)), boundary%surface%radius)
+        call check("boundary '"//boundary%name//"'", far_off)
       end associate
     end do
     do k = 1, data%n
@@ -257,8 +259,8 @@ contains
         associate (boundary => scene%boundaries(k))
           effects%drives = effects%drives .or. moves(boundary)
           effects%forces = effects%forces .or. boundary%is_driven()
-          effects%removal = effects%removal .or. boundary%shape == shape_outlet
-          if (boundary%shape /= shape_outlet) call add_law(boundary%contact)
+          effects%removal = effects%removal .or. boundary%lets_out()
+          if (.not. boundary%lets_out()) call add_law(boundary%contact)
         end associate
       end do
       if (scene%laws%n > 0) then

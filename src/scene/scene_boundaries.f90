@@ -5,9 +5,10 @@ module gravier_scene_boundaries
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_file, only: bodies_data_t
-  use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, &
-    & shape_grains, shape_outlet, drive_names
+  use gravier_surface_registry, only: make_surface
+  use gravier_boundary, only: boundary_t, drive_names
   use gravier_config_types, only: config_t, boundary_config_t
+  use gravier_config_surfaces, only: set_surface
   use gravier_config_laws, only: material_number
   implicit none
   private
@@ -32,9 +33,10 @@ contains
       associate (wall => boundaries(w))
         wall%id = data%wall_id(w)
         wall%name = "wall "//to_text(data%wall_id(w))
-        wall%point(1:nd) = data%wall_point(:, w)
-        wall%pivot(:) = wall%point
-        wall%axis(1:nd) = data%wall_normal(:, w)
+        call make_surface("plane", wall%surface)
+        wall%surface%point(1:nd) = data%wall_point(:, w)
+        wall%pivot(:) = wall%surface%point
+        wall%surface%axis(1:nd) = data%wall_normal(:, w)
         wall%contact = config%scene%wall_contact
         wall%material = material_number(config, config%scene%wall_material)
       end associate
@@ -78,7 +80,8 @@ contains
     end do
     if (boundary%is_driven() .and. boundary%turns()) call refuse("of a rotation rate", &
       & "no such column where a component of the translation is free")
-    pressed = boundary%shape == shape_plane .and. any(boundary%free .and. abs(boundary%axis) > 0.0_dp)
+    pressed = boundary%is_plane()
+    if (pressed) pressed = any(boundary%free .and. abs(boundary%surface%axis) > 0.0_dp)
     if (boundary%table%has(merge(6, 10, nd == 2)) .and. .not. pressed) call refuse("pressure", &
       & "no such column but for a plane of which a component along normal is free")
 
@@ -92,48 +95,17 @@ contains
 
   end subroutine check_table
 
-  !> A vector of length 1, whatever its length was: squares of very large or small components would be lost.
-  pure subroutine set_direction(vector, unit)
-    !> not 0
-    real(dp), intent(in) :: vector(3)
-    real(dp), intent(out) :: unit(3)
-
-    unit(:) = vector/maxval(abs(vector))
-    unit(:) = unit/norm2(unit)
-  end subroutine set_direction
-
   subroutine set_boundary(config, nd, boundary)
     type(boundary_config_t), intent(in) :: config
     integer, intent(in) :: nd
     type(boundary_t), intent(inout) :: boundary
+    character(len=:), allocatable :: wrong, expected
 
     boundary%name = trim(config%name)
-    boundary%point(:) = config%point
     boundary%pivot(:) = config%pivot
-    boundary%radius = config%radius
     boundary%group = config%group
-    select case (config%shape)
-    case ("plane")
-      boundary%shape = shape_plane
-      call set_direction(config%normal, boundary%axis)
-    case ("outlet")
-      boundary%shape = shape_outlet
-      call set_direction(config%normal, boundary%axis)
-    case ("segment")
-      boundary%shape = shape_segment
-      boundary%edge(:, 1) = config%end_point - config%point
-    case ("rectangle")
-      boundary%shape = shape_rectangle
-      boundary%edge(:, 1) = config%edge_a
-      boundary%edge(:, 2) = config%edge_b
-    case ("circle")
-      boundary%shape = shape_circle
-    case ("cylinder")
-      boundary%shape = shape_cylinder
-      call set_direction(config%axis, boundary%axis)
-    case ("grains")
-      boundary%shape = shape_grains
-    end select
+    ! the values were checked
+    call set_surface(config, boundary%surface, wrong, expected)
     boundary%given_velocity(:) = config%velocity
     boundary%given_spin(:) = config%rotation
     if (nd == 2) then

@@ -3,7 +3,8 @@ module gravier_scene_period
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_boundary, only: boundary_t, shape_plane, shape_outlet, shape_grains, shape_circle, shape_cylinder
+  use gravier_boundary, only: boundary_t
+  use gravier_surface, only: surface_features_t
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t
   implicit none
@@ -24,23 +25,26 @@ contains
     !> diameter of the largest grain and range of the lists [m]
     real(dp), intent(in) :: reach
     type(error_t), allocatable, intent(inout) :: error
+    type(surface_features_t) :: features
     integer :: b, d
 
     do d = 1, config%scene%dimension
       if (.not. scene%period%length(d) > 0.0_dp) cycle
       do b = 1, size(scene%boundaries)
         associate (boundary => scene%boundaries(b))
-          select case (boundary%shape)
-          case (shape_plane, shape_outlet)
-            if (abs(boundary%axis(d)) > straight) call refuse(boundary, "a normal at right angles to")
-            if (turns_across(boundary, d)) call refuse(boundary, "no rotation but about")
-          case (shape_grains)
+          if (boundary%is_glued()) then
             if (turns_across(boundary, d)) call check_glued(b)
-          case (shape_cylinder)
+            cycle
+          end if
+          features = boundary%surface%features()
+          if (features%endless) then
+            if (abs(boundary%surface%axis(d)) > straight) call refuse(boundary, "a normal at right angles to")
+            if (turns_across(boundary, d)) call refuse(boundary, "no rotation but about")
+          else if (features%endless_axis) then
             call check_cylinder(boundary)
-          case default
+          else
             call check_width(boundary)
-          end select
+          end if
         end associate
       end do
     end do
@@ -52,8 +56,7 @@ contains
       real(dp) :: width
 
       width = 2.0_dp*boundary%half_width(d)
-      ! grains are inside of circles and cylinders
-      if (boundary%shape /= shape_circle .and. boundary%shape /= shape_cylinder) width = width + reach
+      if (.not. features%encloses) width = width + reach
       if (width > scene%period%length(d)) call refuse(boundary, "a width, with a diameter of the largest grain "// &
         & "and the range of the lists, of at most the period of "//to_text(scene%period%length(d), 4)//" m, here "// &
         & to_text(width, 4)//" m, along")
@@ -65,11 +68,11 @@ contains
       integer :: k
 
       do k = 1, 3
-        if (boundary%turns_about(k) .and. abs(boundary%axis(k)) < 1.0_dp - straight) &
+        if (boundary%turns_about(k) .and. abs(boundary%surface%axis(k)) < 1.0_dp - straight) &
           & call refuse(boundary, "no rotation but about its axis, near")
       end do
-      if (abs(boundary%axis(d)) >= 1.0_dp - straight) return
-      if (abs(boundary%axis(d)) > straight) call refuse(boundary, "an axis along, or at right angles to,")
+      if (abs(boundary%surface%axis(d)) >= 1.0_dp - straight) return
+      if (abs(boundary%surface%axis(d)) > straight) call refuse(boundary, "an axis along, or at right angles to,")
       call check_width(boundary)
     end subroutine check_cylinder
 

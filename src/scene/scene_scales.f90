@@ -2,8 +2,7 @@
 module gravier_scene_scales
   use gravier_kinds, only: dp
   use gravier_motion, only: grain_volume
-  use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, shape_grains, &
-    & shape_outlet
+  use gravier_boundary, only: boundary_t
   use gravier_physics, only: physics_t
   use gravier_velocity_scale, only: imposed_motion_t
   use gravier_load_areas, only: find_load_areas
@@ -13,7 +12,7 @@ module gravier_scene_scales
   public :: scene_scales_t
 
   !> least component along an axis of the normal of a plane that faces along it, and of one that carries grains
-  real(dp), parameter :: facing = 0.99_dp, carrying = 0.1_dp
+  real(dp), parameter :: carrying = 0.1_dp
   real(dp), parameter :: pi = acos(-1.0_dp)
   !> share of space that grains fill in a square or cubic lattice: a looser scene has room to fall into
   real(dp), parameter :: loosest(2:3) = [pi/4.0_dp, pi/6.0_dp]
@@ -206,7 +205,7 @@ contains
       if (norm2(acceleration) > norm2(self%acceleration)) self%acceleration(:) = acceleration
       do b = 1, size(boundaries)
         call boundaries(b)%prescribe(nd, times(k))
-        if (boundaries(b)%shape == shape_outlet) cycle
+        if (boundaries(b)%lets_out()) cycle
         pressure = simulation%velocity_scale%pressure_of(nd, boundaries(b), times(k), area(b))
         if (pressure > self%pressure) then
           self%pressure = pressure
@@ -251,7 +250,7 @@ contains
     self%shear = .false.
     speed = 0.0_dp
     do b = 1, size(boundaries)
-      if (boundaries(b)%shape == shape_outlet .or. imposed_speed(boundaries(b), lever(b)) <= speed) cycle
+      if (boundaries(b)%lets_out() .or. imposed_speed(boundaries(b), lever(b)) <= speed) cycle
       speed = imposed_speed(boundaries(b), lever(b))
       self%driver = b
     end do
@@ -260,7 +259,7 @@ contains
       if (any(abs(driver%spin) > 0.0_dp)) return
       axis = 0
       if (self%pressed > 0) axis = boundaries(self%pressed)%load_axis()
-      if (driver%shape == shape_plane .or. driver%is_driven()) axis = driver%load_axis()
+      if (driver%is_plane() .or. driver%is_driven()) axis = driver%load_axis()
       if (axis == 0) return
       call find_place(driver, self%driver, axis, extent, place, known)
       if (.not. known) return
@@ -287,21 +286,12 @@ contains
     real(dp), intent(out) :: place
     logical, intent(out) :: known
 
-    place = 0.0_dp
-    known = .true.
-    select case (boundary%shape)
-    case (shape_plane)
-      place = boundary%point(axis)
-      known = abs(boundary%axis(axis)) > facing
-    case (shape_segment, shape_rectangle)
-      place = boundary%point(axis) + 0.5_dp*sum(boundary%edge(axis, :))
-      known = all(abs(boundary%edge(axis, :)) <= (1.0_dp - facing)*norm2(boundary%edge))
-    case (shape_grains)
+    if (boundary%is_glued()) then
       place = extent%middle(axis, b)
       known = extent%has_glued(b)
-    case default
-      known = .false.
-    end select
+    else
+      call boundary%surface%level(axis, place, known)
+    end if
   end subroutine find_place
 
   !> Height that the grains have to fall: that of the topmost one above the lowest support, as far as the grains do not fill it.
@@ -349,18 +339,17 @@ contains
     real(dp) :: middle(3)
 
     support = huge(1.0_dp)
-    select case (boundary%shape)
-    case (shape_plane)
-      if (up*boundary%axis(axis) < carrying) return
-      middle(:) = 0.5_dp*(extent%low + extent%high)
-      support = up*(middle(axis) + sum(boundary%axis*(boundary%point - middle))/boundary%axis(axis))
-    case (shape_segment, shape_rectangle)
-      support = up*boundary%point(axis) + sum(min(up*boundary%edge(axis, :), 0.0_dp))
-    case (shape_circle, shape_cylinder)
-      if (abs(boundary%axis(axis)) < facing) support = up*boundary%point(axis) - boundary%radius
-    case (shape_grains)
+    if (boundary%is_glued()) then
       if (extent%has_glued(b)) support = up*extent%middle(axis, b)
-    end select
+    else if (boundary%is_plane()) then
+      associate (plane => boundary%surface)
+        if (up*plane%axis(axis) < carrying) return
+        middle(:) = 0.5_dp*(extent%low + extent%high)
+        support = up*(middle(axis) + sum(plane%axis*(plane%point - middle))/plane%axis(axis))
+      end associate
+    else if (.not. boundary%lets_out()) then
+      support = boundary%surface%support(axis, up)
+    end if
   end function support_of
 
 end module gravier_scene_scales

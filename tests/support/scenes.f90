@@ -7,13 +7,15 @@ module gravier_test_scenes
   use gravier_communicator, only: communicator_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
+  use gravier_surface, only: surface_t
+  use gravier_surface_registry, only: make_surface
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_partition, only: choose_boxes
   use gravier_decomposition, only: decomposition_t
   use gravier_check, only: check
   implicit none
   private
-  public :: cloud_t, near_pair_t, draw, plane, make_decomposition
+  public :: cloud_t, near_pair_t, draw, plane, change_shape, make_decomposition
 
   !> Grains in the unit box, some of which overlap. The identifier of a grain is its number.
   type :: cloud_t
@@ -167,10 +169,27 @@ contains
     type(boundary_t) :: boundary
 
     boundary%id = id
-    boundary%point(1:size(point)) = point
-    boundary%pivot(:) = boundary%point
-    boundary%axis(1:size(normal)) = normal
+    call make_surface("plane", boundary%surface)
+    boundary%surface%point(1:size(point)) = point
+    boundary%pivot(:) = boundary%surface%point
+    boundary%surface%axis(1:size(normal)) = normal
   end function plane
+
+  !> Give a boundary another shape, in its place.
+  subroutine change_shape(kind, boundary)
+    character(len=*), intent(in) :: kind
+    type(boundary_t), intent(inout) :: boundary
+    class(surface_t), allocatable :: surface
+
+    call make_surface(kind, surface)
+    if (allocated(boundary%surface)) then
+      surface%point(:) = boundary%surface%point
+      surface%axis(:) = boundary%surface%axis
+      surface%edge(:, :) = boundary%surface%edge
+      surface%radius = boundary%surface%radius
+    end if
+    call move_alloc(surface, boundary%surface)
+  end subroutine change_shape
 
   !> Share a cloud out, by boxes or by cells. The last rank brings nobody, unless it is alone. Collective.
   subroutine make_decomposition(comm, cloud, n_subdomains, nv, by_cells, decomposition)

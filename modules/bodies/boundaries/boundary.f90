@@ -4,18 +4,11 @@ module gravier_boundary
   use gravier_kinds, only: dp, i8
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_time_table, only: time_table_t
+  use gravier_surface, only: surface_t, surface_features_t
+  use gravier_surface_registry, only: glued_grains
   implicit none
   private
-  public :: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_circle, shape_cylinder, shape_grains, shape_outlet
-  public :: shape_name, drive_names
-
-  !> half-plane or half-space; part of a line (2D); part of a plane (3D); inside of a circle (2D) or of an endless
-  !> cylinder (3D); grains glued to each other; plane behind which grains leave the scene
-  integer, parameter :: shape_plane = 1, shape_segment = 2, shape_rectangle = 3, shape_circle = 4, shape_cylinder = 5, &
-    & shape_grains = 6, shape_outlet = 7
-
-  character(len=*), parameter :: shape_names(7) = [character(len=9) :: "plane", "segment", "rectangle", "circle", &
-    & "cylinder", "grains", "outlet"]
+  public :: boundary_t, drive_names
 
   !> columns of a table of drives, in 2D and 3D; `drive` knows them by their places
   character(len=*), parameter :: drives_2d = "vx vy omega fx fy pressure"
@@ -25,15 +18,8 @@ module gravier_boundary
   type :: boundary_t
     integer(i8) :: id = 0
     character(len=:), allocatable :: name
-    integer :: shape = shape_plane
-    !> point of the plane, end of the segment, corner of the rectangle, centre of the circle, point of the axis [m]
-    real(dp) :: point(3) = 0.0_dp
-    !> plane, outlet: unit normal towards the free side; cylinder: unit vector along the axis
-    real(dp) :: axis(3) = 0.0_dp
-    !> segment: from end to end (first column); rectangle: its edges from the corner [m]
-    real(dp) :: edge(3, 2) = 0.0_dp
-    !> circle, cylinder [m]
-    real(dp) :: radius = 0.0_dp
+    !> where it is and what it is; not allocated for grains that are glued to each other, which have no other surface
+    class(surface_t), allocatable :: surface
     !> grains: their group in the bodies file
     integer :: group = 0
     !> the point it turns about [m]
@@ -62,7 +48,12 @@ module gravier_boundary
     !> of the scene, 0 along axes that are not periodic: what has a finite extent acts on the image of a grain that is nearest [m]
     real(dp) :: period(3) = 0.0_dp
   contains
+    procedure :: shape_name => boundary_shape_name
     procedure :: touches => boundary_touches
+    procedure :: lets_out => boundary_lets_out
+    procedure :: is_plane => boundary_is_plane
+    procedure :: is_glued => boundary_is_glued
+    procedure :: find_place => boundary_find_place
     procedure :: is_driven => boundary_is_driven
     procedure :: is_moved => boundary_is_moved
     procedure :: turns => boundary_turns
@@ -89,11 +80,17 @@ module gravier_boundary
 
 contains
 
-  pure function shape_name(shape) result(name)
-    integer, intent(in) :: shape
+  !> The word for what it is.
+  pure function boundary_shape_name(self) result(name)
+    class(boundary_t), intent(in) :: self
     character(len=:), allocatable :: name
-    name = trim(shape_names(shape))
-  end function shape_name
+    type(surface_features_t) :: features
+
+    name = glued_grains
+    if (.not. allocated(self%surface)) return
+    features = self%surface%features()
+    name = trim(features%kind)
+  end function boundary_shape_name
 
   !> Names of the columns of a table of drives, with a blank between two.
   pure function drive_names(nd) result(names)
@@ -106,8 +103,41 @@ contains
   !> Whether grains can have a contact with its surface.
   pure logical function boundary_touches(self)
     class(boundary_t), intent(in) :: self
-    boundary_touches = self%present .and. self%shape /= shape_grains .and. self%shape /= shape_outlet
+    type(surface_features_t) :: features
+
+    boundary_touches = self%present .and. allocated(self%surface)
+    if (.not. boundary_touches) return
+    features = self%surface%features()
+    boundary_touches = features%touches
   end function boundary_touches
+
+  !> Whether grains leave the scene behind it, while it is there or not.
+  pure logical function boundary_lets_out(self)
+    class(boundary_t), intent(in) :: self
+    type(surface_features_t) :: features
+
+    boundary_lets_out = allocated(self%surface)
+    if (.not. boundary_lets_out) return
+    features = self%surface%features()
+    boundary_lets_out = features%lets_out
+  end function boundary_lets_out
+
+  !> Whether it is a plane that grains can touch, while it is there or not.
+  pure logical function boundary_is_plane(self)
+    class(boundary_t), intent(in) :: self
+    type(surface_features_t) :: features
+
+    boundary_is_plane = allocated(self%surface)
+    if (.not. boundary_is_plane) return
+    features = self%surface%features()
+    boundary_is_plane = features%endless .and. features%touches
+  end function boundary_is_plane
+
+  !> Whether it is a group of grains that are glued to each other.
+  pure logical function boundary_is_glued(self)
+    class(boundary_t), intent(in) :: self
+    boundary_is_glued = .not. allocated(self%surface)
+  end function boundary_is_glued
 
   !> Whether forces move it.
   pure logical function boundary_is_driven(self)
@@ -148,47 +178,49 @@ contains
     end if
   end function boundary_turns_about
 
-  !> Half of what a segment, rectangle, circle or cylinder takes along axis `d`, in any position that it may turn to [m].
+  !> The point that its shape names; of glued grains, the pivot [m].
+  pure subroutine boundary_find_place(self, place)
+    class(boundary_t), intent(in) :: self
+    real(dp), intent(out) :: place(3)
+
+    place(:) = self%pivot
+    if (allocated(self%surface)) place(:) = self%surface%point
+  end subroutine boundary_find_place
+
+  !> Half of what a surface that ends takes along axis `d`, in any position that it may turn to [m].
   pure real(dp) function boundary_half_width(self, d) result(half)
     class(boundary_t), intent(in) :: self
     integer, intent(in) :: d
-
-    if (self%shape == shape_circle .or. self%shape == shape_cylinder) then
-      half = self%radius
-    else if (self%turns()) then
-      half = 0.5_dp*sqrt(sum(self%edge**2))
-    else
-      half = 0.5_dp*sum(abs(self%edge(d, :)))
-    end if
+    half = self%surface%half_width(d, self%turns())
   end function boundary_half_width
 
-  !> The image of a point that is nearest to the middle of a finite shape, or to the pivot of glued grains. What is endless takes
-  !> the point as it is.
+  !> The image of a point that is nearest to the middle of a surface that ends, or to the pivot of glued grains. What is endless
+  !> takes the point as it is.
   pure subroutine find_image(self, x, image)
     class(boundary_t), intent(in) :: self
     !> (nd) [m]
     real(dp), intent(in) :: x(:)
     real(dp), intent(out) :: image(3)
+    type(surface_features_t) :: features
     real(dp) :: middle(3)
     integer :: d
 
     image(:) = 0.0_dp
     image(1:size(x)) = x
-    select case (self%shape)
-    case (shape_plane, shape_outlet)
-      return
-    case (shape_grains)
-      middle(:) = self%pivot
-    case default
-      middle(:) = self%point + 0.5_dp*(self%edge(:, 1) + self%edge(:, 2))
-    end select
+    if (.not. any(self%period > 0.0_dp)) return
+    middle(:) = self%pivot
+    if (allocated(self%surface)) then
+      features = self%surface%features()
+      if (features%endless) return
+      call self%surface%find_middle(middle)
+    end if
     do d = 1, size(x)
       if (self%period(d) > 0.0_dp) image(d) = x(d) - self%period(d)*anint((x(d) - middle(d))/self%period(d))
     end do
   end subroutine find_image
 
-  !> Nearest point of the surface: distance from it, negative behind a surface that has a behind, and unit normal
-  !> there towards `x`.
+  !> Nearest point of its surface: distance from it, negative behind a surface that has a behind, and unit normal there towards
+  !> `x`. Glued grains have no surface to ask for.
   pure subroutine boundary_locate(self, x, distance, normal)
     class(boundary_t), intent(in) :: self
     !> (nd) [m]
@@ -196,70 +228,13 @@ contains
     real(dp), intent(out) :: distance
     !> (nd)
     real(dp), intent(out) :: normal(:)
-    real(dp) :: from(3), away(3), length
-    integer :: nd
+    real(dp) :: from(3), away(3)
 
-    nd = size(x)
     call find_image(self, x, from)
-    from(:) = from - self%point
-    select case (self%shape)
-    case (shape_circle, shape_cylinder)
-      from(:) = from - sum(from*self%axis)*self%axis
-      length = norm2(from)
-      distance = self%radius - length
-      if (length > 0.0_dp) then
-        away(:) = -from/length
-      else
-        away(:) = across(self%axis)
-      end if
-    case (shape_segment, shape_rectangle)
-      away(:) = from - share_along(from, self%edge(:, 1))*self%edge(:, 1)
-      if (self%shape == shape_rectangle) away(:) = away - share_along(from, self%edge(:, 2))*self%edge(:, 2)
-      distance = norm2(away)
-      ! less is rounding, and has no direction
-      if (distance > 8.0_dp*epsilon(1.0_dp)*norm2(from)) then
-        away(:) = away/distance
-      else
-        away(:) = face_normal(self)
-      end if
-    case default
-      distance = sum(from*self%axis)
-      away(:) = self%axis
-    end select
-    normal(:) = away(1:nd)
+    from(:) = from - self%surface%point
+    call self%surface%locate(from, distance, away)
+    normal(:) = away(1:size(x))
   end subroutine boundary_locate
-
-  !> Where the foot of `from` lies along an edge, in [0, 1].
-  pure real(dp) function share_along(from, edge) result(share)
-    real(dp), intent(in) :: from(3), edge(3)
-    share = min(max(sum(from*edge)/sum(edge*edge), 0.0_dp), 1.0_dp)
-  end function share_along
-
-  !> A unit vector across a unit vector; the first one across zero.
-  pure function across(axis) result(normal)
-    real(dp), intent(in) :: axis(3)
-    real(dp) :: normal(3)
-    integer :: least
-
-    least = minloc(abs(axis), dim=1)
-    normal(:) = -axis(least)*axis
-    normal(least) = normal(least) + 1.0_dp
-    normal(:) = normal/norm2(normal)
-  end function across
-
-  !> Unit normal of a segment or rectangle.
-  pure function face_normal(self) result(normal)
-    class(boundary_t), intent(in) :: self
-    real(dp) :: normal(3), other(3)
-
-    other(:) = self%edge(:, 2)
-    if (self%shape == shape_segment) then
-      other(:) = 0.0_dp
-      other(3) = 1.0_dp
-    end if
-    normal(:) = cross(self%edge(:, 1), other)
-    normal(:) = normal/norm2(normal)
-  end function face_normal
 
   pure function cross(a, b) result(c)
     real(dp), intent(in) :: a(3), b(3)
@@ -346,13 +321,16 @@ contains
     real(dp), intent(in) :: time, area
     !> (nd); 0 on other components
     real(dp), intent(out) :: force(:)
+    real(dp) :: normal(3)
     integer :: d
 
     force(:) = 0.0_dp
+    normal(:) = 0.0_dp
+    if (allocated(self%surface)) normal(:) = self%surface%axis
     do d = 1, nd
       if (.not. self%free(d)) cycle
       force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) + &
-        & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*self%axis(d)
+        & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*normal(d)
     end do
   end subroutine boundary_applied_force
 
@@ -362,8 +340,8 @@ contains
     class(boundary_t), intent(in) :: self
     integer :: d
 
-    if (self%shape == shape_plane) then
-      axis = maxloc(abs(self%axis), dim=1)
+    if (self%is_plane()) then
+      axis = maxloc(abs(self%surface%axis), dim=1)
       return
     end if
     axis = findloc(self%free, .true., dim=1)
@@ -380,17 +358,21 @@ contains
     real(dp), intent(in) :: duration
     real(dp) :: turn(3, 3), angle(3)
 
-    if (any(abs(self%spin) > 0.0_dp)) then
-      angle(:) = self%spin*duration
-      call make_rotation(angle, turn)
-      self%point(:) = self%point - self%pivot
-      call rotate(turn, self%point)
-      self%point(:) = self%point + self%pivot
-      call rotate(turn, self%axis)
-      call rotate(turn, self%edge(:, 1))
-      call rotate(turn, self%edge(:, 2))
+    if (allocated(self%surface)) then
+      associate (surface => self%surface)
+        if (any(abs(self%spin) > 0.0_dp)) then
+          angle(:) = self%spin*duration
+          call make_rotation(angle, turn)
+          surface%point(:) = surface%point - self%pivot
+          call rotate(turn, surface%point)
+          surface%point(:) = surface%point + self%pivot
+          call rotate(turn, surface%axis)
+          call rotate(turn, surface%edge(:, 1))
+          call rotate(turn, surface%edge(:, 2))
+        end if
+        surface%point(:) = surface%point + duration*self%velocity
+      end associate
     end if
-    self%point(:) = self%point + duration*self%velocity
     self%pivot(:) = self%pivot + duration*self%velocity
   end subroutine boundary_move
 
@@ -422,7 +404,7 @@ contains
     !> (nd) [m]
     real(dp), intent(in) :: way(:)
 
-    self%point(1:size(way)) = self%point(1:size(way)) + way
+    if (allocated(self%surface)) self%surface%point(1:size(way)) = self%surface%point(1:size(way)) + way
     self%pivot(1:size(way)) = self%pivot(1:size(way)) + way
   end subroutine boundary_shift
 
@@ -476,10 +458,12 @@ contains
     integer :: k
 
     state(:) = 0.0_dp
-    state(1:3) = self%point
-    state(4:6) = self%axis
-    state(7:9) = self%edge(:, 1)
-    state(10:12) = self%edge(:, 2)
+    call self%find_place(state(1:3))
+    if (allocated(self%surface)) then
+      state(4:6) = self%surface%axis
+      state(7:9) = self%surface%edge(:, 1)
+      state(10:12) = self%surface%edge(:, 2)
+    end if
     state(13:15) = self%pivot
     state(16:18) = self%velocity
     state(19:21) = self%spin
@@ -501,10 +485,12 @@ contains
       state(k) = transfer(words(1 + k), 0.0_dp)
     end do
     self%present = words(1) == 1
-    self%point(:) = state(1:3)
-    self%axis(:) = state(4:6)
-    self%edge(:, 1) = state(7:9)
-    self%edge(:, 2) = state(10:12)
+    if (allocated(self%surface)) then
+      self%surface%point(:) = state(1:3)
+      self%surface%axis(:) = state(4:6)
+      self%surface%edge(:, 1) = state(7:9)
+      self%surface%edge(:, 2) = state(10:12)
+    end if
     self%pivot(:) = state(13:15)
     self%velocity(:) = state(16:18)
     self%spin(:) = state(19:21)

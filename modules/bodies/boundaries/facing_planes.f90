@@ -1,7 +1,7 @@
 !> The planes that shut a scene in along the axes.
 module gravier_facing_planes
   use gravier_kinds, only: dp
-  use gravier_boundary, only: boundary_t, shape_plane
+  use gravier_boundary, only: boundary_t
   implicit none
   private
   public :: find_facing_planes
@@ -23,9 +23,9 @@ contains
     high = huge(1.0_dp)
     do b = 1, size(boundaries)
       associate (plane => boundaries(b))
-        if (plane%shape /= shape_plane .or. .not. plane%present) cycle
-        if (plane%axis(d) > facing) low = max(low, plane%point(d))
-        if (plane%axis(d) < -facing) high = min(high, plane%point(d))
+        if (.not. (plane%is_plane() .and. plane%present)) cycle
+        if (plane%surface%axis(d) > facing) low = max(low, plane%surface%point(d))
+        if (plane%surface%axis(d) < -facing) high = min(high, plane%surface%point(d))
       end associate
     end do
   end subroutine find_facing_planes

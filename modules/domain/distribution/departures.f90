@@ -1,7 +1,6 @@
 !> Grains that leave the scene: behind outlets, or with the boundary that they are glued to.
 module gravier_departures
   use gravier_kinds, only: dp, i8
-  use gravier_boundary, only: shape_outlet
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
@@ -24,12 +23,23 @@ contains
         return
       end if
       do b = 1, size(boundaries)
-        if (boundaries(b)%shape /= shape_outlet .or. .not. boundaries(b)%present) cycle
+        if (.not. (boundaries(b)%lets_out() .and. boundaries(b)%present)) cycle
         call boundaries(b)%locate(home%position(:, k), distance, normal)
         if (distance < 0.0_dp) stays = .false.
       end do
     end associate
   end function stays
+
+  !> Whether the scene has an outlet.
+  pure logical function has_outlet(decomposition)
+    type(decomposition_t), intent(in) :: decomposition
+    integer :: b
+
+    has_outlet = .false.
+    do b = 1, size(decomposition%boundaries)
+      has_outlet = has_outlet .or. decomposition%boundaries(b)%lets_out()
+    end do
+  end function has_outlet
 
   !> Whether some grain leaves the scene now. Collective.
   logical function some_leave(decomposition)
@@ -37,7 +47,7 @@ contains
     integer :: s, k
 
     some_leave = .false.
-    if (.not. any(decomposition%boundaries%shape == shape_outlet)) return
+    if (.not. has_outlet(decomposition)) return
     do s = 1, size(decomposition%home)
       do k = 1, decomposition%home(s)%n
         if (.not. stays(decomposition, s, k)) some_leave = .true.
@@ -59,9 +69,7 @@ contains
 
     n_free = 0
     n_glued = 0
-    associate (boundaries => decomposition%boundaries)
-      if (.not. any(boundaries%shape == shape_outlet) .and. (.not. has_glued .or. all(boundaries%present))) return
-    end associate
+    if (.not. has_outlet(decomposition) .and. (.not. has_glued .or. all(decomposition%boundaries%present))) return
     counts(:) = 0
     do s = 1, size(decomposition%home)
       associate (home => decomposition%home(s))

@@ -5,7 +5,7 @@ module gravier_neighbourhood
   use gravier_narrow, only: narrow
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies
-  use gravier_boundary, only: boundary_t, shape_plane, shape_grains, shape_outlet
+  use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_search, only: find_neighbours, sweep_order
   use gravier_decomposition, only: decomposition_t
@@ -251,26 +251,16 @@ contains
   !> which are no tilt.
   pure real(dp) function way_of(now, before) result(way)
     type(boundary_t), intent(in) :: now, before
-    integer :: k
-    real(dp) :: corner(3)
     !> [rad]
     real(dp), parameter :: tilt_of_roundings = 1.0e-11_dp
 
     way = 0.0_dp
-    if (.not. now%present .or. now%shape == shape_grains .or. now%shape == shape_outlet) return
-    if (norm2(now%axis - before%axis) > tilt_of_roundings) then
+    if (.not. now%touches()) return
+    if (norm2(now%surface%axis - before%surface%axis) > tilt_of_roundings) then
       ! a plane or a cylinder that tilts moves without bound
       way = huge(1.0_dp)
-    else if (now%shape == shape_plane) then
-      way = abs(sum((now%point - before%point)*now%axis))
     else
-      ! a rigid motion takes some corner farthest
-      do k = 0, 3
-        corner(:) = now%point - before%point
-        if (k == 1 .or. k == 3) corner(:) = corner + now%edge(:, 1) - before%edge(:, 1)
-        if (k >= 2) corner(:) = corner + now%edge(:, 2) - before%edge(:, 2)
-        way = max(way, norm2(corner))
-      end do
+      way = now%surface%way(before%surface)
     end if
   end function way_of
 

@@ -1,7 +1,6 @@
 !> Areas that loads on boundaries work on.
 module gravier_load_areas
   use gravier_kinds, only: dp
-  use gravier_boundary, only: shape_plane, shape_segment, shape_rectangle
   use gravier_facing_planes, only: find_facing_planes
   use gravier_decomposition, only: decomposition_t
   implicit none
@@ -10,12 +9,15 @@ module gravier_load_areas
 
 contains
 
-  !> Area that a pressure on plane `b` works on [m^2, m in 2D].
+  !> Area that a pressure on plane `b` works on [m^2, m in 2D]; 0 for another boundary.
   pure real(dp) function facing_area(decomposition, b) result(area)
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: b
 
-    area = area_across(decomposition, maxloc(abs(decomposition%boundaries(b)%axis), dim=1))
+    area = 0.0_dp
+    associate (boundary => decomposition%boundaries(b))
+      if (boundary%is_plane()) area = area_across(decomposition, maxloc(abs(boundary%surface%axis), dim=1))
+    end associate
   end function facing_area
 
   !> Area of the scene across axis `main`: along every other axis, the way between the two planes that face each other
@@ -52,16 +54,8 @@ contains
     do b = 1, size(area)
       associate (boundary => decomposition%boundaries(b))
         if (.not. boundary%is_driven()) cycle
-        select case (boundary%shape)
-        case (shape_plane)
-          area(b) = facing_area(decomposition, b)
-        case (shape_segment)
-          area(b) = norm2(boundary%edge(:, 1))
-        case (shape_rectangle)
-          area(b) = norm2(boundary%edge(:, 1))*norm2(boundary%edge(:, 2))
-        case default
-          area(b) = area_across(decomposition, boundary%load_axis())
-        end select
+        if (allocated(boundary%surface)) area(b) = boundary%surface%own_area()
+        if (.not. area(b) > 0.0_dp) area(b) = area_across(decomposition, boundary%load_axis())
       end associate
     end do
   end subroutine find_load_areas

@@ -189,8 +189,10 @@ contains
     real(dp), intent(in) :: h
     character(len=*), parameter :: axes = "xyz"
     character(len=len(boundary%name)) :: name
+    real(dp) :: place(3)
     integer :: d
 
+    call boundary%find_place(place)
     name = boundary%name
     ! a cell of the head of a table holds neither
     do d = 1, len(name)
@@ -200,7 +202,7 @@ contains
       call self%add("force_"//axes(d:d)//":"//name, impulse(d)/h)
     end do
     do d = 1, size(impulse)
-      call self%add("position_"//axes(d:d)//":"//name, boundary%point(d))
+      call self%add("position_"//axes(d:d)//":"//name, place(d))
     end do
   end subroutine add_boundary
 

@@ -14,7 +14,7 @@ module gravier_velocity_scale
   use gravier_communicator, only: communicator_t
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_boundary, only: boundary_t, shape_plane, shape_segment, shape_rectangle, shape_grains, shape_outlet
+  use gravier_boundary, only: boundary_t
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
@@ -110,22 +110,21 @@ contains
     do b = 1, size(boundaries)
       associate (boundary => boundaries(b))
         if (.not. boundary%turns()) cycle
-        select case (boundary%shape)
-        case (shape_plane, shape_grains)
+        if (boundary%is_glued() .or. boundary%is_plane()) then
           do k = 1, grains%n
-            if (boundary%shape == shape_grains .and. grains%glued(k) /= b) cycle
+            if (boundary%is_glued() .and. grains%glued(k) /= b) cycle
             place(:) = 0.0_dp
             place(1:grains%nd) = grains%position(:, k)
             lever(b) = max(lever(b), arm(boundary, place) + grains%radius(k))
           end do
-        case (shape_segment, shape_rectangle)
-          do k = 0, 3
-            place(:) = boundary%point + mod(k, 2)*boundary%edge(:, 1) + (k/2)*boundary%edge(:, 2)
-            lever(b) = max(lever(b), arm(boundary, place))
-          end do
-        case default
-          lever(b) = arm(boundary, boundary%point) + boundary%radius
-        end select
+        else
+          associate (surface => boundary%surface)
+            do k = 0, 3
+              place(:) = surface%point + mod(k, 2)*surface%edge(:, 1) + (k/2)*surface%edge(:, 2)
+              lever(b) = max(lever(b), arm(boundary, place) + surface%radius)
+            end do
+          end associate
+        end if
       end associate
     end do
   end subroutine find_levers
@@ -292,7 +291,7 @@ contains
     n = 0
     do b = 1, size(boundaries)
       associate (boundary => boundaries(b))
-        if (.not. boundary%present .or. boundary%shape == shape_outlet) cycle
+        if (.not. boundary%present .or. boundary%lets_out()) cycle
         motion%bounded = .true.
         if (.not. all(boundary%free(1:nd))) n = n + 1
         do d = 1, nd

@@ -4,11 +4,11 @@ program test_neighbourhood
   use gravier_kinds, only: dp, i8
   use gravier_periodic, only: no_shift, shift_code, shift_of_code
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_boundary, only: boundary_t, shape_segment, shape_circle, shape_cylinder, shape_grains, shape_outlet
+  use gravier_boundary, only: boundary_t
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
-  use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, make_decomposition
+  use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape, make_decomposition
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   integer, parameter :: n_grains = 220, counts(*) = [1, 2, 7, 12]
@@ -248,9 +248,9 @@ contains
     b%velocity(:) = [0.0_dp, 0.0_dp, -0.6_dp]
     call check(.not. due_after(b, 0.39_dp), "a plane and grains, less than the skin")
     call check(due_after(b, 0.41_dp), "a plane and grains, more than the skin")
-    b%shape = shape_outlet
+    call change_shape("outlet", b)
     call check(.not. due_after(b, 0.41_dp), "an outlet has no surface")
-    b%shape = shape_grains
+    deallocate (b%surface)
     call check(.not. due_after(b, 0.41_dp), "nor has a boundary of grains")
     b = plane(1000, floor, up)
     b%velocity(3) = 8.0_dp
@@ -260,21 +260,21 @@ contains
     b%spin(1) = 1.0e-3_dp
     call check(due_after(b, 0.0_dp), "a plane that tilts")
     b = plane(1000, floor, [0.0_dp, 0.0_dp, 0.0_dp])
-    b%shape = shape_segment
-    b%edge(1, 1) = 2.0_dp
+    call change_shape("segment", b)
+    b%surface%edge(1, 1) = 2.0_dp
     b%spin(3) = 0.45_dp
     call check(.not. due_after(b, 0.0_dp), "a segment whose end goes less far than the skin")
     b%spin(3) = 0.55_dp
     call check(due_after(b, 0.0_dp), "a segment whose end goes farther")
     b = plane(1000, floor, [0.0_dp, 0.0_dp, 0.0_dp])
-    b%shape = shape_circle
+    call change_shape("circle", b)
     b%spin(3) = 10.0_dp
     call check(.not. due_after(b, 0.0_dp), "a circle that turns about its centre")
     b%velocity(2) = 1.1_dp
     call check(due_after(b, 0.0_dp), "a circle that moves")
     b = plane(1000, floor, [0.48_dp, 0.6_dp, 0.64_dp])
-    b%shape = shape_cylinder
-    b%spin(:) = 1000.0_dp*b%axis
+    call change_shape("cylinder", b)
+    b%spin(:) = 1000.0_dp*b%surface%axis
     call check(.not. due_after(b, 0.0_dp), "a drum that turns about its axis")
     b%spin(1) = -10.0_dp
     call check(due_after(b, 0.0_dp), "a drum that tilts")

@@ -109,7 +109,7 @@ contains
     do s = 1, size(supports)
       associate (sub => sim%problem%sub(s))
         do b = sub%n_grains + 1, sub%n_columns
-          call check(supports(s)%column(b) .eqv. abs(sim%decomposition%boundaries(sub%boundary(b))%axis(2)) > 0.5_dp, &
+          call check(supports(s)%column(b) .eqv. abs(sim%decomposition%boundaries(sub%boundary(b))%surface%axis(2)) > 0.5_dp, &
             & "the floor and the gentle slope support")
         end do
         call check(.not. any(supports(s)%column(1:sub%n_grains)), "grains do not")

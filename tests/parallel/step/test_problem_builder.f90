@@ -6,7 +6,7 @@ program test_problem_builder
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_set_t
-  use gravier_boundary, only: boundary_t, shape_grains
+  use gravier_boundary, only: boundary_t
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
@@ -138,8 +138,8 @@ contains
         truth%home(i) = decomposition%partition%owner(place(:, i))
         point(:) = place(:, i)
         do w = 1, n_walls
-          branch(:) = boundaries(w)%axis(1:nd)
-          gap = sum((point - boundaries(w)%point(1:nd))*branch) - truth%cloud%radius(i)
+          branch(:) = boundaries(w)%surface%axis(1:nd)
+          gap = sum((point - boundaries(w)%surface%point(1:nd))*branch) - truth%cloud%radius(i)
           call note(truth, i, n_grains + w, truth%home(i), gap, branch)
         end do
       end do
@@ -565,7 +565,6 @@ contains
       lid%velocity(2) = -0.25_dp
     end associate
     glue%id = 13
-    glue%shape = shape_grains
     glue%velocity(1:2) = [0.125_dp, 0.5_dp]
     glue%contact%friction = 0.3_dp
     glue%pivot(1) = 0.8_dp

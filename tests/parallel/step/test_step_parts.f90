@@ -713,14 +713,14 @@ contains
       & "normal = 0, -1, free = F, T, mass = 50.0, force = 0, 0 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
     call advance(sim, figures)
-    top = sim%decomposition%boundaries(1)%point(2)
+    top = sim%decomposition%boundaries(1)%surface%point(2)
     call check_equal(figures%sharing%bodies, 1_i8, "two subdomains share the lid")
     call check_close(figures%max_overlap, overlap, solved, "the overlap of the lid")
     call check_close(top, 0.095_dp + 0.5_dp*(overlap - allowed), solved, "the lid goes up by half of the excess")
     call check_close(grain(sim, 1, 2, .true.), -0.5_dp*(overlap - allowed), solved, "the first disk goes down by the other half")
     call check_close(grain(sim, 2, 2, .true.), -0.5_dp*(overlap - allowed), solved, "and so does the second one")
     call check_close(sim%decomposition%boundaries(1)%velocity(2), 0.0_dp, 0.0_dp, "the lid gets no velocity")
-    call check_close(sim%decomposition%boundaries(1)%point(1), 0.0_dp, 0.0_dp, "and stays along what is prescribed")
+    call check_close(sim%decomposition%boundaries(1)%surface%point(1), 0.0_dp, 0.0_dp, "and stays along what is prescribed")
     call check_close(comm%highest(top) + comm%highest(-top), 0.0_dp, 0.0_dp, "all ranks have moved it alike")
     call sim%free()
   end subroutine check_shared_lid

@@ -4,7 +4,8 @@ program test_config
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
-  use gravier_config, only: config_t, scene_config_t, parse_config, write_active, write_key_reference
+  use gravier_config_surfaces, only: surface_value
+  use gravier_config, only: config_t, scene_config_t, boundary_config_t, parse_config, write_active, write_key_reference
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -146,6 +147,17 @@ contains
     call check(.not. scene%overlap_projection, "overlap_projection")
     call check_close(scene%start_overlap, 0.25_dp, 0.0_dp, "start_overlap")
   end subroutine check_whole_effects
+
+  !> The values of a key of the shape of a boundary.
+  subroutine check_surface(boundary, key, expected, name)
+    type(boundary_config_t), intent(in) :: boundary
+    character(len=*), intent(in) :: key, name
+    real(dp), intent(in) :: expected(3)
+    real(dp) :: values(3)
+
+    values = surface_value(boundary, key)
+    call check_vector(values, expected, name)
+  end subroutine check_surface
 
   subroutine check_vector(vector, expected, name)
     !> shape (3)
@@ -835,8 +847,8 @@ contains
       call check_equal(lid%name, "a, 'lid'", "name of the 3rd")
       call check_equal(floor%shape, "plane", "shape of the 1st")
       call check_equal(drum%shape, "circle", "shape of the 2nd")
-      call check_vector(floor%normal, [0.0_dp, 1.0_dp, 0.0_dp], "normal of the 1st")
-      call check_vector(lid%normal, [0.0_dp, -1.0_dp, 0.0_dp], "normal of the 3rd")
+      call check_surface(floor, "normal", [0.0_dp, 1.0_dp, 0.0_dp], "normal of the 1st")
+      call check_surface(lid, "normal", [0.0_dp, -1.0_dp, 0.0_dp], "normal of the 3rd")
       call check_close(floor%contact%friction, 0.5_dp, 0.0_dp, "friction of the 1st")
       call check_close(drum%contact%friction, 0.25_dp, 0.0_dp, "friction of the 2nd is wall_friction")
       call check(floor%contact_given%friction .and. .not. drum%contact_given%friction, "friction_given")
@@ -846,8 +858,8 @@ contains
       call check_close(floor%remove_at, 3.0_dp, 0.0_dp, "remove_at of the 1st")
       call check(floor%remove_given .and. .not. drum%remove_given, "remove_given")
       call check(drum%remove_at > 1.0e300_dp, "the 2nd is never taken away")
-      call check_close(drum%radius, 2.0_dp, 0.0_dp, "radius of the 2nd")
-      call check_vector(drum%point, [1.0_dp, 2.0_dp, 0.0_dp], "point of the 2nd")
+      call check_surface(drum, "radius", [2.0_dp, 0.0_dp, 0.0_dp], "radius of the 2nd")
+      call check_surface(drum, "point", [1.0_dp, 2.0_dp, 0.0_dp], "point of the 2nd")
       call check_vector(drum%pivot, [3.0_dp, 4.0_dp, 0.0_dp], "pivot of the 2nd")
       call check(drum%pivot_given .and. .not. lid%pivot_given, "pivot_given")
       call check_vector(drum%rotation, [5.0_dp, 0.0_dp, 0.0_dp], "rotation of the 2nd")
@@ -866,8 +878,8 @@ contains
     call accept(column // "&boundary" // plane_keys // "point = 1, 2 /", "a plane", config)
     associate (plane => config%boundaries(1))
       call check_equal(plane%name, "boundary 1", "default name")
-      call check_vector(plane%point, [1.0_dp, 2.0_dp, 0.0_dp], "point")
-      call check_vector(plane%pivot, plane%point, "default pivot")
+      call check_surface(plane, "point", [1.0_dp, 2.0_dp, 0.0_dp], "point")
+      call check_vector(plane%pivot, [1.0_dp, 2.0_dp, 0.0_dp], "default pivot")
       call check_vector(plane%velocity, spread(0.0_dp, 1, 3), "default velocity")
       call check_vector(plane%rotation, spread(0.0_dp, 1, 3), "default rotation of a boundary")
       call check_vector(plane%force, spread(0.0_dp, 1, 3), "default force")
@@ -878,7 +890,7 @@ contains
       call check_close(plane%contact%restitution, 0.0_dp, 0.0_dp, "default restitution of a boundary")
     end associate
     call accept(column // "&boundary" // plane_keys // "/", "a plane through the origin", config)
-    call check_vector(config%boundaries(1)%point, spread(0.0_dp, 1, 3), "default point")
+    call check_surface(config%boundaries(1), "point", [0.0_dp, 0.0_dp, 0.0_dp], "default point")
     call accept(column // "&boundary" // plane_keys // "point = 1, 2 pivot(1) = 3 /", "half a pivot", config)
     call check_vector(config%boundaries(1)%pivot, [3.0_dp, 2.0_dp, 0.0_dp], "pivot(1) given alone")
   end subroutine test_boundary_defaults
@@ -930,12 +942,12 @@ contains
     call refuse(column // plane // "&boundary shap = 'plane' /", "unknown key 'shap' in &boundary; did you mean 'shape'?")
     call refuse(column // "&boundry /", "unknown group &boundry; did you mean &boundary?")
     call refuse(column // plane // "&boundary name = 'b' /", "&boundary (the 2nd, 'b') shape is missing: expected 'plane', " &
-      // "'segment', 'rectangle', 'circle', 'cylinder', 'grains' or 'outlet'")
+      // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet' or 'grains'")
     many = column
     do i = 1, 21
       many = many // plane
       if (i == 3) call refuse(many // "&boundary name = '' /", "&boundary (the 4th, '') shape is missing: expected 'plane', " &
-        // "'segment', 'rectangle', 'circle', 'cylinder', 'grains' or 'outlet'")
+        // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet' or 'grains'")
       if (i == 10) call refuse(many // "&boundary group = a /", "&boundary (the 11th) group = a: expected an integer >= 1")
     end do
     call refuse(many // "&boundary group = a /", "&boundary (the 22nd) group = a: expected an integer >= 1")
@@ -943,8 +955,8 @@ contains
 
   !> Each shape in its dimension, and not in the other.
   subroutine test_shapes()
-    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'grains' or 'outlet' where dimension = 2"
-    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'grains' or 'outlet' where dimension = 3"
+    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'outlet' or 'grains' where dimension = 2"
+    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'outlet' or 'grains' where dimension = 3"
     character(len=*), parameter :: file = "&scene bodies = 'file' bodies_file = 'a.h5' /" // time
     character(len=*), parameter :: space = "&scene bodies = 'file' bodies_file = 'a.h5' dimension = 3 /" // time
     character(len=*), parameter :: segment = "&boundary shape = 'segment' end = 1, 1 /"
@@ -956,12 +968,12 @@ contains
     type(config_t) :: config
 
     call accept(file // segment // circle // others, "the shapes of the plane", config)
-    call check_vector(config%boundaries(1)%end_point, [1.0_dp, 1.0_dp, 0.0_dp], "end of a segment")
+    call check_surface(config%boundaries(1), "end", [1.0_dp, 1.0_dp, 0.0_dp], "end of a segment")
     call check_equal(config%boundaries(5)%group, 1, "group of grains")
     call accept(space // rectangle // cylinder // others, "the shapes of space", config)
-    call check_vector(config%boundaries(1)%edge_a, [1.0_dp, 2.0_dp, 2.0_dp], "edge_a of a rectangle")
-    call check_vector(config%boundaries(1)%edge_b, [0.0_dp, 1.0_dp, -1.0_dp], "edge_b of a rectangle")
-    call check_vector(config%boundaries(2)%axis, [1.0_dp, 1.0_dp, 1.0_dp], "axis of a cylinder")
+    call check_surface(config%boundaries(1), "edge_a", [1.0_dp, 2.0_dp, 2.0_dp], "edge_a of a rectangle")
+    call check_surface(config%boundaries(1), "edge_b", [0.0_dp, 1.0_dp, -1.0_dp], "edge_b of a rectangle")
+    call check_surface(config%boundaries(2), "axis", [1.0_dp, 1.0_dp, 1.0_dp], "axis of a cylinder")
     call refuse(space // segment, "&boundary (the 1st) shape = 'segment': expected " // in_space)
     call refuse(space // circle, "&boundary (the 1st) shape = 'circle': expected " // in_space)
     call refuse(file // "&boundary shape = 'rectangle' edge_a = 1, 0 edge_b = 0, 1 /", &

@@ -7,9 +7,9 @@ program test_small_modules
   use gravier_process, only: pause_for
   use gravier_heap, only: keep_heap
   use gravier_room, only: free_memory
-  use gravier_boundary, only: boundary_t, shape_circle
+  use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes
-  use gravier_test_scenes, only: plane
+  use gravier_test_scenes, only: plane, change_shape
   use gravier_check, only: check, check_close, finish_checks
   implicit none
 
@@ -101,7 +101,7 @@ contains
     call find_facing_planes(planes, 1, low, high)
     call check_close(low, -3.0_dp, 0.0_dp, "the plane that faces along x")
     call check(high >= huge(high), "nothing faces against x")
-    planes(2)%shape = shape_circle
+    call change_shape("circle", planes(2))
     call find_facing_planes(planes, 2, low, high)
     call check_close(low, 0.1_dp, 0.0_dp, "a circle is no plane")
   end subroutine check_facing_planes

@@ -3,9 +3,10 @@ program test_boundary
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_boundary, only: boundary_t, boundary_words, shape_name, drive_names, shape_plane, shape_segment, shape_rectangle, &
-    & shape_circle, shape_cylinder, shape_grains, shape_outlet
-  use gravier_test_scenes, only: draw
+  use gravier_boundary, only: boundary_t, boundary_words, drive_names
+  use gravier_surface, only: surface_features_t
+  use gravier_surface_registry, only: surface_holder_t, registered_surfaces, make_surface
+  use gravier_test_scenes, only: draw, change_shape
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: pi = acos(-1.0_dp)
@@ -59,24 +60,25 @@ contains
   subroutine test_plane()
     type(boundary_t) :: b
 
-    b%point(1:2) = [1.0_dp, 2.0_dp]
-    b%axis(1:2) = [0.6_dp, 0.8_dp]
+    call make_surface("plane", b%surface)
+    b%surface%point(1:2) = [1.0_dp, 2.0_dp]
+    b%surface%axis(1:2) = [0.6_dp, 0.8_dp]
     call check_located(b, [1.6_dp, 2.8_dp], 1.0_dp, [0.6_dp, 0.8_dp], "before a plane")
     call check_located(b, [0.4_dp, 1.2_dp], -1.0_dp, [0.6_dp, 0.8_dp], "behind a plane")
-    b%shape = shape_outlet
+    call change_shape("outlet", b)
     call check_located(b, [0.4_dp, 1.2_dp], -1.0_dp, [0.6_dp, 0.8_dp], "behind an outlet")
-    b%shape = shape_plane
-    b%point(:) = [0.0_dp, 0.0_dp, 1.0_dp]
-    b%axis(:) = [0.0_dp, 0.0_dp, -1.0_dp]
+    call change_shape("plane", b)
+    b%surface%point(:) = [0.0_dp, 0.0_dp, 1.0_dp]
+    b%surface%axis(:) = [0.0_dp, 0.0_dp, -1.0_dp]
     call check_located(b, [7.0_dp, 8.0_dp, -1.0_dp], 2.0_dp, [0.0_dp, 0.0_dp, -1.0_dp], "below a lid")
   end subroutine test_plane
 
   subroutine test_segment()
     type(boundary_t) :: b
 
-    b%shape = shape_segment
-    b%point(1:2) = [1.0_dp, 1.0_dp]
-    b%edge(1:2, 1) = [2.0_dp, 0.0_dp]
+    call make_surface("segment", b%surface)
+    b%surface%point(1:2) = [1.0_dp, 1.0_dp]
+    b%surface%edge(1:2, 1) = [2.0_dp, 0.0_dp]
     call check_located(b, [2.0_dp, 1.5_dp], 0.5_dp, [0.0_dp, 1.0_dp], "above a segment")
     call check_located(b, [2.0_dp, 0.5_dp], 0.5_dp, [0.0_dp, -1.0_dp], "below a segment")
     call check_located(b, [3.75_dp, 2.0_dp], 1.25_dp, [0.6_dp, 0.8_dp], "beyond the second end")
@@ -90,10 +92,10 @@ contains
     type(boundary_t) :: b
     real(dp) :: x(3)
 
-    b%shape = shape_rectangle
-    b%point(:) = [1.0_dp, 1.0_dp, 1.0_dp]
-    b%edge(:, 1) = [2.0_dp, 0.0_dp, 0.0_dp]
-    b%edge(:, 2) = [0.0_dp, 3.0_dp, 0.0_dp]
+    call make_surface("rectangle", b%surface)
+    b%surface%point(:) = [1.0_dp, 1.0_dp, 1.0_dp]
+    b%surface%edge(:, 1) = [2.0_dp, 0.0_dp, 0.0_dp]
+    b%surface%edge(:, 2) = [0.0_dp, 3.0_dp, 0.0_dp]
     call check_located(b, [2.0_dp, 3.0_dp, 1.5_dp], 0.5_dp, [0.0_dp, 0.0_dp, 1.0_dp], "above a face")
     call check_located(b, [2.0_dp, 3.0_dp, 0.5_dp], 0.5_dp, [0.0_dp, 0.0_dp, -1.0_dp], "below a face")
     call check_located(b, [0.25_dp, 2.0_dp, 2.0_dp], 1.25_dp, [-0.6_dp, 0.0_dp, 0.8_dp], "off the first edge")
@@ -104,9 +106,9 @@ contains
     call check_located(b, [-1.0_dp, -1.0_dp, 0.0_dp], 3.0_dp, [-2.0_dp, -2.0_dp, -1.0_dp]/3.0_dp, "off the corner")
     call check_located(b, [2.0_dp, 2.0_dp, 1.0_dp], 0.0_dp, [0.0_dp, 0.0_dp, 1.0_dp], "on a face")
     ! edges along no axis
-    b%edge(:, 1) = [2.0_dp, 2.0_dp, 0.0_dp]
-    b%edge(:, 2) = [1.0_dp, -1.0_dp, 2.0_dp]
-    x(:) = b%point + 0.3_dp*b%edge(:, 1) + 0.9_dp*b%edge(:, 2) + [1.0_dp, -1.0_dp, -1.0_dp]
+    b%surface%edge(:, 1) = [2.0_dp, 2.0_dp, 0.0_dp]
+    b%surface%edge(:, 2) = [1.0_dp, -1.0_dp, 2.0_dp]
+    x(:) = b%surface%point + 0.3_dp*b%surface%edge(:, 1) + 0.9_dp*b%surface%edge(:, 2) + [1.0_dp, -1.0_dp, -1.0_dp]
     call check_located(b, x, sqrt(3.0_dp), &
       & [1.0_dp, -1.0_dp, -1.0_dp]/sqrt(3.0_dp), "before a tilted face")
   end subroutine test_rectangle
@@ -114,9 +116,9 @@ contains
   subroutine test_circle()
     type(boundary_t) :: b
 
-    b%shape = shape_circle
-    b%point(1:2) = [1.0_dp, 1.0_dp]
-    b%radius = 2.0_dp
+    call make_surface("circle", b%surface)
+    b%surface%point(1:2) = [1.0_dp, 1.0_dp]
+    b%surface%radius = 2.0_dp
     call check_located(b, [1.6_dp, 1.8_dp], 1.0_dp, [-0.6_dp, -0.8_dp], "in a circle")
     call check_located(b, [2.8_dp, 3.4_dp], -1.0_dp, [-0.6_dp, -0.8_dp], "out of a circle")
     call check_located(b, [1.0_dp, 1.0_dp], 2.0_dp, [1.0_dp, 0.0_dp], "centre of a circle")
@@ -128,21 +130,21 @@ contains
     real(dp), parameter :: axis(3) = [0.6_dp, 0.0_dp, 0.8_dp], out(3) = [0.8_dp, 0.0_dp, -0.6_dp]
     real(dp) :: distance, normal(3), x(3)
 
-    b%shape = shape_cylinder
-    b%point(:) = [1.0_dp, 1.0_dp, 5.0_dp]
-    b%radius = 2.0_dp
-    b%axis(:) = [0.0_dp, 0.0_dp, 1.0_dp]
+    call make_surface("cylinder", b%surface)
+    b%surface%point(:) = [1.0_dp, 1.0_dp, 5.0_dp]
+    b%surface%radius = 2.0_dp
+    b%surface%axis(:) = [0.0_dp, 0.0_dp, 1.0_dp]
     call check_located(b, [1.6_dp, 1.8_dp, -7.0_dp], 1.0_dp, [-0.6_dp, -0.8_dp, 0.0_dp], "in a cylinder")
     call check_located(b, [2.8_dp, 3.4_dp, 9.0_dp], -1.0_dp, [-0.6_dp, -0.8_dp, 0.0_dp], "out of a cylinder")
-    b%axis(:) = axis
-    x(:) = b%point - 3.0_dp*axis + 0.5_dp*out
+    b%surface%axis(:) = axis
+    x(:) = b%surface%point - 3.0_dp*axis + 0.5_dp*out
     call check_located(b, x, 1.5_dp, -out, "in a tilted cylinder")
-    b%axis(:) = [0.0_dp, 0.0_dp, 1.0_dp]
+    b%surface%axis(:) = [0.0_dp, 0.0_dp, 1.0_dp]
     call b%locate([1.0_dp, 1.0_dp, 3.0_dp], distance, normal)
     call check_close(distance, 2.0_dp, rounding, "axis of a cylinder: distance")
     call check_close(norm2(normal), 1.0_dp, rounding, "axis of a cylinder: a unit normal")
     ! where the axis is along x the normal must not be
-    b%axis(:) = [1.0_dp, 0.0_dp, 0.0_dp]
+    b%surface%axis(:) = [1.0_dp, 0.0_dp, 0.0_dp]
     call b%locate([3.0_dp, 1.0_dp, 5.0_dp], distance, normal)
     call check_close(distance, 2.0_dp, rounding, "axis along x: distance")
     call check_close(norm2(normal), 1.0_dp, rounding, "axis along x: a unit normal")
@@ -156,10 +158,10 @@ contains
     integer :: k, i, j, d
     logical :: nearest, on_surface
 
-    b%shape = shape_rectangle
-    b%point(:) = [0.2_dp, 0.3_dp, 0.4_dp]
-    b%edge(:, 1) = [0.4_dp, 0.2_dp, 0.1_dp]
-    b%edge(:, 2) = [-0.1_dp, 0.3_dp, -0.2_dp]
+    call make_surface("rectangle", b%surface)
+    b%surface%point(:) = [0.2_dp, 0.3_dp, 0.4_dp]
+    b%surface%edge(:, 1) = [0.4_dp, 0.2_dp, 0.1_dp]
+    b%surface%edge(:, 2) = [-0.1_dp, 0.3_dp, -0.2_dp]
     nearest = .true.
     on_surface = .true.
     do k = 1, 200
@@ -169,13 +171,13 @@ contains
       call b%locate(x, distance, normal)
       foot(:) = x - distance*normal
       do d = 1, 2
-        share(d) = sum((foot - b%point)*b%edge(:, d))/sum(b%edge(:, d)**2)
+        share(d) = sum((foot - b%surface%point)*b%surface%edge(:, d))/sum(b%surface%edge(:, d)**2)
       end do
-      other(:) = b%point + share(1)*b%edge(:, 1) + share(2)*b%edge(:, 2)
+      other(:) = b%surface%point + share(1)*b%surface%edge(:, 1) + share(2)*b%surface%edge(:, 2)
       on_surface = on_surface .and. norm2(foot - other) < 1.0e-12_dp .and. all(abs(share - 0.5_dp) < 0.5_dp + 1.0e-12_dp)
       do i = 0, 10
         do j = 0, 10
-          other(:) = b%point + 0.1_dp*i*b%edge(:, 1) + 0.1_dp*j*b%edge(:, 2)
+          other(:) = b%surface%point + 0.1_dp*i*b%surface%edge(:, 1) + 0.1_dp*j*b%surface%edge(:, 2)
           nearest = nearest .and. norm2(x - other) >= distance - rounding
         end do
       end do
@@ -184,22 +186,29 @@ contains
     call check(nearest, "no point of the rectangle is nearer")
   end subroutine test_nearest
 
+  !> Each registered shape under its word, and glued grains, which have no surface.
   subroutine test_kinds()
     type(boundary_t) :: b
-    integer :: shape
-    logical :: right
+    type(surface_holder_t), allocatable :: surfaces(:)
+    type(surface_features_t) :: features
+    integer :: k
 
-    right = .true.
-    do shape = shape_plane, shape_outlet
-      b%shape = shape
+    call check(b%is_glued() .and. b%shape_name() == "grains", "a boundary without a surface")
+    call check(.not. (b%touches() .or. b%lets_out() .or. b%is_plane()), "glued grains have no surface to touch")
+    call registered_surfaces(surfaces)
+    call check_equal(size(surfaces), 6, "registered shapes")
+    do k = 1, size(surfaces)
+      features = surfaces(k)%surface%features()
+      call make_surface(trim(features%kind), b%surface)
       b%present = .true.
-      right = right .and. (b%touches() .neqv. (shape == shape_grains .or. shape == shape_outlet))
+      call check(b%shape_name() == features%kind .and. .not. b%is_glued(), "name of "//features%kind)
+      call check(b%touches() .neqv. b%lets_out(), "grains touch a boundary or leave by it")
+      call check(b%is_plane() .eqv. (features%kind == "plane"), "planes")
       b%present = .false.
-      right = right .and. .not. b%touches()
+      call check(.not. b%touches(), "nothing touches what is not there")
     end do
-    call check(right, "shapes with a surface, while they are there")
-    call check_equal(shape_name(shape_rectangle), "rectangle", "name of a shape")
-    call check_equal(shape_name(shape_outlet), "outlet", "name of the last shape")
+    call make_surface("sphinx", b%surface)
+    call check(.not. allocated(b%surface), "no shape of another word")
     call check(.not. b%is_driven() .and. .not. b%turns(), "a boundary at rest")
     b%free(2) = .true.
     b%given_spin(3) = -1.0_dp
@@ -229,10 +238,10 @@ contains
     type(boundary_t) :: b
     real(dp) :: x(2), tip(3)
 
-    b%shape = shape_segment
-    b%point(1:2) = [2.0_dp, 0.0_dp]
-    b%edge(1:2, 1) = [1.0_dp, 0.0_dp]
-    b%axis(1:2) = [0.0_dp, 1.0_dp]
+    call make_surface("segment", b%surface)
+    b%surface%point(1:2) = [2.0_dp, 0.0_dp]
+    b%surface%edge(1:2, 1) = [1.0_dp, 0.0_dp]
+    b%surface%axis(1:2) = [0.0_dp, 1.0_dp]
     b%pivot(1:2) = [1.0_dp, 0.0_dp]
     b%spin(3) = 0.5_dp*pi/0.25_dp
     b%velocity(1:2) = [4.0_dp, 8.0_dp]
@@ -240,11 +249,11 @@ contains
     call b%carry(0.25_dp, x)
     call b%move(0.25_dp)
     call check_vector(x, [2.0_dp, 4.0_dp], rounding, "a point carried")
-    call check_vector(b%point, [2.0_dp, 3.0_dp, 0.0_dp], rounding, "its point")
+    call check_vector(b%surface%point, [2.0_dp, 3.0_dp, 0.0_dp], rounding, "its point")
     call check_vector(b%pivot, [2.0_dp, 2.0_dp, 0.0_dp], 0.0_dp, "its pivot")
-    call check_vector(b%edge(:, 1), [0.0_dp, 1.0_dp, 0.0_dp], rounding, "its edge")
-    call check_vector(b%axis, [-1.0_dp, 0.0_dp, 0.0_dp], rounding, "its normal")
-    tip(:) = b%point + b%edge(:, 1)
+    call check_vector(b%surface%edge(:, 1), [0.0_dp, 1.0_dp, 0.0_dp], rounding, "its edge")
+    call check_vector(b%surface%axis, [-1.0_dp, 0.0_dp, 0.0_dp], rounding, "its normal")
+    tip(:) = b%surface%point + b%surface%edge(:, 1)
     call check_vector(tip(1:2), x, rounding, "the end that was carried")
   end subroutine test_rotation_2d
 
@@ -256,14 +265,14 @@ contains
     real(dp), parameter :: h = 1.0_dp/n
     integer :: k
 
-    b%shape = shape_rectangle
-    b%point(:) = [0.5_dp, -0.25_dp, 0.75_dp]
-    b%edge(:, 1) = [1.0_dp, 0.0_dp, 0.0_dp]
-    b%edge(:, 2) = [0.0_dp, 0.0_dp, 2.0_dp]
+    call make_surface("rectangle", b%surface)
+    b%surface%point(:) = [0.5_dp, -0.25_dp, 0.75_dp]
+    b%surface%edge(:, 1) = [1.0_dp, 0.0_dp, 0.0_dp]
+    b%surface%edge(:, 2) = [0.0_dp, 0.0_dp, 2.0_dp]
     b%pivot(:) = [0.25_dp, 0.25_dp, 0.0_dp]
     b%spin(:) = 2.0_dp*pi/sqrt(3.0_dp)
     start = b
-    x(:) = b%point + b%edge(:, 2)
+    x(:) = b%surface%point + b%surface%edge(:, 2)
     do k = 1, n
       before(:) = x
       call b%velocity_at(x, v)
@@ -273,16 +282,16 @@ contains
       ! the chord differs from the arc by a second-order term, w^2 r h^2/2 with w below 7 and r below 3
       away(:) = (x - before)/h
       call check_vector(away, v, 0.5_dp*49.0_dp*3.0_dp*h, "velocity of the motion")
-      call check(norm2(b%point - start%point) > 0.1_dp, "it has turned")
-      tip(:) = b%point + b%edge(:, 2)
+      call check(norm2(b%surface%point - start%surface%point) > 0.1_dp, "it has turned")
+      tip(:) = b%surface%point + b%surface%edge(:, 2)
       call check_vector(x, tip, n*rounding, "carried with it")
     end do
-    tip(:) = start%point + start%edge(:, 2)
-    call check_vector(b%point, start%point, n*rounding, "a whole turn: point")
-    call check_vector(b%edge(:, 1), start%edge(:, 1), n*rounding, "a whole turn: first edge")
-    call check_vector(b%edge(:, 2), start%edge(:, 2), n*rounding, "a whole turn: second edge")
+    tip(:) = start%surface%point + start%surface%edge(:, 2)
+    call check_vector(b%surface%point, start%surface%point, n*rounding, "a whole turn: point")
+    call check_vector(b%surface%edge(:, 1), start%surface%edge(:, 1), n*rounding, "a whole turn: first edge")
+    call check_vector(b%surface%edge(:, 2), start%surface%edge(:, 2), n*rounding, "a whole turn: second edge")
     call check_vector(x, tip, n*rounding, "a whole turn: a point carried")
-    call check_close(sum(b%edge(:, 1)*b%edge(:, 2)), 0.0_dp, n*rounding, "edges at right angles")
+    call check_close(sum(b%surface%edge(:, 1)*b%surface%edge(:, 2)), 0.0_dp, n*rounding, "edges at right angles")
   end subroutine test_rotation_3d
 
   !> A cylinder that turns about its axis stays as it is, bit for bit: its surface does not move.
@@ -290,14 +299,14 @@ contains
     type(boundary_t) :: b
     integer :: k
 
-    b%shape = shape_cylinder
-    b%axis(:) = [0.0_dp, 1.0_dp, 0.0_dp]
+    call make_surface("cylinder", b%surface)
+    b%surface%axis(:) = [0.0_dp, 1.0_dp, 0.0_dp]
     b%spin(:) = [0.0_dp, 0.7_dp, 0.0_dp]
     do k = 1, 100
       call b%move(0.013_dp)
     end do
-    call check_vector(b%axis, [0.0_dp, 1.0_dp, 0.0_dp], 0.0_dp, "axis of a drum")
-    call check_vector(b%point, [0.0_dp, 0.0_dp, 0.0_dp], 0.0_dp, "point of a drum")
+    call check_vector(b%surface%axis, [0.0_dp, 1.0_dp, 0.0_dp], 0.0_dp, "axis of a drum")
+    call check_vector(b%surface%point, [0.0_dp, 0.0_dp, 0.0_dp], 0.0_dp, "point of a drum")
   end subroutine test_axis_of_rotation
 
   !> Each column of a table drives its own quantity; the others keep their constants.
@@ -346,7 +355,8 @@ contains
   subroutine make_constants(b)
     type(boundary_t), intent(out) :: b
 
-    b%axis(1) = 1.0_dp
+    call make_surface("plane", b%surface)
+    b%surface%axis(1) = 1.0_dp
     b%given_velocity(:) = [11.0_dp, 12.0_dp, 13.0_dp]
     b%given_spin(:) = [14.0_dp, 15.0_dp, 16.0_dp]
     b%given_force(:) = [17.0_dp, 18.0_dp, 19.0_dp]
@@ -359,7 +369,7 @@ contains
     real(dp) :: force(3)
 
     call make_constants(b)
-    b%axis(:) = [0.0_dp, 0.6_dp, 0.8_dp]
+    b%surface%axis(:) = [0.0_dp, 0.6_dp, 0.8_dp]
     b%free(2) = .true.
     call b%prescribe(3, 0.0_dp)
     call check_vector(b%velocity, [11.0_dp, 0.0_dp, 13.0_dp], 0.0_dp, "prescribed components")
@@ -378,11 +388,13 @@ contains
     integer(i8) :: words(boundary_words), again(boundary_words)
     integer :: k
 
+    call make_surface("rectangle", b%surface)
+    call make_surface("rectangle", back%surface)
     do k = 1, 3
-      b%point(k) = draw(1, k, 1)
-      b%axis(k) = draw(1, k, 2)
-      b%edge(k, 1) = draw(1, k, 3)
-      b%edge(k, 2) = draw(1, k, 4)
+      b%surface%point(k) = draw(1, k, 1)
+      b%surface%axis(k) = draw(1, k, 2)
+      b%surface%edge(k, 1) = draw(1, k, 3)
+      b%surface%edge(k, 2) = draw(1, k, 4)
       b%pivot(k) = draw(1, k, 5)
       b%velocity(k) = draw(1, k, 6)
       b%spin(k) = draw(1, k, 7)
@@ -395,10 +407,10 @@ contains
     call back%set_state(words)
     call back%get_state(again)
     call check(all(words == again), "words of a state")
-    call check_vector(back%point, b%point, 0.0_dp, "state: point")
-    call check_vector(back%axis, b%axis, 0.0_dp, "state: axis")
-    call check_vector(back%edge(:, 1), b%edge(:, 1), 0.0_dp, "state: first edge")
-    call check_vector(back%edge(:, 2), b%edge(:, 2), 0.0_dp, "state: second edge")
+    call check_vector(back%surface%point, b%surface%point, 0.0_dp, "state: point")
+    call check_vector(back%surface%axis, b%surface%axis, 0.0_dp, "state: axis")
+    call check_vector(back%surface%edge(:, 1), b%surface%edge(:, 1), 0.0_dp, "state: first edge")
+    call check_vector(back%surface%edge(:, 2), b%surface%edge(:, 2), 0.0_dp, "state: second edge")
     call check_vector(back%pivot, b%pivot, 0.0_dp, "state: pivot")
     call check_vector(back%velocity, b%velocity, 0.0_dp, "state: velocity")
     call check_vector(back%spin, b%spin, 0.0_dp, "state: spin")
@@ -412,15 +424,15 @@ contains
   subroutine test_shift()
     type(boundary_t) :: b
 
-    b%shape = shape_segment
-    b%point(1:2) = [2.0_dp, 0.5_dp]
-    b%edge(1:2, 1) = [1.0_dp, 0.0_dp]
+    call make_surface("segment", b%surface)
+    b%surface%point(1:2) = [2.0_dp, 0.5_dp]
+    b%surface%edge(1:2, 1) = [1.0_dp, 0.0_dp]
     b%pivot(1:2) = [1.0_dp, 0.25_dp]
     b%velocity(1:2) = [4.0_dp, 8.0_dp]
     call b%shift([0.5_dp, -1.0_dp])
-    call check_vector(b%point, [2.5_dp, -0.5_dp, 0.0_dp], 0.0_dp, "shift: point")
+    call check_vector(b%surface%point, [2.5_dp, -0.5_dp, 0.0_dp], 0.0_dp, "shift: point")
     call check_vector(b%pivot, [1.5_dp, -0.75_dp, 0.0_dp], 0.0_dp, "shift: pivot")
-    call check_vector(b%edge(:, 1), [1.0_dp, 0.0_dp, 0.0_dp], 0.0_dp, "shift: edge")
+    call check_vector(b%surface%edge(:, 1), [1.0_dp, 0.0_dp, 0.0_dp], 0.0_dp, "shift: edge")
     call check_vector(b%velocity, [4.0_dp, 8.0_dp, 0.0_dp], 0.0_dp, "shift: velocity")
   end subroutine test_shift
 

@@ -42,10 +42,10 @@ program test_neighbour_search
   use gravier_kinds, only: dp, i8
   use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
   use gravier_body_store, only: body_set_t
-  use gravier_boundary, only: boundary_t, shape_grains, shape_outlet, shape_circle
+  use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_search, only: neighbour_rule_t, find_neighbours, sweep_order, owner_point, rule_dual, rule_primal
-  use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane
+  use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape
   use test_search_region, only: sites_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -275,8 +275,8 @@ contains
     right = .true.
     do g = 1, cloud%n
       do b = 1, size(boundaries)
-        if (dot_product(cloud%place(:, g) - boundaries(b)%point(1:nd), boundaries(b)%axis(1:nd)) - cloud%radius(g) <= &
-          & rule%alert_distance + rule%skin) then
+        if (dot_product(cloud%place(:, g) - boundaries(b)%surface%point(1:nd), boundaries(b)%surface%axis(1:nd)) - &
+          & cloud%radius(g) <= rule%alert_distance + rule%skin) then
           right = right .and. near(g, b) == region%owner(cloud%place(:, g))
         else
           right = right .and. near(g, b) == 0
@@ -512,11 +512,11 @@ contains
       boundaries(b) = plane(100 + b, [0.0_dp, 0.0_dp], [0.0_dp, 1.0_dp])
     end do
     boundaries(1)%present = .false.
-    boundaries(2)%shape = shape_grains
-    boundaries(3)%shape = shape_outlet
-    boundaries(4)%shape = shape_circle
-    boundaries(4)%radius = 2.5_dp
-    boundaries(4)%axis(:) = 0.0_dp
+    deallocate (boundaries(2)%surface)
+    call change_shape("outlet", boundaries(3))
+    call change_shape("circle", boundaries(4))
+    boundaries(4)%surface%axis(:) = 0.0_dp
+    boundaries(4)%surface%radius = 2.5_dp
     call list_units(bodies, boundaries, period, list)
     call check_equal(list%n, 2, "boundaries with a surface that are there")
     if (list%n /= 2) return

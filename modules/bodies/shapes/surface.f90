@@ -1,0 +1,176 @@
+!> What the surface of a boundary is: its place, its keys in the input, and the answers that contacts, lists and checks ask of it.
+module gravier_surface
+  use gravier_kinds, only: dp
+  use gravier_declared_keys, only: declared_key_t
+  implicit none
+  private
+  public :: surface_t, surface_features_t, point_key, set_direction, is_vector, facing
+
+  !> least component along an axis of the unit normal of what faces along it
+  real(dp), parameter :: facing = 0.99_dp
+
+  !> the key that all shapes have
+  type(declared_key_t), parameter :: point_key = declared_key_t("point", "3*0", "", "m", &
+    & "a point of a plane, of an outlet or of the axis of a cylinder, "// &
+    & "the first end of a segment, a corner of a rectangle, the centre of a circle", 3)
+
+  !> What holds for all surfaces of a shape.
+  type :: surface_features_t
+    !> its word in the input
+    character(len=16) :: kind = ""
+    !> scenes of two and of three dimensions may have it
+    logical :: dimensions(2:3) = .true.
+    !> grains can touch it
+    logical :: touches = .true.
+    !> grains leave the scene behind it
+    logical :: lets_out = .false.
+    !> it is a plane: it goes on for ever, with one normal
+    logical :: endless = .false.
+    !> it goes on for ever along `axis`
+    logical :: endless_axis = .false.
+    !> grains are inside
+    logical :: encloses = .false.
+  end type surface_features_t
+
+  !> A surface where it is now. Its vectors move and turn with the boundary; in 2D their third component is 0. A shape that needs
+  !> lengths of its own has them as components of its type.
+  type, abstract :: surface_t
+    !> the point that the shape names [m]
+    real(dp) :: point(3) = 0.0_dp
+    !> unit normal towards the free side, or unit vector along an axis; 0 where the shape has neither
+    real(dp) :: axis(3) = 0.0_dp
+    !> edges from the point, 0 where the shape has none [m]
+    real(dp) :: edge(3, 2) = 0.0_dp
+    !> 0 where the shape has none [m]
+    real(dp) :: radius = 0.0_dp
+  contains
+    procedure(surface_features), deferred, nopass :: features
+    procedure(surface_keys), deferred, nopass :: keys
+    procedure(surface_set), deferred :: set
+    procedure(surface_locate), deferred :: locate
+    procedure :: find_middle => surface_find_middle
+    procedure :: half_width => surface_half_width
+    procedure :: way => surface_way
+    procedure :: own_area => surface_own_area
+    procedure :: level => surface_level
+    procedure :: support => surface_support
+  end type surface_t
+
+  abstract interface
+    pure function surface_features() result(features)
+      import :: surface_features_t
+      implicit none
+      type(surface_features_t) :: features
+    end function surface_features
+    !> Its keys. A key that several shapes have is the same in all of them: default, rule, unit and meaning.
+    pure subroutine surface_keys(keys)
+      import :: declared_key_t
+      implicit none
+      type(declared_key_t), allocatable, intent(out) :: keys(:)
+    end subroutine surface_keys
+    !> Take the values of the keys, (3, keys) in their order. Where one cannot be, `wrong` names it and `expected` says what was
+    !> expected; blank: what its rule says. A key in braces stands for its value in `expected`.
+    pure subroutine surface_set(self, values, wrong, expected)
+      import :: surface_t, dp
+      implicit none
+      class(surface_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: values(:, :)
+      character(len=:), allocatable, intent(out) :: wrong, expected
+    end subroutine surface_set
+    !> Nearest point of the surface to a point that lies `from` the point of the surface: distance from it [m], negative behind a
+    !> surface that has a behind, and unit normal there towards the point asked about.
+    pure subroutine surface_locate(self, from, distance, normal)
+      import :: surface_t, dp
+      implicit none
+      class(surface_t), intent(in) :: self
+      real(dp), intent(in) :: from(3)
+      real(dp), intent(out) :: distance, normal(3)
+    end subroutine surface_locate
+  end interface
+
+contains
+
+  !> Middle of a surface that ends [m].
+  pure subroutine surface_find_middle(self, middle)
+    class(surface_t), intent(in) :: self
+    real(dp), intent(out) :: middle(3)
+    middle(:) = self%point + 0.5_dp*(self%edge(:, 1) + self%edge(:, 2))
+  end subroutine surface_find_middle
+
+  !> Half of what a surface that ends takes along axis `d`, in any position that it may turn to [m].
+  pure real(dp) function surface_half_width(self, d, turns) result(half)
+    class(surface_t), intent(in) :: self
+    integer, intent(in) :: d
+    logical, intent(in) :: turns
+
+    if (turns) then
+      half = self%radius + 0.5_dp*sqrt(sum(self%edge**2))
+    else
+      half = self%radius + 0.5_dp*sum(abs(self%edge(d, :)))
+    end if
+  end function surface_half_width
+
+  !> How far some point of the surface has moved at most, without a tilt of `axis` [m]: a rigid motion takes some corner farthest.
+  pure real(dp) function surface_way(self, before) result(way)
+    class(surface_t), intent(in) :: self, before
+    real(dp) :: corner(3)
+    integer :: k
+
+    way = 0.0_dp
+    do k = 0, 3
+      corner(:) = self%point - before%point
+      if (k == 1 .or. k == 3) corner(:) = corner + self%edge(:, 1) - before%edge(:, 1)
+      if (k >= 2) corner(:) = corner + self%edge(:, 2) - before%edge(:, 2)
+      way = max(way, norm2(corner))
+    end do
+  end function surface_way
+
+  !> Area that a load on the surface works on [m^2, m in 2D]; 0 for a shape without edges, whose load works on an area of the scene.
+  pure real(dp) function surface_own_area(self) result(area)
+    class(surface_t), intent(in) :: self
+    area = norm2(self%edge(:, 1))
+  end function surface_own_area
+
+  !> Where the surface stands along an axis, if it faces along it.
+  pure subroutine surface_level(self, axis, level, known)
+    class(surface_t), intent(in) :: self
+    integer, intent(in) :: axis
+    !> [m]
+    real(dp), intent(out) :: level
+    logical, intent(out) :: known
+    real(dp) :: size_of_edges
+
+    size_of_edges = norm2(self%edge)
+    level = self%point(axis) + 0.5_dp*sum(self%edge(axis, :))
+    known = size_of_edges > 0.0_dp .and. all(abs(self%edge(axis, :)) <= (1.0_dp - facing)*size_of_edges)
+  end subroutine surface_level
+
+  !> Height of the lowest point at which a surface that ends carries grains [m], huge where it carries none.
+  pure real(dp) function surface_support(self, axis, up) result(support)
+    class(surface_t), intent(in) :: self
+    !> of the fall
+    integer, intent(in) :: axis
+    !> 1 or -1: sense of the axis that is up
+    real(dp), intent(in) :: up
+
+    support = huge(1.0_dp)
+    if (abs(self%axis(axis)) < facing) support = up*self%point(axis) + sum(min(up*self%edge(axis, :), 0.0_dp)) - self%radius
+  end function surface_support
+
+  !> A vector of length 1, whatever its length was: squares of very large or small components would be lost.
+  pure subroutine set_direction(vector, unit)
+    !> not 0
+    real(dp), intent(in) :: vector(3)
+    real(dp), intent(out) :: unit(3)
+
+    unit(:) = vector/maxval(abs(vector))
+    unit(:) = unit/norm2(unit)
+  end subroutine set_direction
+
+  !> Whether a vector is not 0.
+  pure logical function is_vector(vector)
+    real(dp), intent(in) :: vector(:)
+    is_vector = any(abs(vector) > 0.0_dp)
+  end function is_vector
+
+end module gravier_surface
