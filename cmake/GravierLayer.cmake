@@ -12,16 +12,17 @@ endfunction()
 set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds; empty: none")
 
 # gravier_expand(VARIABLE TEMPLATE...): the list of the Fortran files that fypp makes of templates, NAME.f90 of NAME.fypp. Messages of
-# the compiler name the lines of the template.
+# the compiler name the lines of the template. Templates include NAME.fypi, from beside them or by its path below modules/.
 find_program(FYPP_EXECUTABLE fypp REQUIRED)
 function(gravier_expand variable)
   set(expanded)
+  file(GLOB_RECURSE included CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/modules/*.fypi)
   foreach(template ${ARGN})
     file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR} ${template})
     string(REGEX REPLACE "\\.fypp$" ".f90" name ${name})
     set(output ${PROJECT_BINARY_DIR}/expanded/${name})
-    add_custom_command(OUTPUT ${output} VERBATIM DEPENDS ${template}
-      COMMAND ${FYPP_EXECUTABLE} --line-numbering --create-parents ${template} ${output})
+    add_custom_command(OUTPUT ${output} VERBATIM DEPENDS ${template} ${included}
+      COMMAND ${FYPP_EXECUTABLE} --line-numbering --create-parents -I ${PROJECT_SOURCE_DIR}/modules ${template} ${output})
     list(APPEND expanded ${output})
   endforeach()
   set(${variable} ${expanded} PARENT_SCOPE)

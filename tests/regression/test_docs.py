@@ -182,7 +182,7 @@ class Links(unittest.TestCase):
     def test_procedures_are_in_the_files_they_are_linked_to(self):
         count = 0
         for page in PAGES:
-            for name, path in re.findall(r"\[`(\w+)`\]\(([^)#\s]+\.(?:f90|F90|inc|fypp))\)", read(page)[1]):
+            for name, path in re.findall(r"\[`(\w+)`\]\(([^)#\s]+\.(?:f90|F90|fypp|fypi))\)", read(page)[1]):
                 count += 1
                 with self.subTest(page=page.name, procedure=name):
                     text = (page.parent / path).read_text(encoding="utf-8")

@@ -70,7 +70,7 @@ def literals(text):
 def sites():
     """Where messages are made: (place, name of the procedure, statement from its call on)."""
     for folder in ("modules", "src", "drivers"):
-        for path in sorted(Path(SOURCE, folder).rglob("*.[fF]90")):
+        for path in sorted(path for ending in ("*.[fF]90", "*.fypp", "*.fypi") for path in Path(SOURCE, folder).rglob(ending)):
             for line, text in statements(path):
                 found = CALL.search(text)
                 if found:

@@ -23,7 +23,7 @@ EXCEPTIONS = {
 
 
 def sources(folder):
-    """Texts of the Fortran sources below a folder, by path."""
+    """Texts of the Fortran sources and templates below a folder, by path."""
     found = {}
     for path in sorted(path for kind in ("*.[fF]90", "*.fypp")
                        for path in glob.glob(os.path.join(SOURCE, folder, "**", kind), recursive=True)):

@@ -34,8 +34,8 @@ class Narrowing(unittest.TestCase):
     def test_one_procedure(self):
         found, wrong = {}, []
         for folder in ("modules", "src", "drivers"):
-            for path in sorted(path for kind in ("*.[fF]90", "*.fypp")
-                               for path in glob.glob(os.path.join(SOURCE, folder, "**", kind), recursive=True)):
+            for path in sorted(path for ending in ("*.[fF]90", "*.fypp", "*.fypi")
+                               for path in glob.glob(os.path.join(SOURCE, folder, "**", ending), recursive=True)):
                 name = os.path.relpath(path, SOURCE)
                 if name == "modules/base/core/narrow.f90":
                     continue

@@ -1,5 +1,4 @@
-!> Signorini's condition and Coulomb's law on one contact, v = W r + b with a full block W: exact solution, and the projection on
-!> the cone of friction that measures a defect.
+!> Signorini's condition and Coulomb's law on one contact, v = W r + b with a full block W, solved exactly.
 !>
 !> Where b_n < 0 the contact closes: v_n = 0, and r = r_n (1, p) with |p| <= mu, r_n = -b_n/(W_nn + W_nt p). Multiplied by
 !> W_nn + W_nt p > 0, the tangential velocity is affine in p: N p - c, N = -b_n W_tt + b_t W_nt, c = b_n W_tn - b_t W_nn. The
@@ -10,7 +9,7 @@ module gravier_local_law
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: solve_law_2d, solve_law_3d, project_on_cone
+  public :: solve_law_2d, solve_law_3d
 
   !> Newton's steps and bisections on the secular equation; bisections alone end after these
   integer, parameter :: most_steps = 120
@@ -253,22 +252,5 @@ contains
     x(1) = (d*c(1) - n(3)*c(2))/determinant
     x(2) = (a*c(2) - n(2)*c(1))/determinant
   end subroutine solve_shifted
-
-  !> Replace (x_n, x_t), of 2 or 3 dimensions, by its Euclidean projection on the cone |x_t| <= mu x_n.
-  pure subroutine project_on_cone(x, mu)
-    real(dp), intent(inout), contiguous :: x(:)
-    real(dp), intent(in) :: mu
-    real(dp) :: tangential
-
-    ! norm2 is slow for its care of overflow
-    tangential = sqrt(sum(x(2:)**2))
-    ! the polar cone first: without friction and tangential part, x(1) < 0 passes for a point of the cone
-    if (mu*tangential <= -x(1)) then
-      x(:) = 0.0_dp
-    else if (tangential > mu*x(1)) then
-      x(1) = (x(1) + mu*tangential)/(1.0_dp + mu**2)
-      x(2:) = x(2:)*(mu*x(1)/tangential)
-    end if
-  end subroutine project_on_cone
 
 end module gravier_local_law

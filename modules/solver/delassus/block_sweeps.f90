@@ -4,7 +4,8 @@ module gravier_block_sweeps
   use gravier_kinds, only: dp
   use gravier_delassus, only: delassus_t
   use gravier_unbounded, only: growth_t, note_growth
-  use gravier_local_law, only: solve_law_2d, solve_law_3d, project_on_cone
+  use gravier_friction_cone, only: project_on_cone
+  use gravier_local_law, only: solve_law_2d, solve_law_3d
   implicit none
   private
   public :: sweep_control_t, sweep_blocks, solve_by_sweeps

@@ -6,7 +6,7 @@ module gravier_delassus
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_sparse_rows, only: sparse_rows_t
-  use gravier_local_law, only: project_on_cone
+  use gravier_friction_cone, only: project_on_cone
   implicit none
   private
   public :: delassus_t, most_impulse

@@ -14,7 +14,7 @@
 module gravier_unbounded
   use gravier_kinds, only: dp
   use gravier_delassus, only: delassus_t, most_impulse
-  use gravier_local_law, only: project_on_cone
+  use gravier_friction_cone, only: project_on_cone
   implicit none
   private
   public :: growth_none, growth_marked, growth_proven, growth_t, ray_sums_t, find_growth, note_growth

@@ -2,7 +2,8 @@
 program test_local_law
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_local_law, only: solve_law_2d, solve_law_3d, project_on_cone
+  use gravier_friction_cone, only: project_on_cone
+  use gravier_local_law, only: solve_law_2d, solve_law_3d
   use gravier_check, only: check, check_close, finish_checks
   implicit none
 

@@ -5,8 +5,9 @@ program test_contact_kernels
   use gravier_kinds, only: dp, i8
   use gravier_effects, only: effects_t
   use gravier_random_hash, only: hash_uniform
-  use gravier_contact_kernels, only: kernels_t, contact_jacobian, global_impulse, tangents, local_operator, lanes, n_blocks, &
-    & lane_of, block_of, rolling_radius, global_moment
+  use gravier_contact_data, only: lanes, n_blocks, lane_of, block_of
+  use gravier_contact_vectors, only: contact_jacobian, global_impulse, tangents, local_operator, rolling_radius, global_moment
+  use gravier_contact_kernels, only: kernels_t
   use gravier_test_contact_columns, only: contact_column, put_contact_column, same_contacts
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
