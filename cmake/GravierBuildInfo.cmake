@@ -46,6 +46,7 @@ fortran_text(INFO_SHARE "${share}")
 configure_file(${PROJECT_SOURCE_DIR}/cmake/build_info.f90.in ${PROJECT_BINARY_DIR}/generated/build_info.f90 @ONLY)
 
 add_library(gravier_build_info STATIC ${PROJECT_BINARY_DIR}/generated/build_info.f90)
-set_target_properties(gravier_build_info PROPERTIES Fortran_MODULE_DIRECTORY ${PROJECT_BINARY_DIR}/mod/build_info)
-target_include_directories(gravier_build_info PUBLIC ${PROJECT_BINARY_DIR}/mod/build_info)
+set_target_properties(gravier_build_info PROPERTIES EXPORT_NAME build_info POSITION_INDEPENDENT_CODE ON
+  Fortran_MODULE_DIRECTORY ${PROJECT_BINARY_DIR}/mod/build_info)
+target_include_directories(gravier_build_info PUBLIC $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/mod/build_info>)
 gravier_compile_options(gravier_build_info)

@@ -1,4 +1,5 @@
-# Installs the build BUILD under WORK, builds the project CONSUMER against the installation and runs it.
+# Installs the build BUILD under WORK, builds the project CONSUMER against the installation and runs its
+# programs: one on the libraries, and one that extends gravier.
 function(run)
   execute_process(COMMAND ${ARGN} WORKING_DIRECTORY ${WORK} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT status EQUAL 0)
@@ -14,6 +15,7 @@ run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/build -G ${GENERATOR} -DCMAKE_PRE
   -DCMAKE_Fortran_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Release)
 run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${WORK}/build/consumer)
+run(${PYTHON} ${CONSUMER}/check_own.py ${WORK}/build/own_gravier)
 if(PROGRAM)
   run(${WORK}/prefix/bin/gravier --version)
   # a Python that says what it is to draw with: the script of the installation
