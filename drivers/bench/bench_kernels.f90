@@ -6,6 +6,7 @@ module gravier_bench_kernels
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
   use gravier_text, only: to_text
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_effects, only: effects_t
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: subproblem_t
@@ -171,6 +172,7 @@ contains
     type(simulation_t) :: simulation
     type(step_figures_t) :: figures
     type(effects_t) :: effects
+    type(coefficients_t) :: contact
 
     if (index(name, "2d") == 1) then
       packing = make_packing(2, nint(n/contacts_2d))
@@ -185,8 +187,10 @@ contains
       effects%tangential_restitution = index(name, "tangential") > 0
       effects%rolling = index(name, "roll") > 0
       call simulation%problem%kernels%choose(packing%nd, effects)
-      simulation%physics%contact%rolling_friction = rolling_friction
-      simulation%physics%contact%pivoting_friction = rolling_friction
+      contact = simulation%config%scene%contact
+      contact%rolling_friction = rolling_friction
+      contact%pivoting_friction = rolling_friction
+      call simulation%physics%laws%set_default(0, contact)
       call simulation%assemble(figures)
       associate (sub => simulation%problem%sub(1))
         if (index(name, "restitution") > 0) sub%hot(:, packing%nd + 1, :) = 0.5_dp*sub%hot(:, packing%nd + 1, :)

@@ -148,7 +148,6 @@ contains
     associate (config => self%config%scene, rule => self%decomposition%rule)
       self%physics%gravity(:) = config%gravity
       self%physics%body_force(:) = config%body_force
-      self%physics%contact = config%contact
       self%physics%rotation = config%rotation
       self%physics%laws = scene%laws
       self%physics%h = self%config%time%step

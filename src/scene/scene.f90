@@ -14,6 +14,7 @@ module gravier_scene
   use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_law_set, only: law_set_t
+  use gravier_pair_laws, only: set_default_laws
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: features_of, quoted_names, with_moments
   use gravier_config_types, only: config_t, scene_config_t
@@ -78,6 +79,7 @@ contains
       scene%boundaries(b)%period(:) = scene%period%length
     end do
     call collect_laws(config, scene%laws)
+    call set_default_laws(scene%laws, config%scene%contact, scene%boundaries)
     call check_data(comm, config, data, error)
     if (allocated(error)) return
     call take_data(comm, config, data, scene)

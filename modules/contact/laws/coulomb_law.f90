@@ -36,6 +36,7 @@ contains
     class(coulomb_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
 
+    self%is_constant = .true.
     self%friction = values(1)
     self%largest%restitution = values(2)
     self%largest%tangential_restitution = values(3)

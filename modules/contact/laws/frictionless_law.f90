@@ -32,6 +32,8 @@ contains
   pure subroutine frictionless_set(self, values)
     class(frictionless_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
+
+    self%is_constant = .true.
     self%largest%restitution = values(1)
   end subroutine frictionless_set
 

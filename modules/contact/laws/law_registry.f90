@@ -1,6 +1,6 @@
 !> The laws of contact there are. A new law is a file in modules/contact/laws and a line here.
 module gravier_law_registry
-  use gravier_contact_law, only: contact_law_t, law_key_t
+  use gravier_contact_law, only: contact_law_t, contact_terms_t, law_key_t
   implicit none
   private
   public :: law_holder_t, registered_key_t, registered_laws, registered_keys, kind_length
@@ -10,6 +10,8 @@ module gravier_law_registry
 
   type :: law_holder_t
     class(contact_law_t), allocatable :: law
+    !> of a law that has the same terms for all its pairs: these, but for the play
+    type(contact_terms_t) :: terms
   end type law_holder_t
 
   !> A key with the kinds of law that have it.

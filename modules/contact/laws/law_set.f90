@@ -1,20 +1,30 @@
-!> The laws of a scene by pairs of materials.
+!> The laws of a scene: by pairs of materials and, for all other pairs, by default.
+!>
+!> A default law is an ordinary one of kind `coulomb` with the coefficients of &scene, for pairs of grains, or of the &boundary that
+!> takes part.
 module gravier_law_set
   use gravier_kinds, only: dp
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_contact_law, only: law_key_t
+  use gravier_contact_law, only: contact_pair_t, law_key_t
   use gravier_law_registry, only: law_holder_t, registered_laws
   implicit none
   private
   public :: law_set_t
 
-  !> Materials have numbers from 1 on; what has none, 0, is under the values of the scene.
+  !> keys of a default law, which are components of coefficients_t
+  character(len=24), parameter :: coulomb_names(5) = [character(len=24) :: "friction", "restitution", "tangential_restitution", &
+    & "rolling_friction", "pivoting_friction"]
+
+  !> Materials have numbers from 1 on; what has none, 0, is under the default laws.
   type :: law_set_t
-    !> laws so far
+    !> laws of pairs of materials so far
     integer :: n = 0
+    !> laws of pairs of materials from 1 on; the default law of grains at 0, that of boundary b at -b (-boundaries to laws)
     type(law_holder_t), allocatable :: of(:)
-    !> place in `of` of the law of two materials, 0 where the scene's values hold (materials, materials)
+    !> place in `of` of the law of two materials, 0 where a default law holds (materials, materials)
     integer, allocatable :: of_pair(:, :)
+    !> some law has other terms for each pair
+    logical :: varies = .false.
     !> some law attracts, has a memory
     logical :: attracts = .false., remembers = .false.
     !> the largest of all laws; range in [m]
@@ -23,30 +33,67 @@ module gravier_law_set
   contains
     procedure :: init => law_set_init
     procedure :: add => law_set_add
+    procedure :: set_default => law_set_set_default
     procedure :: number_of => law_set_number_of
+    procedure :: default_of => law_set_default_of
+    procedure :: varies_at => law_set_varies_at
   end type law_set_t
 
 contains
 
-  !> No law yet, for so many materials and at most so many laws.
+  !> No law yet but default laws without friction and restitution, for so many materials and at most so many laws.
   subroutine law_set_init(self, n_materials, n_laws)
     class(law_set_t), intent(out) :: self
     integer, intent(in) :: n_materials, n_laws
 
     allocate (self%of_pair(n_materials, n_materials), source=0)
-    allocate (self%of(n_laws))
+    allocate (self%of(0:n_laws))
+    call self%set_default(0, coefficients_t())
   end subroutine law_set_init
 
-  !> Add the law of materials a and b: of a registered kind, with values under the names of keys.
-  subroutine law_set_add(self, a, b, kind, names, values)
+  !> Set the default law of pairs of grains, or of pairs in which boundary `b` takes part.
+  subroutine law_set_set_default(self, b, coefficients)
     class(law_set_t), intent(inout) :: self
-    integer, intent(in) :: a, b
+    !> 0 for grains
+    integer, intent(in) :: b
+    type(coefficients_t), intent(in) :: coefficients
+    type(law_holder_t), allocatable :: longer(:)
+    real(dp) :: values(size(coulomb_names))
+    integer :: l
+
+    if (.not. allocated(self%of)) allocate (self%of(0:0))
+    if (-b < lbound(self%of, 1)) then
+      allocate (longer(-b:ubound(self%of, 1)))
+      do l = lbound(self%of, 1), ubound(self%of, 1)
+        call move_holder(self%of(l), longer(l))
+      end do
+      call move_alloc(longer, self%of)
+    end if
+    values(1) = coefficients%friction
+    values(2) = coefficients%restitution
+    values(3) = coefficients%tangential_restitution
+    values(4) = coefficients%rolling_friction
+    values(5) = coefficients%pivoting_friction
+    call make_law("coulomb", coulomb_names, values, self%of(-b))
+  end subroutine law_set_set_default
+
+  pure subroutine move_holder(from, to)
+    type(law_holder_t), intent(inout) :: from, to
+
+    if (allocated(from%law)) call move_alloc(from%law, to%law)
+    to%terms = from%terms
+  end subroutine move_holder
+
+  !> A law of a registered kind, with values under the names of keys.
+  subroutine make_law(kind, names, values, holder)
     character(len=*), intent(in) :: kind
     !> (keys): among them those of the law
     character(len=*), intent(in) :: names(:)
     real(dp), intent(in) :: values(:)
+    type(law_holder_t), intent(inout) :: holder
     type(law_holder_t), allocatable :: laws(:)
     type(law_key_t), allocatable :: keys(:)
+    type(contact_pair_t) :: pair
     real(dp), allocatable :: own(:)
     integer :: l, k, at
 
@@ -61,21 +108,39 @@ contains
         end do
       end do
       call laws(l)%law%set(own)
-      self%n = self%n + 1
-      call move_alloc(laws(l)%law, self%of(self%n)%law)
+      call move_alloc(laws(l)%law, holder%law)
       exit
     end do
+    if (.not. holder%law%is_constant) return
+    pair%terms%rolling_friction = holder%law%largest%rolling_friction
+    pair%terms%pivoting_friction = holder%law%largest%pivoting_friction
+    call holder%law%evaluate(pair)
+    holder%terms = pair%terms
+  end subroutine make_law
+
+  !> Add the law of materials a and b: of a registered kind, with values under the names of keys.
+  subroutine law_set_add(self, a, b, kind, names, values)
+    class(law_set_t), intent(inout) :: self
+    integer, intent(in) :: a, b
+    character(len=*), intent(in) :: kind
+    !> (keys): among them those of the law
+    character(len=*), intent(in) :: names(:)
+    real(dp), intent(in) :: values(:)
+
+    self%n = self%n + 1
+    call make_law(kind, names, values, self%of(self%n))
     self%of_pair(a, b) = self%n
     self%of_pair(b, a) = self%n
     associate (law => self%of(self%n)%law)
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
+      self%varies = self%varies .or. .not. law%is_constant
       call self%largest%raise_to(law%largest)
       self%range = max(self%range, law%range)
     end associate
   end subroutine law_set_add
 
-  !> Place of the law of two materials, 0 where the scene's values hold.
+  !> Place of the law of two materials, 0 where a default law holds.
   pure integer function law_set_number_of(self, a, b) result(l)
     class(law_set_t), intent(in) :: self
     integer, intent(in) :: a, b
@@ -83,5 +148,26 @@ contains
     l = 0
     if (min(a, b) > 0) l = self%of_pair(a, b)
   end function law_set_number_of
+
+  !> Place of the default law of pairs of grains, b = 0, or of pairs in which boundary `b` takes part; a boundary that has none is under
+  !> that of grains.
+  pure integer function law_set_default_of(self, b) result(l)
+    class(law_set_t), intent(in) :: self
+    integer, intent(in) :: b
+
+    l = 0
+    if (.not. allocated(self%of)) return
+    if (-b < lbound(self%of, 1)) return
+    if (allocated(self%of(-b)%law)) l = -b
+  end function law_set_default_of
+
+  !> Whether the law at place `l` has other terms for each pair.
+  pure logical function law_set_varies_at(self, l) result(varies)
+    class(law_set_t), intent(in) :: self
+    integer, intent(in) :: l
+
+    varies = self%varies
+    if (varies) varies = .not. self%of(l)%law%is_constant
+  end function law_set_varies_at
 
 end module gravier_law_set

@@ -10,6 +10,7 @@ module gravier_nscdd_ep
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve, phase_factorise
+  use gravier_body_mass, only: subtract_inverse_mass
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, default_on_active
@@ -204,16 +205,13 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     real(dp) :: load(problem%kernels%nv)
-    integer :: k, b, nd, nw
+    integer :: k, b
 
-    nd = problem%kernels%nd
-    nw = problem%kernels%nw
     associate (part => problem%shared%part(s), sub => problem%sub(s), change => self%change(s))
       do k = 1, part%n_shared
         b = part%body(k)
         load(:) = change%upper(:, k) - change%lower(:, k)
-        sub%velocity(1:nd, b) = sub%velocity(1:nd, b) - sub%weight(1:nd, b)*load(1:nd)
-        sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) - sub%weight(nw, b)*load(nd + 1:)
+        call subtract_inverse_mass(sub%weight(:, b), load, sub%velocity(:, b))
       end do
     end associate
   end subroutine take_multipliers

@@ -8,6 +8,7 @@ module gravier_enriched_matrix
   use gravier_sparse_rows, only: entries_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
+  use gravier_body_mass, only: diagonal_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_scheme, only: scheme_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
@@ -216,7 +217,7 @@ contains
     real(dp), intent(in), contiguous :: block(:, :, :)
     logical, intent(in) :: general
     type(entries_t), intent(out) :: entries
-    real(dp) :: jacobian(kernels%nc, kernels%nv, 2)
+    real(dp) :: jacobian(kernels%nc, kernels%nv, 2), mass
     integer :: b, c, d, n, nv, side, on_wall, of_pair
 
     nv = kernels%nv
@@ -230,11 +231,9 @@ contains
     call entries%init(n)
     do b = 1, sub%n_bodies
       do d = 1, nv
-        if (sub%moves(d, b)) then
-          call entries%add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp/sub%weight(min(d, kernels%nw), b))
-        else
-          call entries%add((b - 1)*nv + d, (b - 1)*nv + d, 1.0_dp)
-        end if
+        mass = diagonal_mass(sub%inverse_mass(:, b), sub%weight(:, b), d)
+        if (.not. sub%moves(d, b)) mass = 1.0_dp
+        call entries%add((b - 1)*nv + d, (b - 1)*nv + d, mass)
       end do
     end do
     do c = 1, sub%n_contacts

@@ -10,6 +10,7 @@ module gravier_impulse_feedback
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_contact_kernels, only: kernels_t, project_on_cones
+  use gravier_body_mass, only: apply_inverse_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_enriched_matrix, only: enriched_matrix_t, drop_inactive
   use gravier_interface_problem, only: interface_field_t, load_transpose
@@ -91,7 +92,7 @@ contains
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
-      call velocity_change(problem%kernels, problem%sub(s), self%part(s)%lead)
+      call velocity_change(problem%sub(s), self%part(s)%lead)
       associate (part => self%part(s), sub => problem%sub(s), work => matrix%part(s)%contact_work)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
         work(:, 1, :) = work(:, 1, :) + sub%hot(:, problem%kernels%nd + 1, :)
@@ -115,18 +116,14 @@ contains
   end subroutine impulse_feedback_take
 
   !> M^-1 H d of the undivided bodies, from the reactions that all copies have summed.
-  pure subroutine velocity_change(kernels, sub, change)
-    type(kernels_t), intent(in) :: kernels
+  pure subroutine velocity_change(sub, change)
     type(subproblem_t), intent(in) :: sub
     !> (nv, n_columns)
     real(dp), intent(inout), contiguous :: change(:, :)
-    integer :: b, nd, nw
+    integer :: b
 
-    nd = kernels%nd
-    nw = kernels%nw
     do b = 1, sub%n_columns
-      change(1:nd, b) = sub%inverse_mass(1:nd, b)*sub%reaction(1:nd, b)
-      change(nd + 1:, b) = sub%inverse_mass(nw, b)*sub%reaction(nd + 1:, b)
+      call apply_inverse_mass(sub%inverse_mass(:, b), sub%reaction(:, b), change(:, b))
     end do
   end subroutine velocity_change
 

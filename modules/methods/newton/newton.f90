@@ -16,6 +16,7 @@ module gravier_newton
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
+  use gravier_proximal_weight, only: proximal_weight_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_interface_problem, only: interface_field_t, make_field, chain_differences, load_transpose
   use gravier_interface_direct, only: interface_direct_t
@@ -35,12 +36,8 @@ module gravier_newton
   !> times which a residual must fall to be progress
   integer, parameter :: first_patience = 100, late_patience = 40
   real(dp), parameter :: progress_made = 0.8_dp
-  !> alpha at the start of a turn and its bounds
-  real(dp), parameter :: alpha_start = 1.0e-2_dp, alpha_least = 1.0e-10_dp, alpha_most = 10.0_dp
-  !> what it is multiplied with after a proximal point found in very few steps, in few, in many, not found
-  real(dp), parameter :: drop = 0.1_dp, fall = 0.5_dp, climb = 1.5_dp, rise = 5.0_dp
-  !> steps to a proximal point that are very few, few, not many, and the most
-  integer, parameter :: very_few_steps = 2, few_steps = 6, some_steps = 12, most_inner_steps = 25
+  !> most steps to a proximal point
+  integer, parameter :: most_inner_steps = 25
   !> what is left of |F| where a proximal point counts as found; what may be left of its lowest value after so many steps
   !> more, or it counts as not found
   real(dp), parameter :: found_point = 0.1_dp, some_gain = 0.7_dp
@@ -68,17 +65,13 @@ module gravier_newton
     integer, private :: turn = 0, taken = 0, inner = 0
     !> lowest |r - y|^2 of this window of sweeps and of the last [N^2 s^2]
     real(dp), private :: lowest = 0.0_dp, last_lowest = 0.0_dp
-    real(dp), private :: alpha = alpha_start
-    !> that for which a proximal point was not found last, 0 for none
-    real(dp), private :: refused = 0.0_dp
+    type(proximal_weight_t), private :: weight
     !> |F| at the iterate and at the last points of the inner loop, and where it counts as solved [N s]
     real(dp), private :: size_of_f = 0.0_dp, past(memory) = 0.0_dp, goal = 0.0_dp
     !> lowest |F| after each step of the inner loop [N s]
     real(dp), private :: reached(0:most_inner_steps) = 0.0_dp
-    !> residuals: of the best impulses, of the last centre, of the last progress
-    real(dp), private :: least = 0.0_dp, before = 0.0_dp, mark = 0.0_dp
-    !> the least when the sweeps were left
-    real(dp), private :: least_swept = 0.0_dp
+    !> residuals: of the best impulses, of the last centre, of the last progress; the least when the sweeps were left
+    real(dp), private :: least = 0.0_dp, before = 0.0_dp, mark = 0.0_dp, least_swept = 0.0_dp
   contains
     procedure, nopass :: features => newton_features
     procedure :: set => newton_set
@@ -213,8 +206,7 @@ contains
     self%sweeping = .false.
     self%check_next = .true.
     self%taken = 0
-    self%alpha = alpha_start
-    self%refused = 0.0_dp
+    self%weight = proximal_weight_t()
     call keep_best(self, problem, residual)
     do s = 1, size(self%part)
       associate (part => self%part(s), sub => problem%sub(s))
@@ -270,7 +262,7 @@ contains
     do s = 1, size(problem%sub)
       associate (part => self%part(s), sub => problem%sub(s))
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, part%v)
-        call part%law%evaluate(problem%kernels, sub, part%v, self%alpha, squares(s))
+        call part%law%evaluate(problem%kernels, sub, part%v, self%weight%alpha, squares(s))
       end associate
     end do
     size_of_f = sqrt(problem%comm%sum_real(squares))
@@ -337,7 +329,7 @@ contains
 
     call start_timer(phase_factorise)
     do s = 1, size(problem%sub)
-      call self%part(s)%law%linearise(problem%kernels, problem%sub(s), self%alpha)
+      call self%part(s)%law%linearise(problem%kernels, problem%sub(s), self%weight%alpha)
       call self%matrix%factorise_blocks(problem, s, self%part(s)%law%slope, singular)
     end do
     call problem%comm%agree(singular)
@@ -432,9 +424,7 @@ contains
     integer :: s
 
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
-      end associate
+      call project_on_cones(problem%kernels, problem%sub(s)%n_contacts, problem%sub(s)%hot, problem%sub(s)%impulse)
     end do
     call problem%evaluate()
     call problem%residual(residual, ignored)
@@ -466,17 +456,7 @@ contains
     logical :: found
 
     found = self%size_of_f <= self%goal
-    if (found .and. self%alpha <= self%refused) self%refused = 0.0_dp
-    if (.not. found) then
-      self%refused = self%alpha
-      self%alpha = min(self%alpha*rise, alpha_most)
-    else if (self%inner <= very_few_steps .and. self%alpha*drop > self%refused) then
-      self%alpha = max(self%alpha*drop, alpha_least)
-    else if (self%inner <= few_steps) then
-      self%alpha = max(self%alpha*fall, alpha_least)
-    else if (self%inner > some_steps) then
-      self%alpha = min(self%alpha*climb, alpha_most)
-    end if
+    call self%weight%adapt(found, self%inner)
     if (residual <= progress_made*self%mark) then
       self%mark = residual
       self%taken = 0

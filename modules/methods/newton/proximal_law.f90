@@ -1,7 +1,7 @@
 !> The contact law of one subdomain as an equation to which Newton's method applies, in its proximal form.
 !>
-!> With the projection P of Alart and Curnier (P_n = max(x_n, 0), P_t = x_t cut to the disc of radius mu P_n), s the diagonal of
-!> the undivided local operator, v~ the velocity with its shift and r_k the centre of a proximal point,
+!> With the projection P of Alart and Curnier (gravier_friction_cone: P_n = max(x_n, 0), P_t = x_t cut to the disc of radius
+!> mu P_n), s the diagonal of the undivided local operator, v~ the velocity with its shift and r_k the centre of a proximal point,
 !>   F(r, v) = r - P(x),   x = r - (v~ + alpha s (r - r_k))/(b s):
 !> F = 0 says that r and v~ + alpha s (r - r_k) satisfy Signorini's condition and Coulomb's law, and for r = r_k that r and v~ do.
 !> b = 1 gives the function of gravier_alart_curnier, b = alpha the augmented Lagrangian, in which x is a function of v alone;
@@ -9,6 +9,7 @@
 !>   L = (1 - (1 - a) D)^-1 D/(b s),   c = -(1 - (1 - a) D)^-1 F,   D = dP/dx,   a = alpha/b.
 module gravier_proximal_law
   use gravier_kinds, only: dp
+  use gravier_friction_cone, only: project_by_parts, is_open, sticks, slides
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: subproblem_t
   implicit none
@@ -31,8 +32,6 @@ module gravier_proximal_law
     procedure :: linearise => proximal_law_linearise
     procedure :: find_step => proximal_law_find_step
   end type proximal_law_t
-
-  integer, parameter :: is_open = 0, sticks = 1, slides = 2
 
 contains
 
@@ -67,7 +66,7 @@ contains
     real(dp), intent(in) :: alpha
     !> |F|^2 [N^2 s^2]
     real(dp), intent(out) :: square
-    real(dp) :: x(3), mu, length, bound, a, b
+    real(dp) :: x(3), mu, a, b
     integer :: c, q, g, nc
 
     nc = kernels%nc
@@ -78,30 +77,13 @@ contains
     do c = 1, sub%n_contacts
       q = lane_of(c)
       g = block_of(c)
-      if (nc > 1) mu = sub%hot(q, kernels%friction_row, g)
+      if (nc > 1) mu = sub%hot(q, kernels%row%friction, g)
       x(1:nc) = (1.0_dp - a)*sub%impulse(q, :, g) + a*self%centre(q, :, g)
-      x(1) = x(1) - self%softness(1, c)/b*(v(q, 1, g) + sub%hot(q, kernels%nd + 1, g))
+      x(1) = x(1) - self%softness(1, c)/b*(v(q, 1, g) + sub%hot(q, kernels%row%shift, g))
       x(2:nc) = x(2:nc) - self%softness(2, c)/b*v(q, 2:, g)
-      if (kernels%shift_row > 0) x(2:nc) = x(2:nc) &
-        & - self%softness(2, c)/b*sub%hot(q, kernels%shift_row + 1:kernels%shift_row + nc - 1, g)
-      if (x(1) <= 0.0_dp) then
-        self%state(c) = is_open
-        x(1:nc) = 0.0_dp
-      else
-        self%state(c) = sticks
-        length = norm2(x(2:nc))
-        bound = mu*x(1)
-        if (nc > 1 .and. length >= bound) then
-          self%state(c) = slides
-          self%along(:, c) = 0.0_dp
-          self%kept(c) = 0.0_dp
-          if (length > 0.0_dp) then
-            self%along(1:nc - 1, c) = x(2:nc)/length
-            self%kept(c) = bound/length
-            x(2:nc) = bound*self%along(1:nc - 1, c)
-          end if
-        end if
-      end if
+      if (kernels%row%shift_t > 0) x(2:nc) = x(2:nc) &
+        & - self%softness(2, c)/b*sub%hot(q, kernels%row%shift_t:kernels%row%shift_t + nc - 2, g)
+      call project_by_parts(mu, x(1:nc), self%state(c), self%along(1:nc - 1, c), self%kept(c))
       self%f(q, :, g) = sub%impulse(q, :, g) - x(1:nc)
       square = square + sum(self%f(q, :, g)**2)
     end do
@@ -136,7 +118,7 @@ contains
         end do
       case (slides)
         ! across the sliding, D keeps a part and the inverse is 1/(1 - (1 - a) kept); along it D keeps nothing
-        mu = sub%hot(q, kernels%friction_row, g)
+        mu = sub%hot(q, kernels%row%friction, g)
         e(:) = self%along(:, c)
         across = 1.0_dp/((1.0_dp - self%kept(c)) + a*self%kept(c))
         self%offset(q, 1, g) = -f(1)/a

@@ -3,6 +3,7 @@ module gravier_schwarz
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
+  use gravier_body_mass, only: add_inverse_mass, inverse_product
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: scheme_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
   use gravier_method_options, only: method_features_t, method_options_t
@@ -205,10 +206,8 @@ contains
     !> counts how often the factor is lowered
     type(work_t), intent(inout) :: work
     real(dp) :: change(problem%kernels%nv), parts(2, size(load)), sums(2), factor
-    integer :: s, k, b, nd, nw
+    integer :: s, k, b
 
-    nd = problem%kernels%nd
-    nw = problem%kernels%nw
     call problem%shared%pass()
     parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
@@ -218,8 +217,8 @@ contains
           change(:) = 0.0_dp
           call problem%shared%add_copies(s, k, change)
           change(:) = change - load%value(:, k)
-          parts(1, s) = parts(1, s) + energy(sub%weight(:, b), change, change)
-          parts(2, s) = parts(2, s) + energy(sub%weight(:, b), change, load%change(:, k))
+          parts(1, s) = parts(1, s) + inverse_product(sub%weight(:, b), change, change)
+          parts(2, s) = parts(2, s) + inverse_product(sub%weight(:, b), change, load%change(:, k))
           load%change(:, k) = change
         end do
       end associate
@@ -239,26 +238,11 @@ contains
           b = part%body(k)
           change(:) = relaxation%factor*load%change(:, k)
           load%value(:, k) = load%value(:, k) + change
-          sub%velocity(1:nd, b) = sub%velocity(1:nd, b) + sub%weight(1:nd, b)*change(1:nd)
-          sub%velocity(nd + 1:, b) = sub%velocity(nd + 1:, b) + sub%weight(nw, b)*change(nd + 1:)
+          call add_inverse_mass(sub%weight(:, b), change, sub%velocity(:, b))
         end do
       end associate
     end do
   end subroutine take_neighbour_loads
-
-  !> a M^-1 b of one body [J]
-  pure real(dp) function energy(weight, a, b)
-    !> (nw) [1/kg, 1/(kg m^2)]
-    real(dp), intent(in), contiguous :: weight(:)
-    !> (nv) [N s, N m s]
-    real(dp), intent(in), contiguous :: a(:), b(:)
-    integer :: d
-
-    energy = 0.0_dp
-    do d = 1, size(a)
-      energy = energy + weight(min(d, size(weight)))*a(d)*b(d)
-    end do
-  end function energy
 
   !> Whether the changes of the loads alternate and grow; the automatic factor is lowered then.
   pure subroutine relaxation_adapt(self, change, product)

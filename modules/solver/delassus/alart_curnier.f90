@@ -1,10 +1,11 @@
 !> The function of Alart and Curnier on a packed contact problem: zero where impulses and velocities satisfy Signorini's condition
 !> and Coulomb's law, and piecewise smooth, with the blocks of its generalised Jacobian.
 !>
-!> With x = r - v/s, s the stiffness of each contact, P_n = max(x_n, 0) and P_t = x_t cut to the disc of radius mu P_n, it is
+!> With x = r - v/s, s the stiffness of each contact, P_n = max(x_n, 0) and P_t = x_t cut to the disc of radius mu P_n (gravier_friction_cone), it is
 !> F = s (r - P) [m/s]: v where a contact sticks, s r where it is open.
 module gravier_alart_curnier
   use gravier_kinds, only: dp
+  use gravier_friction_cone, only: project_by_parts, is_open, sticks
   use gravier_delassus, only: delassus_t
   implicit none
   private
@@ -62,32 +63,26 @@ contains
     real(dp), intent(inout), contiguous :: x(:)
     !> by columns
     real(dp), intent(out), contiguous :: derivative(:)
-    real(dp) :: length, along(size(x)), keep
-    integer :: d, i, j
+    real(dp) :: along(2), kept
+    integer :: d, i, j, state
 
     d = size(x)
+    along(:) = 0.0_dp
+    kept = 0.0_dp
+    call project_by_parts(mu, x, state, along(1:d - 1), kept)
     derivative(:) = 0.0_dp
-    if (x(1) <= 0.0_dp) then
-      x(:) = 0.0_dp
-      return
-    end if
+    if (state == is_open) return
     derivative(1) = 1.0_dp
-    length = sqrt(sum(x(2:)**2))
-    if (length <= mu*x(1)) then
-      do i = 2, d
-        derivative(i + (i - 1)*d) = 1.0_dp
-      end do
-      return
-    end if
-    along = x/length
-    keep = mu*x(1)/length
     do i = 2, d
-      derivative(i) = mu*along(i)
+      if (state == sticks) then
+        derivative(i + (i - 1)*d) = 1.0_dp
+        cycle
+      end if
+      derivative(i) = mu*along(i - 1)
       do j = 2, d
-        derivative(i + (j - 1)*d) = -keep*along(i)*along(j)
+        derivative(i + (j - 1)*d) = -kept*along(i - 1)*along(j - 1)
       end do
-      derivative(i + (i - 1)*d) = derivative(i + (i - 1)*d) + keep
-      x(i) = mu*x(1)*along(i)
+      derivative(i + (i - 1)*d) = derivative(i + (i - 1)*d) + kept
     end do
   end subroutine cut_to_law
 

@@ -16,6 +16,7 @@ module gravier_layered_start
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_sweep
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_body_mass, only: add_inverse_mass
   use gravier_contact_problem, only: contact_problem_t
   use gravier_scheme, only: momentum_t, work_t
   use gravier_sweep_order, only: group_contacts
@@ -359,7 +360,7 @@ contains
   subroutine hand_on(problem, layers)
     type(contact_problem_t), intent(inout) :: problem
     type(layers_t), intent(inout) :: layers(:)
-    integer :: s, i, b, d, q, g
+    integer :: s, i, b, q, g
 
     do s = 1, size(layers)
       associate (this => layers(s), sub => problem%sub(s))
@@ -389,9 +390,7 @@ contains
     do s = 1, size(layers)
       associate (this => layers(s), inverse => problem%sub(s)%inverse_mass)
         do b = 1, problem%sub(s)%n_bodies
-          do d = 1, size(this%loaded, 1)
-            this%loaded(d, b) = this%loaded(d, b) + inverse(min(d, size(inverse, 1)), b)*this%reaction(d, b)
-          end do
+          call add_inverse_mass(inverse(:, b), this%reaction(:, b), this%loaded(:, b))
         end do
       end associate
     end do

@@ -18,6 +18,7 @@ module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes
+  use gravier_body_mass, only: inverse_products, inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
   use gravier_scheme, only: scheme_t
   use gravier_levels, only: levels_t
@@ -117,8 +118,9 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), nd => problem%kernels%nd)
         do b = 1, sub%n_bodies
-          if (.not. any(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
-          heavy = 1.0_dp/maxval(sub%inverse_mass(1:nd, b))
+          heavy = inverse_of_translation(sub%inverse_mass(:, b), nd)
+          if (.not. heavy > 0.0_dp) cycle
+          heavy = 1.0_dp/heavy
           parts(2, s) = parts(2, s) + heavy/sub%multiplicity(b)
           if (b > sub%n_grains) cycle
           parts(1, s) = parts(1, s) + heavy/sub%multiplicity(b)
@@ -258,7 +260,11 @@ contains
     end do
     if (problem%n_subdomains > 1) call sum_motions(problem, self%part)
     do s = 1, size(problem%sub)
-      call add_products(problem%sub(s), self%part(s), parts(at_products + 1:, s))
+      ! the products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j
+      associate (sub => problem%sub(s), part => self%part(s))
+        call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, sub%reaction, part%recent, &
+          & parts(at_products + 1:, s))
+      end associate
     end do
     call start_timer(phase_reduction)
     call problem%comm%sum_parts(parts, sums)
@@ -361,44 +367,6 @@ contains
       left(i, :) = 0.0_dp
     end do
   end function projection_of
-
-  !> The products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j, a copy of a shared body counting with its part.
-  subroutine add_products(sub, part, products)
-    type(subproblem_t), intent(in) :: sub
-    type(error_part_t), intent(in) :: part
-    !> (6)
-    real(dp), intent(out) :: products(:)
-    real(dp) :: share, sums(6)
-    integer :: b, d, nw
-
-    nw = size(sub%inverse_mass, 1)
-    sums(:) = 0.0_dp
-    do b = 1, sub%n_bodies
-      share = 1.0_dp/sub%multiplicity(b)
-      do d = 1, nw - 1
-        call add(share*sub%inverse_mass(d, b), part%local(d, b), sub%reaction(d, b), part%recent(d, b))
-      end do
-      ! the last row holds for all components from there on
-      do d = nw, size(part%local, 1)
-        call add(share*sub%inverse_mass(nw, b), part%local(d, b), sub%reaction(d, b), part%recent(d, b))
-      end do
-    end do
-    products(:) = sums
-
-  contains
-
-    subroutine add(inverse, x, y, z)
-      real(dp), intent(in) :: inverse, x, y, z
-
-      sums(1) = sums(1) + inverse*x*x
-      sums(2) = sums(2) + inverse*x*y
-      sums(3) = sums(3) + inverse*y*y
-      sums(4) = sums(4) + inverse*x*z
-      sums(5) = sums(5) + inverse*y*z
-      sums(6) = sums(6) + inverse*z*z
-    end subroutine add
-
-  end subroutine add_products
 
   !> L, after `assess`; and how fast each body sinks, where all else is within the error allowed and bounds do not tell enough. Where few
   !> heavy bodies have most of the mass, E says little of the others. Collective.

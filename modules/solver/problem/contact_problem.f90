@@ -5,6 +5,7 @@ module gravier_contact_problem
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_body_mass, only: can_move, mass_product, multiply_mass, velocities_under
   use gravier_contact_kernels, only: kernels_t, local_operator, lanes, n_blocks, lane_of, block_of
   implicit none
   private
@@ -185,7 +186,7 @@ contains
   pure logical function subproblem_moves(self, d, b) result(moves)
     class(subproblem_t), intent(in) :: self
     integer, intent(in) :: d, b
-    moves = self%inverse_mass(min(d, size(self%inverse_mass, 1)), b) > 0.0_dp
+    moves = can_move(self%inverse_mass(:, b), d)
   end function subproblem_moves
 
   !> v := M v of body `b` with the masses in `weight`; 0 for components that cannot move.
@@ -194,15 +195,8 @@ contains
     integer, intent(in) :: b
     !> (nv) [m/s, rad/s] in, [N s, N m s] out
     real(dp), intent(inout), contiguous :: v(:)
-    integer :: d
 
-    do d = 1, size(v)
-      if (self%moves(d, b)) then
-        v(d) = v(d)/self%weight(min(d, size(self%weight, 1)), b)
-      else
-        v(d) = 0.0_dp
-      end if
-    end do
+    call multiply_mass(self%inverse_mass(:, b), self%weight(:, b), v)
   end subroutine subproblem_multiply_mass
 
   !> (a, b)_M of two velocities of the bodies that can move, a copy of a shared body counting with its part [J].
@@ -210,23 +204,11 @@ contains
     class(subproblem_t), intent(in) :: self
     !> (nv, n_columns)
     real(dp), intent(in), contiguous :: a(:, :), b(:, :)
-    real(dp) :: part, last
-    integer :: k, d, nw
+    integer :: k
 
     total = 0.0_dp
-    nw = size(self%inverse_mass, 1)
     do k = 1, self%n_bodies
-      part = 0.0_dp
-      do d = 1, nw - 1
-        if (self%inverse_mass(d, k) > 0.0_dp) part = part + a(d, k)*b(d, k)/self%inverse_mass(d, k)
-      end do
-      ! the last row holds for all components from there on
-      last = 0.0_dp
-      do d = nw, size(a, 1)
-        last = last + a(d, k)*b(d, k)
-      end do
-      if (self%inverse_mass(nw, k) > 0.0_dp) part = part + last/self%inverse_mass(nw, k)
-      total = total + part/self%multiplicity(k)
+      total = total + mass_product(self%inverse_mass(:, k), a(:, k), b(:, k))/self%multiplicity(k)
     end do
   end function subproblem_product_of
 
@@ -295,9 +277,8 @@ contains
   !> but the order of the sums. Collective.
   subroutine contact_problem_evaluate(self)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s, nv
+    integer :: s
 
-    nv = self%kernels%nv
     do s = 1, size(self%sub)
       call self%own_reactions(s)
       call self%shared%load(s, self%sub(s)%reaction)
@@ -305,23 +286,10 @@ contains
     call self%shared%pass()
     do s = 1, size(self%sub)
       call self%shared%sum_copies(s, self%sub(s)%reaction, mean=.false.)
-      call add_impulses(self%sub(s))
+      associate (sub => self%sub(s))
+        call velocities_under(sub%inverse_mass, sub%reaction, sub%v_free, sub%v_global)
+      end associate
     end do
-
-  contains
-
-    subroutine add_impulses(sub)
-      type(subproblem_t), intent(inout) :: sub
-      integer :: b, nd, nw
-
-      nd = self%kernels%nd
-      nw = self%kernels%nw
-      do b = 1, sub%n_columns
-        sub%v_global(1:nd, b) = sub%v_free(1:nd, b) + sub%inverse_mass(1:nd, b)*sub%reaction(1:nd, b)
-        sub%v_global(nd + 1:nv, b) = sub%v_free(nd + 1:nv, b) + sub%inverse_mass(nw, b)*sub%reaction(nd + 1:nv, b)
-      end do
-    end subroutine add_impulses
-
   end subroutine contact_problem_evaluate
 
   !> The residual of the impulses, with v_global as `evaluate` has made it: how far each is from its own exact local solve under

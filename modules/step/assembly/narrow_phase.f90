@@ -7,11 +7,11 @@ module gravier_narrow_phase
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t
-  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
+  use gravier_pair_laws, only: law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: found_t, find_contacts, scene_terms
+  public :: found_t, find_contacts
 
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: found_t
@@ -22,7 +22,7 @@ module gravier_narrow_phase
     integer, allocatable :: source(:)
     !> (n) [m], (nd, n)
     real(dp), allocatable :: gap(:), normal(:, :)
-    !> where a law is given (n)
+    !> where some law has other terms for each pair (n)
     type(contact_terms_t), allocatable :: terms(:)
   end type found_t
 
@@ -42,7 +42,7 @@ contains
     nd = decomposition%nd
     if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms)
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
-    allocate (found%terms(merge(view%list%n, 0, physics%laws%n > 0)))
+    allocate (found%terms(merge(view%list%n, 0, physics%laws%varies)))
     found%n = 0
     row = view%list%memory%law_row
     alert = decomposition%rule%alert_distance
@@ -92,8 +92,8 @@ contains
       integer :: l
 
       l = law_of(view, decomposition%boundaries, physics%laws, p)
-      if (l == 0) then
-        terms = scene_terms(view, decomposition%boundaries, physics, p, gap)
+      if (.not. physics%laws%varies_at(l)) then
+        terms = terms_of(physics%laws, l, gap)
         return
       end if
       pair%first = physics%first
@@ -119,23 +119,5 @@ contains
       branch(d) = branch(d) - shift(d)*period%length(d)
     end do
   end subroutine shift_back
-
-  !> The terms of pair `p` where no law is given: the scene's values, or those of the boundary that takes part.
-  pure type(contact_terms_t) function scene_terms(view, boundaries, physics, p, gap) result(terms)
-    type(neighbourhood_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    !> [m]
-    real(dp), intent(in) :: gap
-    integer :: b
-
-    b = boundary_of(view, p)
-    terms%play = max(gap, 0.0_dp)
-    terms%coefficients_t = physics%contact
-    if (b > 0) terms%coefficients_t = boundaries(b)%contact
-    ! friction alone can send a tangential velocity back
-    if (.not. terms%friction > 0.0_dp) terms%tangential_restitution = 0.0_dp
-  end function scene_terms
 
 end module gravier_narrow_phase

@@ -1,17 +1,32 @@
 !> The laws of the pairs of a subdomain: which one is theirs, its terms over a step, what the pair remembers of it.
 module gravier_pair_laws
   use gravier_kinds, only: dp
+  use gravier_contact_coefficients, only: coefficients_t
   use gravier_boundary, only: boundary_t
-  use gravier_contact_law, only: contact_pair_t
+  use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_surface_velocity, only: find_start_velocity, find_surface_velocity, find_wall_point
   implicit none
   private
-  public :: boundary_of, law_of, evaluate_pair, conclude_pairs
+  public :: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair, conclude_pairs
 
 contains
+
+  !> Set the default laws: of pairs of grains, and of each boundary by its own coefficients.
+  subroutine set_default_laws(laws, between_grains, boundaries)
+    type(law_set_t), intent(inout) :: laws
+    type(coefficients_t), intent(in) :: between_grains
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer :: b
+
+    call laws%set_default(0, between_grains)
+    do b = 1, size(boundaries)
+      call laws%set_default(b, boundaries(b)%contact)
+    end do
+  end subroutine set_default_laws
 
   !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
   pure integer function boundary_of(view, p) result(b)
@@ -25,7 +40,8 @@ contains
     end if
   end function boundary_of
 
-  !> Place of the law of pair `p` among the laws of the scene, 0 where the scene's values hold.
+  !> Place of the law of pair `p` in the set of laws: that of its materials, or the default law of the boundary that takes part or
+  !> of grains.
   pure integer function law_of(view, boundaries, laws, p) result(l)
     type(neighbourhood_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
@@ -33,10 +49,22 @@ contains
     integer, intent(in) :: p
 
     l = 0
-    if (laws%n == 0) return
-    l = laws%number_of(material_of(view, boundaries, view%list%candidate(p)), &
+    if (laws%n > 0) l = laws%number_of(material_of(view, boundaries, view%list%candidate(p)), &
       & material_of(view, boundaries, view%list%antagonist(p)))
+    if (l == 0) l = laws%default_of(boundary_of(view, p))
   end function law_of
+
+  !> The terms of a pair over a step under law `l`, which has the same for all its pairs. A set that was given no law knows neither
+  !> friction nor restitution.
+  pure type(contact_terms_t) function terms_of(laws, l, gap) result(terms)
+    type(law_set_t), intent(in) :: laws
+    integer, intent(in) :: l
+    !> [m]
+    real(dp), intent(in) :: gap
+
+    if (allocated(laws%of)) terms = laws%of(l)%terms
+    terms%play = max(gap, 0.0_dp)
+  end function terms_of
 
   !> Number of the material of grain `k` of a view, or of boundary -k. Grains glued to a boundary that has one are of its material.
   pure integer function material_of(view, boundaries, k) result(material)
@@ -78,8 +106,8 @@ contains
       arm(:) = view%bodies%radius(j)*normal
       call find_surface_velocity(view, boundaries, j, arm, w)
     else
-      arm(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + pair%gap)*normal
-      call boundaries(-j)%last_velocity_at(arm, w)
+      call find_wall_point(view, i, pair%gap, normal, arm)
+      call find_start_velocity(view, boundaries, j, arm, w)
     end if
     v(:) = v - w
     pair%normal_velocity = sum(v*normal)
@@ -91,37 +119,6 @@ contains
       call law%evaluate(pair)
     end associate
   end subroutine evaluate_pair
-
-  !> Velocity of grain `k` at the start of the step, at the point of its surface that `arm` leads to from its centre.
-  pure subroutine find_surface_velocity(view, boundaries, k, arm, v)
-    type(neighbourhood_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    integer, intent(in) :: k
-    !> (nd) [m]
-    real(dp), intent(in) :: arm(:)
-    !> (nd) [m/s]
-    real(dp), intent(out) :: v(:)
-    real(dp) :: point(size(arm))
-    integer :: nd
-
-    nd = size(arm)
-    if (view%bodies%glued(k) > 0) then
-      point(:) = view%bodies%position(:, k) + arm
-      call boundaries(view%bodies%glued(k))%last_velocity_at(point, v)
-      return
-    end if
-    v(:) = view%bodies%velocity(1:nd, k)
-    associate (spin => view%bodies%velocity(nd + 1:, k))
-      if (size(spin) == 1) then
-        v(1) = v(1) - spin(1)*arm(2)
-        v(2) = v(2) + spin(1)*arm(1)
-      else if (size(spin) == 3) then
-        v(1) = v(1) + spin(2)*arm(3) - spin(3)*arm(2)
-        v(2) = v(2) + spin(3)*arm(1) - spin(1)*arm(3)
-        v(3) = v(3) + spin(1)*arm(2) - spin(2)*arm(1)
-      end if
-    end associate
-  end subroutine find_surface_velocity
 
   !> The states of the pairs of a solved problem, whose impulses are those of the solve.
   subroutine conclude_pairs(problem, boundaries, laws, neighbourhoods)
@@ -137,7 +134,6 @@ contains
         do c = 1, sub%n_contacts
           p = sub%source(c)
           l = law_of(view, boundaries, laws, p)
-          if (l == 0) cycle
           q = lane_of(c)
           g = block_of(c)
           pair%state = view%list%state(view%list%memory%law_row, p)
@@ -145,7 +141,7 @@ contains
           pair%normal = sub%impulse(q, 1, g)
           pair%tangential = norm2(sub%impulse(q, 2:problem%kernels%nf, g))
           pair%terms%friction = 0.0_dp
-          if (problem%kernels%nf > 1) pair%terms%friction = sub%hot(q, problem%kernels%friction_row, g)
+          if (problem%kernels%nf > 1) pair%terms%friction = sub%hot(q, problem%kernels%row%friction, g)
           call laws%of(l)%law%conclude(pair)
           view%list%state(view%list%memory%law_row, p) = pair%state
         end do

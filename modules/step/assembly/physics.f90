@@ -3,7 +3,6 @@ module gravier_physics
   use gravier_kinds, only: dp
   use gravier_body_store, only: body_set_t
   use gravier_motion, only: grain_volume
-  use gravier_contact_coefficients, only: coefficients_t
   use gravier_law_set, only: law_set_t
   implicit none
   private
@@ -15,9 +14,7 @@ module gravier_physics
     real(dp) :: gravity(3) = 0.0_dp
     !> on the volume of grains [N/m^3, N/m^2 in 2D]
     real(dp) :: body_force(3) = 0.0_dp
-    !> between grains; boundaries have their own
-    type(coefficients_t) :: contact
-    !> laws of pairs of materials, which take their place
+    !> laws of contact
     type(law_set_t) :: laws
     !> the step is the first of the run
     logical :: first = .false.

@@ -6,17 +6,30 @@ module gravier_problem_builder
   use gravier_contact_law, only: contact_terms_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
   use gravier_sweep_order, only: group_contacts
+  use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
-  use gravier_pair_laws, only: boundary_of
+  use gravier_surface_velocity, only: find_start_velocity, find_wall_point, approach_velocity
+  use gravier_pair_laws, only: boundary_of, law_of, terms_of
   use gravier_physics, only: physics_t
-  use gravier_narrow_phase, only: found_t, find_contacts, scene_terms
+  use gravier_narrow_phase, only: found_t, find_contacts
   use gravier_sleeping, only: put_sleepers_last
   use gravier_interface, only: interface_figures_t, find_interface, count_figures
   implicit none
   private
   public :: build_problem
+
+  !> Columns of the grains of a view, 0 for those without one of their own, and of boundaries.
+  type :: numbers_t
+    integer, allocatable :: of_grain(:), of_boundary(:)
+  end type numbers_t
+
+  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs, its
+  !> candidate and its antagonist, a grain or minus a boundary, and the boundary that takes part, 0 for none.
+  type :: packed_t
+    integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0
+  end type packed_t
 
 contains
 
@@ -70,11 +83,11 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    integer, allocatable :: number_of(:), column_of(:)
+    type(numbers_t) :: numbers
     integer :: c, p, b, n
 
     associate (list => view%list, boundaries => decomposition%boundaries)
-      allocate (number_of(view%bodies%n), column_of(size(boundaries)), source=0)
+      allocate (numbers%of_grain(view%bodies%n), numbers%of_boundary(size(boundaries)), source=0)
       n = 0
       sub%n_grains = 0
       do c = 1, found%n
@@ -83,30 +96,30 @@ contains
         if (list%antagonist(p) > 0) call number(list%antagonist(p))
         b = boundary_of(view, p)
         if (b == 0) cycle
-        column_of(b) = 1
+        numbers%of_boundary(b) = 1
         if (boundaries(b)%turns()) n = n + 1
       end do
       sub%n_contacts = found%n
       sub%n_bodies = sub%n_grains
       do b = 1, size(boundaries)
-        if (column_of(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle
+        if (numbers%of_boundary(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle
         sub%n_bodies = sub%n_bodies + 1
-        column_of(b) = sub%n_bodies
+        numbers%of_boundary(b) = sub%n_bodies
       end do
       sub%n_columns = sub%n_bodies
       do b = 1, size(boundaries)
-        if (column_of(b) == 0 .or. boundaries(b)%is_driven() .or. boundaries(b)%turns()) cycle
+        if (numbers%of_boundary(b) == 0 .or. boundaries(b)%is_driven() .or. boundaries(b)%turns()) cycle
         sub%n_columns = sub%n_columns + 1
-        column_of(b) = sub%n_columns
+        numbers%of_boundary(b) = sub%n_columns
       end do
       call allocate_bodies(kernels, sub%n_columns + n, sub)
-      call pack_grains(view, number_of, kernels, physics, sub)
+      call pack_grains(view, numbers%of_grain, kernels, physics, sub)
       do b = 1, size(boundaries)
-        if (column_of(b) == 0 .or. boundaries(b)%turns()) cycle
-        call pack_boundary(boundaries(b), b, column_of(b), decomposition%n_subdomains, kernels, sub)
+        if (numbers%of_boundary(b) == 0 .or. boundaries(b)%turns()) cycle
+        call pack_boundary(boundaries(b), b, numbers%of_boundary(b), decomposition%n_subdomains, kernels, sub)
       end do
     end associate
-    call pack_contacts(view, found, decomposition%boundaries, number_of, column_of, kernels, physics, sub)
+    call pack_contacts(view, found, decomposition%boundaries, numbers, kernels, physics, sub)
 
   contains
 
@@ -114,9 +127,9 @@ contains
     subroutine number(k)
       integer, intent(in) :: k
 
-      if (number_of(k) > 0 .or. view%bodies%glued(k) > 0) return
+      if (numbers%of_grain(k) > 0 .or. view%bodies%glued(k) > 0) return
       sub%n_grains = sub%n_grains + 1
-      number_of(k) = sub%n_grains
+      numbers%of_grain(k) = sub%n_grains
     end subroutine number
 
   end subroutine pack_subproblem
@@ -182,22 +195,21 @@ contains
     end do
   end subroutine pack_boundary
 
-  subroutine pack_contacts(view, found, boundaries, number_of, column_of, kernels, physics, sub)
+  !> Pack the contacts in the order in which they are swept, with the columns of boundaries that turn.
+  subroutine pack_contacts(view, found, boundaries, numbers, kernels, physics, sub)
     type(neighbourhood_t), intent(in) :: view
     type(found_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
-    !> of the grains of the view, 0 for those without a column of their own; of the boundaries
-    integer, intent(in), contiguous :: number_of(:), column_of(:)
+    type(numbers_t), intent(in) :: numbers
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: pair(:, :), order(:)
-    integer :: c, f, p, b, i, j, q, g, nd
-    type(contact_terms_t) :: terms
+    integer :: c
+    type(packed_t) :: this
 
-    nd = kernels%nd
     allocate (pair(2, found%n), order(found%n))
-    call find_pairs()
+    call find_pairs(view, found, boundaries, numbers, sub, pair)
     sub%n_awake = found%n_awake
     call group_contacts(pair(:, 1:sub%n_awake), sub%n_bodies, order(1:sub%n_awake), sub%n_grouped)
     call group_contacts(pair(:, sub%n_awake + 1:), sub%n_bodies, order(sub%n_awake + 1:), sub%n_grouped_asleep)
@@ -209,164 +221,171 @@ contains
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
     if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
     do c = 1, found%n
-      f = order(c)
-      q = lane_of(c)
-      g = block_of(c)
-      sub%source(c) = found%source(f)
-      sub%gap(c) = found%gap(f)
-      sub%pair(:, c) = pair(:, f)
+      this%c = c
+      this%q = lane_of(c)
+      this%g = block_of(c)
+      this%f = order(c)
+      this%p = found%source(this%f)
+      this%i = view%list%candidate(this%p)
+      this%j = view%list%antagonist(this%p)
+      this%b = boundary_of(view, this%p)
+      sub%source(c) = this%p
+      sub%gap(c) = found%gap(this%f)
+      sub%pair(:, c) = pair(:, this%f)
+      if (this%b > 0) then
+        if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub)
+      end if
+      call pack_terms(view, found, boundaries, kernels, physics, this, sub)
+    end do
+  end subroutine pack_contacts
+
+  !> Columns of candidates and antagonists in the order in which contacts were found; of a boundary that turns, one that cannot move
+  !> stands for the columns that `add_column` makes.
+  subroutine find_pairs(view, found, boundaries, numbers, sub, pair)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(numbers_t), intent(in) :: numbers
+    type(subproblem_t), intent(in) :: sub
+    !> (2, found)
+    integer, intent(out), contiguous :: pair(:, :)
+    integer :: f, p, i, j, b, column
+
+    do f = 1, found%n
       p = found%source(f)
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
       b = boundary_of(view, p)
       if (b > 0) then
-        if (boundaries(b)%turns()) call add_column()
-      end if
-      sub%hot(q, 1:nd, g) = found%normal(:, f)
-      if (size(found%terms) > 0) then
-        terms = found%terms(f)
+        column = merge(sub%n_bodies + 1, numbers%of_boundary(b), boundaries(b)%turns())
+        pair(1, f) = merge(column, numbers%of_grain(i), view%bodies%glued(i) > 0)
+        pair(2, f) = column
+        if (view%bodies%glued(i) > 0) pair(2, f) = numbers%of_grain(j)
       else
-        terms = scene_terms(view, boundaries, physics, p, found%gap(f))
+        pair(1, f) = numbers%of_grain(i)
+        pair(2, f) = numbers%of_grain(j)
       end if
+    end do
+  end subroutine find_pairs
+
+  !> The point of a turning boundary that a contact touches, as a body of its own.
+  subroutine add_column(view, found, boundary, kernels, this, sub)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundary
+    type(kernels_t), intent(in) :: kernels
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: point(kernels%nd)
+    integer :: nd
+
+    nd = kernels%nd
+    sub%n_columns = sub%n_columns + 1
+    sub%id(sub%n_columns) = boundary%id
+    sub%boundary(sub%n_columns) = this%b
+    if (this%j < 0) then
+      call find_wall_point(view, this%i, found%gap(this%f), found%normal(:, this%f), point)
+    else if (view%bodies%glued(this%i) > 0) then
+      point(:) = view%bodies%position(:, this%i) - view%bodies%radius(this%i)*found%normal(:, this%f)
+    else
+      point(:) = view%bodies%position(:, this%j) + view%bodies%radius(this%j)*found%normal(:, this%f)
+    end if
+    call boundary%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
+    ! levers of boundaries are 0: rolling alone sees the spin
+    sub%v_free(nd + 1:, sub%n_columns) = boundary%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
+    sub%pair(merge(1, 2, view%bodies%glued(this%i) > 0), this%c) = sub%n_columns
+  end subroutine add_column
+
+  !> The contact data: normal and levers, and what the law of the pair makes of the step.
+  subroutine pack_terms(view, found, boundaries, kernels, physics, this, sub)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(inout) :: sub
+    type(contact_terms_t) :: terms
+
+    if (size(found%terms) > 0) then
+      terms = found%terms(this%f)
+    else
+      terms = terms_of(physics%laws, law_of(view, boundaries, physics%laws, this%p), found%gap(this%f))
+    end if
+    associate (q => this%q, g => this%g, i => this%i, j => this%j, row => kernels%row)
+      sub%hot(q, 1:kernels%nd, g) = found%normal(:, this%f)
       if (terms%restitution > 0.0_dp) then
-        sub%hot(q, nd + 1, g) = terms%restitution*returned()
+        sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, this, sub)
       else
-        sub%hot(q, nd + 1, g) = terms%play/physics%h
+        sub%hot(q, row%shift, g) = terms%play/physics%h
       end if
       if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
-      if (kernels%nc == 1) cycle
-      sub%hot(q, nd + 4, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
-      sub%hot(q, nd + 5, g) = 0.0_dp
-      if (j > 0) sub%hot(q, nd + 5, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
-      sub%hot(q, kernels%friction_row, g) = terms%friction
-      if (kernels%shift_row > 0) call pack_tangential_shift()
-      if (kernels%rolling_row > 0) call pack_rolling()
-    end do
+      if (kernels%nc == 1) return
+      sub%hot(q, row%lever_i, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
+      sub%hot(q, row%lever_j, g) = 0.0_dp
+      if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
+      sub%hot(q, row%friction, g) = terms%friction
+      if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, terms%tangential_restitution, this, sub)
+      if (row%rolling_radius == 0) return
+      sub%hot(q, row%rolling_radius, g) = rolling_radius(sub%hot(q, row%lever_i, g), sub%hot(q, row%lever_j, g))
+      sub%hot(q, row%rolling_friction, g) = terms%rolling_friction
+      if (kernels%nd == 3) sub%hot(q, row%pivoting_friction, g) = terms%pivoting_friction
+    end associate
+  end subroutine pack_terms
 
-  contains
+  !> Normal velocity at the start of the step as far as the contact sends it back. It counts where the contact opens, too: what
+  !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
+  !> the contact comes to rest.
+  real(dp) function returned_velocity(view, found, boundaries, this, sub) result(returned)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(in) :: sub
+    integer :: nd
 
-    !> Columns of candidates and antagonists in the order in which contacts were found; of a boundary that turns, one that
-    !> cannot move stands for the columns that `add_column` makes.
-    subroutine find_pairs()
-      integer :: column
+    nd = size(found%normal, 1)
+    returned = approach_velocity(view, boundaries, this%p, found%gap(this%f), found%normal(:, this%f))
+    if (returned <= 0.0_dp) return
+    if (sum((sub%v_free(1:nd, sub%pair(1, this%c)) - sub%v_free(1:nd, sub%pair(2, this%c)))*found%normal(:, this%f)) < 0.0_dp) &
+      & returned = 0.0_dp
+  end function returned_velocity
 
-      do f = 1, found%n
-        p = found%source(f)
-        i = view%list%candidate(p)
-        j = view%list%antagonist(p)
-        b = boundary_of(view, p)
-        if (b > 0) then
-          column = merge(sub%n_bodies + 1, column_of(b), boundaries(b)%turns())
-          pair(1, f) = merge(column, number_of(i), view%bodies%glued(i) > 0)
-          pair(2, f) = column
-          if (view%bodies%glued(i) > 0) pair(2, f) = number_of(j)
-        else
-          pair(1, f) = number_of(i)
-          pair(2, f) = number_of(j)
-        end if
-      end do
-    end subroutine find_pairs
+  !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
+  subroutine pack_tangential_shift(view, found, boundaries, kernels, restitution, this, sub)
+    type(neighbourhood_t), intent(in) :: view
+    type(found_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(kernels_t), intent(in) :: kernels
+    !> tangential
+    real(dp), intent(in) :: restitution
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), point(kernels%nd)
+    integer :: d
 
-    !> The point of a turning boundary that this contact touches, as a body of its own.
-    subroutine add_column()
-      real(dp) :: point(nd)
-
-      sub%n_columns = sub%n_columns + 1
-      sub%id(sub%n_columns) = boundaries(b)%id
-      sub%boundary(sub%n_columns) = b
+    call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
+    associate (i => this%i, j => this%j, normal => found%normal(:, this%f))
+      point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*normal
+      call find_start_velocity(view, boundaries, i, point, vi)
       if (j < 0) then
-        call find_surface_point(point)
-      else if (view%bodies%glued(i) > 0) then
-        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*found%normal(:, f)
+        call find_wall_point(view, i, found%gap(this%f), normal, point)
       else
-        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*found%normal(:, f)
+        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*normal
       end if
-      call boundaries(b)%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
-      ! levers of boundaries are 0: rolling alone sees the spin
-      sub%v_free(nd + 1:, sub%n_columns) = boundaries(b)%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
-      sub%pair(merge(1, 2, view%bodies%glued(i) > 0), c) = sub%n_columns
-    end subroutine add_column
-
-    !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
-    subroutine pack_tangential_shift()
-      real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
-      integer :: d
-
-      call contact_jacobian(kernels, sub%hot, c, rows(:, :, 1), rows(:, :, 2))
-      call find_start_velocity(i, vi)
-      call find_start_velocity(j, vj)
-      do d = 2, nd
-        sub%hot(q, kernels%shift_row + d - 1, g) = terms%tangential_restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
-      end do
-    end subroutine pack_tangential_shift
-
-    !> Velocity at the start of the step of grain `k` of the view or, with its spin left out, of the boundary that the grain or the
-    !> negative number stands for, where the free grain touches it.
-    subroutine find_start_velocity(k, v)
-      integer, intent(in) :: k
-      !> (nv)
-      real(dp), intent(out) :: v(:)
-      real(dp) :: point(nd)
-
-      v(:) = 0.0_dp
-      if (k < 0) then
-        call find_surface_point(point)
-      else if (view%bodies%glued(k) == 0) then
-        v(:) = view%bodies%velocity(1:kernels%nv, k)
-        return
-      else
-        point(:) = view%bodies%position(:, k) + merge(-1, 1, k == i)*view%bodies%radius(k)*found%normal(:, f)
-      end if
-      call boundaries(b)%last_velocity_at(point, v(1:nd))
-    end subroutine find_start_velocity
-
-    !> R* and the coefficients of rolling and, of spheres, pivoting.
-    subroutine pack_rolling()
-      associate (row => kernels%rolling_row)
-        sub%hot(q, row + 1, g) = rolling_radius(sub%hot(q, nd + 4, g), sub%hot(q, nd + 5, g))
-        sub%hot(q, row + 3, g) = terms%rolling_friction
-        if (nd == 3) sub%hot(q, row + 4, g) = terms%pivoting_friction
-      end associate
-    end subroutine pack_rolling
-
-    !> Point of the surface of a boundary that the candidate is nearest to.
-    pure subroutine find_surface_point(point)
-      real(dp), intent(out) :: point(nd)
-      point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + found%gap(f))*found%normal(:, f)
-    end subroutine find_surface_point
-
-    !> Normal velocity at the start of the step as far as the contact sends it back. It counts where the contact opens, too: what
-    !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
-    !> the contact comes to rest.
-    real(dp) function returned()
-      returned = approach()
-      if (returned <= 0.0_dp) return
-      if (sum((sub%v_free(1:nd, sub%pair(1, c)) - sub%v_free(1:nd, sub%pair(2, c)))*found%normal(:, f)) < 0.0_dp) returned = 0.0_dp
-    end function returned
-
-    !> Normal velocity at the start of the step.
-    real(dp) function approach()
-      real(dp) :: v(nd), point(nd), surface(nd)
-
-      v(:) = view%bodies%velocity(1:nd, i)
-      if (j > 0) then
-        v(:) = v - view%bodies%velocity(1:nd, j)
-      else
-        call find_surface_point(point)
-        call boundaries(b)%last_velocity_at(point, surface)
-        v(:) = v - surface
-      end if
-      approach = sum(v*found%normal(:, f))
-    end function approach
-
-  end subroutine pack_contacts
+      call find_start_velocity(view, boundaries, j, point, vj)
+    end associate
+    do d = 2, kernels%nd
+      sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
+    end do
+  end subroutine pack_tangential_shift
 
   !> Scales of the residual, of the jump and of roundings: largest |R^d|, over the components that can move, largest free speed,
   !> and largest term of R^d of a body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may
   !> strike. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(3), moving(problem%kernels%nd), speed, lightest
+    real(dp) :: scales(3), moving(problem%kernels%nd), speed, lightest, inverse
     integer :: s, b, d, nd
 
     nd = problem%kernels%nd
@@ -380,10 +399,10 @@ contains
           do d = 1, nd
             if (.not. sub%moves(d, b)) moving(d) = 0.0_dp
           end do
-          ! all components that move have the same mass
-          if (.not. any(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
-          scales(1) = max(scales(1), norm2(moving)/maxval(sub%inverse_mass(1:nd, b)))
-          lightest = min(lightest, maxval(sub%inverse_mass(1:nd, b)))
+          inverse = inverse_of_translation(sub%inverse_mass(:, b), nd)
+          if (.not. inverse > 0.0_dp) cycle
+          scales(1) = max(scales(1), norm2(moving)/inverse)
+          lightest = min(lightest, inverse)
         end do
         do b = sub%n_bodies + 1, sub%n_columns
           speed = norm2(sub%v_free(1:nd, b))

@@ -14,6 +14,7 @@
 module gravier_sleeping
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
@@ -219,8 +220,8 @@ contains
 
       speed = norm2(sub%v_global(1:nd, b))
       if (b <= sub%n_grains) speed = speed + sub%radius(b)*norm2(sub%v_global(nd + 1:, b))
-      momentum = 0.0_dp
-      if (any(sub%inverse_mass(1:nd, b) > 0.0_dp)) momentum = speed/maxval(sub%inverse_mass(1:nd, b))
+      momentum = inverse_of_translation(sub%inverse_mass(:, b), nd)
+      if (momentum > 0.0_dp) momentum = speed/momentum
     end function momentum
 
   end subroutine count_steps

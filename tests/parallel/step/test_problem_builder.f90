@@ -14,6 +14,8 @@ program test_problem_builder
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
+  use gravier_contact_coefficients, only: coefficients_t
+  use gravier_pair_laws, only: set_default_laws
   use gravier_physics, only: physics_t
   use gravier_interface, only: interface_figures_t, n_multiplicities
   use gravier_problem_builder, only: build_problem
@@ -175,7 +177,7 @@ contains
     call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
     call kernels%choose(nd, effects_t(friction=friction))
     physics%gravity(:) = gravity
-    physics%contact%friction = 0.25_dp
+    call set_default_laws(physics%laws, coefficients_t(friction=0.25_dp), decomposition%boundaries)
     physics%h = h
     neighbourhoods%memory%n_impulse = 4
     call neighbourhoods%build(decomposition)
@@ -595,7 +597,7 @@ contains
 
     call make_boundary_scene(n_subdomains, 0.0_dp, turning, decomposition)
     call kernels%choose(2, effects_t(friction=.true.))
-    physics%contact%friction = 0.1_dp
+    call set_default_laws(physics%laws, coefficients_t(friction=0.1_dp), decomposition%boundaries)
     physics%h = h
     neighbourhoods%memory%n_impulse = 2
     call neighbourhoods%build(decomposition)
@@ -728,11 +730,12 @@ contains
 
     call make_boundary_scene(n_subdomains, 0.01_dp, .false., decomposition)
     call kernels%choose(2, effects_t(friction=.true.))
+    call set_default_laws(physics%laws, coefficients_t(), decomposition%boundaries)
     neighbourhoods%memory%n_impulse = 2
     call neighbourhoods%build(decomposition)
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")
-    decomposition%boundaries(1)%contact%restitution = 0.0_dp
+    call physics%laws%set_default(1, coefficients_t())
     call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 3_i8, "no restitution: contacts within the alert distance")
     decomposition%boundaries(1)%present = .false.

@@ -26,6 +26,7 @@ program test_laws
   call check_capillary()
   call check_bonded()
   call check_law_set()
+  call check_defaults()
   call finish_checks()
 
 contains
@@ -322,5 +323,33 @@ contains
     call laws%of(1)%law%evaluate(pair)
     call check_terms(pair, 0.4_dp, 5.0_dp, 0.01_dp, "values go to keys by their names")
   end subroutine check_law_set
+
+  !> Default laws of grains and of boundaries, beside laws of materials and without any.
+  subroutine check_defaults()
+    type(law_set_t) :: laws
+
+    call check_equal(laws%default_of(2), 0, "a set that was given nothing")
+    call laws%set_default(0, coefficients_t(friction=0.3_dp, rolling_friction=0.07_dp))
+    call check_close(laws%of(0)%terms%friction, 0.3_dp, 0.0_dp, "friction of grains, of a set without other laws")
+    call check_close(laws%of(0)%terms%rolling_friction, 0.07_dp, 0.0_dp, "rolling friction of grains")
+    call laws%init(2, 1)
+    call check_close(laws%of(0)%terms%friction, 0.0_dp, 0.0_dp, "no friction at first")
+    call add_law(laws, 1, 2, "frictionless", "restitution", [0.25_dp])
+    call check(.not. (laws%varies .or. laws%varies_at(1)), "laws with the same terms for all pairs")
+    call laws%set_default(2, coefficients_t(friction=0.5_dp, restitution=0.1_dp, tangential_restitution=0.2_dp))
+    call check_equal(laws%default_of(2), -2, "a boundary with a law of its own")
+    call check_equal(laws%default_of(1), 0, "a boundary that has none is under that of grains")
+    call check_equal(laws%default_of(7), 0, "another one")
+    call check_close(laws%of(-2)%terms%tangential_restitution, 0.2_dp, 0.0_dp, "tangential restitution of a boundary")
+    call check_close(laws%of(1)%terms%restitution, 0.25_dp, 0.0_dp, "the law of two materials stays")
+    call laws%set_default(1, coefficients_t(tangential_restitution=0.2_dp))
+    call check_close(laws%of(-1)%terms%tangential_restitution, 0.0_dp, 0.0_dp, "none without friction")
+    call check_close(laws%of(-2)%terms%friction, 0.5_dp, 0.0_dp, "the law of the other boundary stays")
+    call check_close(laws%largest%friction, 0.0_dp, 0.0_dp, "default laws do not count among those of materials")
+    call laws%init(2, 1)
+    call add_law(laws, 1, 1, "velocity", "static_friction dynamic_friction slip_scale restitution tangential_restitution", &
+      & [0.5_dp, 0.3_dp, 1.0_dp, 0.0_dp, 0.0_dp])
+    call check(laws%varies .and. laws%varies_at(1) .and. .not. laws%varies_at(0), "a law whose terms depend on the pair")
+  end subroutine check_defaults
 
 end program test_laws

@@ -8,9 +8,10 @@ program test_narrow_phase
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_neighbourhood, only: neighbourhood_t
-  use gravier_pair_laws, only: boundary_of, law_of, evaluate_pair
+  use gravier_surface_velocity, only: find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
+  use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
-  use gravier_narrow_phase, only: found_t, find_contacts, scene_terms
+  use gravier_narrow_phase, only: found_t, find_contacts
   use gravier_test_scenes, only: plane
   use gravier_test_law_names, only: add_law
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -28,6 +29,7 @@ program test_narrow_phase
   call check_memory()
   call check_velocities()
   call check_turning_boundary()
+  call check_start_velocities()
   call finish_checks()
 
 contains
@@ -154,22 +156,22 @@ contains
 
     call make(2, reshape([0.0_dp, 0.105_dp, 0.205_dp, 0.105_dp], [2, 2]), view, decomposition)
     call list(view, reshape([1, 2, 1, -1], [2, 2]), pair_memory_t())
-    physics%contact = coefficients_t(friction=0.2_dp, restitution=0.5_dp)
     decomposition%boundaries(1)%contact = coefficients_t(friction=0.0_dp, tangential_restitution=0.7_dp)
+    call set_default_laws(physics%laws, coefficients_t(friction=0.2_dp, restitution=0.5_dp), decomposition%boundaries)
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 1, "an open pair with restitution is no contact")
     if (found%n == 1) call check_equal(found%source(1), 2, "tangential restitution without friction is none")
-    decomposition%boundaries(1)%contact%friction = 0.1_dp
+    call physics%laws%set_default(1, coefficients_t(friction=0.1_dp, tangential_restitution=0.7_dp))
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 0, "with friction the boundary's is")
     view%bodies%position(1, 2) = 0.2_dp*(1.0_dp - epsilon(1.0_dp))
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 1, "a pair that touches is a contact")
-    associate (terms => scene_terms(view, decomposition%boundaries, physics, 1, -0.25_dp))
+    associate (terms => terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, 1), -0.25_dp))
       call check_close(terms%restitution, 0.5_dp, 0.0_dp, "grains have the coefficients of the scene")
       call check_close(terms%play, 0.0_dp, 0.0_dp, "an overlap gives no play")
     end associate
-    associate (terms => scene_terms(view, decomposition%boundaries, physics, 2, 0.25_dp))
+    associate (terms => terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, 2), 0.25_dp))
       call check_close(terms%friction, 0.1_dp, 0.0_dp, "a boundary has its own")
       call check_close(terms%play, 0.25_dp, 0.0_dp, "an open gap is the play")
     end associate
@@ -190,14 +192,18 @@ contains
     call check_equal(boundary_of(view, 3), 0, "two free grains")
     call check_equal(boundary_of(view, 4), 1, "a boundary")
     call physics%laws%init(3, 3)
+    call set_default_laws(physics%laws, coefficients_t(), decomposition%boundaries)
     call add_law(physics%laws, 1, 2, "coulomb", coulomb_keys, [0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
     call add_law(physics%laws, 1, 3, "frictionless", "restitution", [0.0_dp])
-    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 1), 0, "both are of the first material, which has no law")
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 1), -2, &
+      & "both are of the first material, which has no law: the default law of the boundary")
     call check_equal(law_of(view, decomposition%boundaries, physics%laws, 2), 2, "materials 1 and 3")
     decomposition%boundaries(2)%material = 2
     call check_equal(law_of(view, decomposition%boundaries, physics%laws, 1), 1, "a glued grain is of the boundary's material")
-    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 2), 0, "the other pair has no law then")
-    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 4), 0, "the plane has no material")
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 2), -2, &
+      & "the other pair is under the default law of its boundary then")
+    call check_equal(law_of(view, decomposition%boundaries, physics%laws, 4), -1, &
+      & "the plane has no material, and a default law of its own")
     decomposition%boundaries(1)%material = 3
     call check_equal(law_of(view, decomposition%boundaries, physics%laws, 4), 2, "materials of grain and plane")
   end subroutine check_materials
@@ -319,5 +325,38 @@ contains
       call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")
     end do
   end subroutine check_turning_boundary
+
+  !> Velocities at the start of a step: of a grain that turns, of a glued one, of a boundary, and of a pair along its normal.
+  subroutine check_start_velocities()
+    type(neighbourhood_t) :: view
+    type(decomposition_t) :: decomposition
+    real(dp) :: v(3), w(2), point(2)
+
+    call make(2, reshape([1.0_dp, 0.15_dp, 1.0_dp, 0.35_dp], [2, 2]), view, decomposition)
+    call list(view, reshape([1, -1, 1, 2], [2, 2]), pair_memory_t())
+    view%bodies%velocity(:, 1) = [0.5_dp, -0.25_dp, 2.0_dp]
+    view%bodies%velocity(:, 2) = [1.0_dp, 0.5_dp, -1.0_dp]
+    decomposition%boundaries(1)%last_velocity(2) = 0.125_dp
+    decomposition%boundaries(2)%last_spin(3) = 3.0_dp
+    decomposition%boundaries(2)%pivot(:) = 0.0_dp
+    call find_wall_point(view, 1, 0.05_dp, [0.0_dp, 1.0_dp], point)
+    call check_close(point(1), 1.0_dp, rounding, "point of a wall below a grain")
+    call check_close(point(2), 0.0_dp, rounding, "its height")
+    call find_start_velocity(view, decomposition%boundaries, 1, point, v)
+    call check_close(v(3), 2.0_dp, 0.0_dp, "spin of a grain")
+    call find_start_velocity(view, decomposition%boundaries, -1, point, v)
+    call check_close(v(2), 0.125_dp, 0.0_dp, "velocity of a boundary")
+    call check_close(v(3), 0.0_dp, 0.0_dp, "a boundary's velocity has no spin")
+    call find_surface_velocity(view, decomposition%boundaries, 1, [0.0_dp, -0.1_dp], w)
+    call check_close(w(1), 0.7_dp, rounding, "the spin carries the point below")
+    call check_close(approach_velocity(view, decomposition%boundaries, 1, 0.05_dp, [0.0_dp, 1.0_dp]), -0.375_dp, rounding, &
+      & "approach of a boundary")
+    call check_close(approach_velocity(view, decomposition%boundaries, 2, 0.0_dp, [0.0_dp, -1.0_dp]), 0.75_dp, rounding, &
+      & "two grains part")
+    view%bodies%glued(1) = 2
+    call find_surface_velocity(view, decomposition%boundaries, 1, [0.0_dp, -0.1_dp], w)
+    call check_close(w(1), -0.15_dp, rounding, "a glued grain turns with its boundary, along x")
+    call check_close(w(2), 3.0_dp, rounding, "and along y")
+  end subroutine check_start_velocities
 
 end program test_narrow_phase

@@ -1,0 +1,100 @@
+!> Velocities at the start of a step of what takes part in a pair: grains, boundaries and grains that are part of one.
+!>
+!> A body is a grain of a view, by its number there, or a boundary, by its negative number. Grains glued to a boundary move with it.
+module gravier_surface_velocity
+  use gravier_kinds, only: dp
+  use gravier_boundary, only: boundary_t
+  use gravier_neighbourhood, only: neighbourhood_t
+  implicit none
+  private
+  public :: find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
+
+contains
+
+  !> Velocity of body `k`: of a free grain, translation and spin; of a boundary, the velocity of its material at a point, as a
+  !> translation without spin.
+  pure subroutine find_start_velocity(view, boundaries, k, point, v)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: k
+    !> (nd) where a boundary is touched, which a free grain does not read [m]
+    real(dp), intent(in) :: point(:)
+    !> (nd to the components that a body has) [m/s, rad/s]
+    real(dp), intent(out) :: v(:)
+    integer :: b
+
+    b = -k
+    if (k > 0) b = view%bodies%glued(k)
+    if (b == 0) then
+      v(:) = view%bodies%velocity(1:size(v), k)
+    else
+      v(:) = 0.0_dp
+      call boundaries(b)%last_velocity_at(point, v(1:size(point)))
+    end if
+  end subroutine find_start_velocity
+
+  !> Velocity of grain `k` at the point of its surface that `arm` leads to from its centre.
+  pure subroutine find_surface_velocity(view, boundaries, k, arm, v)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: k
+    !> (nd) [m]
+    real(dp), intent(in) :: arm(:)
+    !> (nd) [m/s]
+    real(dp), intent(out) :: v(:)
+    real(dp) :: point(size(arm))
+    integer :: nd
+
+    nd = size(arm)
+    point(:) = view%bodies%position(:, k) + arm
+    call find_start_velocity(view, boundaries, k, point, v)
+    if (view%bodies%glued(k) > 0) return
+    associate (spin => view%bodies%velocity(nd + 1:, k))
+      if (size(spin) == 1) then
+        v(1) = v(1) - spin(1)*arm(2)
+        v(2) = v(2) + spin(1)*arm(1)
+      else if (size(spin) == 3) then
+        v(1) = v(1) + spin(2)*arm(3) - spin(3)*arm(2)
+        v(2) = v(2) + spin(3)*arm(1) - spin(1)*arm(3)
+        v(3) = v(3) + spin(1)*arm(2) - spin(2)*arm(1)
+      end if
+    end associate
+  end subroutine find_surface_velocity
+
+  !> Point of the surface of a boundary that grain `i` is nearest to.
+  pure subroutine find_wall_point(view, i, gap, normal, point)
+    type(neighbourhood_t), intent(in) :: view
+    integer, intent(in) :: i
+    !> [m]
+    real(dp), intent(in) :: gap
+    !> (nd) from the boundary to the grain
+    real(dp), intent(in) :: normal(:)
+    !> (nd) [m]
+    real(dp), intent(out) :: point(:)
+    point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + gap)*normal
+  end subroutine find_wall_point
+
+  !> Normal velocity of pair `p` [m/s], positive where the two part. Of round grains it is that of their centres.
+  pure real(dp) function approach_velocity(view, boundaries, p, gap, normal) result(approach)
+    type(neighbourhood_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap
+    !> (nd) from the antagonist to the candidate
+    real(dp), intent(in) :: normal(:)
+    real(dp) :: v(size(normal)), w(size(normal)), point(size(normal))
+
+    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
+      v(:) = view%bodies%velocity(1:size(v), i)
+      if (j > 0) then
+        w(:) = view%bodies%velocity(1:size(w), j)
+      else
+        call find_wall_point(view, i, gap, normal, point)
+        call find_start_velocity(view, boundaries, j, point, w)
+      end if
+    end associate
+    approach = sum((v - w)*normal)
+  end function approach_velocity
+
+end module gravier_surface_velocity
