@@ -136,7 +136,6 @@ contains
       if (plan%every == 0) cycle
       if (mod(k, plan%every) > 0) cycle
       ! the program is done with this problem: it may be solved on
-      call simulation%problem%shift_impulses(1)
       call take_figures(simulation, row)
       row%situation = "in a run"
       row%step = k

@@ -10,6 +10,7 @@ module gravier_sample_preparation
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_load_areas, only: facing_area
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_log, only: run_log_t
   use gravier_sample_rest, only: rest_t
@@ -298,7 +299,7 @@ contains
     do s = 1, size(simulation%problem%sub)
       associate (sub => simulation%problem%sub(s))
         do c = 1, sub%n_contacts
-          if (sub%held_impulse(c) > 0.0_dp) ends = ends + count(sub%pair(:, c) <= sub%n_grains)
+          if (sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) ends = ends + count(sub%pair(:, c) <= sub%n_grains)
         end do
       end associate
     end do

@@ -213,7 +213,6 @@ contains
     if (self%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%neighbourhoods)
-    call self%problem%shift_impulses(-1)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)

@@ -177,7 +177,7 @@ contains
     integer :: status
 
     associate (sub => simulation%problem%sub(s), kernels => simulation%problem%kernels, q => lane_of(c), g => block_of(c))
-      held = sub%held_impulse(c)
+      held = sub%impulse(q, 1, g)
       tangential = 0.0_dp
       status = idle
       if (held > 0.0_dp) status = sliding
@@ -185,7 +185,7 @@ contains
         tangential = norm2(sub%impulse(q, 2:kernels%nf, g))
         if (held > 0.0_dp .and. tangential < (1.0_dp - unused)*sub%hot(q, kernels%friction_row, g)*held) status = sticking
       end if
-      value(1) = sub%impulse(q, 1, g)/simulation%physics%h
+      value(1) = sub%normal_impulse(c)/simulation%physics%h
       value(2) = tangential/simulation%physics%h
       value(3) = sub%gap(c)
       value(4) = real(status, dp)

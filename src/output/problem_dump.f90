@@ -18,10 +18,9 @@ module gravier_problem_dump
   private
   public :: write_problem
 
-  !> Of a subdomain: places of its bodies in the global problem, from 1 on (n_bodies), and impulses put aside.
+  !> Of a subdomain: places of its bodies in the global problem, from 1 on (n_bodies).
   type :: places_t
     integer(i8), allocatable :: place(:)
-    real(dp), allocatable :: impulse(:, :, :)
   end type places_t
 
 contains
@@ -33,23 +32,13 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(fclib_rows_t) :: rows
     type(places_t) :: bodies(size(simulation%problem%sub))
-    integer :: s
 
     if (allocated(error)) return
     rows%dimension = simulation%problem%kernels%nd
-    do s = 1, size(bodies)
-      bodies(s)%impulse = simulation%problem%sub(s)%impulse
-    end do
-    call simulation%problem%shift_impulses(1)
     ! a projection of overlaps has used the velocities for its own
     call simulation%problem%evaluate()
     call order_bodies(simulation%problem, bodies, rows)
     call order_contacts(simulation, bodies, rows)
-    call simulation%problem%shift_impulses(-1)
-    ! bit by bit what they were
-    do s = 1, size(bodies)
-      call move_alloc(bodies(s)%impulse, simulation%problem%sub(s)%impulse)
-    end do
     call write_fclib_global(simulation%comm, path, rows, error)
   end subroutine write_problem
 

@@ -326,6 +326,7 @@ contains
           rows%normal(:, n) = sub%hot(lane_of(c), 1:nd, block_of(c))
           rows%gap(n) = sub%gap(c)
           rows%impulse(1:nf, n) = sub%impulse(lane_of(c), 1:nf, block_of(c))
+          rows%impulse(1, n) = sub%normal_impulse(c)
           if (.not. allocated(rows%moment)) cycle
           radius = sub%hot(lane_of(c), simulation%problem%kernels%rolling_row + 1, block_of(c))
           ! that about the normal comes last in a sweep

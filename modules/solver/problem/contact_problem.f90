@@ -5,8 +5,8 @@ module gravier_contact_problem
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_body_mass, only: can_move, mass_product, multiply_mass, velocities_under
-  use gravier_contact_kernels, only: kernels_t, local_operator, lanes, n_blocks, lane_of, block_of
+  use gravier_body_mass, only: add_inverse_mass, can_move, mass_product, multiply_mass, velocities_under
+  use gravier_contact_kernels, only: kernels_t, local_operator, global_impulse, lanes, n_blocks, lane_of, block_of
   implicit none
   private
   public :: subproblem_t, contact_problem_t, n_residual_sums
@@ -19,6 +19,10 @@ module gravier_contact_problem
 
   !> The contacts of one subdomain and the bodies they touch, packed in sweep order. Bodies 1 to n_grains are free
   !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed.
+  !>
+  !> Attractions F of contacts are loads of the solve, and unilateral contact holds for r~_n = r_n + h F. `impulse`, `reaction` and
+  !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what belongs
+  !> to it are asked of `normal_impulse`, `contact_reaction`, `free_velocity` and `impulse_on_candidate`.
   type :: subproblem_t
     !> global number of the subdomain, from 1
     integer :: subdomain = 0
@@ -39,7 +43,7 @@ module gravier_contact_problem
     integer, allocatable :: boundary(:)
     !> of grains (n_grains) [m]
     real(dp), allocatable :: radius(:)
-    !> velocity without contacts, M^-1 R^d, in a solve with attractions among the loads (nv, n_columns) [m/s, rad/s]
+    !> velocity without contacts, M^-1 R^d, with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
     !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
     real(dp) :: largest_term = 0.0_dp
@@ -47,7 +51,7 @@ module gravier_contact_problem
     real(dp), allocatable :: velocity(:, :)
     !> velocity of the undivided bodies under all impulses (nv, n_columns), made by `evaluate`
     real(dp), allocatable :: v_global(:, :)
-    !> H r (nv, n_columns), of all copies after `evaluate`; work space of schemes [N s, N m s]
+    !> H r~ (nv, n_columns), of all copies after `evaluate`; work space of schemes [N s, N m s]
     real(dp), allocatable :: reaction(:, :)
     !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (nw, n_columns)
     real(dp), allocatable :: inverse_mass(:, :)
@@ -56,6 +60,7 @@ module gravier_contact_problem
     !> (2, lanes*blocks), (lanes, nh, blocks), (lanes, nc, blocks): see gravier_contact_kernels
     integer, allocatable :: pair(:, :)
     real(dp), allocatable :: hot(:, :, :)
+    !> r~, of which a normal part above 0 says that the bodies touch
     real(dp), allocatable :: impulse(:, :, :)
     !> where some law of the scene attracts: h F of the attraction F of each contact (lanes, blocks) [N s], and their load on the
     !> bodies, H (-h F n), of all copies (nv, n_columns) [N s, N m s]
@@ -71,7 +76,9 @@ module gravier_contact_problem
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
     procedure :: product_of => subproblem_product_of
-    procedure :: held_impulse => subproblem_held_impulse
+    procedure :: normal_impulse => subproblem_normal_impulse
+    procedure :: contact_reaction => subproblem_contact_reaction
+    procedure :: free_velocity => subproblem_free_velocity
   end type subproblem_t
 
   type :: contact_problem_t
@@ -120,7 +127,7 @@ module gravier_contact_problem
     procedure :: own_reactions => contact_problem_own_reactions
     procedure :: any_impulse => contact_problem_any_impulse
     procedure :: load_attraction => contact_problem_load_attraction
-    procedure :: shift_impulses => contact_problem_shift_impulses
+    procedure :: impulse_on_candidate => contact_problem_impulse_on_candidate
   end type contact_problem_t
 
 contains
@@ -212,55 +219,77 @@ contains
     end do
   end function subproblem_product_of
 
-  !> Normal impulse of contact `c` of a step that is over as the solve had it, r_n + h F [N s]: it is not 0 where the bodies touch.
-  pure real(dp) function subproblem_held_impulse(self, c) result(impulse)
+  !> Normal impulse of contact `c` on its candidate, r_n = r~_n - h F [N s]; below 0 where the attraction pulls more than the bodies
+  !> press.
+  pure real(dp) function subproblem_normal_impulse(self, c) result(impulse)
     class(subproblem_t), intent(in) :: self
     integer, intent(in) :: c
 
     impulse = self%impulse(lane_of(c), 1, block_of(c))
-    if (allocated(self%attraction)) impulse = impulse + self%attraction(lane_of(c), block_of(c))
-  end function subproblem_held_impulse
+    if (allocated(self%attraction)) impulse = impulse - self%attraction(lane_of(c), block_of(c))
+  end function subproblem_normal_impulse
 
-  !> Add the attractions to the loads, v_free := v_free + M^-1 H (-h F n). Impulses are zero before and after. Collective.
+  !> Impulse of all contacts on body `b`, component `d` of H r = H r~ - H h F n, once `evaluate` was called [N s, N m s].
+  pure real(dp) function subproblem_contact_reaction(self, d, b) result(reaction)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: d, b
+
+    reaction = self%reaction(d, b)
+    if (allocated(self%pull)) reaction = reaction + self%pull(d, b)
+  end function subproblem_contact_reaction
+
+  !> Velocity of body `b` without contacts and without their attractions, component `d` [m/s, rad/s].
+  pure real(dp) function subproblem_free_velocity(self, d, b) result(velocity)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: d, b
+
+    velocity = self%v_free(d, b)
+    ! the product is rounded by itself
+    if (allocated(self%pull)) velocity = velocity - (self%inverse_mass(min(d, size(self%inverse_mass, 1)), b)*self%pull(d, b))
+  end function subproblem_free_velocity
+
+  !> Impulse r of contact `c` of subdomain `s` of this rank on its candidate, in global axes [N s].
+  pure subroutine contact_problem_impulse_on_candidate(self, s, c, p)
+    class(contact_problem_t), intent(in) :: self
+    integer, intent(in) :: s, c
+    !> (nd)
+    real(dp), intent(out) :: p(:)
+    real(dp) :: impulse(lanes, self%kernels%nc, 1)
+
+    associate (sub => self%sub(s), q => lane_of(c), g => block_of(c))
+      impulse(q, :, 1) = sub%impulse(q, :, g)
+      impulse(q, 1, 1) = sub%normal_impulse(c)
+      call global_impulse(self%kernels, sub%hot(:, :, g:g), impulse, q, p)
+    end associate
+  end subroutine contact_problem_impulse_on_candidate
+
+  !> Add the attractions to the loads, v_free := v_free + M^-1 pull with pull = H (-h F n). Collective.
   subroutine contact_problem_load_attraction(self)
     class(contact_problem_t), intent(inout) :: self
-    integer :: s
+    real(dp), allocatable :: load(:, :, :)
+    integer :: s, b
 
     do s = 1, size(self%sub)
-      self%sub(s)%impulse(:, 1, :) = -self%sub(s)%attraction
-    end do
-    call self%evaluate()
-    do s = 1, size(self%sub)
       associate (sub => self%sub(s))
-        sub%pull = sub%reaction
-        sub%v_free(:, :) = sub%v_global
-        sub%impulse(:, :, :) = 0.0_dp
+        allocate (load(lanes, self%kernels%nc, size(sub%attraction, 2)), source=0.0_dp)
+        load(:, 1, :) = -sub%attraction
+        if (.not. allocated(sub%pull)) allocate (sub%pull, mold=sub%v_free)
+        sub%pull(:, :) = 0.0_dp
+        call self%kernels%add_reaction(sub%pair, sub%hot, load, sub%pull)
+        call self%shared%load(s, sub%pull)
+        deallocate (load)
       end associate
     end do
-  end subroutine contact_problem_load_attraction
-
-  !> Where there are attractions, turn the problem as it was solved, in r~_n = r_n + h F, into that of the impulses on the bodies,
-  !> r_n under loads without attractions, or back: impulses, H r and v_free. v_global is the same in both.
-  subroutine contact_problem_shift_impulses(self, sign)
-    class(contact_problem_t), intent(inout) :: self
-    !> -1 or 1, back
-    integer, intent(in) :: sign
-    integer :: s, b, nd, nw
-
-    nd = self%kernels%nd
-    nw = self%kernels%nw
+    call self%shared%pass()
     do s = 1, size(self%sub)
       associate (sub => self%sub(s))
-        if (.not. allocated(sub%attraction)) cycle
-        sub%impulse(:, 1, :) = sub%impulse(:, 1, :) + sign*sub%attraction
-        sub%reaction(:, :) = sub%reaction - sign*sub%pull
+        call self%shared%sum_copies(s, sub%pull, mean=.false.)
         do b = 1, sub%n_columns
-          sub%v_free(1:nd, b) = sub%v_free(1:nd, b) + sign*(sub%inverse_mass(1:nd, b)*sub%pull(1:nd, b))
-          sub%v_free(nd + 1:, b) = sub%v_free(nd + 1:, b) + sign*(sub%inverse_mass(nw, b)*sub%pull(nd + 1:, b))
+          call add_inverse_mass(sub%inverse_mass(:, b), sub%pull(:, b), sub%v_free(:, b))
         end do
       end associate
     end do
-  end subroutine contact_problem_shift_impulses
+  end subroutine contact_problem_load_attraction
 
   !> R_E = H_E r_E of subdomain `s` of this rank, into `reaction`.
   subroutine contact_problem_own_reactions(self, s)

@@ -32,6 +32,11 @@ module gravier_contact_structure
     procedure :: measure => structure_measure
   end type contact_structure_t
 
+  !> Of a subdomain: numbers of carrying contacts of its bodies, in the first row (nv, n_columns).
+  type :: tally_t
+    real(dp), allocatable :: ends(:, :)
+  end type tally_t
+
   !> places among the counts of contacts and grains
   integer, parameter :: carrying = 1, carrying_grains = 2, with_friction = 3, sliding = 4, overlapping = 5, &
     & ends = 6, held = 7, held_ends = 8, n_counts = 8
@@ -48,7 +53,7 @@ contains
     real(dp), intent(in) :: h
     real(dp) :: parts(problem%kernels%nd**2 + 2, size(problem%sub)), sums(problem%kernels%nd**2 + 2), largest
     integer(i8) :: counts(n_counts)
-    integer :: s, nd
+    integer :: s, c, nd
 
     nd = problem%kernels%nd
     parts(:, :) = 0.0_dp
@@ -56,7 +61,9 @@ contains
     largest = 0.0_dp
     do s = 1, size(problem%sub)
       call count_contacts(problem%sub(s), nd, problem%kernels%nf, counts, parts(:, s))
-      if (problem%sub(s)%n_contacts > 0) largest = max(largest, maxval(problem%sub(s)%impulse(:, 1, :)))
+      do c = 1, problem%sub(s)%n_contacts
+        largest = max(largest, problem%sub(s)%normal_impulse(c))
+      end do
     end do
     call count_ends(problem, counts)
     call problem%comm%sum_counts(counts)
@@ -103,10 +110,11 @@ contains
       end if
       q = lane_of(c)
       g = block_of(c)
-      held = sub%held_impulse(c)
+      ! the impulse of the solve is above 0 where the bodies touch
+      held = sub%impulse(q, 1, g)
       if (.not. held > 0.0_dp) cycle
       counts(carrying) = counts(carrying) + 1
-      part(nd**2 + 1) = part(nd**2 + 1) + abs(sub%impulse(q, 1, g))
+      part(nd**2 + 1) = part(nd**2 + 1) + abs(sub%normal_impulse(c))
       if (nf > 1) then
         bound = sub%hot(q, nd + 6, g)*held
         if (bound > 0.0_dp) then
@@ -128,19 +136,20 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer(i8), intent(inout) :: counts(n_counts)
     logical, allocatable :: counted_elsewhere(:)
+    !> number of carrying contacts of each body in the first row: an exchange takes columns of nv
+    type(tally_t) :: tally(size(problem%sub))
     integer :: s, b, c, k, n
 
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
-        ! the first row of `reaction` serves as number of contacts
-        sub%reaction(:, :) = 0.0_dp
+        allocate (tally(s)%ends(problem%kernels%nv, sub%n_columns), source=0.0_dp)
         do c = 1, sub%n_contacts
-          if (.not. sub%held_impulse(c) > 0.0_dp) cycle
+          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
           do k = 1, 2
-            sub%reaction(1, sub%pair(k, c)) = sub%reaction(1, sub%pair(k, c)) + 1.0_dp
+            tally(s)%ends(1, sub%pair(k, c)) = tally(s)%ends(1, sub%pair(k, c)) + 1.0_dp
           end do
         end do
-        call problem%shared%load(s, sub%reaction)
+        call problem%shared%load(s, tally(s)%ends)
       end associate
     end do
     call problem%shared%pass()
@@ -149,10 +158,10 @@ contains
         allocate (counted_elsewhere(sub%n_bodies), source=.false.)
         do k = 1, part%n_shared
           counted_elsewhere(part%body(k)) = part%rung(k) > 1
-          call problem%shared%add_copies(s, k, sub%reaction(:, part%body(k)))
+          call problem%shared%add_copies(s, k, tally(s)%ends(:, part%body(k)))
         end do
         do b = 1, sub%n_grains
-          n = nint(sub%reaction(1, b))
+          n = nint(tally(s)%ends(1, b))
           if (counted_elsewhere(b)) cycle
           counts(ends) = counts(ends) + n
           if (n < 2) cycle
@@ -181,8 +190,8 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
-          if (.not. sub%held_impulse(c) > 0.0_dp) cycle
-          force = abs(sub%impulse(lane_of(c), 1, block_of(c)))/(h*self%force_mean)
+          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+          force = abs(sub%normal_impulse(c))/(h*self%force_mean)
           part(s) = part(s) + (force - 1.0_dp)**2
           bin = n_bins + 1
           if (force < n_bins*bin_width) bin = min(int(force/bin_width, i4) + 1, n_bins)

@@ -5,7 +5,7 @@ module gravier_energy_balance
   use gravier_boundary, only: boundary_t
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_contact_kernels, only: global_impulse, global_moment, lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: global_moment, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
@@ -183,7 +183,7 @@ contains
       do c = 1, sub%n_contacts
         q = lane_of(c)
         g = block_of(c)
-        part(in_normal) = part(in_normal) - sub%impulse(q, 1, g)*v(q, 1, g)
+        part(in_normal) = part(in_normal) - sub%normal_impulse(c)*v(q, 1, g)
         part(in_friction) = part(in_friction) - sum(sub%impulse(q, 2:, g)*v(q, 2:, g))
         if (any(sub%pair(:, c) > sub%n_grains)) call add_boundary_work(c)
       end do
@@ -197,7 +197,7 @@ contains
       integer :: column, d
 
       associate (sub => problem%sub(s))
-        call global_impulse(problem%kernels, sub%hot, sub%impulse, c, p)
+        call problem%impulse_on_candidate(s, c, p)
         column = sub%pair(2, c)
         if (sub%pair(1, c) > sub%n_grains) then
           column = sub%pair(1, c)

@@ -166,16 +166,16 @@ contains
     do b = 1, sub%n_grains
       twice = 0.0_dp
       do d = 1, nd
-        twice = twice + sub%reaction(d, b)*((sub%v_free(d, b) + sub%v_global(d, b)) - physics%h*physics%gravity(d))
+        twice = twice + sub%contact_reaction(d, b)*((sub%free_velocity(d, b) + sub%v_global(d, b)) - physics%h*physics%gravity(d))
       end do
       if (has_body_force) then
         volume = grain_volume(nd, sub%radius(b))
         do d = 1, nd
-          twice = twice - sub%reaction(d, b)*(physics%h*physics%body_force(d)*volume*sub%inverse_mass(d, b))
+          twice = twice - sub%contact_reaction(d, b)*(physics%h*physics%body_force(d)*volume*sub%inverse_mass(d, b))
         end do
       end if
       do d = nd + 1, nv
-        twice = twice + sub%reaction(d, b)*(sub%v_free(d, b) + sub%v_global(d, b))
+        twice = twice + sub%contact_reaction(d, b)*(sub%free_velocity(d, b) + sub%v_global(d, b))
       end do
       work = work + 0.5_dp*twice/sub%multiplicity(b)
     end do

@@ -3,7 +3,7 @@ module gravier_mean_stress
   use gravier_kinds, only: dp
   use gravier_facing_planes, only: find_facing_planes
   use gravier_motion, only: grain_volume
-  use gravier_contact_kernels, only: global_impulse, lane_of, block_of
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   implicit none
@@ -69,7 +69,7 @@ contains
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
       do c = 1, sub%n_contacts
-        call global_impulse(problem%kernels, sub%hot, sub%impulse, c, p)
+        call problem%impulse_on_candidate(s, c, p)
         do d = 1, nd
           part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + p*(branch_length(sub, c)*sub%hot(lane_of(c), d, block_of(c)))
         end do

@@ -1,7 +1,6 @@
 !> What grains do to boundaries: impulses of a step, and the velocities and displacements of boundaries that forces move.
 module gravier_boundary_loads
   use gravier_kinds, only: dp
-  use gravier_contact_kernels, only: global_impulse
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   implicit none
@@ -28,7 +27,7 @@ contains
       associate (sub => problem%sub(s))
         do c = 1, sub%n_contacts
           if (all(sub%pair(:, c) <= sub%n_grains)) cycle
-          call global_impulse(problem%kernels, sub%hot, sub%impulse, c, p)
+          call problem%impulse_on_candidate(s, c, p)
           if (sub%pair(2, c) > sub%n_grains) then
             b = sub%boundary(sub%pair(2, c))
             p(:) = -p

@@ -187,15 +187,19 @@ contains
     type(sums_t), intent(inout) :: sums
     logical, allocatable :: rests(:)
     integer, allocatable :: steps(:)
-    integer :: c, b, row
+    real(dp) :: reaction(nd)
+    integer :: c, b, d, row
 
     allocate (rests(sub%n_columns), steps(sub%n_contacts))
     do b = 1, sub%n_columns
       rests(b) = .not. is_moved(boundaries, sub, b)
       if (b > sub%n_bodies) cycle
       rests(b) = max(momentum(b), sums%of(2, b)/settled) <= min(limit, share*sums%of(1, b))
-      ! H r is H r~ and the pull of the attractions
-      if (allocated(sub%pull)) rests(b) = rests(b) .and. momentum(b) <= share*norm2(sub%reaction(1:nd, b) + sub%pull(1:nd, b))
+      if (.not. allocated(sub%pull)) cycle
+      do d = 1, nd
+        reaction(d) = sub%contact_reaction(d, b)
+      end do
+      rests(b) = rests(b) .and. momentum(b) <= share*norm2(reaction)
     end do
     row = list%memory%rest_row
     do c = 1, sub%n_contacts
