@@ -71,8 +71,8 @@ contains
     integer :: places(size(study%quantities)), q, k
 
     measured = config
-    measured%output%stress = .true.
-    measured%output%boundary_forces = .true.
+    call measured%output%ask("stress")
+    call measured%output%ask("boundary_forces")
     call simulation%init(comm, measured, error)
     if (allocated(error)) return
     call find_quantities(simulation, study%quantities, places)

@@ -7,6 +7,7 @@ module gravier_accuracy_run
   use gravier_timers, only: clock
   use gravier_config, only: config_t
   use gravier_solve, only: solve_report_t, solve_converged, solve_diverged
+  use gravier_mean_stress, only: mean_stress_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_accuracy_motion, only: state_t, take_state, unknown
   use gravier_accuracy_study, only: text_t
@@ -77,8 +78,8 @@ contains
     type(config_t) :: measured
 
     measured = config
-    measured%output%stress = .true.
-    measured%output%boundary_forces = .true.
+    call measured%output%ask("stress")
+    call measured%output%ask("boundary_forces")
     measured%output%trace = .false.
     call simulation%init(comm, measured, error)
   end subroutine start_measured
@@ -111,9 +112,7 @@ contains
       do q = 1, size(quantities)
         run%means(q) = run%means(q) + quantity(simulation, figures, places(q))
       end do
-      if (.not. allocated(run%stress)) allocate (run%stress, mold=simulation%diagnostics%stress%stress)
-      if (run%steps == 1) run%stress(:, :) = 0.0_dp
-      run%stress(:, :) = run%stress + simulation%diagnostics%stress%stress
+      call add_stress(simulation, run%stress)
       if (mod(run%steps, every) == 0) call take_state(simulation, run%states(run%steps/every))
     end do
     if (run%diverged) then
@@ -124,6 +123,24 @@ contains
     run%means(:) = run%means/run%steps
     run%stress(:, :) = run%stress/run%steps
   end subroutine make_steps
+
+  !> Add the mean stress of the last step; the sum begins with the first one.
+  subroutine add_stress(simulation, total)
+    type(simulation_t), intent(in) :: simulation
+    !> (nd, nd) [Pa, N/m in 2D]
+    real(dp), allocatable, intent(inout) :: total(:, :)
+
+    associate (diagnostics => simulation%diagnostics)
+      select type (measured => diagnostics%asked(diagnostics%place("stress"))%item)
+      type is (mean_stress_t)
+        if (.not. allocated(total)) then
+          allocate (total, mold=measured%stress)
+          total(:, :) = 0.0_dp
+        end if
+        total(:, :) = total + measured%stress
+      end select
+    end associate
+  end subroutine add_stress
 
   !> Where quantities are: columns of the diagnostics, or negative for figures of the step; 0 for what there is not.
   subroutine find_quantities(simulation, quantities, places)

@@ -13,6 +13,7 @@ module gravier_bench_scene
   use gravier_file_system, only: make_directory, remove_directory
   use gravier_own_files, only: remove_own
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_output, only: of_states
   use gravier_run_output, only: run_output_t
   use gravier_bench_packing, only: packing_t, make_simulation, reset_grains
   use gravier_bench_record, only: record_t, case_t
@@ -158,6 +159,7 @@ contains
     type(record_t), intent(inout) :: record
     type(error_t), allocatable, intent(inout) :: error
     type(run_output_t) :: output
+    type(step_figures_t) :: none
     real(dp) :: start, seconds
 
     if (allocated(error)) return
@@ -167,7 +169,7 @@ contains
     self%simulation%config%output%directory = directory
     call output%open(self%simulation, "gravier_bench", error)
     start = MPI_Wtime()
-    if (.not. allocated(error)) call output%write_state(self%simulation, error)
+    if (.not. allocated(error)) call output%write(of_states, self%simulation, none, 0.0_dp, error, always=.true.)
     seconds = MPI_Wtime() - start
     call output%finish(self%simulation, .false., error)
     if (self%simulation%comm%rank == 0) then

@@ -9,7 +9,8 @@ module gravier_fclib_run
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_csv_writer, only: csv_writer_t
-  use gravier_fclib_file, only: write_fclib_local, name_of_solution, name_of_guess
+  use gravier_fclib_file, only: name_of_solution, name_of_guess
+  use gravier_fclib_writer, only: write_fclib_local
   use gravier_friction_solver, only: friction_control_t, verdict_no_solution
   use gravier_fclib_options, only: options_t
   use gravier_fclib_outputs, only: written_path, check_outputs

@@ -29,6 +29,8 @@ module gravier_time_stepper
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
   use gravier_impulse_memory, only: keep_impulses, recall_impulses, gather_impulses, spread_impulses
+  use gravier_schedule, only: schedule_t
+  use gravier_diagnostic, only: solved_step_t
   use gravier_diagnostics, only: diagnostics_t
   use gravier_grain_balance, only: grain_balance_t
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
@@ -104,8 +106,9 @@ module gravier_time_stepper
     !> of the last step [m]
     real(dp) :: largest_overlap = 0.0_dp
     ! ---- what is noted
-    !> figures that the user asked for
+    !> figures that the user asked for, and the steps whose states are written, which some of them wait for
     type(diagnostics_t) :: diagnostics
+    type(schedule_t) :: written_steps
     !> energies of the grains since this run began or went on from a checkpoint
     type(grain_balance_t) :: balance
     !> messages between ranks, and numbers in them, that iterations of this rank have sent
@@ -130,11 +133,12 @@ contains
   !> One step. After a solve that diverged, velocities and places are not those of any step: the run must end.
   !> Collective.
   subroutine time_stepper_advance(self, figures, error, watch)
-    class(time_stepper_t), intent(inout) :: self
+    class(time_stepper_t), target, intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
     type(error_t), allocatable, intent(inout) :: error
     !> is told how the solve goes on
     class(solve_watch_t), intent(inout), optional :: watch
+    type(solved_step_t) :: solved
     real(dp) :: shifts
 
     if (allocated(error)) return
@@ -144,17 +148,16 @@ contains
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
     call take_solution(self, figures)
-    call self%diagnostics%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, self%boundary_impulses, &
-      & self%time, figures%left > 0)
-    call self%balance%take_step(self%decomposition, self%neighbourhoods, self%physics, self%problem, figures%left > 0)
+    solved = solved_step_of(self, figures)
+    call self%diagnostics%take_step(solved)
+    call self%balance%take_step(solved)
     call move_to_end(self%decomposition, self%physics, self%theta, self%n_glued > 0)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
     shifts = 0.0_dp
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed, shifts)
     call note_step(self, figures, shifts)
-    call self%diagnostics%measure(self%decomposition, self%physics, self%problem, self%boundary_impulses, &
-      & self%n_grains - self%n_glued)
+    call self%diagnostics%measure(solved, self%written_steps%due(self%step))
     call check_numbers(self, figures, error)
   end subroutine time_stepper_advance
 
@@ -217,6 +220,21 @@ contains
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
   end subroutine take_solution
+
+  !> What diagnostics see of a step: it lives as long as the stepper that is shown.
+  type(solved_step_t) function solved_step_of(self, figures) result(solved)
+    class(time_stepper_t), target, intent(in) :: self
+    type(step_figures_t), intent(in) :: figures
+
+    solved%decomposition => self%decomposition
+    solved%neighbourhoods => self%neighbourhoods
+    solved%physics => self%physics
+    solved%problem => self%problem
+    solved%boundary_impulses => self%boundary_impulses
+    solved%time = self%time
+    solved%n_free = self%n_grains - self%n_glued
+    solved%some_left = figures%left > 0
+  end function solved_step_of
 
   !> Note how a solve ended, and the contact where it failed. Collective.
   subroutine note_solve(self, figures, error)

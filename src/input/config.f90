@@ -10,6 +10,7 @@ module gravier_config
   use gravier_config_table, only: groups, keys, surface_rows, fill_keys, kind_real
   use gravier_method_options, only: method_features_t, default_always, default_on_active
   use gravier_method_registry, only: features_of
+  use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   use gravier_config_surfaces, only: surface_value
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
@@ -40,6 +41,7 @@ contains
     type(assignment_t), intent(in), optional :: changes(:)
     type(scan_t) :: found
     type(report_t) :: report
+    type(diagnostic_holder_t), allocatable :: diagnostics(:)
     integer :: k
 
     call fill_keys()
@@ -58,6 +60,8 @@ contains
     do k = 1, size(config%laws)
       allocate (config%laws(k)%value(count(keys%group == "law" .and. keys%kind == kind_real)))
     end do
+    call registered_diagnostics(diagnostics)
+    allocate (config%output%diagnostics(size(diagnostics)), source=.false.)
     allocate (report%given(size(keys), max(1, size(config%boundaries), size(config%materials), size(config%laws))))
     call set_defaults(config, error)
     call read_first(config, found, report, error)

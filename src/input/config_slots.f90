@@ -2,6 +2,7 @@
 module gravier_config_slots
   use gravier_kinds, only: dp
   use gravier_contact_coefficients, only: coefficients_t
+  use gravier_diagnostic_registry, only: diagnostic_place
   use gravier_config_types, only: config_t, text_length, choice_length
   use gravier_config_table, only: key_t, groups, keys, surface_rows
   use gravier_config_keys, only: find_group, find_key, has_word
@@ -333,11 +334,10 @@ contains
     case ("fclib_step"); slot%integer => config%output%fclib_step
     case ("checkpoint_seconds"); slot%real => config%output%checkpoint_seconds
     case ("walltime"); slot%real => config%output%walltime
-    case ("energy"); slot%logical => config%output%energy
-    case ("stress"); slot%logical => config%output%stress
-    case ("structure"); slot%logical => config%output%structure
-    case ("boundary_forces"); slot%logical => config%output%boundary_forces
     case ("vtk"); slot%logical => config%output%vtk
+    case default
+      ! the other keys ask for diagnostics
+      slot%logical => config%output%diagnostics(diagnostic_place(name))
     end select
   end subroutine output_slot
 

@@ -1,6 +1,6 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact and of the
-!> shapes of boundaries come from their modules, the words of the methods from theirs.
+!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the
+!> shapes of boundaries and those that ask for diagnostics come from their modules, the words of the methods from theirs.
 module gravier_config_table
   use gravier_declared_keys, only: collected_key_t, collected_keys_t
   use gravier_law_registry, only: registered_key_t, registered_keys, kind_length
@@ -9,6 +9,7 @@ module gravier_config_table
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
     & with_momentum, with_momentum_on_active, with_sleeping
+  use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   implicit none
   private
   public :: group_t, key_t, groups, keys, surface_rows, fill_keys
@@ -339,11 +340,7 @@ module gravier_config_table
            "step whose contact problem is written to `step_N.hdf5` in the format of FCLIB; 0: none"), &
      key_t("output", "checkpoint_seconds", kind_real, "0.0", ">= 0", "wall time between two checkpoints; 0: never", unit="s"), &
      key_t("output", "walltime", kind_real, "0.0", ">= 0", &
-           "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s"), &
-     key_t("output", "energy", kind_logical, ".false.", "", "write the energies and works of each step"), &
-     key_t("output", "stress", kind_logical, ".false.", "", "write the mean stress and the solid fraction"), &
-     key_t("output", "structure", kind_logical, ".false.", "", "write coordination, fabric, sliding and forces in contacts"), &
-     key_t("output", "boundary_forces", kind_logical, ".false.", "", "write force and place of each boundary")]
+           "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s")]
   !&>
 
   !> all keys, once `fill_keys` was called
@@ -356,6 +353,7 @@ contains
   !> Complete the table. Whoever reads it has called this before.
   subroutine fill_keys()
     type(registered_key_t), allocatable :: own(:)
+    type(diagnostic_holder_t), allocatable :: diagnostics(:)
     type(key_t) :: row(1)
     character(len=kind_length) :: kinds
     integer :: k, n
@@ -386,6 +384,13 @@ contains
     call add(decomposition_keys)
     call add(enriched_keys)
     call add(output_keys)
+    call registered_diagnostics(diagnostics)
+    do k = 1, size(diagnostics)
+      associate (features => diagnostics(k)%item%features())
+        row(1) = key_t("output", features%key, kind_logical, ".false.", "", features%meaning)
+      end associate
+      call add(row)
+    end do
 
   contains
 

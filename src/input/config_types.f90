@@ -3,6 +3,7 @@
 module gravier_config_types
   use gravier_kinds, only: dp
   use gravier_contact_coefficients, only: coefficients_t
+  use gravier_diagnostic_registry, only: diagnostic_place
   implicit none
   private
   public :: scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t
@@ -160,8 +161,12 @@ module gravier_config_types
     real(dp) :: checkpoint_seconds
     !> s: the run writes a checkpoint and stops before it has run so long; 0: no limit
     real(dp) :: walltime
-    !> groups of diagnostics
-    logical :: energy, stress, structure, boundary_forces, vtk
+    logical :: vtk
+    !> which diagnostics are asked for, in the order of the registry
+    logical, allocatable :: diagnostics(:)
+  contains
+    procedure :: asks => output_config_asks
+    procedure :: ask => output_config_ask
   end type output_config_t
 
   !> &boundary: one boundary. What does not belong to its shape keeps the default.
@@ -270,5 +275,28 @@ module gravier_config_types
     !> defaults unless bodies is sample
     type(sample_config_t) :: sample
   end type config_t
+
+contains
+
+  !> Whether the diagnostic with that key is asked for.
+  logical function output_config_asks(self, key) result(asked)
+    class(output_config_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer :: place
+
+    place = diagnostic_place(key)
+    asked = .false.
+    if (place > 0) asked = self%diagnostics(place)
+  end function output_config_asks
+
+  !> Ask for the diagnostic with that key, where there is one.
+  subroutine output_config_ask(self, key)
+    class(output_config_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    integer :: place
+
+    place = diagnostic_place(key)
+    if (place > 0) self%diagnostics(place) = .true.
+  end subroutine output_config_ask
 
 end module gravier_config_types

@@ -1,15 +1,55 @@
-!> The bodies of a simulation as a bodies file from which another scene starts.
+!> final_bodies.h5: the bodies of a simulation as a bodies file from which another scene starts.
 module gravier_final_bodies
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_config_types, only: config_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls
   use gravier_bodies_hdf5, only: write_bodies_hdf5
-  use gravier_simulation, only: simulation_t
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_output, only: output_t, of_end
   implicit none
   private
-  public :: write_final_bodies
+  public :: write_final_bodies, final_bodies_output_t
+
+  type, extends(output_t) :: final_bodies_output_t
+    private
+    character(len=:), allocatable :: path
+  contains
+    procedure, nopass :: wanted => final_bodies_wanted
+    procedure :: open => final_bodies_open
+    procedure :: write => final_bodies_write
+  end type final_bodies_output_t
 
 contains
+
+  pure logical function final_bodies_wanted(config) result(wanted)
+    type(config_t), intent(in) :: config
+    wanted = config%output%final_bodies
+  end function final_bodies_wanted
+
+  subroutine final_bodies_open(self, simulation, directory, command, error)
+    class(final_bodies_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: directory, command
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (unused => simulation, unused_command => command, unused_error => error)
+    end associate
+    self%stage = of_end
+    self%path = directory//"final_bodies.h5"
+  end subroutine final_bodies_open
+
+  subroutine final_bodies_write(self, simulation, figures, seconds, error)
+    class(final_bodies_output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    real(dp), intent(in) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (unused => figures, unused_seconds => seconds)
+    end associate
+    call write_final_bodies(simulation, self%path, error)
+  end subroutine final_bodies_write
 
   !> Write grains, the walls that came with them and the period. Boundaries of the input file are not written: the next
   !> input file has its own. Collective; errors are the same on all ranks.

@@ -9,10 +9,13 @@ module gravier_problem_dump
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_sparse_exchange, only: sparse_exchange
-  use gravier_ordered_rows, only: order_rows
   use gravier_contact_kernels, only: contact_jacobian, tangents, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_fclib_file, only: fclib_rows_t, write_fclib_global
+  use gravier_field_list, only: field_list_t
+  use gravier_fclib_file, only: fclib_rows_t
+  use gravier_fclib_writer, only: write_fclib_global
+  use gravier_body_collector, only: collect_problem_bodies
+  use gravier_contact_collector, only: collect_contacts
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -31,125 +34,145 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     type(fclib_rows_t) :: rows
-    type(places_t) :: bodies(size(simulation%problem%sub))
+    type(field_list_t) :: bodies, contacts, sorted
+    type(places_t) :: places(size(simulation%problem%sub))
+    character(len=1), parameter :: no_fields(0) = ""
 
     if (allocated(error)) return
     rows%dimension = simulation%problem%kernels%nd
     ! a projection of overlaps has used the velocities for its own
     call simulation%problem%evaluate()
-    call order_bodies(simulation%problem, bodies, rows)
-    call order_contacts(simulation, bodies, rows)
+    call collect_problem_bodies(simulation%problem, bodies)
+    call bodies%order(simulation%comm, sorted)
+    call take_bodies(sorted, rows)
+    call number_bodies(simulation%problem, sorted, places)
+    call collect_contacts(simulation, no_fields, contacts)
+    call add_columns(simulation%problem, places, contacts)
+    call contacts%order(simulation%comm, sorted)
+    call take_contacts(sorted, rows%dimension, simulation%problem%kernels%nv, rows)
     call write_fclib_global(simulation%comm, path, rows, error)
   end subroutine write_problem
 
-  !> Number the bodies, and take their masses, loads and velocities. Collective.
-  subroutine order_bodies(problem, bodies, rows)
-    type(contact_problem_t), intent(in) :: problem
-    type(places_t), intent(inout) :: bodies(:)
+  !> Whether item `k` of ordered bodies is the first copy of its body.
+  pure logical function is_first(bodies, k)
+    type(field_list_t), intent(in) :: bodies
+    integer, intent(in) :: k
+
+    is_first = k == 1
+    if (.not. is_first) is_first = bodies%key(1, k - 1) /= bodies%key(1, k)
+  end function is_first
+
+  !> Masses, loads and velocities of the bodies of this rank, each once.
+  subroutine take_bodies(bodies, rows)
+    !> ordered; copies of a body stand together
+    type(field_list_t), intent(in) :: bodies
     type(fclib_rows_t), intent(inout) :: rows
-    integer(i8), allocatable :: records(:, :), ordered(:, :), answers(:, :), received(:, :)
+    integer :: k, n, nv
+
+    associate (mass => bodies%field(bodies%place("mass"))%value, load => bodies%field(bodies%place("load"))%value, &
+        & velocity => bodies%field(bodies%place("velocity"))%value)
+      nv = size(mass, 1)
+      n = 0
+      do k = 1, bodies%n_items()
+        if (is_first(bodies, k)) n = n + 1
+      end do
+      allocate (rows%mass(nv*n), rows%f(nv*n), rows%v(nv*n))
+      n = 0
+      do k = 1, bodies%n_items()
+        if (.not. is_first(bodies, k)) cycle
+        rows%mass(n + 1:n + nv) = mass(:, k)
+        rows%f(n + 1:n + nv) = load(:, k)
+        rows%v(n + 1:n + nv) = velocity(:, k)
+        n = n + nv
+      end do
+    end associate
+  end subroutine take_bodies
+
+  !> Number the bodies in the order of their identifiers, and tell all copies. Collective.
+  subroutine number_bodies(problem, bodies, places)
+    type(contact_problem_t), intent(in) :: problem
+    !> ordered; copies of a body stand together
+    type(field_list_t), intent(in) :: bodies
+    type(places_t), intent(inout) :: places(:)
+    integer(i8), allocatable :: answers(:, :), received(:, :)
     integer, allocatable :: destination(:)
     integer(i8) :: place
-    real(dp) :: mass
-    integer :: s, b, d, k, n, nv
+    integer :: s, k
 
-    nv = problem%kernels%nv
-    n = sum(problem%sub%n_bodies)
-    allocate (records(4 + 3*nv, n))
-    n = 0
-    do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        do b = 1, sub%n_bodies
-          n = n + 1
-          records(1, n) = sub%id(b)
-          records(2, n) = problem%comm%rank
-          records(3, n) = s
-          records(4, n) = b
-          do d = 1, nv
-            mass = 1.0_dp
-            if (sub%moves(d, b)) mass = 1.0_dp/sub%inverse_mass(min(d, problem%kernels%nw), b)
-            records(4 + d, n) = transfer(mass, 0_i8)
-            records(4 + nv + d, n) = transfer(mass*sub%v_free(d, b), 0_i8)
-            records(4 + 2*nv + d, n) = transfer(sub%v_global(d, b), 0_i8)
-          end do
-        end do
-        allocate (bodies(s)%place(sub%n_bodies))
-      end associate
+    do s = 1, size(places)
+      allocate (places(s)%place(problem%sub(s)%n_bodies))
     end do
-    call order_rows(problem%comm, 1, records, ordered)
-    n = size(ordered, 2)
-    k = 0
-    if (n > 0) k = 1 + count(ordered(1, 2:) /= ordered(1, :n - 1))
-    allocate (answers(3, n), destination(n), rows%mass(nv*k), rows%f(nv*k), rows%v(nv*k))
-    place = problem%comm%offset(int(k, i8))
-    b = 0
-    do k = 1, n
-      if (k == 1 .or. ordered(1, max(k - 1, 1)) /= ordered(1, k)) then
-        place = place + 1
-        do d = 1, nv
-          rows%mass(b + d) = transfer(ordered(4 + d, k), 0.0_dp)
-          rows%f(b + d) = transfer(ordered(4 + nv + d, k), 0.0_dp)
-          rows%v(b + d) = transfer(ordered(4 + 2*nv + d, k), 0.0_dp)
-        end do
-        b = b + nv
-      end if
-      destination(k) = narrow(ordered(2, k))
-      answers(1:2, k) = ordered(3:4, k)
-      answers(3, k) = place
+    allocate (answers(3, bodies%n_items()), destination(bodies%n_items()))
+    place = 0
+    do k = 1, bodies%n_items()
+      if (is_first(bodies, k)) place = place + 1
     end do
+    place = problem%comm%offset(place)
+    associate (home => bodies%field(bodies%place("place"))%whole)
+      do k = 1, bodies%n_items()
+        if (is_first(bodies, k)) place = place + 1
+        destination(k) = narrow(home(1, k))
+        answers(1:2, k) = home(2:3, k)
+        answers(3, k) = place
+      end do
+    end associate
     call sparse_exchange(problem%comm, answers, destination, received)
     do k = 1, size(received, 2)
-      bodies(narrow(received(1, k)))%place(narrow(received(2, k))) = received(3, k)
+      places(narrow(received(1, k)))%place(narrow(received(2, k))) = received(3, k)
     end do
-  end subroutine order_bodies
+  end subroutine number_bodies
 
-  !> Columns of H, w, mu and the impulses of all contacts. Collective.
-  subroutine order_contacts(simulation, bodies, rows)
-    type(simulation_t), intent(in) :: simulation
-    type(places_t), intent(in) :: bodies(:)
-    type(fclib_rows_t), intent(inout) :: rows
-    integer(i8), allocatable :: records(:, :), ordered(:, :)
-    integer :: s, c, p, n, nd, nv, words
-
-    nd = simulation%problem%kernels%nd
-    nv = simulation%problem%kernels%nv
-    words = 5 + nd*(3 + 2*nv)
-    allocate (records(words, sum(simulation%problem%sub%n_contacts)), source=0_i8)
-    n = 0
-    do s = 1, size(bodies)
-      associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
-        do c = 1, sub%n_contacts
-          n = n + 1
-          p = sub%source(c)
-          records(1, n) = view%bodies%id(view%list%candidate(p))
-          if (view%list%antagonist(p) > 0) then
-            records(2, n) = view%bodies%id(view%list%antagonist(p))
-          else
-            records(2, n) = simulation%decomposition%boundaries(-view%list%antagonist(p))%id
-          end if
-          call pack_contact(simulation%problem, sub, bodies(s), c, records(:, n))
-        end do
-      end associate
-    end do
-    call order_rows(simulation%comm, 2, records, ordered)
-    call unpack_contacts(ordered, nd, nv, rows)
-  end subroutine order_contacts
-
-  !> Bodies, mu, and by component w, r, v and the rows of H^T of contact `c`, from word 3 on.
-  subroutine pack_contact(problem, sub, bodies, c, record)
+  !> Add to the contacts of this rank what a global problem has of them: `bodies` (2), the places of candidate and antagonist, 0 for
+  !> what moves as prescribed; mu; by component w, r and u (nd each); the rows of H^T, by component those of both sides (2 nd nv).
+  subroutine add_columns(problem, places, contacts)
     type(contact_problem_t), intent(in) :: problem
-    type(subproblem_t), intent(in) :: sub
-    type(places_t), intent(in) :: bodies
-    integer, intent(in) :: c
-    integer(i8), intent(inout), contiguous :: record(:)
-    real(dp) :: jacobian(problem%kernels%nd, problem%kernels%nv, 2), w(problem%kernels%nd), u(problem%kernels%nd), r
-    integer :: side, body, d, k, at, nd, nv, nc
+    type(places_t), intent(in) :: places(:)
+    type(field_list_t), intent(inout) :: contacts
+    integer(i8), allocatable :: bodies(:, :)
+    real(dp), allocatable :: mu(:, :), w(:, :), r(:, :), u(:, :), h(:, :)
+    integer :: s, c, k, n, nd, nv
 
     nd = problem%kernels%nd
     nv = problem%kernels%nv
-    nc = problem%kernels%nc
+    n = contacts%n_items()
+    allocate (bodies(2, n), source=0_i8)
+    allocate (mu(1, n), w(nd, n), r(nd, n), u(nd, n), h(2*nd*nv, n), source=0.0_dp)
+    n = 0
+    do s = 1, size(places)
+      associate (sub => problem%sub(s))
+        do c = 1, sub%n_contacts
+          n = n + 1
+          do k = 1, 2
+            if (sub%pair(k, c) <= sub%n_bodies) bodies(k, n) = places(s)%place(sub%pair(k, c))
+          end do
+          if (problem%kernels%nc > 1) mu(1, n) = sub%hot(lane_of(c), problem%kernels%friction_row, block_of(c))
+          k = min(nd, problem%kernels%nc)
+          r(1:k, n) = sub%impulse(lane_of(c), 1:k, block_of(c))
+          call take_rows(problem, sub, c, w(:, n), u(:, n), h(:, n))
+        end do
+      end associate
+    end do
+    call contacts%add_whole("bodies", "", bodies)
+    call contacts%add_reals("mu", "", mu)
+    call contacts%add_reals("w", "m/s", w)
+    call contacts%add_reals("r", "N s", r)
+    call contacts%add_reals("u", "m/s", u)
+    call contacts%add_reals("h", "", h)
+  end subroutine add_columns
+
+  !> w, u = H^T v + w and the rows of H^T of contact `c`, with the velocities of what cannot move in w.
+  subroutine take_rows(problem, sub, c, w, u, h)
+    type(contact_problem_t), intent(in) :: problem
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    !> (nd), (nd), (2 nd nv) by component, then by side
+    real(dp), intent(inout) :: w(:), u(:), h(:)
+    real(dp) :: jacobian(problem%kernels%nd, problem%kernels%nv, 2)
+    integer :: side, body, d, k, at, nd, nv
+
+    nd = problem%kernels%nd
+    nv = problem%kernels%nv
     call full_jacobian(problem, sub, c, jacobian)
-    w(:) = 0.0_dp
     w(1) = sub%hot(lane_of(c), nd + 1, block_of(c))
     associate (row => problem%kernels%shift_row)
       if (row > 0) w(2:) = sub%hot(lane_of(c), row + 1:row + nd - 1, block_of(c))
@@ -157,7 +180,6 @@ contains
     u(:) = w
     do side = 1, 2
       body = sub%pair(side, c)
-      if (body <= sub%n_bodies) record(2 + side) = bodies%place(body)
       do d = 1, nv
         u(:) = u + jacobian(:, d, side)*sub%v_global(d, body)
         if (sub%moves(d, body)) cycle
@@ -165,23 +187,14 @@ contains
         jacobian(:, d, side) = 0.0_dp
       end do
     end do
-    if (nc > 1) record(5) = transfer(sub%hot(lane_of(c), problem%kernels%friction_row, block_of(c)), 0_i8)
-    at = 5
+    at = 0
     do k = 1, nd
-      r = 0.0_dp
-      if (k <= nc) r = sub%impulse(lane_of(c), k, block_of(c))
-      record(at + 1) = transfer(w(k), 0_i8)
-      record(at + 2) = transfer(r, 0_i8)
-      record(at + 3) = transfer(u(k), 0_i8)
-      at = at + 3
       do side = 1, 2
-        do d = 1, nv
-          record(at + d) = transfer(jacobian(k, d, side), 0_i8)
-        end do
+        h(at + 1:at + nv) = jacobian(k, :, side)
         at = at + nv
       end do
     end do
-  end subroutine pack_contact
+  end subroutine take_rows
 
   !> Rows of H^T of all components of contact `c`, of candidate and antagonist; without friction, too.
   subroutine full_jacobian(problem, sub, c, jacobian)
@@ -209,55 +222,58 @@ contains
     jacobian(2:, :, 2) = -jacobian(2:, :, 1)
   end subroutine full_jacobian
 
-  !> The columns of this rank from its records.
-  subroutine unpack_contacts(records, nd, nv, rows)
-    integer(i8), intent(in), contiguous :: records(:, :)
+  !> The columns of the contacts of this rank, compressed.
+  subroutine take_contacts(contacts, nd, nv, rows)
+    !> ordered
+    type(field_list_t), intent(in) :: contacts
     integer, intent(in) :: nd, nv
     type(fclib_rows_t), intent(inout) :: rows
-    integer(i8) :: place
-    real(dp) :: x
-    integer :: c, k, side, d, at, column, n, first, round
+    integer :: c, n, round
 
-    n = size(records, 2)
+    n = contacts%n_items()
     allocate (rows%mu(n), rows%w(nd*n), rows%r(nd*n), rows%u(nd*n))
     allocate (rows%entries(nd*n), source=0_i8)
+    do c = 1, n
+      rows%mu(c) = contacts%field(contacts%place("mu"))%value(1, c)
+      rows%w((c - 1)*nd + 1:c*nd) = contacts%field(contacts%place("w"))%value(:, c)
+      rows%r((c - 1)*nd + 1:c*nd) = contacts%field(contacts%place("r"))%value(:, c)
+      rows%u((c - 1)*nd + 1:c*nd) = contacts%field(contacts%place("u"))%value(:, c)
+    end do
     do round = 1, 2
       n = 0
-      do c = 1, size(records, 2)
-        call unpack(c)
-      end do
+      associate (bodies => contacts%field(contacts%place("bodies"))%whole, h => contacts%field(contacts%place("h"))%value)
+        do c = 1, contacts%n_items()
+          call take_entries(c, bodies(:, c), h(:, c))
+        end do
+      end associate
       if (round == 1) allocate (rows%row(n), rows%h(n))
     end do
 
   contains
 
-    subroutine unpack(c)
+    !> Count the entries of a contact in H, or take them, those of a column in the order of their rows.
+    subroutine take_entries(c, bodies, h)
       integer, intent(in) :: c
+      integer(i8), intent(in) :: bodies(2)
+      real(dp), intent(in) :: h(nv, 2, nd)
+      integer :: k, side, first, d, column
 
-      rows%mu(c) = transfer(records(5, c), 0.0_dp)
-      ! entries of a column in the order of their rows
-      first = merge(2, 1, records(4, c) < records(3, c))
+      first = merge(2, 1, bodies(2) < bodies(1))
       do k = 1, nd
         column = (c - 1)*nd + k
-        at = 5 + (k - 1)*(3 + 2*nv)
-        rows%w(column) = transfer(records(at + 1, c), 0.0_dp)
-        rows%r(column) = transfer(records(at + 2, c), 0.0_dp)
-        rows%u(column) = transfer(records(at + 3, c), 0.0_dp)
         do side = first, 3 - first, 3 - 2*first
-          place = records(2 + side, c)
           do d = 1, nv
-            x = transfer(records(at + 3 + (side - 1)*nv + d, c), 0.0_dp)
-            if (.not. (place > 0 .and. abs(x) > 0.0_dp)) cycle
+            if (.not. (bodies(side) > 0 .and. abs(h(d, side, k)) > 0.0_dp)) cycle
             n = n + 1
             if (round == 1) cycle
             rows%entries(column) = rows%entries(column) + 1
-            rows%row(n) = (place - 1)*nv + d
-            rows%h(n) = x
+            rows%row(n) = (bodies(side) - 1)*nv + d
+            rows%h(n) = h(d, side, k)
           end do
         end do
       end do
-    end subroutine unpack
+    end subroutine take_entries
 
-  end subroutine unpack_contacts
+  end subroutine take_contacts
 
 end module gravier_problem_dump

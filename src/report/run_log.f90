@@ -23,6 +23,7 @@ module gravier_run_log
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line
   use gravier_run_summary, only: converged_text, time_text, halving_text
+  use gravier_energy_balance, only: energy_balance_t
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
   implicit none
@@ -672,12 +673,17 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
     real(dp) :: off, turnover
+    integer :: place
 
     off = simulation%balance%error()
     turnover = simulation%balance%turnover()
-    if (allocated(simulation%diagnostics%energy)) then
-      off = simulation%diagnostics%energy%error()
-      turnover = simulation%diagnostics%energy%turnover()
+    place = simulation%diagnostics%place("energy")
+    if (place > 0) then
+      select type (energy => simulation%diagnostics%asked(place)%item)
+      type is (energy_balance_t)
+        off = energy%error()
+        turnover = energy%turnover()
+      end select
     end if
     text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
   end function energy_text

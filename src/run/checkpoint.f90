@@ -11,7 +11,8 @@ module gravier_checkpoint
   use gravier_boundary, only: boundary_t, boundary_words, boundary_record
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_impulse_memory, only: list_impulses, match_impulses, pair_record
-  use gravier_energy_balance, only: energy_words, energy_record
+  use gravier_diagnostics, only: diagnostics_t
+  use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   use gravier_partition, only: head_words, head_record, is_sound_head
   use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_config, only: write_active
@@ -30,11 +31,19 @@ contains
   !> What the records of a checkpoint are, a line a kind, from the modules that make them: the version of the file.
   function records_text() result(text)
     character(len=:), allocatable :: text
+    type(diagnostic_holder_t), allocatable :: diagnostics(:)
+    integer :: k
 
     text = "grain: "//body_record//" position_now"//newline//"pair: "//pair_record//newline// &
-      & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
-      & "energy: "//energy_record//", "//to_text(energy_words)//" words"//newline// &
-      & "partition: "//head_record//", "//to_text(head_words)//" words"
+      & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline
+    call registered_diagnostics(diagnostics)
+    do k = 1, size(diagnostics)
+      associate (features => diagnostics(k)%item%features())
+        if (features%n_words > 0) text = text//trim(features%key)//": "//trim(features%record)//", "// &
+          & to_text(features%n_words)//" words"//newline
+      end associate
+    end do
+    text = text//"partition: "//head_record//", "//to_text(head_words)//" words"
   end function records_text
 
   !> Write a checkpoint, in the place of an older one when it is complete. Collective; errors are the same on all ranks.
@@ -77,10 +86,7 @@ contains
     end if
     words = real_words(simulation%boundary_impulses, size(simulation%boundary_impulses))
     call file%write_array("boundary_impulses", words, error)
-    deallocate (words)
-    allocate (words(merge(energy_words, 0, allocated(simulation%diagnostics%energy))))
-    if (size(words) > 0) call simulation%diagnostics%energy%get_state(words)
-    call file%write_array("energy_balance", words, error)
+    call save_diagnostics(simulation%diagnostics, file, error)
     call simulation%decomposition%partition%get_head(words)
     call file%write_array("partition", words, error)
     call save_tables(simulation, file, error)
@@ -129,15 +135,53 @@ contains
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)
     call load_grains(simulation, file, path, builds, error)
-    call file%read_array("energy_balance", 0, energy_words, words, error)
-    if (.not. allocated(error)) then
-      ! a balance that begins now has no past
-      call simulation%start_diagnostics()
-      if (allocated(simulation%diagnostics%energy) .and. size(words) == energy_words) &
-        & call simulation%diagnostics%energy%set_state(words)
-    end if
+    if (.not. allocated(error)) call simulation%start_diagnostics()
+    call load_diagnostics(simulation%diagnostics, file, error)
     call file%close(error)
   end subroutine load_checkpoint
+
+  !> The states of all diagnostics that have one; no words of those that are not asked for.
+  subroutine save_diagnostics(diagnostics, file, error)
+    type(diagnostics_t), intent(in) :: diagnostics
+    type(checkpoint_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostic_holder_t), allocatable :: all_kinds(:)
+    integer(i8), allocatable :: words(:)
+    integer :: k, place
+
+    call registered_diagnostics(all_kinds)
+    do k = 1, size(all_kinds)
+      associate (features => all_kinds(k)%item%features())
+        if (features%n_words == 0) cycle
+        place = diagnostics%place(trim(features%key))
+        allocate (words(merge(features%n_words, 0, place > 0)))
+        if (place > 0) call diagnostics%asked(place)%item%get_state(words)
+        call file%write_array(trim(features%array), words, error)
+        deallocate (words)
+      end associate
+    end do
+  end subroutine save_diagnostics
+
+  !> Take the states of diagnostics that are asked for now and were asked for then. One that begins now has no past.
+  subroutine load_diagnostics(diagnostics, file, error)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(checkpoint_file_t), intent(in) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    type(diagnostic_holder_t), allocatable :: all_kinds(:)
+    integer(i8), allocatable :: words(:)
+    integer :: k, place
+
+    call registered_diagnostics(all_kinds)
+    do k = 1, size(all_kinds)
+      associate (features => all_kinds(k)%item%features())
+        if (features%n_words == 0) cycle
+        call file%read_array(trim(features%array), 0, features%n_words, words, error)
+        if (allocated(error)) return
+        place = diagnostics%place(trim(features%key))
+        if (place > 0 .and. size(words) == features%n_words) call diagnostics%asked(place)%item%set_state(words)
+      end associate
+    end do
+  end subroutine load_diagnostics
 
   !> Refuse a checkpoint of another scene, naming the first option that differs.
   subroutine check_scene(simulation, file, path, error)

@@ -21,6 +21,7 @@ module gravier_run
   use gravier_run_log, only: run_log_t
   use gravier_run_summary, only: verdict_text
   use gravier_accuracy_lines, only: goal_name
+  use gravier_output, only: after_solve, of_each_step, of_states, of_checkpoints
   use gravier_run_output, only: run_output_t
   implicit none
   private
@@ -251,7 +252,7 @@ contains
     interruption%last_checkpoint = interruption%first_step
     keep_last = .true.
     ends = .false.
-    if (simulation%config%output%every > 0 .and. .not. simulation%restarted) call output%write_state(simulation, error)
+    if (.not. simulation%restarted) call output%write(of_states, simulation, figures, 0.0_dp, error)
     do while (simulation%step < simulation%config%time%steps .and. .not. ends .and. .not. allocated(error))
       step_start = MPI_Wtime()
       call simulation%advance(figures, error, watch=log)
@@ -259,12 +260,13 @@ contains
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
-      if (simulation%step == simulation%config%output%fclib_step .and. figures%solve%status /= solve_diverged) &
-        & call output%write_problem(simulation, error)
+      if (figures%solve%status /= solve_diverged) call output%write(after_solve, simulation, figures, 0.0_dp, error)
       call judge(simulation, figures, ends, keep_last)
-      if (keep_last) call write_step(simulation, figures, MPI_Wtime() - step_start, output, error)
+      if (keep_last) call output%write(of_each_step, simulation, figures, MPI_Wtime() - step_start, error)
+      ! the last state comes before the last checkpoint
+      if (keep_last) call output%write(of_states, simulation, figures, 0.0_dp, error)
       call simulation%comm%agree(error)
-      if (.not. ends .and. .not. allocated(error)) call attend(simulation, log, output, interruption, error)
+      if (.not. ends .and. .not. allocated(error)) call attend(simulation, figures, log, output, interruption, error)
       if (interruption%stops) exit
     end do
     if (allocated(error)) keep_last = .false.
@@ -298,8 +300,9 @@ contains
 
   !> Between two steps: write a checkpoint where one is due by steps, by time, by SIGUSR1, at the end, or because the run
   !> has to stop by SIGTERM or for want of time. Collective.
-  subroutine attend(simulation, log, output, interruption, error)
+  subroutine attend(simulation, figures, log, output, interruption, error)
     type(simulation_t), intent(inout) :: simulation
+    type(step_figures_t), intent(in) :: figures
     type(run_log_t), intent(inout) :: log
     type(run_output_t), intent(inout) :: output
     type(interruption_t), intent(inout) :: interruption
@@ -322,7 +325,7 @@ contains
       call simulation%comm%sum_counts(asked)
       due = asked(2) > 0 .or. requests > interruption%answered
       interruption%answered = requests
-      if (config%checkpoint_every > 0) due = due .or. mod(simulation%step, config%checkpoint_every) == 0
+      due = due .or. output%due(of_checkpoints, simulation%step)
       if (simulation%step == simulation%config%time%steps) then
         ! one that may be prolonged
         due = due .or. config%checkpoint_every > 0 .or. config%checkpoint_seconds > 0.0_dp .or. config%walltime > 0.0_dp
@@ -334,7 +337,7 @@ contains
     end associate
     interruption%stops = allocated(interruption%reason)
     if (.not. (due .or. interruption%stops)) return
-    call output%write_checkpoint(simulation, error)
+    call output%write(of_checkpoints, simulation, figures, 0.0_dp, error, always=.true.)
     interruption%last_checkpoint = MPI_Wtime()
     interruption%dearest = max(interruption%dearest, interruption%last_checkpoint - now)
     if (.not. allocated(error)) call log%line("checkpoint  of step "//to_text(simulation%step)//" written in "// &
@@ -360,21 +363,6 @@ contains
     ends = simulation%config%solver%on_failure /= "continue" .or. figures%solve%status == solve_diverged
     keep = simulation%config%solver%on_failure /= "discard" .and. figures%solve%status /= solve_diverged
   end subroutine judge
-
-  subroutine write_step(simulation, figures, seconds, output, error)
-    type(simulation_t), intent(in) :: simulation
-    type(step_figures_t), intent(in) :: figures
-    real(dp), intent(in) :: seconds
-    type(run_output_t), intent(inout) :: output
-    type(error_t), allocatable, intent(inout) :: error
-    logical :: wanted
-
-    call output%write_row(simulation, figures, seconds, figures%solve%status == solve_converged, error)
-    ! the last state comes before the last checkpoint
-    wanted = simulation%step == simulation%config%time%steps
-    if (simulation%config%output%every > 0) wanted = wanted .or. mod(simulation%step, simulation%config%output%every) == 0
-    if (wanted) call output%write_state(simulation, error)
-  end subroutine write_step
 
   !> The last word: did it converge, are the results those of the law, and where are they.
   subroutine write_verdict(simulation, log, kept, error)

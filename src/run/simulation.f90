@@ -5,6 +5,7 @@ module gravier_simulation
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
+  use gravier_schedule, only: schedule_t
   use gravier_time_table, only: time_table_t
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_solve, only: by_velocity, by_residual, by_error
@@ -126,9 +127,7 @@ contains
     class(simulation_t), intent(inout) :: self
 
     call self%balance%begin(self%decomposition, self%physics)
-    associate (output => self%config%output)
-      call self%diagnostics%init(self%decomposition, output%energy, output%stress, output%structure, output%boundary_forces)
-    end associate
+    call self%diagnostics%init(self%decomposition, self%config%output%diagnostics)
   end subroutine simulation_start_diagnostics
 
   !> Make room for the subdomains that &decomposition asks for, without grains.
@@ -202,6 +201,7 @@ contains
       self%control%max_iterations = config%solver%max_iterations
       self%control%check_every = config%solver%check_every
       self%control%trace = config%output%trace
+      self%written_steps = schedule_t(every=config%output%every, last=config%time%steps)
       if (config%scene%bodies == "column") allocate (self%exact, source=column_solution_t(config%scene%column_count, &
         & -config%scene%mass*config%scene%gravity(config%scene%dimension)*config%time%step))
       self%theta = config%time%theta

@@ -2,13 +2,15 @@
 """Compare two builds of Gravier bit for bit.
 
     python3 tests/support/compare_builds.py OLD_BIN NEW_BIN [--cases PATTERN] [--steps N] [--ranks 1 2] [--skip-large] [--keep DIR]
+                                            [--added REGEX]
 
 OLD_BIN and NEW_BIN are directories that hold gravier, gravier_fclib and gravier_sample. Both builds run every case on every number
-of ranks (effects with one subdomain on one): the cases under data/, shortened to a few steps, and small scenes that cover methods and effects. What they wrote is
-compared without tolerance: all datasets and attributes of results.h5, all columns of history.csv and trace.csv, all tables of the
-checkpoint, bodies files, contact problems, and what gravier_fclib says of these. Only what names the program or measures time is
-left out (LEFT_OUT). Each case prints one line, and the last line counts them. The exit status is 0 only where all are the same; a
-case that does not run in both builds is not the same.
+of ranks (effects with one subdomain on one): the cases under data/, shortened to a few steps, and small scenes that cover methods
+and effects. What they wrote is compared without tolerance: all datasets and attributes of results.h5, all columns of history.csv and
+trace.csv, all tables of the checkpoint, bodies files, contact problems, and what gravier_fclib says of these. Only what names the
+program or measures time is left out (LEFT_OUT). With --added, names are accepted that the new build alone has and that match the
+whole expression; a name that the new build lacks, or has with other values, is never accepted. Each case prints one line, and the
+last line counts them. The exit status is 0 only where all are the same; a case that does not run in both builds is not the same.
 """
 import argparse
 import concurrent.futures
@@ -340,8 +342,9 @@ def small_cases():
 
 # ---- the comparison
 
-def compare(case, builds, ranks, directory):
-    """Complaints about a case: names of what differs, or why it did not run."""
+def compare(case, builds, ranks, directory, added=None):
+    """Complaints about a case: names of what differs, or why it did not run. What the new build alone has and `added`
+    matches is none."""
     found = []
     for build in ("old", "new"):
         place = os.path.join(directory, build)
@@ -350,7 +353,10 @@ def compare(case, builds, ranks, directory):
             found.append(case.act(builds[build], place, ranks))
         except (Failure, OSError) as reason:
             return [f"{build} build: {reason}"]
-    return differences(*found)
+    old, new = found
+    if added:
+        new = {name: value for name, value in new.items() if name in old or not re.fullmatch(added, name)}
+    return differences(old, new)
 
 
 def line_of(case, ranks, wrong, shown=4):
@@ -361,7 +367,7 @@ def line_of(case, ranks, wrong, shown=4):
     return f"{case.name}{note} on {ranks} rank{'' if ranks == 1 else 's'}: {words}"
 
 
-def compare_all(old, new, pattern="*", steps=4, ranks=(1, 2), skip_large=False, directory=".", say=print):
+def compare_all(old, new, pattern="*", steps=4, ranks=(1, 2), skip_large=False, directory=".", say=print, added=None):
     """Compare all cases whose names match a pattern: (same, different, left out)."""
     builds = {"old": os.path.abspath(old), "new": os.path.abspath(new)}
     lock = threading.Lock()
@@ -390,7 +396,7 @@ def compare_all(old, new, pattern="*", steps=4, ranks=(1, 2), skip_large=False, 
                 if case.alone and count > 1:
                     continue
                 place = os.path.join(directory, f"{re.sub('[^A-Za-z0-9_]+', '_', case.name)}_np{count}")
-                jobs[pool.submit(compare, case, builds, count, place)] = case, place
+                jobs[pool.submit(compare, case, builds, count, place, added)] = case, place
             for job in concurrent.futures.as_completed(jobs):
                 case, place = jobs[job]
                 wrong = job.result()
@@ -410,6 +416,8 @@ def main():
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2], metavar="R", help="numbers of ranks (1 2)")
     parser.add_argument("--skip-large", action="store_true", help="leave out data/large instead of reducing it")
     parser.add_argument("--keep", metavar="DIR", help="keep what the cases that differ wrote, in a directory that does not exist yet")
+    parser.add_argument("--added", metavar="REGEX", help="accept names that match as a whole and that the new build alone has, as "
+                        r"'results\.h5 /steps/\d+/bodies/(mass|material)(@.*)?'")
     options = parser.parse_args()
     for programs in (options.old, options.new):
         if not os.path.isfile(os.path.join(programs, "gravier")):
@@ -420,7 +428,7 @@ def main():
         os.makedirs(directory)
     try:
         same, different, left_out = compare_all(options.old, options.new, options.cases, options.steps, options.ranks,
-                                                options.skip_large, directory, lambda line: print(line, flush=True))
+                                                options.skip_large, directory, lambda line: print(line, flush=True), options.added)
     finally:
         if not options.keep:
             shutil.rmtree(directory, ignore_errors=True)

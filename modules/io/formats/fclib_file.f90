@@ -1,7 +1,7 @@
-!> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection: local problems v = W r + V l + q and global
-!> ones (M, H and G) read, those without the constraints of V or G written. Solutions and guesses stand at the root of a file, as
-!> libfclib has them; those that older versions put into the group of the problem are read, too. What is wrong with a file ends in
-!> status_input and one line that names the dataset.
+!> Frictional contact problems in the HDF5 layout of FCLIB, the field's open collection, as they are read: local problems
+!> v = W r + V l + q and global ones (M, H and G). gravier_fclib_writer writes those without the constraints of V or G. Solutions
+!> and guesses stand at the root of a file, as libfclib has them; those that older versions put into the group of the problem are
+!> read, too. What is wrong with a file ends in status_input and one line that names the dataset.
 module gravier_fclib_file
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow, take_count
@@ -12,12 +12,11 @@ module gravier_fclib_file
   use gravier_communicator, only: communicator_t
   use gravier_finite, only: is_finite
   use gravier_magnitude, only: is_bounded
-  use gravier_file_system, only: file_length
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: fclib_local_t, fclib_global_t, fclib_rows_t, read_fclib, write_fclib_local, write_fclib_global
-  public :: name_of_solution, name_of_guess
+  public :: fclib_local_t, fclib_global_t, fclib_rows_t, read_fclib
+  public :: by_columns, by_rows, local_group, global_group, name_of_solution, name_of_guess, matrix_info
 
   !> v = W r + V l + q, of each contact (n, t) or (n, t, s), and bilateral constraints V^T r + R l + s = 0 with multipliers l.
   type :: fclib_local_t
@@ -143,8 +142,8 @@ contains
     end if
   end subroutine read_local
 
-  !> The impulses of the solution, or of the first guess, at the root of the file or in the group of the problem; not allocated where
-  !> there are none.
+  !> The impulses of the solution, or of the first guess, at the root of the file or in the group of the problem; not allocated
+  !> where there are none.
   subroutine read_impulses(source, group, dimension, mu, r, error)
     type(source_t), intent(inout) :: source
     character(len=*), intent(in) :: group
@@ -412,188 +411,5 @@ contains
     if (allocated(error)) return
     call check_numbers(source, dataset, values, error)
   end subroutine read_entries
-
-  !> Write a local problem without constraints, W by compressed rows, and its solution if there is one. Collective, the same on all
-  !> ranks.
-  subroutine write_fclib_local(comm, path, local, error, velocity, multipliers, origin, same_matrix)
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: path
-    !> where `r` is allocated it is written as the solution
-    type(fclib_local_t), intent(in) :: local
-    type(error_t), allocatable, intent(inout) :: error
-    !> (dimension, contacts) W r + q
-    real(dp), intent(in), contiguous, optional :: velocity(:, :)
-    !> of the constraints that the problem was rid of; none is not written (p)
-    real(dp), intent(in), contiguous, optional :: multipliers(:)
-    !> the file that the problem was read from, whose `info` is kept; and what it says of W, where W is the same
-    character(len=*), intent(in), optional :: origin
-    logical, intent(in), optional :: same_matrix
-    type(h5_file_t) :: file
-    integer(i8) :: bytes
-    logical :: mine
-
-    if (allocated(error)) return
-    mine = comm%rank == 0
-    call file%create(comm, path, error)
-    bytes = 16_i8*size(local%w%value) + 40_i8*size(local%q) + 65536_i8
-    if (present(multipliers)) bytes = bytes + 8_i8*size(multipliers)
-    ! what is kept of a file is not longer than the file
-    if (present(origin)) bytes = bytes + file_length(origin)
-    call file%reserve(bytes, error)
-    call write_integer("/fclib_local/spacedim", local%dimension)
-    call write_integer("/fclib_local/W/m", local%w%n_rows)
-    call write_integer("/fclib_local/W/n", local%w%n_columns)
-    call write_integer("/fclib_local/W/nzmax", size(local%w%value))
-    call write_integer("/fclib_local/W/nz", by_rows)
-    call write_indices("/fclib_local/W/p", local%w%start)
-    call write_indices("/fclib_local/W/i", local%w%column)
-    call write_reals("/fclib_local/W/x", local%w%value)
-    call write_reals("/fclib_local/vectors/q", local%q)
-    call write_reals("/fclib_local/vectors/mu", local%mu)
-    if (allocated(local%r)) call write_columns(name_of_solution, local%r)
-    if (present(velocity)) call write_columns("/solution/u", velocity)
-    if (present(multipliers)) then
-      if (size(multipliers) > 0) call write_reals("/solution/l", multipliers)
-    end if
-    if (present(origin)) call keep_info(origin)
-    call file%close(error)
-
-  contains
-
-    !> What the file of origin says of the problem and of W.
-    subroutine keep_info(origin)
-      character(len=*), intent(in) :: origin
-      type(h5_file_t) :: source
-      type(error_t), allocatable :: ignored
-      logical :: same
-      integer :: k
-
-      same = .false.
-      if (present(same_matrix)) same = same_matrix
-      call source%open(comm, origin, error)
-      if (allocated(error)) return
-      call file%take_over(source, local_group//"/info", local_group//"/info", error)
-      if (.not. source%exists(local_group)) call file%take_over(source, global_group//"/info", local_group//"/info", error)
-      do k = 1, merge(size(matrix_info), 0, same)
-        call file%take_over(source, local_group//"/W/"//trim(matrix_info(k)), local_group//"/W/"//trim(matrix_info(k)), error)
-      end do
-      call source%close(ignored)
-    end subroutine keep_info
-
-    subroutine write_integer(dataset, value)
-      character(len=*), intent(in) :: dataset
-      integer, intent(in) :: value
-      integer(i8) :: rows(1)
-      rows(1) = value
-      call file%write_rows(dataset, rows(1:merge(1, 0, mine)), error)
-    end subroutine write_integer
-
-    !> Numbers that count from 1 here and from 0 in the file.
-    subroutine write_indices(dataset, values)
-      character(len=*), intent(in) :: dataset
-      integer, intent(in), contiguous :: values(:)
-      integer(i8), allocatable :: rows(:)
-
-      allocate (rows(size(values)))
-      rows(:) = values - 1
-      call file%write_rows(dataset, rows(1:merge(size(rows), 0, mine)), error)
-    end subroutine write_indices
-
-    subroutine write_reals(dataset, values)
-      character(len=*), intent(in) :: dataset
-      real(dp), intent(in), contiguous :: values(:)
-      call file%write_rows(dataset, values(1:merge(size(values), 0, mine)), error)
-    end subroutine write_reals
-
-    subroutine write_columns(dataset, values)
-      character(len=*), intent(in) :: dataset
-      real(dp), intent(in), contiguous :: values(:, :)
-      real(dp), allocatable :: flat(:)
-      integer :: a
-
-      allocate (flat(size(values)))
-      do a = 1, size(values, 2)
-        flat((a - 1)*size(values, 1) + 1:a*size(values, 1)) = values(:, a)
-      end do
-      call write_reals(dataset, flat)
-    end subroutine write_columns
-
-  end subroutine write_fclib_local
-
-  !> Write a global problem, M by compressed rows and H by compressed columns, with its solution. Collective; errors are the same
-  !> on all ranks.
-  subroutine write_fclib_global(comm, path, rows, error)
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: path
-    type(fclib_rows_t), intent(in) :: rows
-    type(error_t), allocatable, intent(inout) :: error
-    type(h5_file_t) :: file
-    integer(i8) :: n, columns, entries, before
-    integer(i8), allocatable :: one(:), place(:)
-    integer :: k
-
-    if (allocated(error)) return
-    n = comm%total(size(rows%mass, kind=i8))
-    before = comm%offset(size(rows%mass, kind=i8))
-    columns = comm%total(size(rows%w, kind=i8))
-    entries = comm%total(size(rows%h, kind=i8))
-    allocate (one(size(rows%mass)), source=1_i8)
-    allocate (place(size(rows%mass)))
-    do k = 1, size(place)
-      place(k) = before + k
-    end do
-    call file%create(comm, path, error)
-    call file%reserve(48_i8*(n + columns) + 16_i8*entries + 65536_i8, error)
-    call write_integer("/fclib_global/spacedim", int(rows%dimension, i8))
-    call write_matrix("/fclib_global/M", by_rows, n, one, place, rows%mass)
-    call write_matrix("/fclib_global/H", by_columns, columns, rows%entries, rows%row, rows%h)
-    call file%write_rows("/fclib_global/vectors/f", rows%f, error)
-    call file%write_rows("/fclib_global/vectors/w", rows%w, error)
-    call file%write_rows("/fclib_global/vectors/mu", rows%mu, error)
-    call file%write_rows("/solution/v", rows%v, error)
-    call file%write_rows(name_of_solution, rows%r, error)
-    call file%write_rows("/solution/u", rows%u, error)
-    call file%close(error)
-
-  contains
-
-    !> One number, by rank 0.
-    subroutine write_integer(dataset, value)
-      character(len=*), intent(in) :: dataset
-      integer(i8), intent(in) :: value
-      integer(i8) :: values(1)
-
-      values(1) = value
-      call file%write_rows(dataset, values(1:merge(1, 0, comm%rank == 0)), error)
-    end subroutine write_integer
-
-    !> A matrix of n rows, compressed by lines (rows or columns).
-    subroutine write_matrix(group, kind, n_columns, length, places, values)
-      character(len=*), intent(in) :: group
-      integer, intent(in) :: kind
-      integer(i8), intent(in) :: n_columns
-      !> entries of each line of this rank; their places in the lines, from 1 on
-      integer(i8), intent(in), contiguous :: length(:), places(:)
-      real(dp), intent(in), contiguous :: values(:)
-      integer(i8), allocatable :: start(:)
-      integer :: i
-
-      allocate (start(size(length) + 1))
-      start(1) = comm%offset(size(values, kind=i8))
-      do i = 1, size(length)
-        start(i + 1) = start(i) + length(i)
-      end do
-      call write_integer(group//"/m", n)
-      call write_integer(group//"/n", n_columns)
-      call write_integer(group//"/nzmax", comm%total(size(values, kind=i8)))
-      call write_integer(group//"/nz", int(kind, i8))
-      ! the last rank writes the end of the last line
-      call file%write_rows(group//"/p", start(1:size(length) + merge(1, 0, comm%rank == comm%size - 1)), error)
-      start = places - 1
-      call file%write_rows(group//"/i", start, error)
-      call file%write_rows(group//"/x", values, error)
-    end subroutine write_matrix
-
-  end subroutine write_fclib_global
 
 end module gravier_fclib_file

@@ -11,30 +11,20 @@ module gravier_vtkhdf_file
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: remove_file
   use gravier_own_files, only: part_of
-  use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
+  use gravier_field_list, only: field_list_t
   use gravier_hdf5_file, only: h5_file_t, table_integer, table_single, table_double
   implicit none
   private
-  public :: vtkhdf_file_t, vtk_field_t, vtk_rows_t
+  public :: vtkhdf_file_t, points_name
 
-  !> A value of each point, or of each line.
+  !> Numbers of each point, or of each line, as the file keeps them.
   type :: vtk_field_t
-    character(len=24) :: name
+    character(len=24) :: name = ""
     !> numbers of it; 1 makes a scalar
     integer :: components = 1
     !> kept as integers
     logical :: whole = .false.
   end type vtk_field_t
-
-  !> The points or lines of this rank.
-  type :: vtk_rows_t
-    !> (keys, n): the order of the rows, key 1 >= 0
-    integer(i8), allocatable :: key(:, :)
-    !> (3 points of a row, n) [m]: a point, or the two ends of a line
-    real(dp), allocatable :: point(:, :)
-    !> (components of all fields, n)
-    real(dp), allocatable :: value(:, :)
-  end type vtk_rows_t
 
   !> An open file.
   type :: vtkhdf_file_t
@@ -56,6 +46,8 @@ module gravier_vtkhdf_file
     procedure :: close => vtkhdf_close
   end type vtkhdf_file_t
 
+  !> field of a table that says where its items are (3 or 6, items) [m]: a point, or the two ends of a line
+  character(len=*), parameter :: points_name = "points"
   character(len=*), parameter :: root = "/VTKHDF", steps_group = "/VTKHDF/Steps", step_table = "/step"
   !> kinds of cells of a PolyData, in the order of the columns of CellOffsets
   character(len=*), parameter :: topologies(4) = [character(len=8) :: "Vertices", "Lines", "Polygons", "Strips"]
@@ -69,19 +61,18 @@ module gravier_vtkhdf_file
 contains
 
   !> Create the file, without steps, in place of an older one. Collective.
-  subroutine vtkhdf_open(self, comm, path, n_points, field, expected, error)
+  subroutine vtkhdf_open(self, comm, path, table, expected, error)
     class(vtkhdf_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
-    !> of a row: 1 for points, 2 for lines
-    integer, intent(in) :: n_points
-    type(vtk_field_t), intent(in) :: field(:)
+    !> its fields are those of all steps; the first one is that of the points
+    type(field_list_t), intent(in) :: table
     !> rows of all steps together, about; the same on all ranks
     integer(i8), intent(in) :: expected
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(error)) return
-    call set_up(self, comm, path, n_points, field)
+    call set_up(self, comm, path, table)
     self%chunk = min(max(least_chunk, expected/chunks_in_block), greatest_chunk)
     if (comm%rank == 0) call remove_file(path)
     call self%file%create(comm, path, error, chunks_in_block)
@@ -94,17 +85,26 @@ contains
     if (allocated(error)) call self%file%discard()
   end subroutine vtkhdf_open
 
-  subroutine set_up(self, comm, path, n_points, field)
+  !> Note what the file is made of.
+  subroutine set_up(self, comm, path, table)
     type(vtkhdf_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
-    integer, intent(in) :: n_points
-    type(vtk_field_t), intent(in) :: field(:)
+    type(field_list_t), intent(in) :: table
+    integer :: k
 
     self%comm = comm
     self%path = path
-    self%n_points = n_points
-    self%field = field
+    self%n_points = table%field(1)%components()/3
+    if (allocated(self%field)) deallocate (self%field)
+    allocate (self%field(table%n_fields - 1))
+    do k = 1, size(self%field)
+      associate (field => table%field(k + 1))
+        self%field(k)%name = field%name
+        self%field(k)%components = field%components()
+        self%field(k)%whole = allocated(field%whole)
+      end associate
+    end do
     self%steps = 0
     self%rows = 0
     self%shown = .false.
@@ -174,13 +174,12 @@ contains
 
   !> Go on with a file that a run left, with its name or before it has one: steps above `last_step` are forgotten, and written over.
   !> Without such a file, create it. Failure (status_input): a file that is damaged or has not these fields. Collective.
-  subroutine vtkhdf_reopen(self, comm, path, n_points, field, expected, last_step, error)
+  subroutine vtkhdf_reopen(self, comm, path, table, expected, last_step, error)
     class(vtkhdf_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> as for open
-    integer, intent(in) :: n_points
-    type(vtk_field_t), intent(in) :: field(:)
+    type(field_list_t), intent(in) :: table
     integer(i8), intent(in) :: expected
     integer, intent(in) :: last_step
     type(error_t), allocatable, intent(inout) :: error
@@ -193,10 +192,10 @@ contains
     named = exists(comm, path)
     begun = exists(comm, part_of(path))
     if (.not. (named .or. begun)) then
-      call self%open(comm, path, n_points, field, expected, error)
+      call self%open(comm, path, table, expected, error)
       return
     end if
-    call set_up(self, comm, path, n_points, field)
+    call set_up(self, comm, path, table)
     ! for reading first: in a file open for writing HDF5 makes room for all rows that a damaged table says it has
     if (named) then
       call self%file%open(comm, path, error)
@@ -204,10 +203,10 @@ contains
       call self%file%open(comm, part_of(path), error)
     end if
     call self%file%read_attribute(steps_group, "NSteps", written, error)
-    do k = 1, size(field)
+    do k = 1, size(self%field)
       if (allocated(error)) exit
-      if (self%file%exists(root//"/"//data_group(self)//"/"//trim(field(k)%name))) cycle
-      call raise(error, status_input, path//": no field "//trim(field(k)%name)//", but one was expected")
+      if (self%file%exists(root//"/"//data_group(self)//"/"//trim(self%field(k)%name))) cycle
+      call raise(error, status_input, path//": no field "//trim(self%field(k)%name)//", but one was expected")
     end do
     if (.not. allocated(error)) call self%file%check_table(step_table, 0, table_integer, written, error)
     if (.not. allocated(error)) then
@@ -273,38 +272,41 @@ contains
 
   !> Write a step behind the others. The first one has rows: before it, a step without rows is left out (VTK's reader looks for the
   !> cells of a step that follows only empty ones in the wrong place). Collective; a failure leaves the steps before as they are.
-  subroutine vtkhdf_write_step(self, step, time, rows, error)
+  subroutine vtkhdf_write_step(self, step, time, table, error)
     class(vtkhdf_file_t), intent(inout) :: self
     integer, intent(in) :: step
     !> s
     real(dp), intent(in) :: time
-    type(vtk_rows_t), intent(in) :: rows
+    !> items of this rank, with the fields that the file was opened with
+    type(field_list_t), intent(in) :: table
     type(error_t), allocatable, intent(inout) :: error
-    real(dp), allocatable :: point(:, :), value(:, :), part(:, :)
+    type(field_list_t) :: sorted
+    real(dp), allocatable :: part(:, :)
     real(dp) :: now(1, 1)
     integer(i8) :: total
     integer :: k, first
 
     if (allocated(error)) return
-    total = self%comm%total(size(rows%key, 2, kind=i8))
+    total = self%comm%total(int(table%n_items(), i8))
     if (self%rows + total == 0) return
-    call sort_rows(self%comm, rows, point, value)
+    call table%order(self%comm, sorted)
     call self%file%reserve(bytes_of_headers + bytes_of_step(self, total), error)
-    allocate (part(3, self%n_points*size(point, 2)))
+    allocate (part(3, self%n_points*sorted%n_items()))
     do k = 1, size(part, 2)
       first = 3*mod(k - 1, self%n_points)
-      part(:, k) = point(first + 1:first + 3, (k - 1)/self%n_points + 1)
+      part(:, k) = sorted%field(1)%value(first + 1:first + 3, (k - 1)/self%n_points + 1)
     end do
     call self%file%put_rows(root//"/Points", self%n_points*self%rows, part, error)
-    first = 1
     do k = 1, size(self%field)
-      associate (last => first + self%field(k)%components - 1)
-        part = value(first:last, :)
-        call self%file%put_rows(root//"/"//data_group(self)//"/"//trim(self%field(k)%name), self%rows, part, error)
+      associate (name => root//"/"//data_group(self)//"/"//trim(self%field(k)%name), field => sorted%field(k + 1))
+        if (self%field(k)%whole) then
+          call self%file%put_rows(name, self%rows, field%whole, error)
+        else
+          call self%file%put_rows(name, self%rows, field%value, error)
+        end if
       end associate
-      first = first + self%field(k)%components
     end do
-    call write_cells(self, size(point, 2), total, error)
+    call write_cells(self, sorted%n_items(), total, error)
     call write_offsets(self, step, total, error)
     call self%file%flush(error)
     now = time
@@ -355,26 +357,6 @@ contains
     growth = 0
     if (chunks > 0) growth = chunks*chunk*width + blocks*bytes_of_block
   end function growth
-
-  !> The rows of all ranks in the order of their keys, cut into nearly equal blocks.
-  subroutine sort_rows(comm, rows, point, value)
-    type(communicator_t), intent(in) :: comm
-    type(vtk_rows_t), intent(in) :: rows
-    real(dp), allocatable, intent(out) :: point(:, :), value(:, :)
-    integer(i8), allocatable :: records(:, :), ordered(:, :)
-    integer :: nk, np, nv
-
-    nk = size(rows%key, 1)
-    np = size(rows%point, 1)
-    nv = size(rows%value, 1)
-    allocate (records(nk + np + nv, size(rows%key, 2)))
-    records(1:nk, :) = rows%key
-    call pack_reals(np, rows%point, nk + 1, records)
-    call pack_reals(nv, rows%value, nk + np + 1, records)
-    call order_rows(comm, nk, records, ordered)
-    call unpack_reals(ordered, nk + 1, np, point)
-    call unpack_reals(ordered, nk + np + 1, nv, value)
-  end subroutine sort_rows
 
   !> One cell a row, of its points; no cell of the other kinds.
   subroutine write_cells(self, n, total, error)

@@ -4,6 +4,8 @@ module gravier_contact_structure
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t
   implicit none
   private
   public :: contact_structure_t, n_bins, bin_width
@@ -13,7 +15,7 @@ module gravier_contact_structure
   real(dp), parameter :: bin_width = 0.1_dp
 
   !> The same on every rank. A contact carries where its bodies touch: where the normal impulse of its solve is not zero.
-  type :: contact_structure_t
+  type, extends(diagnostic_t) :: contact_structure_t
     !> carrying contacts of a free grain on average: of all, and of those that two or more contacts hold
     real(dp) :: coordination = 0.0_dp, mechanical_coordination = 0.0_dp
     !> free grains with less than two carrying contacts
@@ -29,7 +31,11 @@ module gravier_contact_structure
     !> carrying contacts by normal force over mean (n_bins + 1)
     integer(i8) :: histogram(n_bins + 1) = 0
   contains
+    procedure, nopass :: features => structure_features
+    procedure :: begin => structure_begin
     procedure :: measure => structure_measure
+    procedure :: columns => structure_columns
+    procedure :: get_histogram => structure_get_histogram
   end type contact_structure_t
 
   !> Of a subdomain: numbers of carrying contacts of its bodies, in the first row (nv, n_columns).
@@ -43,9 +49,55 @@ module gravier_contact_structure
 
 contains
 
-  !> Measure the contacts of a step as it was solved. Collective.
-  subroutine structure_measure(self, problem, n_free, h)
+  pure function structure_features() result(features)
+    type(diagnostic_features_t) :: features
+
+    features%key = "structure"
+    features%meaning = "write coordination, fabric, sliding and forces in contacts"
+  end function structure_features
+
+  subroutine structure_begin(self, decomposition)
     class(contact_structure_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    allocate (self%fabric(decomposition%nd, decomposition%nd), source=0.0_dp)
+  end subroutine structure_begin
+
+  subroutine structure_columns(self, list)
+    class(contact_structure_t), intent(in) :: self
+    type(column_list_t), intent(inout) :: list
+
+    call list%add("coordination", self%coordination)
+    call list%add("mechanical_coordination", self%mechanical_coordination)
+    call list%add("rattlers", real(self%rattlers, dp))
+    call list%add_tensor("fabric", self%fabric)
+    call list%add("carrying_fraction", self%carrying_fraction)
+    call list%add("sliding_fraction", self%sliding_fraction)
+    call list%add("force_mean", self%force_mean)
+    call list%add("force_deviation", self%force_deviation)
+    call list%add("force_max", self%force_max)
+    call list%add("overlap_mean", self%overlap_mean)
+  end subroutine structure_columns
+
+  !> Normal forces of the carrying contacts over their mean.
+  subroutine structure_get_histogram(self, histogram)
+    class(contact_structure_t), intent(in) :: self
+    type(histogram_t), allocatable, intent(out) :: histogram
+
+    allocate (histogram)
+    histogram%name = "force_histogram"
+    histogram%counts = self%histogram
+    histogram%bin_width = bin_width
+  end subroutine structure_get_histogram
+
+  !> Measure the contacts of a step as it was solved. Collective.
+  subroutine structure_measure(self, step)
+    class(contact_structure_t), intent(inout) :: self
+    type(solved_step_t), intent(in) :: step
+    call measure_structure(self, step%problem, step%n_free, step%physics%h)
+  end subroutine structure_measure
+
+  subroutine measure_structure(self, problem, n_free, h)
+    type(contact_structure_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     !> free grains of the scene
     integer(i8), intent(in) :: n_free
@@ -81,7 +133,7 @@ contains
     self%force_mean = ratio(sums(nd**2 + 1), counts(carrying))/h
     self%overlap_mean = ratio(sums(nd**2 + 2), counts(overlapping))
     call distribute(self, problem, counts(carrying), h)
-  end subroutine structure_measure
+  end subroutine measure_structure
 
   !> 0 where there is nothing to divide by.
   pure real(dp) function ratio(part, whole)
@@ -175,7 +227,7 @@ contains
 
   !> Standard deviation and histogram of the normal forces over their mean. Collective.
   subroutine distribute(self, problem, n_carrying, h)
-    class(contact_structure_t), intent(inout) :: self
+    type(contact_structure_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     integer(i8), intent(in) :: n_carrying
     real(dp), intent(in) :: h

@@ -8,14 +8,15 @@ module gravier_energy_balance
   use gravier_contact_kernels, only: global_moment, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_neighbourhood, only: neighbourhood_t
   use gravier_physics, only: physics_t
+  use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
-  public :: energy_balance_t, energy_words, energy_record
+  public :: energy_balance_t
 
   !> Energies at the end of a step, and what was done since the start; the same on every rank [J].
-  type :: energy_balance_t
+  type, extends(diagnostic_t) :: energy_balance_t
     !> of the free grains, and of the free components of boundaries that forces move
     real(dp) :: translation = 0.0_dp, rotation = 0.0_dp, boundaries = 0.0_dp
     !> of the free grains in the loads of the present time, from the origin, unwrapped in periodic scenes
@@ -30,9 +31,11 @@ module gravier_energy_balance
     !> kinetic energy of grains and boundaries that were taken out of the scene
     real(dp) :: carried_away = 0.0_dp
   contains
+    procedure, nopass :: features => energy_features
     procedure :: begin => energy_begin
     procedure :: take_step => energy_take_step
-    procedure :: take_places => energy_take_places
+    procedure :: measure => energy_measure
+    procedure :: columns => energy_columns
     procedure :: error => energy_error
     procedure :: turnover => energy_turnover
     procedure :: get_state => energy_get_state
@@ -49,6 +52,32 @@ module gravier_energy_balance
     & in_boundary = 7, n_sums = 7
 
 contains
+
+  pure function energy_features() result(features)
+    type(diagnostic_features_t) :: features
+
+    features%key = "energy"
+    features%meaning = "write the energies and works of each step"
+    features%n_words = energy_words
+    features%array = "energy_balance"
+    features%record = energy_record
+  end function energy_features
+
+  subroutine energy_columns(self, list)
+    class(energy_balance_t), intent(in) :: self
+    type(column_list_t), intent(inout) :: list
+
+    call list%add("kinetic_translation", self%translation)
+    call list%add("kinetic_rotation", self%rotation)
+    call list%add("kinetic_boundaries", self%boundaries)
+    call list%add("potential_energy", self%potential)
+    call list%add("load_work", self%load_work)
+    call list%add("boundary_work", self%boundary_work)
+    call list%add("dissipated_normal", self%dissipated_normal)
+    call list%add("dissipated_friction", self%dissipated_friction)
+    call list%add("carried_away", self%carried_away)
+    call list%add("energy_error", self%error())
+  end subroutine energy_columns
 
   !> Begin with the scene as it is. Collective.
   subroutine energy_begin(self, decomposition)
@@ -101,43 +130,33 @@ contains
     if (boundary%present) energy = 0.5_dp*boundary%mass*sum(velocity**2, mask=boundary%free)
   end function kinetic_of
 
-  !> Take the works of a step into account. Grains and boundaries have the velocities of its end and the places of its
-  !> middle, the views still the velocities of its start. Collective.
-  subroutine energy_take_step(self, decomposition, neighbourhoods, physics, problem, impulses, time, some_left)
+  !> Take the works of a step into account. Collective.
+  subroutine energy_take_step(self, step)
     class(energy_balance_t), intent(inout) :: self
-    type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
-    type(physics_t), intent(in) :: physics
-    type(contact_problem_t), intent(in) :: problem
-    !> of the contacts on each boundary (nd, boundaries) [N s]
-    real(dp), intent(in), contiguous :: impulses(:, :)
-    !> start of the step [s]
-    real(dp), intent(in) :: time
-    !> grains were taken out of the scene in this step
-    logical, intent(in) :: some_left
-    type(boundary_t) :: earlier(size(decomposition%boundaries))
-    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums)
+    type(solved_step_t), intent(in) :: step
+    type(boundary_t) :: earlier(size(step%decomposition%boundaries))
+    real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums)
     integer :: s, b
 
     do b = 1, size(earlier)
-      earlier(b) = decomposition%boundaries(b)
-      call earlier(b)%prescribe(decomposition%nd, time)
+      earlier(b) = step%decomposition%boundaries(b)
+      call earlier(b)%prescribe(step%decomposition%nd, step%time)
       earlier(b)%velocity(:) = earlier(b)%last_velocity
     end do
     parts(:, :) = 0.0_dp
-    do s = 1, size(problem%sub)
-      call add_grains(neighbourhoods%view(s), decomposition%home(s), physics, parts(:, s))
-      call add_contacts(neighbourhoods%view(s), earlier, problem, s, parts(:, s))
+    do s = 1, size(step%problem%sub)
+      call add_grains(step%neighbourhoods%view(s), step%decomposition%home(s), step%physics, parts(:, s))
+      call add_contacts(step%neighbourhoods%view(s), earlier, step%problem, s, parts(:, s))
     end do
-    call decomposition%comm%sum_parts(parts, sums)
-    if (some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
+    call step%decomposition%comm%sum_parts(parts, sums)
+    if (step%some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
     self%translation = sums(in_translation)
     self%rotation = sums(in_rotation)
     self%load_work = self%load_work + sums(in_load)
     self%dissipated_normal = self%dissipated_normal + sums(in_normal)
     self%dissipated_friction = self%dissipated_friction + sums(in_friction)
     self%boundary_work = self%boundary_work + sums(in_boundary)
-    call take_boundaries(self, decomposition%boundaries, impulses)
+    call take_boundaries(self, step%decomposition%boundaries, step%boundary_impulses)
   end subroutine energy_take_step
 
   !> Energies of the grains of a subdomain, and the work of the loads on them, h F . (V_i + V_{i+1})/2.
@@ -261,7 +280,7 @@ contains
 
   !> Energies of the boundaries that forces move, and the work of these forces.
   pure subroutine take_boundaries(self, boundaries, impulses)
-    class(energy_balance_t), intent(inout) :: self
+    type(energy_balance_t), intent(inout) :: self
     type(boundary_t), intent(in) :: boundaries(:)
     !> (nd, boundaries)
     real(dp), intent(in), contiguous :: impulses(:, :)
@@ -285,9 +304,16 @@ contains
     self%boundaries = after
   end subroutine take_boundaries
 
-  !> Potential energy in the places that grains have now, -(m g + f V) . x. Collective.
-  subroutine energy_take_places(self, decomposition, physics)
+  !> Measure what depends on the places of the end of the step. Collective.
+  subroutine energy_measure(self, step)
     class(energy_balance_t), intent(inout) :: self
+    type(solved_step_t), intent(in) :: step
+    call take_places(self, step%decomposition, step%physics)
+  end subroutine energy_measure
+
+  !> Potential energy in the places that grains have now, -(m g + f V) . x. Collective.
+  subroutine take_places(self, decomposition, physics)
+    type(energy_balance_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     real(dp) :: part(size(decomposition%home)), x
@@ -307,7 +333,7 @@ contains
       end associate
     end do
     self%potential = decomposition%comm%sum_real(part)
-  end subroutine energy_take_places
+  end subroutine take_places
 
   !> What the balance lacks since the start [J]: rounding, and what was taken from grains that stand still (gravier_sleeping).
   pure real(dp) function energy_error(self) result(error)
@@ -326,7 +352,8 @@ contains
   !> All of the balance, bit for bit.
   pure subroutine energy_get_state(self, words)
     class(energy_balance_t), intent(in) :: self
-    integer(i8), intent(out) :: words(energy_words)
+    !> (energy_words)
+    integer(i8), intent(out) :: words(:)
 
     words(1) = transfer(self%translation, 0_i8)
     words(2) = transfer(self%rotation, 0_i8)
@@ -342,7 +369,8 @@ contains
 
   pure subroutine energy_set_state(self, words)
     class(energy_balance_t), intent(inout) :: self
-    integer(i8), intent(in) :: words(energy_words)
+    !> (energy_words)
+    integer(i8), intent(in) :: words(:)
 
     self%translation = transfer(words(1), 0.0_dp)
     self%rotation = transfer(words(2), 0.0_dp)

@@ -6,10 +6,10 @@ module gravier_grain_balance
   use gravier_kinds, only: dp
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
   use gravier_physics, only: physics_t
+  use gravier_diagnostic, only: solved_step_t
   implicit none
   private
   public :: grain_balance_t
@@ -58,44 +58,40 @@ contains
     self%carried_away = 0.0_dp
   end subroutine grain_balance_begin
 
-  !> Take the works of a step into account. Grains have the velocities of its end, the views still those of its start, and the
-  !> problem the impulses on its bodies as `evaluate` sums them. Collective.
-  subroutine grain_balance_take_step(self, decomposition, neighbourhoods, physics, problem, some_left)
+  !> Take the works of a step into account, with the impulses on the bodies of the problem as `evaluate` sums them. Collective.
+  subroutine grain_balance_take_step(self, step)
     class(grain_balance_t), intent(inout) :: self
-    type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
-    type(physics_t), intent(in) :: physics
-    type(contact_problem_t), intent(in) :: problem
-    !> grains were taken out of the scene in this step
-    logical, intent(in) :: some_left
-    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums), kinetic, momentum(3), flux(3)
+    type(solved_step_t), intent(in) :: step
+    real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums), kinetic, momentum(3), flux(3)
     integer :: s, nd
 
-    nd = decomposition%nd
-    if (some_left) then
+    nd = step%decomposition%nd
+    if (step%some_left) then
       kinetic = self%kinetic
       parts(:, :) = 0.0_dp
       do s = 1, size(parts, 2)
-        associate (view => neighbourhoods%view(s))
-          call add_grains(view%bodies, physics, parts(:, s), view%origin)
+        associate (view => step%neighbourhoods%view(s))
+          call add_grains(view%bodies, step%physics, parts(:, s), view%origin)
         end associate
       end do
-      call decomposition%comm%sum_parts(parts, sums)
+      call step%decomposition%comm%sum_parts(parts, sums)
       call keep_motion(self, sums)
       self%carried_away = self%carried_away + (kinetic - self%kinetic)
     end if
     momentum(:) = self%momentum
     flux(:) = self%flux
     parts(:, :) = 0.0_dp
-    do s = 1, size(problem%sub)
-      call add_grains(decomposition%home(s), physics, parts(:, s))
-      call add_contact_work(problem%sub(s), physics, nd, problem%kernels%nv, parts(in_contacts, s))
+    do s = 1, size(step%problem%sub)
+      call add_grains(step%decomposition%home(s), step%physics, parts(:, s))
+      call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%kernels%nv, parts(in_contacts, s))
     end do
-    call decomposition%comm%sum_parts(parts, sums)
+    call step%decomposition%comm%sum_parts(parts, sums)
     call keep_motion(self, sums)
     ! h F . (v_i + v_{i+1})/2, summed over the grains
-    self%load_work = self%load_work + 0.5_dp*physics%h*(dot_product(physics%gravity(1:nd), momentum(1:nd) + self%momentum(1:nd)) + &
-      & dot_product(physics%body_force(1:nd), flux(1:nd) + self%flux(1:nd)))
+    associate (physics => step%physics)
+      self%load_work = self%load_work + 0.5_dp*physics%h*(dot_product(physics%gravity(1:nd), momentum(1:nd) + &
+        & self%momentum(1:nd)) + dot_product(physics%body_force(1:nd), flux(1:nd) + self%flux(1:nd)))
+    end associate
     self%contact_work = self%contact_work + sums(in_contacts)
   end subroutine grain_balance_take_step
 

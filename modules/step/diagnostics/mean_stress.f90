@@ -6,29 +6,63 @@ module gravier_mean_stress
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
   public :: mean_stress_t
 
   !> The same on every rank.
-  type :: mean_stress_t
+  type, extends(diagnostic_t) :: mean_stress_t
     !> of the contact forces, compression positive; row: force, column: branch (nd, nd) [Pa, N/m in 2D]
     real(dp), allocatable :: stress(:, :)
     !> of the space that the scene takes [m^3, m^2 in 2D]
     real(dp) :: volume = 0.0_dp
     real(dp) :: solid_fraction = 0.0_dp
   contains
+    procedure, nopass :: features => mean_stress_features
+    procedure :: begin => mean_stress_begin
     procedure :: measure => mean_stress_measure
+    procedure :: columns => mean_stress_columns
     procedure :: pressure => mean_stress_pressure
   end type mean_stress_t
 
 contains
 
+  pure function mean_stress_features() result(features)
+    type(diagnostic_features_t) :: features
+
+    features%key = "stress"
+    features%meaning = "write the mean stress and the solid fraction"
+  end function mean_stress_features
+
+  subroutine mean_stress_begin(self, decomposition)
+    class(mean_stress_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    allocate (self%stress(decomposition%nd, decomposition%nd), source=0.0_dp)
+  end subroutine mean_stress_begin
+
+  subroutine mean_stress_columns(self, list)
+    class(mean_stress_t), intent(in) :: self
+    type(column_list_t), intent(inout) :: list
+
+    call list%add_tensor("stress", self%stress)
+    call list%add("pressure", self%pressure())
+    call list%add("volume", self%volume)
+    call list%add("solid_fraction", self%solid_fraction)
+  end subroutine mean_stress_columns
+
+  !> Measure a step at its end, whose places are those of the grains. Collective.
+  subroutine mean_stress_measure(self, step)
+    class(mean_stress_t), intent(inout) :: self
+    type(solved_step_t), intent(in) :: step
+    call measure_stress(self, step%decomposition, step%problem, step%physics%h)
+  end subroutine mean_stress_measure
+
   !> Stress of the impulses of a step (Weber 1966), sigma = (1/(h V)) sum over the contacts of p l^T: p the impulse on the
   !> candidate, l the branch from the antagonist to the candidate at q_m, or from the place of contact to the grain where
   !> a boundary takes part. Places are those of the end of the step. Collective.
-  subroutine mean_stress_measure(self, decomposition, problem, h)
-    class(mean_stress_t), intent(inout) :: self
+  subroutine measure_stress(self, decomposition, problem, h)
+    type(mean_stress_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(contact_problem_t), intent(in) :: problem
     !> [s]
@@ -55,7 +89,7 @@ contains
     if (.not. self%volume > 0.0_dp) return
     self%stress(:, :) = self%stress/(h*self%volume)
     self%solid_fraction = self%solid_fraction/self%volume
-  end subroutine mean_stress_measure
+  end subroutine measure_stress
 
   !> Add p l^T of the contacts of a subdomain, column by column.
   pure subroutine add_contacts(problem, s, part)

@@ -8,7 +8,8 @@ program test_io_full_disk
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory, remove_file
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, body_rows_t
+  use gravier_results_file, only: results_file_t
+  use gravier_test_results_rows, only: body_rows_t, write_rows
   use gravier_bodies_file, only: bodies_data_t, read_bodies, write_bodies
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_csv_writer, only: csv_writer_t
@@ -169,13 +170,13 @@ contains
     call results%open(comm, disk//"/results.h5", "0.1.0", "gravier case.nml", "&scene /", 3, error)
     call expect_none(error, "a results file on a disk with room")
     do step = 1, 100
-      call results%write_step(step, 0.01_dp*step, bodies, error)
+      call write_rows(results, step, 0.01_dp*step, bodies, error)
       if (allocated(error)) exit
     end do
     call check(step > 1 .and. step < 100, "steps until the disk is full")
     call expect(error, "results.h5: no space left on device: ", "a step on a full disk")
     call fill(4096)
-    call results%write_step(step, 0.01_dp*step, bodies, error)
+    call write_rows(results, step, 0.01_dp*step, bodies, error)
     call expect(error, "what was written before stays readable", "a step on a fuller disk")
     call results%close(error)
     call expect_none(error, "closing on a full disk")
@@ -183,12 +184,12 @@ contains
 
     call fill(-1)
     call results%open(comm, disk//"/results.h5", "0.1.0", "gravier case.nml", "&scene /", 3, error)
-    call results%write_step(1, 0.01_dp, bodies, error)
+    call write_rows(results, 1, 0.01_dp, bodies, error)
     call fill(4096)
-    call results%write_step(2, 0.02_dp, bodies, error)
+    call write_rows(results, 2, 0.02_dp, bodies, error)
     call expect(error, "no space left on device: ", "a step while the disk is full")
     call fill(-1)
-    call results%write_step(2, 0.02_dp, bodies, error)
+    call write_rows(results, 2, 0.02_dp, bodies, error)
     call results%close(error)
     call expect_none(error, "a step once there is room again")
     call check_steps(2)

@@ -7,7 +7,8 @@ program test_io_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, body_rows_t, contact_rows_t, boundary_rows_t, accuracy_t
+  use gravier_results_file, only: results_file_t, accuracy_t
+  use gravier_test_results_rows, only: body_rows_t, contact_rows_t, boundary_rows_t, write_rows, write_boundaries
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_bodies = 23, n_contacts = 41
@@ -148,13 +149,13 @@ contains
     call make_contacts(comm, dimension, contacts)
     call make_boundaries(dimension, boundaries)
     call results%open(comm, name, "0.1.0", "gravier case.nml", input_text, dimension, error)
-    call results%write_boundaries(boundaries%id, names, shapes, boundaries%normal, error)
-    call results%write_step(0, 0.0_dp, bodies, error)
-    call results%write_step(10, 0.01_dp, bodies, error, contacts, boundaries)
+    call write_boundaries(results, boundaries%id, names, shapes, boundaries%normal, error)
+    call write_rows(results, 0, 0.0_dp, bodies, error)
+    call write_rows(results, 10, 0.01_dp, bodies, error, contacts, boundaries)
     call empty_step(results, dimension, error)
     call make_images(dimension, bodies)
     deallocate (boundaries%normal)
-    call results%write_step(30, 0.03_dp, bodies, error, boundaries=boundaries, accuracy=accuracy_t(1.0e-3_dp, 2.0e-2_dp))
+    call write_rows(results, 30, 0.03_dp, bodies, error, boundaries=boundaries, accuracy=accuracy_t(1.0e-3_dp, 2.0e-2_dp))
     call results%close(error)
   end subroutine write_all
 
@@ -198,7 +199,7 @@ contains
     allocate (bodies%id(0), bodies%position(dimension, 0), bodies%velocity(3*(dimension - 1), 0), bodies%radius(0))
     allocate (contacts%candidate(0), contacts%antagonist(0), contacts%normal(dimension, 0), contacts%gap(0), &
       & contacts%impulse(dimension, 0))
-    call results%write_step(20, 0.02_dp, bodies, error, contacts)
+    call write_rows(results, 20, 0.02_dp, bodies, error, contacts)
   end subroutine empty_step
 
   subroutine test_content(dimension)
@@ -415,28 +416,28 @@ contains
     call make_bodies(world, 2, bodies)
     call make_contacts(world, 2, contacts)
     where (bodies%id == 103 .or. bodies%id == 109) bodies%velocity(3, :) = nan
-    call results%write_step(1, 0.5_dp, bodies, error, contacts)
+    call write_rows(results, 1, 0.5_dp, bodies, error, contacts)
     call expect(error, path//": /steps/1/bodies/velocity, row of id 103: NaN or infinity, but finite numbers were expected; "// &
       & "nothing of it is written", "NaN in a velocity")
     call make_bodies(world, 2, bodies)
     where (bodies%id == 169) bodies%radius = ieee_value(1.0_dp, ieee_negative_inf)
-    call results%write_step(1, 0.5_dp, bodies, error)
+    call write_rows(results, 1, 0.5_dp, bodies, error)
     call expect(error, path//": /steps/1/bodies/radius, row of id 169: NaN or infinity, but finite numbers were expected; "// &
       & "nothing of it is written", "infinity in a radius")
     call make_bodies(world, 2, bodies)
     where (contacts%candidate == 112) contacts%impulse(2, :) = nan
-    call results%write_step(1, 0.5_dp, bodies, error, contacts)
+    call write_rows(results, 1, 0.5_dp, bodies, error, contacts)
     call expect(error, path//": /steps/1/contacts/impulse, row of id 112: NaN or infinity, but finite numbers were expected; "// &
       & "nothing of it is written", "NaN in an impulse")
-    call results%write_step(1, nan, bodies, error)
+    call write_rows(results, 1, nan, bodies, error)
     call expect(error, path//": /steps/1, attribute time: NaN or infinity, but finite numbers were expected; "// &
       & "nothing of it is written", "NaN as time")
-    call results%write_step(1, 0.5_dp, bodies, error, accuracy=accuracy_t(nan, 1.0_dp))
+    call write_rows(results, 1, 0.5_dp, bodies, error, accuracy=accuracy_t(nan, 1.0_dp))
     call expect(error, path//": /steps/1, attribute velocity_error or velocity_scale: NaN or infinity, but finite numbers were "// &
       & "expected; nothing of it is written", "NaN as velocity error")
-    call results%write_step(1, 0.5_dp, bodies, error)
+    call write_rows(results, 1, 0.5_dp, bodies, error)
     call expect_none(error, "a step after refused ones")
-    call results%write_step(1, 0.5_dp, bodies, error)
+    call write_rows(results, 1, 0.5_dp, bodies, error)
     call expect(error, path//": /steps/1: is in the file already", "a step twice")
     call results%close(error)
     call expect_none(error, "closing after refusals")
@@ -463,7 +464,7 @@ contains
     call make_contacts(world, 3, contacts)
     call make_boundaries(3, boundaries)
     call write_all(world, path, 3, error)
-    call results%reopen(world, path, 30, error)
+    call results%reopen(world, path, 30, "bodies/radius", error)
     call results%close(error)
     call expect_none(error, "reopened for nothing")
     call check_steps([0, 10, 20, 30])
@@ -471,10 +472,10 @@ contains
     call check_images(file, 3)
     call file%close(error)
     do round = 1, 3
-      call results%reopen(world, path, 19, error)
+      call results%reopen(world, path, 19, "bodies/radius", error)
       call expect_none(error, "reopening")
       do step = 20, 500, 20
-        call results%write_step(step, 0.001_dp*step, bodies, error, contacts, boundaries)
+        call write_rows(results, step, 0.001_dp*step, bodies, error, contacts, boundaries)
       end do
       call results%close(error)
       call expect_none(error, "steps after reopening")
@@ -485,8 +486,8 @@ contains
       call check_equal(n_rows(file, "/steps/20/contacts/gap"), int(n_contacts, i8), "contacts of a step written again")
       call file%close(error)
     end do
-    call results%reopen(world, path, -1, error)
-    call results%write_step(0, 0.0_dp, bodies, error)
+    call results%reopen(world, path, -1, "bodies/radius", error)
+    call write_rows(results, 0, 0.0_dp, bodies, error)
     call results%close(error)
     call expect_none(error, "reopening from the start")
     call check_steps([0])
@@ -523,21 +524,21 @@ contains
     character(len=:), allocatable :: whole
     integer :: i
 
-    call results%reopen(world, path//".none", 3, error)
+    call results%reopen(world, path//".none", 3, "bodies/radius", error)
     call expect(error, path//".none: cannot read this file: No such file or directory", "no file", status_input)
     call put("a text")
-    call results%reopen(world, path//".cut", 3, error)
+    call results%reopen(world, path//".cut", 3, "bodies/radius", error)
     call expect(error, path//".cut: not an HDF5 file", "a text file", status_input)
     call write_all(world, path, 3, error)
     whole = content(path)
     do i = 1, 9
       call put(whole(1:i*(len(whole) - 1)/9))
-      call results%reopen(world, path//".cut", 3, error)
+      call results%reopen(world, path//".cut", 3, "bodies/radius", error)
       call expect(error, path//".cut: truncated or damaged HDF5 file", "a file cut short", status_input)
     end do
     call file%create(world, path//".cut", error)
     call file%close(error)
-    call results%reopen(world, path//".cut", 3, error)
+    call results%reopen(world, path//".cut", 3, "bodies/radius", error)
     call expect(error, path//".cut: /run: attribute dimension is missing or not one number of its kind", "another HDF5 file", &
       & status_input)
     call refuse_members("12x", '/steps: a member "12x", but numbers of steps were expected')
@@ -561,7 +562,7 @@ contains
     if (name == "8") call file%write_attribute("/steps/8", "step", 8, error)
     call file%close(error)
     call expect_none(error, "writing what is to be refused")
-    call results%reopen(world, path//".cut", 30, error)
+    call results%reopen(world, path//".cut", 30, "bodies/radius", error)
     call expect(error, path//".cut: "//message, "a strange step", status_input)
   end subroutine refuse_members
 

@@ -225,11 +225,11 @@ contains
     call check_equal(config%output%fclib_step, 3, "fclib_step")
     call check_close(config%output%checkpoint_seconds, 60.0_dp, 0.0_dp, "checkpoint_seconds")
     call check_close(config%output%walltime, 3600.0_dp, 0.0_dp, "walltime")
-    call check(config%output%energy, "energy")
-    call check(config%output%stress, "stress")
-    call check(config%output%structure, "structure")
+    call check(config%output%asks("energy"), "energy")
+    call check(config%output%asks("stress"), "stress")
+    call check(config%output%asks("structure"), "structure")
     call check(config%output%vtk, "vtk")
-    call check(config%output%boundary_forces, "boundary_forces")
+    call check(config%output%asks("boundary_forces"), "boundary_forces")
   end subroutine check_whole_methods
 
   subroutine test_defaults()
@@ -312,11 +312,11 @@ contains
     call check_equal(config%output%fclib_step, 0, "default fclib_step")
     call check_close(config%output%checkpoint_seconds, 0.0_dp, 0.0_dp, "default checkpoint_seconds")
     call check_close(config%output%walltime, 0.0_dp, 0.0_dp, "default walltime")
-    call check(.not. config%output%energy, "default energy")
-    call check(.not. config%output%stress, "default stress")
-    call check(.not. config%output%structure, "default structure")
+    call check(.not. config%output%asks("energy"), "default energy")
+    call check(.not. config%output%asks("stress"), "default stress")
+    call check(.not. config%output%asks("structure"), "default structure")
     call check(.not. config%output%vtk, "default vtk")
-    call check(.not. config%output%boundary_forces, "default boundary_forces")
+    call check(.not. config%output%asks("boundary_forces"), "default boundary_forces")
   end subroutine check_default_methods
 
   subroutine test_defaults_in_space()

@@ -7,7 +7,8 @@ program test_block_solvers
   use gravier_random_hash, only: hash_uniform
   use gravier_sparse_rows, only: sparse_rows_t, compressed_rows, no_columns
   use gravier_communicator, only: communicator_t
-  use gravier_fclib_file, only: fclib_local_t, fclib_global_t, write_fclib_local, read_fclib
+  use gravier_fclib_file, only: fclib_local_t, fclib_global_t, read_fclib
+  use gravier_fclib_writer, only: write_fclib_local
   use gravier_condensation, only: multipliers_t, condense, eliminate_constraints
   use gravier_delassus, only: delassus_t
   use gravier_unbounded, only: growth_t, growth_none

@@ -1,0 +1,245 @@
+!> The contacts of the last step of a simulation as a table of named fields, for whatever file is written of them.
+module gravier_contact_collector
+  use gravier_kinds, only: dp, i8
+  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_law, only: unused
+  use gravier_contact_problem, only: subproblem_t
+  use gravier_field_list, only: field_list_t
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: collect_contacts, idle, sticking, sliding
+
+  !> values of `status`: no force; a force within the cone of friction; one on it
+  integer, parameter :: idle = 0, sticking = 1, sliding = 2
+
+contains
+
+  !> Contacts of this rank: the table `contacts` with the keys `candidate` and `antagonist`, identifiers of bodies or boundaries.
+  !> The fields are `normal` (nd), `gap` [m], `impulse` on the candidate (nd; n, t[, s]) [N s], `moment` on it (about n[, t, s])
+  !> [N m s], `normal_force` and `tangential_force` [N], `status`, and `points` (6) [m], the centre of the candidate and that of
+  !> the antagonist's nearest image, or the boundary, where the contact was detected.
+  subroutine collect_contacts(simulation, names, table)
+    type(simulation_t), intent(in) :: simulation
+    !> of the fields, in their order; a moment is left out where the kernels have none
+    character(len=*), intent(in) :: names(:)
+    type(field_list_t), intent(out) :: table
+    real(dp), allocatable :: value(:, :)
+    integer(i8), allocatable :: whole(:, :)
+    integer :: s, k, first, last, n
+
+    associate (problem => simulation%problem, decomposition => simulation%decomposition)
+      n = sum(problem%sub%n_contacts)
+      call table%init("contacts", "candidate antagonist", n)
+      last = 0
+      do s = 1, size(problem%sub)
+        call take_keys(simulation, s, table%key(:, last + 1:last + problem%sub(s)%n_contacts))
+        last = last + problem%sub(s)%n_contacts
+      end do
+      do k = 1, size(names)
+        if (components_of(trim(names(k)), simulation) == 0) cycle
+        if (names(k) == "status") then
+          allocate (whole(1, n))
+        else
+          allocate (value(components_of(trim(names(k)), simulation), n))
+        end if
+        last = 0
+        do s = 1, size(problem%sub)
+          first = last + 1
+          last = last + problem%sub(s)%n_contacts
+          if (allocated(whole)) then
+            call take_status(simulation, problem%sub(s), whole(1, first:last))
+          else
+            call take_field(simulation, s, trim(names(k)), value(:, first:last))
+          end if
+        end do
+        if (allocated(whole)) then
+          call table%add_whole(trim(names(k)), "", whole, .true.)
+        else
+          call table%add_reals(trim(names(k)), unit_of(trim(names(k))), value, is_scalar(trim(names(k))))
+        end if
+      end do
+    end associate
+  end subroutine collect_contacts
+
+  !> Numbers of a contact in a field, 0 where the scene has none.
+  pure integer function components_of(name, simulation) result(n)
+    character(len=*), intent(in) :: name
+    type(simulation_t), intent(in) :: simulation
+
+    select case (name)
+    case ("normal", "impulse")
+      n = simulation%problem%kernels%nd
+    case ("moment")
+      n = merge(2*simulation%problem%kernels%nd - 3, 0, simulation%problem%kernels%rolling_row > 0)
+    case ("points")
+      n = 6
+    case default
+      n = 1
+    end select
+  end function components_of
+
+  !> Unit of a field, empty where none is said.
+  pure function unit_of(name) result(unit)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: unit
+
+    select case (name)
+    case ("gap", "points")
+      unit = "m"
+    case ("impulse")
+      unit = "N s"
+    case ("moment")
+      unit = "N m s"
+    case ("normal_force", "tangential_force")
+      unit = "N"
+    case default
+      unit = ""
+    end select
+  end function unit_of
+
+  !> Whether a field has one number by its meaning.
+  pure logical function is_scalar(name)
+    character(len=*), intent(in) :: name
+    is_scalar = name == "gap" .or. name == "normal_force" .or. name == "tangential_force" .or. name == "status"
+  end function is_scalar
+
+  !> Identifiers of candidate and antagonist of the contacts of a subdomain of this rank.
+  subroutine take_keys(simulation, s, key)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: s
+    !> (2, contacts)
+    integer(i8), intent(out) :: key(:, :)
+    integer :: c, p
+
+    associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+      do c = 1, sub%n_contacts
+        p = sub%source(c)
+        key(1, c) = view%bodies%id(view%list%candidate(p))
+        if (view%list%antagonist(p) > 0) then
+          key(2, c) = view%bodies%id(view%list%antagonist(p))
+        else
+          key(2, c) = simulation%decomposition%boundaries(-view%list%antagonist(p))%id
+        end if
+      end do
+    end associate
+  end subroutine take_keys
+
+  !> A field of the contacts of a subdomain of this rank.
+  subroutine take_field(simulation, s, name, values)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: s
+    character(len=*), intent(in) :: name
+    !> (components, contacts)
+    real(dp), intent(out) :: values(:, :)
+    integer :: c, nd, nf
+
+    associate (sub => simulation%problem%sub(s), kernels => simulation%problem%kernels, h => simulation%physics%h)
+      nd = kernels%nd
+      nf = kernels%nf
+      select case (name)
+      case ("normal")
+        do c = 1, sub%n_contacts
+          values(:, c) = sub%hot(lane_of(c), 1:nd, block_of(c))
+        end do
+      case ("gap")
+        values(1, :) = sub%gap
+      case ("impulse")
+        do c = 1, sub%n_contacts
+          values(1, c) = sub%normal_impulse(c)
+          ! without friction there is none along the tangents
+          values(2:nf, c) = sub%impulse(lane_of(c), 2:nf, block_of(c))
+          values(nf + 1:, c) = 0.0_dp
+        end do
+      case ("moment")
+        call take_moments(sub, nd, kernels%rolling_row, kernels%nc, values)
+      case ("normal_force")
+        do c = 1, sub%n_contacts
+          values(1, c) = sub%normal_impulse(c)/h
+        end do
+      case ("tangential_force")
+        do c = 1, sub%n_contacts
+          values(1, c) = tangential_impulse(sub, nf, c)/h
+        end do
+      case ("points")
+        call take_points(simulation, s, values)
+      end select
+    end associate
+  end subroutine take_field
+
+  !> Moments of the contacts of a subdomain about n[, t, s].
+  pure subroutine take_moments(sub, nd, rolling_row, nc, values)
+    type(subproblem_t), intent(in) :: sub
+    !> space dimension, row of the rolling resistance, components of an impulse
+    integer, intent(in) :: nd, rolling_row, nc
+    !> (1 or 3, contacts)
+    real(dp), intent(out) :: values(:, :)
+    real(dp) :: radius
+    integer :: c
+
+    do c = 1, sub%n_contacts
+      radius = sub%hot(lane_of(c), rolling_row + 1, block_of(c))
+      ! that about the normal comes last in a sweep
+      values(1, c) = radius*sub%impulse(lane_of(c), nc, block_of(c))
+      if (nd == 3) values(2:3, c) = radius*sub%impulse(lane_of(c), 4:5, block_of(c))
+    end do
+  end subroutine take_moments
+
+  !> Size of the tangential impulse of contact `c` [N s].
+  pure real(dp) function tangential_impulse(sub, nf, c) result(tangential)
+    type(subproblem_t), intent(in) :: sub
+    !> components of a force
+    integer, intent(in) :: nf
+    integer, intent(in) :: c
+
+    tangential = 0.0_dp
+    if (nf > 1) tangential = norm2(sub%impulse(lane_of(c), 2:nf, block_of(c)))
+  end function tangential_impulse
+
+  !> Ends of the contacts of a subdomain of this rank; in 2D in the plane z = 0.
+  subroutine take_points(simulation, s, point)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: s
+    !> (6, contacts)
+    real(dp), intent(out) :: point(:, :)
+    real(dp) :: reach
+    integer :: c, p, nd
+
+    nd = simulation%problem%kernels%nd
+    point(:, :) = 0.0_dp
+    associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+      do c = 1, sub%n_contacts
+        p = sub%source(c)
+        associate (candidate => view%list%candidate(p), antagonist => view%list%antagonist(p))
+          point(1:nd, c) = view%bodies%position(:, candidate)
+          reach = view%bodies%radius(candidate) + sub%gap(c)
+          if (antagonist > 0) reach = reach + view%bodies%radius(antagonist)
+        end associate
+        point(4:3 + nd, c) = point(1:nd, c) - reach*sub%hot(lane_of(c), 1:nd, block_of(c))
+      end do
+    end associate
+  end subroutine take_points
+
+  !> How the contacts of a subdomain carry: idle, sticking or sliding.
+  subroutine take_status(simulation, sub, status)
+    type(simulation_t), intent(in) :: simulation
+    type(subproblem_t), intent(in) :: sub
+    !> (contacts)
+    integer(i8), intent(out) :: status(:)
+    real(dp) :: held, bound
+    integer :: c
+
+    associate (kernels => simulation%problem%kernels)
+      do c = 1, sub%n_contacts
+        held = sub%impulse(lane_of(c), 1, block_of(c))
+        status(c) = idle
+        if (.not. held > 0.0_dp) cycle
+        status(c) = sliding
+        if (kernels%nf == 1) cycle
+        bound = (1.0_dp - unused)*sub%hot(lane_of(c), kernels%friction_row, block_of(c))*held
+        if (tangential_impulse(sub, kernels%nf, c) < bound) status(c) = sticking
+      end do
+    end associate
+  end subroutine take_status
+
+end module gravier_contact_collector

@@ -1,0 +1,130 @@
+!> history.csv: a row a step, the columns of the diagnostics last.
+module gravier_history_output
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_schedule, only: schedule_t
+  use gravier_csv_writer, only: csv_writer_t
+  use gravier_solve, only: solve_converged
+  use gravier_config_types, only: config_t
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_output, only: output_t, of_each_step
+  implicit none
+  private
+  public :: history_output_t, open_table
+
+  type, extends(output_t) :: history_output_t
+    private
+    type(csv_writer_t) :: table
+  contains
+    procedure, nopass :: wanted => history_output_wanted
+    procedure :: open => history_output_open
+    procedure :: write => history_output_write
+    procedure :: finish => history_output_finish
+  end type history_output_t
+
+contains
+
+  !> Every run has one.
+  pure logical function history_output_wanted(config) result(wanted)
+    type(config_t), intent(in) :: config
+    wanted = config%output%every >= 0
+  end function history_output_wanted
+
+  subroutine history_output_open(self, simulation, directory, command, error)
+    class(history_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: directory, command
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (unused => command)
+    end associate
+    self%stage = of_each_step
+    self%schedule = schedule_t(every=1)
+    call open_table(self%table, directory//"history.csv", history_header(simulation), simulation, error)
+  end subroutine history_output_open
+
+  !> Begin a table, or go on with it behind the step of the simulation. Rank 0 writes, and may fail.
+  subroutine open_table(table, path, header, simulation, error)
+    type(csv_writer_t), intent(inout) :: table
+    character(len=*), intent(in) :: path, header
+    type(simulation_t), intent(in) :: simulation
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (simulation%comm%rank /= 0) return
+    if (simulation%restarted) then
+      call table%resume(path, header, simulation%step, error)
+    else
+      call table%open(path, header, error)
+    end if
+  end subroutine open_table
+
+  !> Names of the columns, in the order in which `history_output_write` adds their cells.
+  pure function history_header(simulation) result(header)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: header
+    integer :: k
+
+    header = "step,time,contacts,iterations,sweeps,residual,velocity_error,velocity_scale,jump,max_overlap,"// &
+      & "kinetic_energy,wall_seconds,interface_bodies,converged,grains,left,fast,listed,divided,projected,"// &
+      & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds"
+    if (simulation%config%solver%sleeping) header = header//",sleeping,woken"
+    do k = 1, simulation%diagnostics%n_columns
+      if (simulation%diagnostics%in_history(k)) header = header//","//trim(simulation%diagnostics%name(k))
+    end do
+  end function history_header
+
+  !> Write the row of a step, on rank 0.
+  subroutine history_output_write(self, simulation, figures, seconds, error)
+    class(history_output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    real(dp), intent(in) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    if (simulation%comm%rank /= 0) return
+    associate (table => self%table, solve => figures%solve, sharing => figures%sharing)
+      call table%add(simulation%step)
+      call table%add(simulation%time)
+      call table%add(figures%contacts)
+      call table%add(solve%iterations)
+      call table%add(solve%iterations*simulation%config%solver%sweeps)
+      call table%add(solve%residual)
+      call table%add(solve%velocity_error)
+      call table%add(solve%velocity_scale)
+      call table%add(solve%jump)
+      call table%add(figures%max_overlap)
+      call table%add(figures%kinetic_energy)
+      call table%add(seconds)
+      call table%add(sharing%bodies)
+      call table%add(merge(1, 0, solve%status == solve_converged))
+      call table%add(simulation%n_grains)
+      call table%add(figures%left)
+      call table%add(figures%fast)
+      call table%add(merge(1, 0, figures%listed))
+      call table%add(merge(1, 0, figures%divided))
+      call table%add(merge(1, 0, figures%projected))
+      call table%add(sharing%neighbours)
+      call table%add(sharing%values)
+      call table%add(sharing%most_neighbours)
+      call table%add(sharing%most_values)
+      call table%add(sharing%ghosts)
+      call table%add(solve%seconds)
+      if (simulation%config%solver%sleeping) then
+        call table%add(figures%asleep)
+        call table%add(merge(1, 0, solve%woken))
+      end if
+      do k = 1, simulation%diagnostics%n_columns
+        if (simulation%diagnostics%in_history(k)) call table%add(simulation%diagnostics%value(k))
+      end do
+      call table%end_row(error)
+    end associate
+  end subroutine history_output_write
+
+  subroutine history_output_finish(self, error)
+    class(history_output_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%table%close(error)
+  end subroutine history_output_finish
+
+end module gravier_history_output

@@ -1,0 +1,164 @@
+!> The files of a run for ParaView: bodies.vtkhdf, a point a grain, and contacts.vtkhdf, a line a contact.
+module gravier_picture_output
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_schedule, only: schedule_t
+  use gravier_field_list, only: field_list_t
+  use gravier_vtkhdf_file, only: vtkhdf_file_t, points_name
+  use gravier_config_types, only: config_t
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_body_collector, only: collect_bodies
+  use gravier_contact_collector, only: collect_contacts
+  use gravier_output, only: output_t, of_states
+  implicit none
+  private
+  public :: picture_output_t
+
+  type, extends(output_t) :: picture_output_t
+    private
+    type(vtkhdf_file_t) :: bodies, contacts
+  contains
+    procedure, nopass :: wanted => picture_output_wanted
+    procedure :: open => picture_output_open
+    procedure :: write => picture_output_write
+    procedure :: finish => picture_output_finish
+  end type picture_output_t
+
+  character(len=*), parameter :: bodies_name = "bodies.vtkhdf", contacts_name = "contacts.vtkhdf"
+  !> what is asked of bodies, and of contacts
+  character(len=9), parameter :: body_fields(6) = [character(len=9) :: "position", "subdomain", "radius", "velocity", "mass", &
+    & "material"]
+  character(len=16), parameter :: contact_fields(5) = [character(len=16) :: points_name, "normal_force", "tangential_force", &
+    & "gap", "status"]
+
+contains
+
+  pure logical function picture_output_wanted(config) result(wanted)
+    type(config_t), intent(in) :: config
+    wanted = config%output%vtk
+  end function picture_output_wanted
+
+  !> Create the files, or go on with those of a run that was interrupted. Collective.
+  subroutine picture_output_open(self, simulation, directory, command, error)
+    class(picture_output_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: directory, command
+    type(error_t), allocatable, intent(inout) :: error
+    type(field_list_t) :: table
+    integer(i8) :: states, bodies
+
+    associate (unused => command)
+    end associate
+    self%stage = of_states
+    if (simulation%restarted) self%last = simulation%last_written
+    states = 2
+    associate (output => simulation%config%output)
+      self%schedule = schedule_t(every=output%every, last=simulation%config%time%steps)
+      if (output%every > 0) states = states + simulation%config%time%steps/output%every
+      bodies = max(simulation%n_grains, 1_i8)
+      call draw_bodies(simulation, table)
+      call open_one(self%bodies, simulation, directory//bodies_name, table, states*bodies, error)
+      if (.not. output%contacts) return
+      ! a dense packing has about two contacts a disk, three a sphere
+      call describe_contacts(table)
+      call open_one(self%contacts, simulation, directory//contacts_name, table, states*bodies*simulation%decomposition%nd, error)
+    end associate
+  end subroutine picture_output_open
+
+  !> Create a file, or go on with it.
+  subroutine open_one(file, simulation, path, table, expected, error)
+    type(vtkhdf_file_t), intent(inout) :: file
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: path
+    !> with the fields of the file
+    type(field_list_t), intent(in) :: table
+    !> rows of all states together, about
+    integer(i8), intent(in) :: expected
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (simulation%restarted) then
+      call file%reopen(simulation%comm, path, table, expected, simulation%step, error)
+    else
+      call file%open(simulation%comm, path, table, expected, error)
+    end if
+  end subroutine open_one
+
+  !> Write the present state; its contacts too, where they are known: not at the start. Collective.
+  subroutine picture_output_write(self, simulation, figures, seconds, error)
+    class(picture_output_t), intent(inout) :: self
+    type(simulation_t), intent(inout) :: simulation
+    type(step_figures_t), intent(in) :: figures
+    real(dp), intent(in) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+    type(field_list_t) :: table
+
+    associate (unused => figures, unused_seconds => seconds)
+    end associate
+    call draw_bodies(simulation, table)
+    call self%bodies%write_step(simulation%step, simulation%time, table, error)
+    if (.not. (simulation%config%output%contacts .and. allocated(simulation%problem%sub))) return
+    call collect_contacts(simulation, contact_fields, table)
+    call self%contacts%write_step(simulation%step, simulation%time, table, error)
+  end subroutine picture_output_write
+
+  !> Collective.
+  subroutine picture_output_finish(self, error)
+    class(picture_output_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    call self%bodies%close(error)
+    call self%contacts%close(error)
+  end subroutine picture_output_finish
+
+  !> Grains of this rank as points, with vectors of three components; in 2D in the plane z = 0.
+  subroutine draw_bodies(simulation, table)
+    type(simulation_t), intent(in) :: simulation
+    type(field_list_t), intent(out) :: table
+    type(field_list_t) :: bodies
+    real(dp), allocatable :: points(:, :), velocity(:, :), spin(:, :)
+    integer(i8), allocatable :: id(:, :)
+    integer :: n, nd
+
+    call collect_bodies(simulation, bodies, body_fields)
+    n = bodies%n_items()
+    nd = simulation%decomposition%nd
+    allocate (points(3, n), velocity(3, n), spin(3, n), source=0.0_dp)
+    points(1:nd, :) = bodies%field(bodies%place("position"))%value
+    associate (v => bodies%field(bodies%place("velocity"))%value)
+      velocity(1:nd, :) = v(1:nd, :)
+      ! in 2D about z
+      spin(merge(3, 1, nd == 2):3, :) = v(nd + 1:, :)
+    end associate
+    id = bodies%key
+    call table%init("bodies", "id", n)
+    table%key(:, :) = bodies%key
+    call table%add_reals(points_name, "m", points)
+    call table%add_whole("id", "", id)
+    call table%add_whole("subdomain", "", bodies%field(bodies%place("subdomain"))%whole)
+    call table%add_reals("radius", "m", bodies%field(bodies%place("radius"))%value)
+    call table%add_reals("velocity", "m/s", velocity)
+    call table%add_reals("spin", "rad/s", spin)
+    call table%add_reals("mass", "kg", bodies%field(bodies%place("mass"))%value)
+    call table%add_whole("material", "", bodies%field(bodies%place("material"))%whole)
+  end subroutine draw_bodies
+
+  !> The fields of contacts, without a contact: there is none before the first step.
+  subroutine describe_contacts(table)
+    type(field_list_t), intent(out) :: table
+    real(dp), allocatable :: value(:, :)
+    integer(i8), allocatable :: whole(:, :)
+    integer :: k
+
+    call table%init("contacts", "candidate antagonist", 0)
+    do k = 1, size(contact_fields)
+      if (contact_fields(k) == "status") then
+        allocate (whole(1, 0))
+        call table%add_whole(trim(contact_fields(k)), "", whole)
+      else
+        allocate (value(merge(6, 1, contact_fields(k) == points_name), 0))
+        call table%add_reals(trim(contact_fields(k)), "", value)
+      end if
+    end do
+  end subroutine describe_contacts
+
+end module gravier_picture_output
