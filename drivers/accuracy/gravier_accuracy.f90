@@ -8,7 +8,7 @@ program gravier_accuracy
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_command_line, only: argument, leave
-  use gravier_run_log, only: banner_text
+  use gravier_start_lines, only: banner_text
   use gravier_drawing, only: draw_figure
   use gravier_accuracy_study, only: study_t, read_study
   use gravier_accuracy_measure, only: case_run_t, case_solve_t, check_scenes, measure_runs, measure_solves

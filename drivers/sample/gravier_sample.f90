@@ -13,7 +13,8 @@ program gravier_sample
   use gravier_command_line, only: argument, leave
   use gravier_config, only: config_t
   use gravier_run, only: read_config
-  use gravier_run_log, only: run_log_t, banner_text
+  use gravier_run_log, only: run_log_t
+  use gravier_start_lines, only: banner_text
   use gravier_sample_bodies, only: make_sample
   use gravier_sample_preparation, only: prepare_sample, open_log
   implicit none

@@ -7,7 +7,7 @@ module gravier_program
     & leave
   use gravier_config, only: write_key_reference
   use gravier_run, only: run_case, check_case, report_error
-  use gravier_run_log, only: banner_text
+  use gravier_start_lines, only: banner_text
   implicit none
   private
   public :: run_program

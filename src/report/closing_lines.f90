@@ -1,0 +1,169 @@
+!> What the log of a run ends with: times by phase, the work of the solver, energies and costs, and a summary in words.
+module gravier_closing_lines
+  use gravier_kinds, only: dp, i8
+  use gravier_text, only: to_text
+  use gravier_communicator, only: communicator_t
+  use gravier_timers, only: gather_timers, phase_names, n_phases
+  use gravier_scheme, only: work_t
+  use gravier_descent, only: effort_t, tenfold
+  use gravier_energy_balance, only: energy_balance_t
+  use gravier_simulation, only: simulation_t
+  use gravier_memory_report, only: peak_memory
+  use gravier_run_summary, only: converged_text, time_text, halving_text
+  use gravier_accuracy_lines, only: goal_name
+  use gravier_step_lines, only: balance_text
+  implicit none
+  private
+  public :: phase_lines, work_lines, cost_lines, summary_lines
+
+  character(len=*), parameter :: newline = new_line("a")
+
+contains
+
+  !> Table of the times by phase over the ranks, and the mean times. Collective.
+  function phase_lines(comm, seconds, mean) result(text)
+    type(communicator_t), intent(in) :: comm
+    !> wall time of the run [s]
+    real(dp), intent(in) :: seconds
+    !> over the ranks [s]
+    real(dp), intent(out) :: mean(n_phases)
+    character(len=:), allocatable :: text
+    real(dp) :: least(n_phases), most(n_phases)
+    character(len=100) :: row
+    integer :: p
+
+    call gather_timers(comm, mean, least, most)
+    text = "phase                         mean [s]     min [s]     max [s]   share"//newline
+    do p = 1, n_phases
+      write (row, "(a28,3f12.4,f7.1,' %')") phase_names(p), mean(p), least(p), most(p), 100.0_dp*mean(p)/max(seconds, tiny(seconds))
+      text = text//trim(row)//newline
+    end do
+    write (row, "(a28,f12.4)") "whole run                   ", seconds
+    text = text//trim(row)//newline
+  end function phase_lines
+
+  !> What the solver did, and what it took of memory and messages. Collective.
+  function work_lines(comm, simulation) result(text)
+    type(communicator_t), intent(in) :: comm
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    type(work_t) :: work
+    integer(i8) :: counts(5)
+    real(dp) :: ranks, subdomains
+
+    work = simulation%scheme%work_done()
+    counts(1) = work%relaxations
+    counts(2) = work%analyses
+    counts(3) = work%factorisations
+    counts(4) = simulation%messages
+    counts(5) = simulation%values
+    call comm%sum_counts(counts)
+    text = "solver      "//to_text(work%solves)//" solves, "//to_text(work%iterations)//" iterations, "// &
+      & to_text(work%sweeps)//" sweeps, "//to_text(counts(1))//" contact relaxations"//newline// &
+      & "interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
+      & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
+      & " factorisations"//newline
+    if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
+      & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance"//newline
+    if (simulation%scheme%direction_text /= "") text = text//"direction   "//simulation%scheme%direction_text//"; lowered "// &
+      & to_text(work%lowered)//" times"//newline
+    if (work%shortened + work%put_off > 0) text = text//"momentum    memory shortened "//to_text(work%shortened)// &
+      & " times, put off "//to_text(work%put_off)//" times"//newline
+    if (work%relaxed > 0) text = text//"relaxation  lowered "//to_text(work%relaxed)//" times, to "// &
+      & to_text(work%least_factor, 3)//" at least"//newline
+    if (simulation%decomposition%n_subdomains > 1) then
+      call simulation%scheme%measure_balance(comm, simulation%decomposition%n_subdomains, ranks, subdomains)
+      text = text//"balance     "//balance_text(ranks, subdomains)//" of the mean since the last partition"//newline
+    end if
+    text = text//"lists       made "//to_text(simulation%neighbourhoods%builds)//" times"//newline// &
+      & "memory      at most "//to_text(nint(comm%highest(peak_memory())))//" MiB on a rank"//newline// &
+      & "messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB"//newline
+  end function work_lines
+
+  !> How far energies balance, what the solves took, and what they would have taken with other tolerances. Collective.
+  function cost_lines(comm, simulation) result(text)
+    type(communicator_t), intent(in) :: comm
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    real(dp) :: least, most
+
+    associate (effort => simulation%effort)
+      text = "            "//energy_text(simulation)//newline// &
+        & "cost        "//to_text(comm%highest(effort%seconds), 3)//" s in "//to_text(effort%solves)//" solves of "// &
+        & to_text(effort%iterations)//" iterations in all"//newline
+      if (effort%iterations == 0) return
+      call effort%looser_range(least, most)
+      text = text//"            at ten times the "//goal_name(simulation)//" "//estimate_text(comm, effort, least, most)
+      if (effort%unreached(tenfold) > 0) text = text//": "//to_text(effort%unreached(tenfold))//" solves did not reach that"
+      call effort%tighter_range(least, most)
+      text = text//newline//"            at a tenth of the "//goal_name(simulation)//" "//estimate_text(comm, effort, least, most)
+      if (simulation%failed > 0) then
+        text = text//": "//to_text(simulation%failed)//" solves did not reach the "//goal_name(simulation)//" itself"
+      else if (least < 0.0_dp) then
+        text = text//": solves do not show how errors decay"
+      else
+        text = text//", if solves get there"
+      end if
+      text = text//newline
+    end associate
+  end function cost_lines
+
+  !> How far energies balance: of the whole scene where its terms are measured, else of the grains.
+  function energy_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    real(dp) :: off, turnover
+    integer :: place
+
+    off = simulation%balance%error()
+    turnover = simulation%balance%turnover()
+    place = simulation%diagnostics%place("energy")
+    if (place > 0) then
+      select type (energy => simulation%diagnostics%asked(place)%item)
+      type is (energy_balance_t)
+        off = energy%error()
+        turnover = energy%turnover()
+      end select
+    end if
+    text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
+  end function energy_text
+
+  !> What so many iterations would have taken. Collective.
+  function estimate_text(comm, effort, least, most) result(text)
+    type(communicator_t), intent(in) :: comm
+    type(effort_t), intent(in) :: effort
+    real(dp), intent(in) :: least, most
+    character(len=:), allocatable :: text
+    real(dp) :: seconds(2)
+
+    text = "not known"
+    if (least < 0.0_dp) return
+    seconds(1) = comm%highest(effort%seconds_of(least))
+    seconds(2) = comm%highest(effort%seconds_of(most))
+    text = to_text(nint(least, i8))//" to "//to_text(nint(most, i8))//" iterations, "//to_text(seconds(1), 2)//" to "// &
+      & to_text(seconds(2), 2)//" s (estimated)"
+  end function estimate_text
+
+  !> In words, for a person: convergence and time; nothing of a run without a solve. Collective.
+  function summary_lines(comm, simulation, phases, seconds) result(text)
+    type(communicator_t), intent(in) :: comm
+    type(simulation_t), intent(in) :: simulation
+    !> (n_phases), mean over the ranks, and of the run [s]
+    real(dp), intent(in) :: phases(n_phases), seconds
+    character(len=:), allocatable :: text
+    real(dp) :: iterations(3), looser_seconds(3)
+    integer :: k
+
+    text = ""
+    iterations(1) = simulation%effort%looser()
+    call simulation%effort%looser_range(iterations(2), iterations(3))
+    do k = 1, size(iterations)
+      looser_seconds(k) = comm%highest(simulation%effort%seconds_of(iterations(k)))
+    end do
+    if (simulation%effort%solves == 0) return
+    text = "converged   "//converged_text(simulation)//newline// &
+      & "time        "//time_text(phases, seconds, simulation%effort%solves)//newline// &
+      & "to halve it "//halving_text(simulation, phases, seconds, looser_seconds)//newline
+  end function summary_lines
+
+end module gravier_closing_lines
