@@ -1,0 +1,142 @@
+!> Whether a checkpoint is one of the scene that an input file makes now: the options in force that must not change.
+module gravier_checkpoint_scene
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_checkpoint_file, only: checkpoint_file_t
+  use gravier_time_table, only: time_table_t
+  use gravier_config, only: write_active
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: check_scene, check_steps, fixed_options
+
+  character(len=*), parameter :: newline = achar(10)
+  !> groups of the input that a run must go on with as it began
+  character(len=*), parameter :: fixed_groups = "&scene &boundary &sample &material &law"
+
+contains
+
+  !> Refuse a checkpoint of another scene, naming the first option that differs.
+  subroutine check_scene(simulation, file, path, error)
+    type(simulation_t), intent(in) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: before
+    integer(i8) :: subdomains, grains
+    real(dp) :: h, theta, radius
+
+    call file%read_text("scene", before, error)
+    call file%read_scalar("subdomains", subdomains, error)
+    call file%read_scalar("time_step", h, error)
+    call file%read_scalar("theta", theta, error)
+    call file%read_scalar("grains_at_start", grains, error)
+    call file%read_scalar("mean_radius_at_start", radius, error)
+    if (allocated(error)) return
+    associate (config => simulation%config)
+      call expect(subdomains == config%decomposition%subdomains, "&decomposition subdomains", to_text(subdomains))
+      call expect(.not. abs(h - config%time%step) > 0.0_dp, "&time step", to_text(h))
+      call expect(.not. abs(theta - config%time%theta) > 0.0_dp, "&time theta", to_text(theta))
+      if (.not. allocated(error)) call compare_options(path, before, fixed_options(simulation), config%file, error)
+    end associate
+    if (allocated(error)) return
+    if (grains /= simulation%n_first .or. abs(radius - simulation%decomposition%rule%mean_radius) > 0.0_dp) call raise(error, &
+      & status_input, path//": the run began with "//to_text(grains)//" grains of mean radius "//to_text(radius)// &
+      & " m; expected the bodies that "//simulation%config%file//" makes now, "//to_text(simulation%n_first)// &
+      & " of mean radius "//to_text(simulation%decomposition%rule%mean_radius)//" m")
+
+  contains
+
+    subroutine expect(holds, option, value)
+      logical, intent(in) :: holds
+      character(len=*), intent(in) :: option, value
+
+      if (.not. holds) call raise(error, status_input, simulation%config%file//": "//option//": expected "//value// &
+        & ", with which "//path//" was written")
+    end subroutine expect
+
+  end subroutine check_scene
+
+  !> Refuse a checkpoint that is beyond the last step of the input.
+  subroutine check_steps(simulation, step, path, error)
+    type(simulation_t), intent(in) :: simulation
+    integer(i8), intent(in) :: step
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error) .or. step <= simulation%config%time%steps) return
+    call raise(error, status_input, simulation%config%file//": &time steps = "//to_text(simulation%config%time%steps)// &
+      & ": expected "//to_text(step)//" at least, the step of "//path)
+  end subroutine check_steps
+
+  !> Fails at the first line that differs between the options of a checkpoint and those of now.
+  subroutine compare_options(path, before, now, input, error)
+    character(len=*), intent(in) :: path, before, now, input
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: line_before, line_now
+    integer :: at_before, at_now
+
+    at_before = 1
+    at_now = 1
+    do while (at_before <= len(before) .or. at_now <= len(now))
+      call next_line(before, at_before, line_before)
+      call next_line(now, at_now, line_now)
+      if (line_before == line_now) cycle
+      call raise(error, status_input, input//": the scene is not that of "//path//": "//trim(adjustl(line_now))// &
+        & ": expected "//trim(adjustl(line_before)))
+      return
+    end do
+  end subroutine compare_options
+
+  pure subroutine next_line(text, at, line)
+    character(len=*), intent(in) :: text
+    integer, intent(inout) :: at
+    character(len=:), allocatable, intent(out) :: line
+    integer :: length
+
+    if (at > len(text)) then
+      line = "(nothing)"
+      return
+    end if
+    length = index(text(at:)//newline, newline) - 1
+    line = text(at:at + length - 1)
+    at = at + length + 1
+  end subroutine next_line
+
+  !> The options in force that must not change, a line each, and what tells contents of tables apart.
+  function fixed_options(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: options, line
+    integer :: at, b
+    logical :: fixed
+
+    call write_active(options, simulation%config)
+    text = ""
+    fixed = .false.
+    at = 1
+    do while (at <= len(options))
+      call next_line(options, at, line)
+      if (line(1:min(1, len(line))) == "&") fixed = index(fixed_groups//" ", line//" ") > 0
+      ! starts are over
+      if (index(line, "  title = ") == 1 .or. index(line, "  start_overlap = ") == 1) cycle
+      if (fixed) text = text//line//newline
+    end do
+    call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
+    do b = 1, size(simulation%config%boundaries)
+      call add_table(simulation%decomposition%boundaries(simulation%n_walls + b)%table, trim(simulation%config%boundaries(b)%table))
+    end do
+
+  contains
+
+    subroutine add_table(table, path)
+      type(time_table_t), intent(in) :: table
+      character(len=*), intent(in) :: path
+
+      if (allocated(table%has)) text = text//"contents of "//path//", digest "//to_text(table%digest())//newline
+    end subroutine add_table
+
+  end function fixed_options
+
+end module gravier_checkpoint_scene

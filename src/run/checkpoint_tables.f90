@@ -1,0 +1,253 @@
+!> The tables of a checkpoint by subdomain: grains, impulses and states of pairs, cells of the partition; and the boundaries.
+module gravier_checkpoint_tables
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_checkpoint_file, only: checkpoint_file_t
+  use gravier_narrow, only: narrow, take_count
+  use gravier_body_store, only: body_layout_t, place_word
+  use gravier_boundary, only: boundary_t, boundary_words
+  use gravier_neighbour_list, only: pair_memory_t
+  use gravier_impulse_memory, only: list_impulses, match_impulses
+  use gravier_partition, only: head_words, is_sound_head
+  use gravier_magnitude, only: is_bounded, bounded_text
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: save_tables, load_partition, load_grains, pack_boundaries
+
+contains
+
+  pure subroutine pack_boundaries(boundaries, words)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer(i8), allocatable, intent(out) :: words(:)
+    integer :: b
+
+    allocate (words(boundary_words*size(boundaries)))
+    do b = 1, size(boundaries)
+      call boundaries(b)%get_state(words((b - 1)*boundary_words + 1:b*boundary_words))
+    end do
+  end subroutine pack_boundaries
+
+  pure subroutine unpack_boundaries(words, boundaries)
+    type(boundary_t), intent(inout) :: boundaries(:)
+    integer(i8), intent(in) :: words(boundary_words*size(boundaries))
+    integer :: b
+
+    do b = 1, size(boundaries)
+      call boundaries(b)%set_state(words((b - 1)*boundary_words + 1:b*boundary_words))
+    end do
+  end subroutine unpack_boundaries
+
+  !> By subdomain: the grains where they were when the lists were made, each with its place now; the impulses and states; the
+  !> cells.
+  subroutine save_tables(simulation, file, error)
+    type(simulation_t), intent(in) :: simulation
+    type(checkpoint_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), own(:, :), counts(:), map(:)
+    integer :: s, n, k, n_subdomains
+
+    n_subdomains = simulation%decomposition%n_subdomains
+    associate (home => simulation%decomposition%home)
+      allocate (counts(size(home)))
+      call pack_grains(simulation, records, counts)
+      call file%write_table("grains", n_subdomains, records, counts, error)
+      if (simulation%neighbourhoods%builds > 0) then
+        do s = 1, size(home)
+          counts(s) = simulation%neighbourhoods%view(s)%list%n_kept()
+        end do
+        deallocate (records)
+        allocate (records(2 + simulation%neighbourhoods%memory%words(), sum(counts)))
+        n = 0
+        do s = 1, size(home)
+          call list_impulses(simulation%neighbourhoods%view(s), 0, own)
+          records(:, n + 1:n + size(own, 2)) = own
+          n = n + size(own, 2)
+        end do
+        call file%write_table("impulses", n_subdomains, records, counts, error)
+      end if
+      deallocate (records)
+      do s = 1, size(home)
+        call simulation%decomposition%partition%get_map(simulation%decomposition%subdomain_of(s), map)
+        counts(s) = size(map)
+      end do
+      allocate (records(1, sum(counts)))
+      n = 0
+      do s = 1, size(home)
+        call simulation%decomposition%partition%get_map(simulation%decomposition%subdomain_of(s), map)
+        do k = 1, size(map)
+          records(1, n + k) = map(k)
+        end do
+        n = n + size(map)
+      end do
+      call file%write_table("cells", n_subdomains, records, counts, error)
+    end associate
+  end subroutine save_tables
+
+  subroutine pack_grains(simulation, records, counts)
+    type(simulation_t), intent(in) :: simulation
+    !> (words of a grain + nd, grains): its place is that of the lists, the last words are its place now
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    !> (subdomains of this rank)
+    integer(i8), intent(out) :: counts(:)
+    type(body_layout_t) :: layout
+    integer :: s, k, n, d, words, nd
+
+    nd = simulation%decomposition%nd
+    layout = simulation%decomposition%layout()
+    words = layout%record_words()
+    associate (home => simulation%decomposition%home)
+      do s = 1, size(home)
+        counts(s) = home(s)%n
+      end do
+      allocate (records(words + nd, sum(counts)))
+      n = 0
+      do s = 1, size(home)
+        do k = 1, home(s)%n
+          n = n + 1
+          call home(s)%get_record(k, records(1:words, n))
+          do d = 1, nd
+            records(words + d, n) = transfer(home(s)%position(d, k), 0_i8)
+            if (simulation%neighbourhoods%builds > 0) records(place_word - 1 + d, n) = &
+              & transfer(simulation%neighbourhoods%reference(s)%position(d, k), 0_i8)
+          end do
+        end do
+      end do
+    end associate
+  end subroutine pack_grains
+
+  subroutine load_partition(simulation, file, path, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: head(:), records(:, :), counts(:), words(:)
+    integer, allocatable :: lengths(:)
+
+    call file%read_array("partition", head_words, huge(head_words), head, error)
+    call file%read_table("cells", simulation%decomposition%n_subdomains, 1, records, counts, error)
+    if (allocated(error)) return
+    if (.not. is_sound_head(head, simulation%decomposition%nd, simulation%decomposition%n_subdomains)) &
+      & call raise(error, status_input, path//": the array partition is none of this scene in "// &
+      & to_text(simulation%decomposition%n_subdomains)//" subdomains: the file is damaged")
+    if (allocated(error)) return
+    words = records(1, :)
+    lengths = narrow(counts)
+    call simulation%decomposition%partition%restore(simulation%comm, head, words, lengths)
+  end subroutine load_partition
+
+  !> Grains into their homes as when the lists were made, then the lists with their impulses, then everything to where it
+  !> was when the checkpoint was written.
+  subroutine load_grains(simulation, file, path, builds, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: builds
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:)
+    type(body_layout_t) :: layout
+    integer :: s, k, n, d, nd, n_words, n_boundary
+
+    associate (decomposition => simulation%decomposition)
+      nd = decomposition%nd
+      layout = decomposition%layout()
+      n_words = layout%record_words()
+      n_boundary = boundary_words*size(decomposition%boundaries)
+      call file%read_table("grains", decomposition%n_subdomains, n_words + nd, records, counts, error)
+      if (builds > 0) call file%read_array("boundaries_when_listed", n_boundary, n_boundary, words, error)
+      call file%read_array("boundaries", n_boundary, n_boundary, now, error)
+      if (builds > 0 .and. .not. allocated(error)) call check_reals(path//": the array boundaries_when_listed", words, error)
+      if (.not. allocated(error)) call check_reals(path//": the array boundaries", now, error)
+      if (.not. allocated(error)) call check_grains(simulation, path, records, error)
+      call simulation%comm%agree(error)
+      if (allocated(error)) return
+      n = 0
+      do s = 1, size(decomposition%home)
+        call decomposition%home(s)%init(nd, decomposition%nv, decomposition%ni, narrow(counts(s)))
+        do k = 1, decomposition%home(s)%n
+          call decomposition%home(s)%set_record(k, records(1:n_words, n + k))
+        end do
+        n = n + decomposition%home(s)%n
+      end do
+      if (builds > 0) then
+        call unpack_boundaries(words, decomposition%boundaries)
+        call simulation%neighbourhoods%build(decomposition)
+        simulation%neighbourhoods%builds = builds
+        call load_impulses(simulation, file, path, error)
+      end if
+      n = 0
+      do s = 1, size(decomposition%home)
+        do k = 1, decomposition%home(s)%n
+          do d = 1, nd
+            decomposition%home(s)%position(d, k) = transfer(records(n_words + d, n + k), 0.0_dp)
+          end do
+        end do
+        n = n + decomposition%home(s)%n
+      end do
+      call unpack_boundaries(now, decomposition%boundaries)
+    end associate
+  end subroutine load_grains
+
+  !> Refuse grains of a file that no scene has. Errors may differ between ranks.
+  subroutine check_grains(simulation, path, records, error)
+    type(simulation_t), intent(in) :: simulation
+    character(len=*), intent(in) :: path
+    !> (words of a grain and its place now, grains of this rank)
+    integer(i8), intent(in), contiguous :: records(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    type(body_layout_t) :: layout
+    character(len=:), allocatable :: field
+    integer :: k
+
+    layout = simulation%decomposition%layout()
+    do k = 1, size(records, 2)
+      field = layout%invalid_field(records(:, k), size(simulation%decomposition%boundaries), size(simulation%config%materials))
+      if (len(field) > 0) call raise(error, status_input, path//": table grains: grain "//to_text(records(1, k))// &
+        & " has a value of "//field//" that no grain has: the file is damaged")
+      call check_reals(path//": table grains: grain "//to_text(records(1, k)), records(layout%record_words() + 1:, k), error)
+      if (allocated(error)) return
+    end do
+  end subroutine check_grains
+
+  !> Refuse reals of a file that are none to reckon with.
+  subroutine check_reals(what, words, error)
+    !> file and place, for the message
+    character(len=*), intent(in) :: what
+    integer(i8), intent(in) :: words(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    do k = 1, size(words)
+      if (is_bounded(transfer(words(k), 0.0_dp))) cycle
+      call raise(error, status_input, what//": "//bounded_text//" was expected: the file is damaged")
+      return
+    end do
+  end subroutine check_reals
+
+  subroutine load_impulses(simulation, file, path, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), counts(:)
+    integer(i8) :: n_impulse, law_row, rest_row
+    type(pair_memory_t) :: kept
+    integer :: s, n
+
+    call file%read_scalar("impulse_entries", n_impulse, error)
+    call file%read_scalar("law_row", law_row, error)
+    call file%read_scalar("rest_row", rest_row, error)
+    call take_count(n_impulse, path//": impulse_entries", kept%n_impulse, error)
+    call take_count(law_row, path//": law_row", kept%law_row, error)
+    call take_count(rest_row, path//": rest_row", kept%rest_row, error)
+    call file%read_table("impulses", simulation%decomposition%n_subdomains, 2 + kept%words(), records, counts, error)
+    if (allocated(error)) return
+    n = 0
+    do s = 1, size(simulation%neighbourhoods%view)
+      call match_impulses(records(:, n + 1:n + narrow(counts(s))), kept, simulation%neighbourhoods%view(s))
+      n = n + narrow(counts(s))
+    end do
+  end subroutine load_impulses
+
+end module gravier_checkpoint_tables
