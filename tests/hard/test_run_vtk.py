@@ -75,6 +75,8 @@ class Pictures(RunTestCase):
                 self.assertLess(np.abs(found[name][:, :d] - values).max(), SINGLE)
                 self.assertTrue(np.all(found[name][:, d:] == 0.0))
             self.assertLess(np.abs(found["radius"] - expected.radius).max(), SINGLE)
+            self.assertLess(np.abs(found["mass"] - expected.mass).max(), SINGLE * expected.mass.max())
+            self.assertTrue(np.array_equal(found["material"], expected.material))
             self.assertLess(np.abs(found["spin"][:, 2:] - expected.spin[:, -1:]).max(), 1e-4 * max(np.abs(expected.spin).max(), 1.0))
             self.assertEqual(set(found["subdomain"]) - {1, 2, 3, 4}, set())
             if step not in contacts:

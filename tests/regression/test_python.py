@@ -72,6 +72,10 @@ class Package(RunTestCase):
         with h5py.File(run.path) as file:
             for step in run.steps:
                 self.assertTrue(np.array_equal(run.bodies(step).position, file[f"steps/{step}/bodies/position"]))
+            bodies = run.bodies()
+            self.assertTrue(np.array_equal(bodies.mass, file["steps/300/bodies/mass"]))
+            self.assertLess(np.abs(bodies.mass / (2500.0 * math.pi * bodies.radius**2) - 1.0).max(), 1e-14)
+            self.assertTrue(np.array_equal(bodies.material, np.ones(36)), "without a &material all are of the first")
             velocity = file["steps/300/bodies/velocity"][:]
             self.assertTrue(np.array_equal(np.hstack([run.bodies().velocity, run.bodies().spin]), velocity))
             self.assertTrue(np.array_equal(run.contacts().impulse, file["steps/300/contacts/impulse"]))

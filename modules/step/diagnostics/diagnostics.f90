@@ -28,6 +28,7 @@ module gravier_diagnostics
     real(dp), allocatable :: value(:)
   contains
     procedure :: init => diagnostics_init
+    procedure :: take => diagnostics_take
     procedure :: take_step => diagnostics_take_step
     procedure :: measure => diagnostics_measure
     procedure :: place => diagnostics_place
@@ -49,10 +50,10 @@ contains
     type(diagnostic_holder_t), allocatable :: all_kinds(:)
 
     call registered_diagnostics(all_kinds)
-    call diagnostics_take(self, decomposition, all_kinds, asked)
+    call self%take(decomposition, all_kinds, asked)
   end subroutine diagnostics_init
 
-  !> Take over those of a list that are asked for.
+  !> Take over those of a list that are asked for, of a scene as it starts. Collective.
   subroutine diagnostics_take(self, decomposition, list, asked)
     class(diagnostics_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
