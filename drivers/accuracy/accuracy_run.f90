@@ -131,7 +131,7 @@ contains
     real(dp), allocatable, intent(inout) :: total(:, :)
 
     associate (diagnostics => simulation%diagnostics)
-      select type (measured => diagnostics%asked(diagnostics%place("stress"))%item)
+      select type (measured => diagnostics%asked(diagnostics%place("stress"))%diagnostic)
       type is (mean_stress_t)
         if (.not. allocated(total)) then
           allocate (total, mold=measured%stress)

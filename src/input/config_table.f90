@@ -386,7 +386,7 @@ contains
     call add(output_keys)
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
-      associate (features => diagnostics(k)%item%features())
+      associate (features => diagnostics(k)%diagnostic%features())
         row(1) = key_t("output", features%key, kind_logical, ".false.", "", features%meaning)
       end associate
       call add(row)

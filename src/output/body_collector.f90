@@ -49,7 +49,7 @@ contains
     type(simulation_t), intent(in) :: simulation
     type(body_field_t), intent(in) :: field
     type(field_list_t), intent(inout) :: table
-    real(dp), allocatable :: value(:, :)
+    real(dp), allocatable :: value(:, :), written(:, :)
     integer(i8), allocatable :: whole(:, :)
     integer :: s, first, last
     logical :: scalar
@@ -65,7 +65,11 @@ contains
       associate (home => simulation%decomposition%home(s))
         first = last + 1
         last = last + home%n
-        if (field%whole) then
+        if (field%written > 0) then
+          call home%get_written(field%written, written)
+          if (field%whole) whole(:, first:last) = nint(written, i8)
+          if (.not. field%whole) value(:, first:last) = written
+        else if (field%whole) then
           call take_whole_field(home, field%name, simulation%decomposition%subdomain_of(s), whole(:, first:last))
         else
           call take_real_field(home, field%name, value(:, first:last))

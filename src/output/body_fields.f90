@@ -1,8 +1,8 @@
-!> The fields of a body that files may have: the one list of their names, units and shapes, and the one place that takes their
-!> values from where grains are held.
+!> The fields of a body that files may have: those that every file has in a shape of its own, and those that the table of fields in
+!> body_store.fypp marks as written, which need no line here.
 module gravier_body_fields
   use gravier_kinds, only: dp, i8
-  use gravier_body_store, only: body_set_t
+  use gravier_body_store, only: body_layout_t, body_set_t, written_field_t => body_field_t, written_fields
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
@@ -15,6 +15,8 @@ module gravier_body_fields
     integer :: components = 1
     !> integers, not reals
     logical :: whole = .false.
+    !> its place among the written fields of the table, 0 for the others
+    integer :: written = 0
     !> results.h5 has it
     logical :: in_results = .true.
   end type body_field_t
@@ -25,22 +27,43 @@ contains
   pure subroutine list_body_fields(decomposition, fields)
     type(decomposition_t), intent(in) :: decomposition
     type(body_field_t), allocatable, intent(out) :: fields(:)
-    integer :: nd
+    type(written_field_t), allocatable :: written(:)
+    integer :: nd, k
 
     nd = decomposition%nd
-    allocate (fields(7))
+    call written_fields(written)
+    allocate (fields(5 + size(written)))
     fields(1) = body_field_t("position", "m", nd)
     ! 2D vx, vy, omega; 3D vx, vy, vz, wx, wy, wz; spins are 0 where nothing turns a grain
     fields(2) = body_field_t("velocity", "m/s, rad/s", 3*nd - 3)
     fields(3) = body_field_t("radius", "m")
-    fields(4) = body_field_t("mass", "kg")
-    ! its number among the &material groups
-    fields(5) = body_field_t("material", "", whole=.true.)
+    do k = 1, size(written)
+      fields(3 + k) = body_field_t(written(k)%name, written(k)%unit, entries_of(decomposition, written(k)%name), &
+        & written(k)%whole, written=k)
+    end do
+    k = 3 + size(written)
     ! how many periods the centre has gone along each axis
-    fields(6) = body_field_t("image", "", decomposition%ni, whole=.true.)
+    fields(k + 1) = body_field_t("image", "", decomposition%ni, whole=.true.)
     ! the one that holds it, which the results do not depend on
-    fields(7) = body_field_t("subdomain", "", whole=.true., in_results=.false.)
+    fields(k + 2) = body_field_t("subdomain", "", whole=.true., in_results=.false.)
   end subroutine list_body_fields
+
+  !> Numbers of a body in a field of the table.
+  pure integer function entries_of(decomposition, field) result(entries)
+    type(decomposition_t), intent(in) :: decomposition
+    character(len=*), intent(in) :: field
+    type(body_layout_t) :: layout
+    character(len=:), allocatable :: name
+    integer :: f, bytes
+
+    layout = decomposition%layout()
+    f = 0
+    do
+      f = f + 1
+      call layout%describe_field(f, name, bytes, entries)
+      if (name == field .or. len(name) == 0) return
+    end do
+  end function entries_of
 
   !> Reals of the grains of one subdomain.
   pure subroutine take_real_field(grains, name, values)
@@ -57,8 +80,6 @@ contains
       values(grains%nv + 1:, :) = 0.0_dp
     case ("radius")
       values(1, :) = grains%radius
-    case ("mass")
-      values(1, :) = grains%mass
     end select
   end subroutine take_real_field
 
@@ -72,8 +93,6 @@ contains
     integer(i8), intent(out) :: values(:, :)
 
     select case (name)
-    case ("material")
-      values(1, :) = grains%material
     case ("image")
       values(:, :) = grains%image
     case ("subdomain")

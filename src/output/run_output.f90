@@ -40,15 +40,15 @@ contains
     call registered_outputs(all_kinds)
     allocate (wanted(size(all_kinds)))
     do k = 1, size(all_kinds)
-      wanted(k) = all_kinds(k)%item%wanted(simulation%config)
+      wanted(k) = all_kinds(k)%output%wanted(simulation%config)
     end do
     allocate (self%output(count(wanted)))
     n = 0
     do k = 1, size(all_kinds)
       if (.not. wanted(k)) cycle
       n = n + 1
-      call move_alloc(all_kinds(k)%item, self%output(n)%item)
-      call self%output(n)%item%open(simulation, trim(simulation%config%output%directory)//"/", command, error)
+      call move_alloc(all_kinds(k)%output, self%output(n)%output)
+      call self%output(n)%output%open(simulation, trim(simulation%config%output%directory)//"/", command, error)
     end do
     call self%comm%agree(error)
   end subroutine run_output_open
@@ -63,7 +63,7 @@ contains
 
     due = .false.
     do k = 1, size(self%output)
-      associate (item => self%output(k)%item)
+      associate (item => self%output(k)%output)
         due = due .or. (item%stage == stage .and. item%schedule%due(step))
       end associate
     end do
@@ -90,7 +90,7 @@ contains
     wrote = .false.
     if (present(always)) all_due = always
     do k = 1, size(self%output)
-      associate (item => self%output(k)%item)
+      associate (item => self%output(k)%output)
         if (item%stage /= stage .or. item%last == simulation%step) cycle
         if (.not. (all_due .or. item%schedule%due(simulation%step))) cycle
         call item%write(simulation, figures, seconds, error)
@@ -117,7 +117,7 @@ contains
       call self%write(of_end, simulation, none, 0.0_dp, error, always=.true.)
     end if
     do k = 1, size(self%output)
-      call self%output(k)%item%finish(error)
+      call self%output(k)%output%finish(error)
     end do
     call self%comm%agree(error)
   end subroutine run_output_finish

@@ -119,7 +119,7 @@ contains
     turnover = simulation%balance%turnover()
     place = simulation%diagnostics%place("energy")
     if (place > 0) then
-      select type (energy => simulation%diagnostics%asked(place)%item)
+      select type (energy => simulation%diagnostics%asked(place)%diagnostic)
       type is (energy_balance_t)
         off = energy%error()
         turnover = energy%turnover()

@@ -34,7 +34,7 @@ contains
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
-      associate (features => diagnostics(k)%item%features())
+      associate (features => diagnostics(k)%diagnostic%features())
         if (features%n_words > 0) text = text//trim(features%key)//": "//trim(features%record)//", "// &
           & to_text(features%n_words)//" words"//newline
       end associate
@@ -147,11 +147,11 @@ contains
 
     call registered_diagnostics(all_kinds)
     do k = 1, size(all_kinds)
-      associate (features => all_kinds(k)%item%features())
+      associate (features => all_kinds(k)%diagnostic%features())
         if (features%n_words == 0) cycle
         place = diagnostics%place(trim(features%key))
         allocate (words(merge(features%n_words, 0, place > 0)))
-        if (place > 0) call diagnostics%asked(place)%item%get_state(words)
+        if (place > 0) call diagnostics%asked(place)%diagnostic%get_state(words)
         call file%write_array(trim(features%array), words, error)
         deallocate (words)
       end associate
@@ -169,12 +169,12 @@ contains
 
     call registered_diagnostics(all_kinds)
     do k = 1, size(all_kinds)
-      associate (features => all_kinds(k)%item%features())
+      associate (features => all_kinds(k)%diagnostic%features())
         if (features%n_words == 0) cycle
         call file%read_array(trim(features%array), 0, features%n_words, words, error)
         if (allocated(error)) return
         place = diagnostics%place(trim(features%key))
-        if (place > 0 .and. size(words) == features%n_words) call diagnostics%asked(place)%item%set_state(words)
+        if (place > 0 .and. size(words) == features%n_words) call diagnostics%asked(place)%diagnostic%set_state(words)
       end associate
     end do
   end subroutine load_diagnostics

@@ -68,9 +68,9 @@ contains
     do k = 1, size(list)
       if (.not. asked(k)) cycle
       n = n + 1
-      call move_alloc(list(k)%item, self%asked(n)%item)
-      self%asked(n)%features = self%asked(n)%item%features()
-      call self%asked(n)%item%begin(decomposition)
+      call move_alloc(list(k)%diagnostic, self%asked(n)%diagnostic)
+      self%asked(n)%features = self%asked(n)%diagnostic%features()
+      call self%asked(n)%diagnostic%begin(decomposition)
     end do
     call self%fill()
   end subroutine diagnostics_take
@@ -83,7 +83,7 @@ contains
 
     if (.not. allocated(self%asked)) return
     do k = 1, size(self%asked)
-      call self%asked(k)%item%take_step(step)
+      call self%asked(k)%diagnostic%take_step(step)
     end do
   end subroutine diagnostics_take_step
 
@@ -99,7 +99,7 @@ contains
     do k = 1, size(self%asked)
       associate (one => self%asked(k))
         one%measured = written .or. one%features%measures == in_each_step
-        if (one%measured) call one%item%measure(step)
+        if (one%measured) call one%diagnostic%measure(step)
       end associate
     end do
     call self%fill()
@@ -114,7 +114,7 @@ contains
     call move_alloc(self%name, list%name)
     call move_alloc(self%value, list%value)
     do k = 1, size(self%asked)
-      call self%asked(k)%item%columns(list)
+      call self%asked(k)%diagnostic%columns(list)
       self%asked(k)%last = list%n
     end do
     self%n_columns = list%n
@@ -173,7 +173,7 @@ contains
     if (.not. allocated(self%asked)) return
     do k = 1, size(self%asked)
       if (.not. self%asked(k)%measured) cycle
-      call self%asked(k)%item%get_histogram(one)
+      call self%asked(k)%diagnostic%get_histogram(one)
       if (.not. allocated(one)) cycle
       allocate (longer(size(histograms) + 1))
       longer(1:size(histograms)) = histograms

@@ -192,7 +192,7 @@ contains
     type(simulation_t), intent(in) :: sim
 
     associate (diagnostics => sim%diagnostics)
-      select type (item => diagnostics%asked(diagnostics%place("energy"))%item)
+      select type (item => diagnostics%asked(diagnostics%place("energy"))%diagnostic)
       type is (energy_balance_t)
         energy = item
       end select
@@ -203,7 +203,7 @@ contains
     type(simulation_t), intent(in) :: sim
 
     associate (diagnostics => sim%diagnostics)
-      select type (item => diagnostics%asked(diagnostics%place("stress"))%item)
+      select type (item => diagnostics%asked(diagnostics%place("stress"))%diagnostic)
       type is (mean_stress_t)
         stress = item
       end select
@@ -214,7 +214,7 @@ contains
     type(simulation_t), intent(in) :: sim
 
     associate (diagnostics => sim%diagnostics)
-      select type (item => diagnostics%asked(diagnostics%place("structure"))%item)
+      select type (item => diagnostics%asked(diagnostics%place("structure"))%diagnostic)
       type is (contact_structure_t)
         structure = item
       end select

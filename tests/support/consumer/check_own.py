@@ -1,4 +1,4 @@
-"""What a shape and a method of one's own do in a run: check_own.py PROGRAM, in an empty directory."""
+"""What a shape, a method and a diagnostic of one's own do in a run: check_own.py PROGRAM, in an empty directory."""
 import csv
 import subprocess
 import sys
@@ -10,7 +10,7 @@ CASE = """&scene
 &boundary shape = 'capsule', name = 'bar', point = -1.0, 0.0, end = 1.0, 0.0, half_thickness = {thickness} /
 &time step = 1e-3, steps = 200 /
 &solver method = 'two_sweeps' /
-&output directory = 'out', boundary_forces = .true. /
+&output directory = 'out', boundary_forces = .true., fastest = .true. /
 """
 
 
@@ -26,13 +26,17 @@ def run(thickness):
 
 def main():
     keys = subprocess.run([sys.argv[1], "--keys"], capture_output=True, text=True, check=True).stdout
-    assert "'two_sweeps'" in keys and "`half_thickness`" in keys and "'capsule'" in keys, "keys of one's own are listed"
+    assert "'two_sweeps'" in keys and "`half_thickness`" in keys and "'capsule'" in keys and "`fastest`" in keys, "keys of one's own are listed"
     status, words = run(0.05)
     assert status == 0, words
     with open("out/history.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     last = rows[-1]
     assert abs(float(last["force_y:bar"]) + 20.0) < 1e-9, f"the capsule carries the weight: {last['force_y:bar']} N"
+    speeds = [float(row["fastest_grain"]) for row in rows]
+    energies = [float(row["kinetic_energy"]) for row in rows]
+    assert max(speeds) > 0.0 and all(abs(speed**2 - energy) < 1e-12 for speed, energy in zip(speeds, energies)), \
+        "the diagnostic of one's own has the speed of the disk of 2 kg, which does not turn"
     assert sum(int(row["iterations"]) for row in rows) > 0, "the method of one's own solved the impact"
     assert float(last["kinetic_energy"]) < 1e-12, f"the disk rests: {last['kinetic_energy']} J"
     status, words = run(-0.05)
