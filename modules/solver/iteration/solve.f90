@@ -108,6 +108,23 @@ module gravier_solve
     end subroutine look_at
   end interface
 
+  !> What a solve carries along.
+  type :: solve_state_t
+    type(velocity_error_t) :: velocity
+    type(check_schedule_t) :: schedule
+    type(stagnation_t) :: stagnation
+    type(layer_trial_t) :: trial
+    !> the first defect, or the scale of forces where that is larger [N s]
+    real(dp) :: reference = 0.0_dp
+    !> when the solve began, and what its checks have taken [s]
+    real(dp) :: began = 0.0_dp, checking = 0.0_dp
+    !> iteration from which on the defect has been above the reference, -1 where it is not; whether that is too long
+    integer :: exceeded_at = -1
+    logical :: grows = .false.
+    !> the criterion is by_velocity; the first residual was within its tolerance
+    logical :: by_estimate = .false., settled = .false.
+  end type solve_state_t
+
 contains
 
   !> Solve. The state is checked at the start, at the end and in between as gravier_check_schedule says. Collective.
@@ -121,234 +138,302 @@ contains
     !> needed where the criterion is by_error
     class(exact_solution_t), intent(in), optional :: exact
     class(solve_watch_t), intent(inout), optional :: watch
-    type(velocity_error_t) :: velocity
-    type(check_schedule_t) :: schedule
-    type(stagnation_t) :: stagnation
-    type(layer_trial_t) :: trial
-    real(dp) :: reference, began, checking, ignored
-    integer :: exceeded_at
-    logical :: by_estimate, measure, done, settled, anew
+    type(solve_state_t) :: state
+    logical :: measure, done, anew
 
-    began = clock()
-    checking = 0.0_dp
+    call prepare(state, problem, scheme, control, report, error)
+    if (allocated(error)) return
+    call check(state, problem, scheme, control, report, done, exact)
+    state%settled = report%residual <= control%tolerance
+    if (state%by_estimate .and. control%layered) call state%trial%start(problem, report%residual)
+    do while (.not. done)
+      report%iterations = report%iterations + 1
+      measure = state%schedule%calls(problem, scheme, report%iterations, report%goal, state%reference, report%descent)
+      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations .or. &
+        & (state%settled .and. state%by_estimate .and. report%iterations == copies_ready) .or. state%trial%calls(report%iterations)
+      call scheme%iterate(problem, measure, report%jump, error)
+      if (allocated(error)) return
+      if (measure) then
+        call check(state, problem, scheme, control, report, done, exact)
+        if (done) exit
+        call state%trial%advance(problem, scheme, state%velocity, report%iterations, control%accuracy, anew, error)
+        if (allocated(error)) return
+        if (anew) call state%schedule%forget_ratio()
+      end if
+      call state%velocity%keep_copy(problem, scheme, report%iterations)
+      if (present(watch)) call watch%look(report)
+    end do
+    report%layered = state%trial%layered
+    report%layered_sweeps = state%trial%sweeps
+    if (report%status /= solve_converged .and. report%status /= solve_diverged .and. scheme%keeps_best) &
+      & call take_best(state, problem, scheme, control, report, exact)
+    report%seconds = clock() - state%began
+  end subroutine solve_contacts
+
+  !> All that comes before the first check. Collective.
+  subroutine prepare(state, problem, scheme, control, report, error)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    type(error_t), allocatable, intent(inout) :: error
+
+    state%began = clock()
     if (control%trace) allocate (report%trace(n_traced, 64))
-    by_estimate = control%criterion == by_velocity
-    schedule%check_every = control%check_every
-    schedule%chooses = .not. (control%trace .or. control%criterion == by_error)
-    schedule%short_pauses = by_estimate
-    reference = 0.0_dp
-    exceeded_at = -1
-    report%goal = merge(control%accuracy, control%tolerance, by_estimate)
+    state%by_estimate = control%criterion == by_velocity
+    state%schedule%check_every = control%check_every
+    state%schedule%chooses = .not. (control%trace .or. control%criterion == by_error)
+    state%schedule%short_pauses = state%by_estimate
+    report%goal = merge(control%accuracy, control%tolerance, state%by_estimate)
     report%velocity_scale = problem%error_scale
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
     call start_timer(phase_setup)
     call scheme%start(problem, error)
-    if (.not. allocated(error)) call velocity%start(problem, control%accuracy*problem%error_scale)
+    if (.not. allocated(error)) call state%velocity%start(problem, control%accuracy*problem%error_scale)
     call stop_timer(phase_setup)
     if (allocated(error)) return
-    report%start_seconds = clock() - began
-    report%descent%first_check = schedule%first_check(scheme)
-    call check(done)
-    settled = report%residual <= control%tolerance
-    if (by_estimate .and. control%layered) call trial%start(problem, report%residual)
-    do while (.not. done)
-      report%iterations = report%iterations + 1
-      measure = schedule%calls(problem, scheme, report%iterations, report%goal, reference, report%descent)
-      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations .or. &
-        & (settled .and. by_estimate .and. report%iterations == copies_ready) .or. trial%calls(report%iterations)
-      call scheme%iterate(problem, measure, report%jump, error)
-      if (allocated(error)) return
-      if (measure) then
-        call check(done)
-        if (done) exit
-        call trial%advance(problem, scheme, velocity, report%iterations, control%accuracy, anew, error)
-        if (allocated(error)) return
-        if (anew) call schedule%forget_ratio()
-      end if
-      call velocity%keep_copy(problem, scheme, report%iterations)
-      if (present(watch)) call watch%look(report)
-    end do
-    report%layered = trial%layered
-    report%layered_sweeps = trial%sweeps
-    if (report%status /= solve_converged .and. report%status /= solve_diverged .and. scheme%keeps_best) then
-      call scheme%conclude(problem)
-      call problem%residual(report%residual, ignored)
-      call velocity%bound(problem)
-      call complete_estimate()
-      if (control%criterion == by_error) report%error = exact%error(problem)
-      call take_figure()
+    report%start_seconds = clock() - state%began
+    report%descent%first_check = state%schedule%first_check(scheme)
+  end subroutine prepare
+
+  !> The best impulses of a method that keeps them, where a solve ends without success, and their figures. Collective.
+  subroutine take_best(state, problem, scheme, control, report, exact)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    class(exact_solution_t), intent(in), optional :: exact
+    real(dp) :: ignored
+
+    call scheme%conclude(problem)
+    call problem%residual(report%residual, ignored)
+    call state%velocity%bound(problem)
+    call complete_estimate(state, problem, scheme, report)
+    if (control%criterion == by_error) report%error = exact%error(problem)
+    call take_figure(state, problem, control, report)
+  end subroutine take_best
+
+  !> Judge the state after the iterations made. Collective.
+  subroutine check(state, problem, scheme, control, report, finished, exact)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    logical, intent(out) :: finished
+    class(exact_solution_t), intent(in), optional :: exact
+    real(dp) :: defect, start
+
+    call start_timer(phase_check)
+    start = clock()
+    if (report%iterations > 0) call problem%evaluate()
+    ! where the last residual was within its tolerance, the velocity error is likely to be asked for
+    if (state%by_estimate .and. report%iterations >= copies_ready .and. report%residual <= control%tolerance) then
+      call state%velocity%assess(problem, scheme, report%iterations, report%residual, defect)
+    else
+      call problem%residual(report%residual, defect)
+      call state%velocity%bound(problem)
     end if
-    report%seconds = clock() - began
+    if (control%criterion == by_error) report%error = exact%error(problem)
+    call judge(state, problem, scheme, control, report, defect, finished)
+    if (control%trace) call keep_trace(report, start - state%began - state%checking)
+    if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, report%goal)
+    call state%schedule%note_check(report%iterations, report%figure)
+    if (.not. finished .and. problem%n_asleep > 0) call wake_if_due(state, problem, control, report)
+    state%checking = state%checking + clock() - start
+    call stop_timer(phase_check)
+  end subroutine check
 
-  contains
+  !> Where most of the defect lies in contacts that sleep, no sweep would lower it: they wake. Else the other contacts'
+  !> part has to fall first, and may do.
+  subroutine wake_if_due(state, problem, control, report)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
 
-    !> Judge the state after the iterations made. Collective.
-    subroutine check(finished)
-      logical, intent(out) :: finished
-      real(dp) :: defect, start
+    if (problem%asleep_share < 0.5_dp .and. report%residual > control%tolerance) return
+    call problem%wake()
+    report%woken = .true.
+    ! changes of all contacts are other changes
+    call state%schedule%forget_ratio()
+  end subroutine wake_if_due
 
-      call start_timer(phase_check)
-      start = clock()
-      if (report%iterations > 0) call problem%evaluate()
-      ! where the last residual was within its tolerance, the velocity error is likely to be asked for
-      if (by_estimate .and. report%iterations >= copies_ready .and. report%residual <= control%tolerance) then
-        call velocity%assess(problem, scheme, report%iterations, report%residual, defect)
-      else
-        call problem%residual(report%residual, defect)
-        call velocity%bound(problem)
-      end if
-      if (control%criterion == by_error) report%error = exact%error(problem)
-      call judge(defect, finished)
-      if (control%trace) call keep_trace(report, start - began - checking)
-      if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, report%goal)
-      call schedule%note_check(report%iterations, report%figure)
-      if (.not. finished .and. problem%n_asleep > 0) call wake_if_due()
-      checking = checking + clock() - start
-      call stop_timer(phase_check)
-    end subroutine check
+  !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
+  subroutine find_whether_met(state, problem, scheme, control, report, is_met)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    logical, intent(out) :: is_met
 
-    !> Where most of the defect lies in contacts that sleep, no sweep would lower it: they wake. Else the other contacts'
-    !> part has to fall first, and may do.
-    subroutine wake_if_due()
-      if (problem%asleep_share < 0.5_dp .and. report%residual > control%tolerance) return
-      call problem%wake()
-      report%woken = .true.
-      ! changes of all contacts are other changes
-      call schedule%forget_ratio()
-    end subroutine wake_if_due
+    is_met = .false.
+    if (report%residual > control%tolerance .and. control%criterion /= by_error) return
+    select case (control%criterion)
+    case (by_residual)
+      is_met = .true.
+    case (by_error)
+      is_met = report%error <= control%tolerance
+    case default
+      call find_whether_velocity_met(state, problem, scheme, control, report, is_met)
+    end select
+  end subroutine find_whether_met
 
-    !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
-    logical function is_met()
-      is_met = .false.
-      if (report%residual > control%tolerance .and. control%criterion /= by_error) return
-      select case (control%criterion)
-      case (by_residual)
-        is_met = .true.
-      case (by_error)
-        is_met = report%error <= control%tolerance
-      case default
-        is_met = velocity_is_met()
-      end select
-    end function is_met
+  !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
+  !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
+  !> zero impulses neither before some iterations. Collective.
+  subroutine find_whether_velocity_met(state, problem, scheme, control, report, is_met)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    logical, intent(out) :: is_met
+    real(dp) :: limit, defect
 
-    !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
-    !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
-    !> zero impulses neither before some iterations. Collective.
-    logical function velocity_is_met() result(is_met)
-      real(dp) :: limit, defect
-
-      limit = control%accuracy*problem%error_scale
-      is_met = .not. report%residual > 0.0_dp
-      if (is_met) return
-      if (.not. velocity%is_assessed) then
-        if (velocity%rests()) then
-          is_met = velocity%all_are_slow(problem)
-          if (is_met) return
-        else if (report%iterations < copies_ready) then
-          return
-        end if
-        call velocity%assess(problem, scheme, report%iterations, report%residual, defect)
-      end if
-      if (velocity%criterion() <= limit) call velocity%add_levels(problem)
-      report%velocity_error = velocity%estimate()
-      is_met = velocity%criterion() <= limit
-    end function velocity_is_met
-
-    !> The whole estimate. Where the residual is rounding the velocities are exact. Collective.
-    subroutine complete_estimate()
-      report%velocity_error = 0.0_dp
-      if (.not. report%residual > 0.0_dp) return
-      call velocity%complete(problem, scheme, report%iterations)
-      report%velocity_error = velocity%estimate()
-      report%violation = velocity%largest_violation
-    end subroutine complete_estimate
-
-    !> What the goal is compared with.
-    subroutine take_figure()
-      select case (control%criterion)
-      case (by_residual)
-        report%figure = report%residual
-      case (by_error)
-        report%figure = report%error
-      case default
-        report%figure = report%residual*(control%accuracy/control%tolerance)
-        if (problem%error_scale > 0.0_dp .and. report%residual > 0.0_dp) &
-          & report%figure = max(report%figure, velocity%criterion()/problem%error_scale)
-      end select
-    end subroutine take_figure
-
-    !> Whether the solve ends here, and why. Collective.
-    subroutine judge(defect, finished)
-      real(dp), intent(in) :: defect
-      logical, intent(out) :: finished
-      logical :: met
-
-      finished = .true.
-      report%figure = report%residual
-      if (.not. (ieee_is_finite(report%residual) .and. ieee_is_finite(defect))) then
-        report%status = solve_diverged
+    limit = control%accuracy*problem%error_scale
+    is_met = .not. report%residual > 0.0_dp
+    if (is_met) return
+    if (.not. state%velocity%is_assessed) then
+      if (state%velocity%rests()) then
+        is_met = state%velocity%all_are_slow(problem)
+        if (is_met) return
+      else if (report%iterations < copies_ready) then
         return
       end if
-      if (report%iterations == 0) reference = max(defect, problem%force_scale)
-      report%velocity_error = 0.0_dp
-      if (report%residual > 0.0_dp) report%velocity_error = velocity%estimate()
-      met = is_met()
-      call take_figure()
-      if (met) then
-        report%status = solve_converged
-        ! a residual is relative to the impulses, and falls where they grow without bound
-        if (control%criterion == by_residual .and. .not. problem%rest_is_admissible .and. report%iterations > 0) then
-          if (normals_are_in_vain(problem)) report%status = solve_unbounded
-        end if
-      else if (defect > growth_limit*reference .and. .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
-        report%status = solve_diverged
-      else if (grows(defect)) then
+      call state%velocity%assess(problem, scheme, report%iterations, report%residual, defect)
+    end if
+    if (state%velocity%criterion() <= limit) call state%velocity%add_levels(problem)
+    report%velocity_error = state%velocity%estimate()
+    is_met = state%velocity%criterion() <= limit
+  end subroutine find_whether_velocity_met
+
+  !> The whole estimate. Where the residual is rounding the velocities are exact. Collective.
+  subroutine complete_estimate(state, problem, scheme, report)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_report_t), intent(inout) :: report
+
+    report%velocity_error = 0.0_dp
+    if (.not. report%residual > 0.0_dp) return
+    call state%velocity%complete(problem, scheme, report%iterations)
+    report%velocity_error = state%velocity%estimate()
+    report%violation = state%velocity%largest_violation
+  end subroutine complete_estimate
+
+  !> What the goal is compared with.
+  subroutine take_figure(state, problem, control, report)
+    type(solve_state_t), intent(in) :: state
+    type(contact_problem_t), intent(in) :: problem
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+
+    select case (control%criterion)
+    case (by_residual)
+      report%figure = report%residual
+    case (by_error)
+      report%figure = report%error
+    case default
+      report%figure = report%residual*(control%accuracy/control%tolerance)
+      if (problem%error_scale > 0.0_dp .and. report%residual > 0.0_dp) &
+        & report%figure = max(report%figure, state%velocity%criterion()/problem%error_scale)
+    end select
+  end subroutine take_figure
+
+  !> Whether the solve ends here, and why. Collective.
+  subroutine judge(state, problem, scheme, control, report, defect, finished)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(inout) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    real(dp), intent(in) :: defect
+    logical, intent(out) :: finished
+    logical :: met
+
+    finished = .true.
+    report%figure = report%residual
+    if (.not. (ieee_is_finite(report%residual) .and. ieee_is_finite(defect))) then
+      report%status = solve_diverged
+      return
+    end if
+    if (report%iterations == 0) state%reference = max(defect, problem%force_scale)
+    report%velocity_error = 0.0_dp
+    if (report%residual > 0.0_dp) report%velocity_error = state%velocity%estimate()
+    call find_whether_met(state, problem, scheme, control, report, met)
+    call take_figure(state, problem, control, report)
+    if (met) then
+      report%status = solve_converged
+      ! a residual is relative to the impulses, and falls where they grow without bound
+      if (control%criterion == by_residual .and. .not. problem%rest_is_admissible .and. report%iterations > 0) then
+        if (normals_are_in_vain(problem)) report%status = solve_unbounded
+      end if
+    else if (defect > growth_limit*state%reference .and. &
+        & .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
+      report%status = solve_diverged
+    else
+      call note_growth(state, scheme%mends_growth(), report%iterations, defect)
+      if (state%grows) then
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
       else
-        finished = stagnates()
+        call judge_stagnation(state, problem, scheme, control, report, finished)
       end if
-      if (control%trace .or. (finished .and. .not. (met .and. by_estimate))) call complete_estimate()
-      if (control%trace) call take_figure()
-    end subroutine judge
+    end if
+    if (control%trace .or. (finished .and. .not. (met .and. state%by_estimate))) &
+      & call complete_estimate(state, problem, scheme, report)
+    if (control%trace) call take_figure(state, problem, control, report)
+  end subroutine judge
 
-    !> Whether the defect has been above the reference for unmended_iterations and is unmended_limit times it, where the method
-    !> has no means against it.
-    logical function grows(defect)
-      real(dp), intent(in) :: defect
+  !> Note whether the defect has been above the reference for unmended_iterations and is unmended_limit times it, where the method
+  !> has no means against it.
+  subroutine note_growth(state, mends_growth, iterations, defect)
+    type(solve_state_t), intent(inout) :: state
+    logical, intent(in) :: mends_growth
+    integer, intent(in) :: iterations
+    real(dp), intent(in) :: defect
 
-      grows = .false.
-      if (scheme%mends_growth() .or. .not. defect > reference) then
-        exceeded_at = -1
-      else if (exceeded_at < 0) then
-        exceeded_at = report%iterations
-      else
-        grows = report%iterations >= exceeded_at + unmended_iterations .and. defect > unmended_limit*reference
-      end if
-    end function grows
+    state%grows = .false.
+    if (mends_growth .or. .not. defect > state%reference) then
+      state%exceeded_at = -1
+    else if (state%exceeded_at < 0) then
+      state%exceeded_at = iterations
+    else
+      state%grows = iterations >= state%exceeded_at + unmended_iterations .and. defect > unmended_limit*state%reference
+    end if
+  end subroutine note_growth
 
-    !> Whether nothing is to be expected of more iterations: because there is no solution, or because the method finds none. Collective.
-    logical function stagnates() result(has_stagnated)
-      logical :: due, in_vain
+  !> Whether nothing is to be expected of more iterations: because there is no solution, or because the method finds none.
+  !> Collective.
+  subroutine judge_stagnation(state, problem, scheme, control, report, has_stagnated)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    class(scheme_t), intent(in) :: scheme
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    logical, intent(out) :: has_stagnated
+    logical :: due, in_vain
 
-      has_stagnated = .false.
-      ! the residual of no impulses is relative to something else
-      if (report%iterations == 0) return
-      call stagnation%note(problem, report%iterations, report%figure, scheme%momentum%on, &
-        & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
-      if (.not. due) return
-      if (velocity%levels%most_depth < 0) call velocity%levels%find_depth(problem)
-      call stagnation%judge(problem, report%iterations, velocity%levels%most_depth, has_stagnated, in_vain)
-      if (in_vain) then
-        report%status = solve_unbounded
-      else
-        has_stagnated = has_stagnated .and. .not. scheme%persists
-        if (has_stagnated) report%status = solve_stagnated
-      end if
-    end function stagnates
-
-  end subroutine solve_contacts
+    has_stagnated = .false.
+    ! the residual of no impulses is relative to something else
+    if (report%iterations == 0) return
+    call state%stagnation%note(problem, report%iterations, report%figure, scheme%momentum%on, &
+      & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
+    if (.not. due) return
+    if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)
+    call state%stagnation%judge(problem, report%iterations, state%velocity%levels%most_depth, has_stagnated, in_vain)
+    if (in_vain) then
+      report%status = solve_unbounded
+    else
+      has_stagnated = has_stagnated .and. .not. scheme%persists
+      if (has_stagnated) report%status = solve_stagnated
+    end if
+  end subroutine judge_stagnation
 
   subroutine keep_trace(report, seconds)
     type(solve_report_t), intent(inout) :: report
