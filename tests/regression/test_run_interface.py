@@ -177,7 +177,7 @@ class Results(RunTestCase):
                         "force": ("<f8", (walls, dimension))})
                     self.assert_datasets(group["bodies"], {
                         "id": ("<i8", (n,)), "position": ("<f8", (n, dimension)), "velocity": ("<f8", (n, 3 * dimension - 3)),
-                        "radius": ("<f8", (n,))})
+                        "radius": ("<f8", (n,)), "mass": ("<f8", (n,)), "material": ("<i8", (n,))})
                     self.assertEqual(list(group["bodies/id"]), list(range(1, n + 1)))
                     if step > 0:
                         self.check_contacts(group, dimension, run.history()["contacts"][step - 1])

@@ -275,7 +275,7 @@ contains
   !> Names as columns can have them; forces and places of the step, which hold for no scene as a whole.
   subroutine test_boundary_forces()
     type(simulation_t) :: sim
-    real(dp) :: weight
+    real(dp) :: weight, place(3)
     integer :: k
 
     call make(case_text//" &output boundary_forces = T /", sim)
@@ -288,8 +288,8 @@ contains
     end do
     weight = sim%boundary_impulses(2, size(sim%decomposition%boundaries))/sim%physics%h
     call check_close(sim%diagnostics%value(k + 1), weight, 0.0_dp, "impulse over step")
-    call check_close(sim%diagnostics%value(k + 3), sim%decomposition%boundaries(size(sim%decomposition%boundaries))%point(2), &
-      & 0.0_dp, "its place")
+    call sim%decomposition%boundaries(size(sim%decomposition%boundaries))%find_place(place)
+    call check_close(sim%diagnostics%value(k + 3), place(2), 0.0_dp, "its place")
     call check(sim%diagnostics%in_history(k) .and. .not. sim%diagnostics%in_results(k), "they are in the history alone")
     call sim%free()
   end subroutine test_boundary_forces
