@@ -1,9 +1,9 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the
-!> shapes of boundaries and those that ask for diagnostics come from their modules, the words of the methods from theirs.
+!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the shapes
+!> of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
 module gravier_config_table
-  use gravier_declared_keys, only: collected_key_t, collected_keys_t
-  use gravier_law_registry, only: registered_key_t, registered_keys, kind_length
+  use gravier_declared_keys, only: collected_key_t, collected_keys_t, kind_length
+  use gravier_law_registry, only: collect_law_keys => law_keys
   use gravier_surface, only: surface_features_t
   use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
   use gravier_method_options, only: method_features_t
@@ -352,11 +352,10 @@ contains
 
   !> Complete the table. Whoever reads it has called this before.
   subroutine fill_keys()
-    type(registered_key_t), allocatable :: own(:)
     type(diagnostic_holder_t), allocatable :: diagnostics(:)
+    type(collected_keys_t) :: own
     type(key_t) :: row(1)
-    character(len=kind_length) :: kinds
-    integer :: k, n
+    integer :: k
 
     if (allocated(keys)) return
     allocate (keys(0))
@@ -364,7 +363,7 @@ contains
     call add(shape_keys)
     call surface_keys(surface_rows)
     do k = 1, size(surface_rows%keys)
-      row(1) = row_of_surface(surface_rows%keys(k))
+      row(1) = row_of("boundary", "shape", surface_rows%keys(k))
       call add(row)
     end do
     call add(boundary_keys)
@@ -372,10 +371,10 @@ contains
     call add(sample_keys)
     call add(material_keys)
     call add(law_keys)
-    call registered_keys(own, n, kinds)
-    keys(size(keys))%allowed = kinds
-    do k = 1, n
-      row(1) = row_of(own(k))
+    call collect_law_keys(own)
+    keys(size(keys))%allowed = own%kinds
+    do k = 1, size(own%keys)
+      row(1) = row_of("law", "kind", own%keys(k))
       call add(row)
     end do
     call add(time_keys)
@@ -454,26 +453,17 @@ contains
     end do
   end subroutine complete_solver_keys
 
-  !> The row of a key of some shapes of boundaries.
-  pure type(key_t) function row_of_surface(own) result(row)
+  !> The row of a key that some kinds of a group have.
+  pure type(key_t) function row_of(group, chooser, own) result(row)
+    !> the group, and its key that says the kind
+    character(len=*), intent(in) :: group, chooser
     type(collected_key_t), intent(in) :: own
 
-    row = key_t("boundary", own%key%name, kind_real, own%key%default, own%key%allowed, own%key%meaning, count=own%key%count, &
-      & unit=own%key%unit, chooser="shape", chosen=own%kinds)
+    row = key_t(group, own%key%name, kind_real, own%key%default, own%key%allowed, own%key%meaning, count=own%key%count, &
+      & unit=own%key%unit, chooser=chooser, chosen=own%kinds)
     if (own%key%default /= "") return
     row%default = "0"
     if (own%key%count == 3) row%default = "3*0"
-    row%note = "required"
-  end function row_of_surface
-
-  !> The row of a key of some laws.
-  pure type(key_t) function row_of(own) result(row)
-    type(registered_key_t), intent(in) :: own
-
-    row = key_t("law", own%key%name, kind_real, own%key%default, own%key%allowed, own%key%meaning, unit=own%key%unit, &
-      & chooser="kind", chosen=own%kinds)
-    if (own%key%default /= "") return
-    row%default = "0"
     row%note = "required"
   end function row_of
 

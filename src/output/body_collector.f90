@@ -2,7 +2,7 @@
 module gravier_body_collector
   use gravier_kinds, only: dp, i8
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_body_fields, only: body_field_t, list_body_fields, take_real_field, take_whole_field
+  use gravier_body_store, only: collect_fields
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -11,77 +11,24 @@ module gravier_body_collector
 
 contains
 
-  !> Grains at home on this rank: the table `bodies` with the key `id`.
-  subroutine collect_bodies(simulation, table, names)
+  !> Grains at home on this rank: the table `bodies` with the key `id`, and the fields that gravier_body_store has for files.
+  subroutine collect_bodies(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table
-    !> those of the fields, in their order; absent: all that results.h5 has
-    character(len=*), intent(in), optional :: names(:)
-    type(body_field_t), allocatable :: fields(:)
-    integer :: s, k, f, n
+    integer :: s, k, n
 
-    associate (decomposition => simulation%decomposition)
-      call table%init("bodies", "id", sum(decomposition%home%n))
+    associate (home => simulation%decomposition%home)
+      call table%init("bodies", "id", sum(home%n))
       n = 0
-      do s = 1, size(decomposition%home)
-        do k = 1, decomposition%home(s)%n
+      do s = 1, size(home)
+        do k = 1, home(s)%n
           n = n + 1
-          table%key(1, n) = decomposition%home(s)%id(k)
+          table%key(1, n) = home(s)%id(k)
         end do
       end do
-      call list_body_fields(decomposition, fields)
-      if (present(names)) then
-        do k = 1, size(names)
-          do f = 1, size(fields)
-            if (fields(f)%name == names(k)) call add_field(simulation, fields(f), table)
-          end do
-        end do
-      else
-        do f = 1, size(fields)
-          if (fields(f)%in_results .and. fields(f)%components > 0) call add_field(simulation, fields(f), table)
-        end do
-      end if
+      call collect_fields(simulation%decomposition%layout(), home, table)
     end associate
   end subroutine collect_bodies
-
-  !> Add a field of the grains.
-  subroutine add_field(simulation, field, table)
-    type(simulation_t), intent(in) :: simulation
-    type(body_field_t), intent(in) :: field
-    type(field_list_t), intent(inout) :: table
-    real(dp), allocatable :: value(:, :), written(:, :)
-    integer(i8), allocatable :: whole(:, :)
-    integer :: s, first, last
-    logical :: scalar
-
-    scalar = field%components == 1
-    if (field%whole) then
-      allocate (whole(field%components, table%n_items()))
-    else
-      allocate (value(field%components, table%n_items()))
-    end if
-    last = 0
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        first = last + 1
-        last = last + home%n
-        if (field%written > 0) then
-          call home%get_written(field%written, written)
-          if (field%whole) whole(:, first:last) = nint(written, i8)
-          if (.not. field%whole) value(:, first:last) = written
-        else if (field%whole) then
-          call take_whole_field(home, field%name, simulation%decomposition%subdomain_of(s), whole(:, first:last))
-        else
-          call take_real_field(home, field%name, value(:, first:last))
-        end if
-      end associate
-    end do
-    if (field%whole) then
-      call table%add_whole(trim(field%name), trim(field%unit), whole, scalar)
-    else
-      call table%add_reals(trim(field%name), trim(field%unit), value, scalar)
-    end if
-  end subroutine add_field
 
   !> Where all boundaries are, how they move and what the grains did to them in the last step: the table `boundaries` with the key
   !> `id`, the same on all ranks.

@@ -25,9 +25,7 @@ module gravier_picture_output
   end type picture_output_t
 
   character(len=*), parameter :: bodies_name = "bodies.vtkhdf", contacts_name = "contacts.vtkhdf"
-  !> what is asked of bodies, and of contacts
-  character(len=9), parameter :: body_fields(6) = [character(len=9) :: "position", "subdomain", "radius", "velocity", "mass", &
-    & "material"]
+  !> what is asked of contacts
   character(len=16), parameter :: contact_fields(5) = [character(len=16) :: points_name, "normal_force", "tangential_force", &
     & "gap", "status"]
 
@@ -116,10 +114,10 @@ contains
     type(field_list_t), intent(out) :: table
     type(field_list_t) :: bodies
     real(dp), allocatable :: points(:, :), velocity(:, :), spin(:, :)
-    integer(i8), allocatable :: id(:, :)
-    integer :: n, nd
+    integer(i8), allocatable :: id(:, :), subdomain(:, :)
+    integer :: n, nd, s, f
 
-    call collect_bodies(simulation, bodies, body_fields)
+    call collect_bodies(simulation, bodies)
     n = bodies%n_items()
     nd = simulation%decomposition%nd
     allocate (points(3, n), velocity(3, n), spin(3, n), source=0.0_dp)
@@ -134,12 +132,26 @@ contains
     table%key(:, :) = bodies%key
     call table%add_reals(points_name, "m", points)
     call table%add_whole("id", "", id)
-    call table%add_whole("subdomain", "", bodies%field(bodies%place("subdomain"))%whole)
-    call table%add_reals("radius", "m", bodies%field(bodies%place("radius"))%value)
+    allocate (subdomain(1, n))
+    n = 0
+    do s = 1, size(simulation%decomposition%home)
+      subdomain(1, n + 1:n + simulation%decomposition%home(s)%n) = simulation%decomposition%subdomain_of(s)
+      n = n + simulation%decomposition%home(s)%n
+    end do
+    call table%add_whole("subdomain", "", subdomain)
     call table%add_reals("velocity", "m/s", velocity)
     call table%add_reals("spin", "rad/s", spin)
-    call table%add_reals("mass", "kg", bodies%field(bodies%place("mass"))%value)
-    call table%add_whole("material", "", bodies%field(bodies%place("material"))%whole)
+    ! what the points are not made of is drawn as it is
+    do f = 1, bodies%n_fields
+      associate (field => bodies%field(f))
+        select case (field%name)
+        case ("position", "velocity", "image")
+          cycle
+        end select
+        if (allocated(field%value)) call table%add_reals(field%name, field%unit, field%value)
+        if (allocated(field%whole)) call table%add_whole(field%name, field%unit, field%whole)
+      end associate
+    end do
   end subroutine draw_bodies
 
   !> The fields of contacts, without a contact: there is none before the first step.

@@ -1,7 +1,8 @@
 !> Coulomb friction with a constant attraction up to a range.
 module gravier_adhesive_law
   use gravier_kinds, only: dp
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  use gravier_declared_keys, only: declared_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
   implicit none
   private
   public :: adhesive_law_t
@@ -17,10 +18,10 @@ module gravier_adhesive_law
     procedure :: evaluate => adhesive_evaluate
   end type adhesive_law_t
 
-  type(law_key_t), parameter :: law_keys(*) = &
-    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
-    &  law_key_t("adhesion", "", ">= 0", "N", "attraction of two bodies within the range"), &
-    &  law_key_t("adhesion_range", "", "> 0", "m", "gap up to which they attract each other")]
+  type(declared_key_t), parameter :: law_keys(*) = &
+    & [declared_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  declared_key_t("adhesion", "", ">= 0", "N", "attraction of two bodies within the range"), &
+    &  declared_key_t("adhesion_range", "", "> 0", "m", "gap up to which they attract each other")]
 
 contains
 
@@ -30,7 +31,7 @@ contains
   end function adhesive_kind
 
   pure subroutine adhesive_keys(keys)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
     call add_resistance_keys(law_keys, keys)
   end subroutine adhesive_keys
 

@@ -3,7 +3,8 @@
 !> for good, and the law is Coulomb's from the next step on.
 module gravier_bonded_law
   use gravier_kinds, only: dp
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  use gravier_declared_keys, only: declared_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
   implicit none
   private
   public :: bonded_law_t
@@ -25,11 +26,11 @@ module gravier_bonded_law
     procedure :: evaluate => bonded_evaluate
   end type bonded_law_t
 
-  type(law_key_t), parameter :: law_keys(*) = &
-    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
-    &  law_key_t("bond_strength", "", ">= 0", "N", "tension that an intact bond withstands"), &
-    &  law_key_t("bond_friction", "", "> 0", "", "friction coefficient of an intact bond, of r_n + h `bond_strength`"), &
-    &  law_key_t("bond_distance", "", "> 0", "m", "gap up to which pairs are bonded at the start of a run")]
+  type(declared_key_t), parameter :: law_keys(*) = &
+    & [declared_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  declared_key_t("bond_strength", "", ">= 0", "N", "tension that an intact bond withstands"), &
+    &  declared_key_t("bond_friction", "", "> 0", "", "friction coefficient of an intact bond, of r_n + h `bond_strength`"), &
+    &  declared_key_t("bond_distance", "", "> 0", "m", "gap up to which pairs are bonded at the start of a run")]
 
 contains
 
@@ -39,7 +40,7 @@ contains
   end function bonded_kind
 
   pure subroutine bonded_keys(keys)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
     call add_resistance_keys(law_keys, keys)
   end subroutine bonded_keys
 

@@ -3,7 +3,8 @@
 !> touch and breaks at the debonding distance; the pair remembers it.
 module gravier_capillary_law
   use gravier_kinds, only: dp
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  use gravier_declared_keys, only: declared_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
   implicit none
   private
   public :: capillary_law_t
@@ -25,12 +26,12 @@ module gravier_capillary_law
     procedure :: conclude => capillary_conclude
   end type capillary_law_t
 
-  type(law_key_t), parameter :: law_keys(*) = &
-    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
-    &  law_key_t("capillarity", "", ">= 0", "N/m", &
+  type(declared_key_t), parameter :: law_keys(*) = &
+    & [declared_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  declared_key_t("capillarity", "", ">= 0", "N/m", &
     &            "attraction of touching grains over the geometric mean of their radii, 2 pi gamma cos(theta) in 3D"), &
-    &  law_key_t("decay_length", "", "> 0", "m", "gap over which the attraction falls by a factor e"), &
-    &  law_key_t("debonding_distance", "", "> 0", "m", "gap at which a bridge breaks")]
+    &  declared_key_t("decay_length", "", "> 0", "m", "gap over which the attraction falls by a factor e"), &
+    &  declared_key_t("debonding_distance", "", "> 0", "m", "gap at which a bridge breaks")]
 
 contains
 
@@ -40,7 +41,7 @@ contains
   end function capillary_kind
 
   pure subroutine capillary_keys(keys)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
     call add_resistance_keys(law_keys, keys)
   end subroutine capillary_keys
 

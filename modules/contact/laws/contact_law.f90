@@ -4,30 +4,20 @@
 !> F [N] costs it nothing: with r~_n = r_n + h F the law of the pair is Coulomb's in r~, and the pair force -h F n is a load.
 module gravier_contact_law
   use gravier_kinds, only: dp
+  use gravier_declared_keys, only: declared_key_t
   use gravier_contact_coefficients, only: coefficients_t
   implicit none
   private
-  public :: contact_law_t, contact_pair_t, contact_terms_t, law_key_t, add_resistance_keys, unused
+  public :: contact_law_t, contact_pair_t, contact_terms_t, add_resistance_keys, unused
 
   !> a contact slides whose friction is used but for this part
   real(dp), parameter :: unused = 1.0e-6_dp
 
-  !> A key of &law. All values are real numbers.
-  type :: law_key_t
-    character(len=24) :: name
-    !> as it would be typed after the equal sign; blank: each group must give it
-    character(len=16) :: default
-    !> one of "", "> 0", ">= 0", "in [0, 1]"
-    character(len=16) :: allowed
-    character(len=24) :: unit
-    character(len=200) :: meaning
-  end type law_key_t
-
   !> keys of all laws with friction
-  type(law_key_t), parameter :: resistance_keys(2) = &
-    & [law_key_t("rolling_friction", "0.0", ">= 0", "", &
+  type(declared_key_t), parameter :: resistance_keys(2) = &
+    & [declared_key_t("rolling_friction", "0.0", ">= 0", "", &
     &              "rolling friction coefficient: the largest moment over `R* r_n`, over `R* (r_n + h F)` under an attraction F"), &
-    &  law_key_t("pivoting_friction", "0.0", ">= 0", "", "pivoting friction coefficient, the same about the normal; 0 in 2D")]
+    &  declared_key_t("pivoting_friction", "0.0", ">= 0", "", "pivoting friction coefficient, the same about the normal; 0 in 2D")]
 
   !> What holds at a contact over a step.
   type, extends(coefficients_t) :: contact_terms_t
@@ -81,9 +71,9 @@ module gravier_contact_law
     end function law_kind
     !> Its keys. A key that several laws have is the same in all of them: default, rule, unit and meaning.
     pure subroutine law_keys(keys)
-      import :: law_key_t
+      import :: declared_key_t
       implicit none
-      type(law_key_t), allocatable, intent(out) :: keys(:)
+      type(declared_key_t), allocatable, intent(out) :: keys(:)
     end subroutine law_keys
     !> Take the values of the keys, in their order.
     pure subroutine law_set(self, values)
@@ -113,8 +103,8 @@ contains
 
   !> The keys of a law with friction: its own, then those of the resistance to rolling and pivoting, which set_resistance takes.
   pure subroutine add_resistance_keys(own, keys)
-    type(law_key_t), intent(in) :: own(:)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), intent(in) :: own(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
 
     allocate (keys(size(own) + 2))
     keys(1:size(own)) = own

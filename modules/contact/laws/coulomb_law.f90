@@ -1,7 +1,8 @@
 !> Coulomb friction with Newton restitution (Moreau 1988).
 module gravier_coulomb_law
   use gravier_kinds, only: dp
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  use gravier_declared_keys, only: declared_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
   implicit none
   private
   public :: coulomb_law_t
@@ -15,10 +16,11 @@ module gravier_coulomb_law
     procedure :: evaluate => coulomb_evaluate
   end type coulomb_law_t
 
-  type(law_key_t), parameter :: law_keys(*) = &
-    & [law_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
-    &  law_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient"), &
-    &  law_key_t("tangential_restitution", "0.0", "in [0, 1]", "", "tangential restitution coefficient, where there is friction")]
+  type(declared_key_t), parameter :: law_keys(*) = &
+    & [declared_key_t("friction", "0.0", ">= 0", "", "friction coefficient"), &
+    &  declared_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient"), &
+    &  declared_key_t("tangential_restitution", "0.0", "in [0, 1]", "", &
+    &                 "tangential restitution coefficient, where there is friction")]
 
 contains
 
@@ -28,7 +30,7 @@ contains
   end function coulomb_kind
 
   pure subroutine coulomb_keys(keys)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
     call add_resistance_keys(law_keys, keys)
   end subroutine coulomb_keys
 

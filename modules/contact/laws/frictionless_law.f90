@@ -1,7 +1,8 @@
 !> No friction, with Newton restitution.
 module gravier_frictionless_law
   use gravier_kinds, only: dp
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t
+  use gravier_declared_keys, only: declared_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t
   implicit none
   private
   public :: frictionless_law_t
@@ -14,8 +15,8 @@ module gravier_frictionless_law
     procedure :: evaluate => frictionless_evaluate
   end type frictionless_law_t
 
-  type(law_key_t), parameter :: law_keys(*) = &
-    & [law_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient")]
+  type(declared_key_t), parameter :: law_keys(*) = &
+    & [declared_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient")]
 
 contains
 
@@ -25,7 +26,7 @@ contains
   end function frictionless_kind
 
   pure subroutine frictionless_keys(keys)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
     allocate (keys, source=law_keys)
   end subroutine frictionless_keys
 

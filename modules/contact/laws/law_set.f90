@@ -4,8 +4,9 @@
 !> takes part.
 module gravier_law_set
   use gravier_kinds, only: dp
+  use gravier_declared_keys, only: declared_key_t
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_contact_law, only: contact_pair_t, law_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, contact_terms_t
   use gravier_law_registry, only: law_holder_t, registered_laws
   implicit none
   private
@@ -15,12 +16,19 @@ module gravier_law_set
   character(len=24), parameter :: coulomb_names(5) = [character(len=24) :: "friction", "restitution", "tangential_restitution", &
     & "rolling_friction", "pivoting_friction"]
 
+  !> A law of the scene.
+  type :: scene_law_t
+    class(contact_law_t), allocatable :: law
+    !> of a law that has the same terms for all its pairs: these, but for the play
+    type(contact_terms_t) :: terms
+  end type scene_law_t
+
   !> Materials have numbers from 1 on; what has none, 0, is under the default laws.
   type :: law_set_t
     !> laws of pairs of materials so far
     integer :: n = 0
     !> laws of pairs of materials from 1 on; the default law of grains at 0, that of boundary b at -b (-boundaries to laws)
-    type(law_holder_t), allocatable :: of(:)
+    type(scene_law_t), allocatable :: of(:)
     !> place in `of` of the law of two materials, 0 where a default law holds (materials, materials)
     integer, allocatable :: of_pair(:, :)
     !> some law has other terms for each pair
@@ -57,7 +65,7 @@ contains
     !> 0 for grains
     integer, intent(in) :: b
     type(coefficients_t), intent(in) :: coefficients
-    type(law_holder_t), allocatable :: longer(:)
+    type(scene_law_t), allocatable :: longer(:)
     real(dp) :: values(size(coulomb_names))
     integer :: l
 
@@ -65,7 +73,7 @@ contains
     if (-b < lbound(self%of, 1)) then
       allocate (longer(-b:ubound(self%of, 1)))
       do l = lbound(self%of, 1), ubound(self%of, 1)
-        call move_holder(self%of(l), longer(l))
+        call move_law(self%of(l), longer(l))
       end do
       call move_alloc(longer, self%of)
     end if
@@ -77,22 +85,22 @@ contains
     call make_law("coulomb", coulomb_names, values, self%of(-b))
   end subroutine law_set_set_default
 
-  pure subroutine move_holder(from, to)
-    type(law_holder_t), intent(inout) :: from, to
+  pure subroutine move_law(from, to)
+    type(scene_law_t), intent(inout) :: from, to
 
     if (allocated(from%law)) call move_alloc(from%law, to%law)
     to%terms = from%terms
-  end subroutine move_holder
+  end subroutine move_law
 
   !> A law of a registered kind, with values under the names of keys.
-  subroutine make_law(kind, names, values, holder)
+  subroutine make_law(kind, names, values, one)
     character(len=*), intent(in) :: kind
     !> (keys): among them those of the law
     character(len=*), intent(in) :: names(:)
     real(dp), intent(in) :: values(:)
-    type(law_holder_t), intent(inout) :: holder
+    type(scene_law_t), intent(inout) :: one
     type(law_holder_t), allocatable :: laws(:)
-    type(law_key_t), allocatable :: keys(:)
+    type(declared_key_t), allocatable :: keys(:)
     type(contact_pair_t) :: pair
     real(dp), allocatable :: own(:)
     integer :: l, k, at
@@ -108,14 +116,14 @@ contains
         end do
       end do
       call laws(l)%law%set(own)
-      call move_alloc(laws(l)%law, holder%law)
+      call move_alloc(laws(l)%law, one%law)
       exit
     end do
-    if (.not. holder%law%is_constant) return
-    pair%terms%rolling_friction = holder%law%largest%rolling_friction
-    pair%terms%pivoting_friction = holder%law%largest%pivoting_friction
-    call holder%law%evaluate(pair)
-    holder%terms = pair%terms
+    if (.not. one%law%is_constant) return
+    pair%terms%rolling_friction = one%law%largest%rolling_friction
+    pair%terms%pivoting_friction = one%law%largest%pivoting_friction
+    call one%law%evaluate(pair)
+    one%terms = pair%terms
   end subroutine make_law
 
   !> Add the law of materials a and b: of a registered kind, with values under the names of keys.

@@ -2,7 +2,8 @@
 !> makes static and dynamic friction of it.
 module gravier_velocity_law
   use gravier_kinds, only: dp
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, add_resistance_keys
+  use gravier_declared_keys, only: declared_key_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
   implicit none
   private
   public :: velocity_law_t
@@ -18,13 +19,14 @@ module gravier_velocity_law
     procedure :: evaluate => velocity_evaluate
   end type velocity_law_t
 
-  type(law_key_t), parameter :: law_keys(*) = &
-    & [law_key_t("static_friction", "", ">= 0", "", "friction coefficient without slip, mu_s"), &
-    &  law_key_t("dynamic_friction", "", ">= 0", "", "friction coefficient at large slip, mu_d"), &
-    &  law_key_t("slip_scale", "", "> 0", "m/s", &
+  type(declared_key_t), parameter :: law_keys(*) = &
+    & [declared_key_t("static_friction", "", ">= 0", "", "friction coefficient without slip, mu_s"), &
+    &  declared_key_t("dynamic_friction", "", ">= 0", "", "friction coefficient at large slip, mu_d"), &
+    &  declared_key_t("slip_scale", "", "> 0", "m/s", &
     &           "slip v_s in mu_d + (mu_s - mu_d) exp(-v_t/v_s), v_t the slip at the start of the step"), &
-    &  law_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient"), &
-    &  law_key_t("tangential_restitution", "0.0", "in [0, 1]", "", "tangential restitution coefficient, where there is friction")]
+    &  declared_key_t("restitution", "0.0", "in [0, 1]", "", "normal restitution coefficient"), &
+    &  declared_key_t("tangential_restitution", "0.0", "in [0, 1]", "", &
+    &                 "tangential restitution coefficient, where there is friction")]
 
 contains
 
@@ -34,7 +36,7 @@ contains
   end function velocity_kind
 
   pure subroutine velocity_keys(keys)
-    type(law_key_t), allocatable, intent(out) :: keys(:)
+    type(declared_key_t), allocatable, intent(out) :: keys(:)
     call add_resistance_keys(law_keys, keys)
   end subroutine velocity_keys
 

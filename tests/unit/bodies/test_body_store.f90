@@ -3,7 +3,8 @@ program test_body_store
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_body_store, only: body_set_t, body_field_t, append_bodies, written_fields, place_word, body_record
+  use gravier_body_store, only: body_set_t, append_bodies, collect_fields, place_word, body_record
+  use gravier_field_list, only: field_list_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   !> space dimensions, degrees of freedom with and without spin, entries of an image with and without periods
@@ -233,31 +234,41 @@ contains
       & "identifier, radius, mass and material are not renewed")
   end subroutine test_renewed
 
-  !> What files get beside identifier, place, velocity and radius.
+  !> What files get of the bodies of two sets: place, velocity with spin, radius, mass, material and, in a periodic scene, image.
   subroutine test_written(sizes)
     !> space dimension, degrees of freedom, entries of an image
     integer, intent(in) :: sizes(3)
-    type(body_set_t) :: bodies
-    type(body_field_t), allocatable :: fields(:)
-    real(dp), allocatable :: values(:, :)
-    integer :: f
+    type(body_set_t) :: sets(2), none(0)
+    type(field_list_t) :: table
+    integer :: nd, nv
 
-    call fill(bodies, sizes, 4, 1)
-    call written_fields(fields)
-    call check_equal(size(fields), 2, "fields that are written")
-    do f = 1, size(fields)
-      call bodies%get_written(f, values)
-      call check(all(shape(values) == [1, 4]), "shape of "//fields(f)%name)
-      select case (fields(f)%name)
-      case ("mass")
-        call check(.not. fields(f)%whole .and. fields(f)%unit == "kg", "what masses are")
-        call check(all(abs(values(1, :) - bodies%mass) <= 0.0_dp), "masses")
-      case ("material")
-        call check(fields(f)%whole .and. all(nint(values(1, :)) == bodies%material), "materials")
-      case default
-        call check(.false., "a field of another name: "//fields(f)%name)
-      end select
-    end do
+    nd = sizes(1)
+    nv = sizes(2)
+    call fill(sets(1), sizes, 4, 1)
+    call fill(sets(2), sizes, 3, 11)
+    call table%init("bodies", "id", 7)
+    call collect_fields(sets(1)%body_layout_t, sets, table)
+    call check_equal(table%n_fields, merge(6, 5, sizes(3) > 0), "fields that are written")
+    associate (masses => table%field(table%place("mass")), places => table%field(table%place("position")))
+      call check(masses%unit == "kg" .and. masses%scalar .and. .not. places%scalar, "one number, or one a direction")
+      call check(same(masses%value(1, 3), number(3_i8, 2)) .and. same(masses%value(1, 5), number(11_i8, 2)), "masses")
+      call check(same(places%value(nd, 7), number(13_i8, 3 + nd)), "places")
+    end associate
+    associate (velocities => table%field(table%place("velocity"))%value, materials => table%field(table%place("material")))
+      call check_equal(size(velocities, 1), 3*nd - 3, "a velocity has a spin in files")
+      call check(same(velocities(nv, 6), number(12_i8, 6 + nv)), "velocities")
+      call check(all(abs(velocities(nv + 1:, :)) <= 0.0_dp), "bodies that do not turn have no spin")
+      call check(materials%whole(1, 7) == 3 + image_of(13_i8, 1), "materials")
+    end associate
+    call table%init("bodies", "id", 0)
+    call collect_fields(sets(1)%body_layout_t, none, table)
+    call check_equal(table%n_fields, merge(6, 5, sizes(3) > 0), "fields without a body")
+    if (sizes(3) == 0) return
+    call table%init("bodies", "id", 7)
+    call collect_fields(sets(1)%body_layout_t, sets, table)
+    associate (images => table%field(table%place("image"))%whole)
+      call check(images(sizes(3), 5) == image_of(11_i8, 1 + sizes(3)), "images")
+    end associate
   end subroutine test_written
 
   !> Names and bytes of the fields add up to the record that travels.

@@ -1,15 +1,16 @@
 !> The laws of contact against their formulas: keys, terms of a pair, memories, and the laws of a scene by pairs of materials.
 program test_laws
   use gravier_kinds, only: dp
+  use gravier_declared_keys, only: declared_key_t, collected_keys_t
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, law_key_t, unused
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, unused
   use gravier_coulomb_law, only: coulomb_law_t
   use gravier_frictionless_law, only: frictionless_law_t
   use gravier_velocity_law, only: velocity_law_t
   use gravier_adhesive_law, only: adhesive_law_t
   use gravier_capillary_law, only: capillary_law_t
   use gravier_bonded_law, only: bonded_law_t
-  use gravier_law_registry, only: law_holder_t, registered_key_t, registered_laws, registered_keys, kind_length
+  use gravier_law_registry, only: law_holder_t, registered_laws, law_keys
   use gravier_law_set, only: law_set_t
   use gravier_test_law_names, only: name_length, split_names, add_law
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -38,7 +39,7 @@ contains
     character(len=*), intent(in) :: text
     real(dp), intent(in) :: values(:)
     character(len=name_length), allocatable :: names(:)
-    type(law_key_t), allocatable :: keys(:)
+    type(declared_key_t), allocatable :: keys(:)
     real(dp), allocatable :: own(:)
     integer :: k, i
 
@@ -71,35 +72,37 @@ contains
   subroutine check_registry()
     character(len=*), parameter :: words = "coulomb frictionless velocity adhesive capillary bonded"
     type(law_holder_t), allocatable :: laws(:)
-    type(registered_key_t), allocatable :: keys(:)
-    type(law_key_t), allocatable :: own(:)
-    character(len=kind_length) :: kinds
+    type(collected_keys_t) :: collected
+    type(declared_key_t), allocatable :: own(:)
     integer :: n, l, k, i, holders
 
     call registered_laws(laws)
-    call registered_keys(keys, n, kinds)
+    call law_keys(collected)
+    n = size(collected%keys)
     call check_equal(size(laws), 6, "laws")
-    call check_equal(kinds, words, "words of the laws, in the order of the registry")
+    call check_equal(collected%kinds, words, "words of the laws, in the order of the registry")
     do i = 1, n
-      call check_equal(count(keys(1:n)%key%name == keys(i)%key%name), 1, "a key is there once: "//keys(i)%key%name)
+      call check_equal(count(collected%keys(1:n)%key%name == collected%keys(i)%key%name), 1, &
+        & "a key is there once: "//collected%keys(i)%key%name)
       holders = 0
       do l = 1, size(laws)
         call laws(l)%law%keys(own)
         do k = 1, size(own)
-          if (own(k)%name /= keys(i)%key%name) cycle
+          if (own(k)%name /= collected%keys(i)%key%name) cycle
           holders = holders + 1
-          call check(index(" "//keys(i)%kinds, " "//trim(laws(l)%law%kind())) > 0, "the key knows the laws that have it")
-          call check(own(k)%default == keys(i)%key%default .and. own(k)%allowed == keys(i)%key%allowed &
-            & .and. own(k)%unit == keys(i)%key%unit .and. own(k)%meaning == keys(i)%key%meaning, "a key is the same in all laws")
+          call check(index(" "//collected%keys(i)%kinds, " "//trim(laws(l)%law%kind())) > 0, "the key knows the laws that have it")
+          call check(own(k)%default == collected%keys(i)%key%default .and. own(k)%allowed == collected%keys(i)%key%allowed &
+            & .and. own(k)%unit == collected%keys(i)%key%unit .and. own(k)%meaning == collected%keys(i)%key%meaning, &
+            & "a key is the same in all laws")
         end do
       end do
-      call check_equal(holders, words_in(keys(i)%kinds), "and no others: "//keys(i)%key%name)
+      call check_equal(holders, words_in(collected%keys(i)%kinds), "and no others: "//collected%keys(i)%key%name)
     end do
     do i = 1, n
-      if (keys(i)%key%name == "restitution") call check_equal(keys(i)%kinds, "coulomb frictionless velocity", &
+      if (collected%keys(i)%key%name == "restitution") call check_equal(collected%keys(i)%kinds, "coulomb frictionless velocity", &
         & "laws with restitution")
-      if (keys(i)%key%name == "rolling_friction") call check_equal(keys(i)%kinds, "coulomb velocity adhesive capillary bonded", &
-        & "laws that resist rolling")
+      if (collected%keys(i)%key%name == "rolling_friction") call check_equal(collected%keys(i)%kinds, &
+        & "coulomb velocity adhesive capillary bonded", "laws that resist rolling")
     end do
   end subroutine check_registry
 
