@@ -73,6 +73,20 @@ class Found(RunTestCase):
         self.refuse("contacts.vtkhdf", replaced("VTKHDF/Vertices/Offsets", shape=(2**58,), chunks=(1024,), dtype="i8"), "Offsets")
         self.refuse("bodies.vtkhdf", lambda file: file["VTKHDF/Steps"].attrs.modify("NSteps", 2**32), "rows, but at least 4294967296")
 
+    def test_lost_chunk(self):
+        """A table whose rows cannot be read is refused before the first step, not when the step after the restart is written there."""
+        def lost(name):
+            def damage(file):
+                address = file[name].id.get_chunk_info(0).byte_offset
+                path = file.filename
+                file.close()
+                whole = fuzz_inputs.read(path)
+                self.assertEqual(whole.count(address.to_bytes(8, "little")), 1)
+                write(path, whole.replace(address.to_bytes(8, "little"), (2**32 + address).to_bytes(8, "little")))
+            return damage
+        for name in ("Steps/ConnectivityIdOffsets", "Points", "Steps/Values", "PointData/radius"):
+            self.refuse("bodies.vtkhdf", lost("VTKHDF/" + name), f"/VTKHDF/{name}: cannot read")
+
     def test_states(self):
         def no_group(file):
             del file["steps"]
