@@ -116,7 +116,7 @@ class Found(RunTestCase):
         self.refuse("checkpoint.h5", changed("arrays/partition", 12, nan), "partition is none of this scene")
         self.refuse("checkpoint.h5", changed("arrays/boundaries", 3, nan), "the array boundaries: a number of at most 1e30", " was expected: the file is damaged")
         self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 3), 99), "table grains: grain")
-        self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 6), nan), "table grains: grain", "a number of at most 1e30")
+        self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 6), nan), "table grains: grain", "a value of position that no grain has", "the file is damaged")
         self.refuse("checkpoint.h5", lambda file: file["scalars"].attrs.modify("law_row", 2**40), "law_row: 1099511627776")
 
     def test_python(self):

@@ -288,7 +288,8 @@ contains
     end do
     weight = sim%boundary_impulses(2, size(sim%decomposition%boundaries))/sim%physics%h
     call check_close(sim%diagnostics%value(k + 1), weight, 0.0_dp, "impulse over step")
-    call check_close(sim%diagnostics%value(k + 3), sim%decomposition%boundaries(size(sim%decomposition%boundaries))%point(2), &
+    call check_close(sim%diagnostics%value(k + 3), &
+      & sim%decomposition%boundaries(size(sim%decomposition%boundaries))%surface%point(2), &
       & 0.0_dp, "its place")
     call check(sim%diagnostics%in_history(k) .and. .not. sim%diagnostics%in_results(k), "they are in the history alone")
     call sim%free()
