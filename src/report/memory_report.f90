@@ -32,7 +32,7 @@ module gravier_memory_report
   !> words of a row of a picture: of a grain and of a contact
   integer, parameter :: picture_words(2) = [13, 12]
   !> holes in the heap, over what is held
-  real(dp), parameter :: holes = 0.1_dp
+  real(dp), parameter :: holes = 0.2_dp
   !> of libraries when they write for the first time, on one rank and on several [MiB]
   real(dp), parameter :: of_first_output(2) = [4.0_dp, 8.0_dp]
   real(dp), parameter :: bytes_of_mebibyte = 1048576.0_dp
