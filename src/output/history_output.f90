@@ -3,7 +3,7 @@ module gravier_history_output
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_schedule, only: schedule_t
-  use gravier_csv_writer, only: csv_writer_t
+  use gravier_csv_writer, only: csv_writer_t, csv_option_t
   use gravier_solve, only: solve_converged
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -21,6 +21,11 @@ module gravier_history_output
     procedure :: write => history_output_write
     procedure :: finish => history_output_finish
   end type history_output_t
+
+  !> with which the history has columns more
+  type(csv_option_t), parameter :: column_options(4) = [csv_option_t("kinetic_translation", "&output energy"), &
+    & csv_option_t("stress_", "&output stress"), csv_option_t("coordination", "&output structure"), &
+    & csv_option_t("force_x:", "&output boundary_forces")]
 
 contains
 
@@ -52,7 +57,7 @@ contains
 
     if (simulation%comm%rank /= 0) return
     if (simulation%restarted) then
-      call table%resume(path, header, simulation%step, error)
+      call table%resume(path, header, simulation%step, error, column_options)
     else
       call table%open(path, header, error)
     end if
@@ -66,8 +71,7 @@ contains
 
     header = "step,time,contacts,iterations,sweeps,residual,velocity_error,velocity_scale,jump,max_overlap,"// &
       & "kinetic_energy,wall_seconds,interface_bodies,converged,grains,left,fast,listed,divided,projected,"// &
-      & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds"
-    if (simulation%config%solver%sleeping) header = header//",sleeping,woken"
+      & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds,sleeping,woken"
     do k = 1, simulation%diagnostics%n_columns
       if (simulation%diagnostics%in_history(k)) header = header//","//trim(simulation%diagnostics%name(k))
     end do
@@ -110,10 +114,8 @@ contains
       call table%add(sharing%most_values)
       call table%add(sharing%ghosts)
       call table%add(solve%seconds)
-      if (simulation%config%solver%sleeping) then
-        call table%add(figures%asleep)
-        call table%add(merge(1, 0, solve%woken))
-      end if
+      call table%add(figures%asleep)
+      call table%add(merge(1, 0, solve%woken))
       do k = 1, simulation%diagnostics%n_columns
         if (simulation%diagnostics%in_history(k)) call table%add(simulation%diagnostics%value(k))
       end do

@@ -22,13 +22,28 @@ module gravier_memory_report
     type(item_t) :: items(5)
     !> bytes of all ranks, and of the rank with most
     integer(i8) :: total = 0, most = 0
+    !> what a rank is expected to hold at most [MiB]
+    real(dp) :: peak = 0.0_dp
   end type memory_report_t
+
+  !> copies of the words of a row while it is written: as they are collected, as a record, sorted, and as they are written; on
+  !> several ranks with those that are sent and received. Rows of grains are down to two when those of contacts are at their most
+  integer, parameter :: copies(2) = [4, 6], grain_copies = 2
+  !> words of a row of a picture: of a grain and of a contact
+  integer, parameter :: picture_words(2) = [13, 12]
+  !> holes in the heap, over what is held
+  real(dp), parameter :: holes = 0.2_dp
+  !> of libraries when they write for the first time, on one rank and on several [MiB]
+  real(dp), parameter :: of_first_output(2) = [4.0_dp, 8.0_dp]
+  real(dp), parameter :: bytes_of_mebibyte = 1048576.0_dp
 
 contains
 
   !> Bytes of the arrays of an assembled simulation, counted from their shapes. Collective.
-  subroutine report_memory(simulation, report)
+  subroutine report_memory(simulation, libraries, report)
     type(simulation_t), intent(in) :: simulation
+    !> held by this rank before there was a scene [MiB]
+    real(dp), intent(in) :: libraries
     type(memory_report_t), intent(out) :: report
     integer(i8) :: counts(5), most
     integer :: k
@@ -39,6 +54,10 @@ contains
     do k = 1, size(counts)
       most = most + counts(k)*report%items(k)%bytes
     end do
+    ! the start, which a check makes too, or the steps
+    report%peak = simulation%comm%highest(of_first_output(merge(2, 1, simulation%comm%size > 1)) + &
+      & max(peak_memory(), libraries + (1.0_dp + holes)*real(most + max(written_bytes(simulation, counts), &
+      & solve_bytes(simulation, counts)), dp)/bytes_of_mebibyte))
     report%most = simulation%comm%largest(most)
     call simulation%comm%sum_counts(counts)
     do k = 1, size(counts)
@@ -46,6 +65,35 @@ contains
       report%total = report%total + counts(k)*report%items(k)%bytes
     end do
   end subroutine report_memory
+
+  !> Bytes of the copies of a state that is written.
+  integer(i8) function written_bytes(simulation, counts) result(bytes)
+    type(simulation_t), intent(in) :: simulation
+    !> of the items of this rank
+    integer(i8), intent(in) :: counts(5)
+    integer :: of_grain, of_contact
+
+    associate (nd => simulation%decomposition%nd, output => simulation%config%output, &
+      & several => merge(2, 1, simulation%comm%size > 1))
+      of_grain = 2 + nd + (3*nd - 3) + merge(nd, 0, simulation%decomposition%ni > 0)
+      of_contact = merge(3 + 2*nd + merge(2*nd - 3, 0, simulation%problem%kernels%rolling_row > 0), 0, output%contacts)
+      bytes = 8*(counts(5)*of_grain*merge(grain_copies, copies(several), output%contacts) + counts(1)*of_contact*copies(several))
+      ! pictures are made while the rows of the state are there
+      if (output%vtk) bytes = max(bytes, 8*(counts(5)*of_grain + counts(1)*of_contact + &
+        & copies(several)*max(counts(5)*picture_words(1), counts(1)*picture_words(2))))
+    end associate
+  end function written_bytes
+
+  !> Bytes of what a solve keeps beside its method: velocities of two iterations, powers of contacts, impulses of two iterations.
+  integer(i8) function solve_bytes(simulation, counts) result(bytes)
+    type(simulation_t), intent(in) :: simulation
+    !> of the items of this rank
+    integer(i8), intent(in) :: counts(5)
+
+    associate (kernels => simulation%problem%kernels)
+      bytes = 8*(counts(3)*2*kernels%nv + counts(1)*(1 + 2*kernels%nc))
+    end associate
+  end function solve_bytes
 
   !> Bytes of a contact, of a body in contact, and of what an exchange sends of a copy of a shared body.
   subroutine item_bytes(simulation, contact, body, copy)

@@ -225,15 +225,17 @@ contains
     call write_lines(self, text, "", error)
   end subroutine run_log_write_scales
 
-  !> What is kept in memory, array by array. Collective.
-  subroutine run_log_write_memory(self, simulation, error)
+  !> What is kept in memory, array by array, and what a rank holds at most. Collective.
+  subroutine run_log_write_memory(self, simulation, libraries, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
+    !> held by this rank before there was a scene [MiB]
+    real(dp), intent(in) :: libraries
     type(error_t), allocatable, intent(inout) :: error
     type(memory_report_t) :: report
     integer :: k
 
-    call report_memory(simulation, report)
+    call report_memory(simulation, libraries, report)
     call self%line("memory      bytes of each item", error)
     do k = 1, size(report%items)
       associate (item => report%items(k))
@@ -242,6 +244,8 @@ contains
     end do
     call self%line("  "//to_text(report%total/1024 + 1)//" KiB in all, "//to_text(report%most/1024 + 1)// &
       & " KiB on the rank with most", error)
+    call self%line("  about "//to_text(nint(report%peak))//" MiB at most on a rank while it runs, with libraries, copies of "// &
+      & "what is written and work space of solves", error)
   end subroutine run_log_write_memory
 
   !> A line of a step where one is due, and what there is to warn of.

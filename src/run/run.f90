@@ -18,6 +18,7 @@ module gravier_run
   use gravier_scene_scales, only: scene_scales_t
   use gravier_start_overlap, only: check_start_overlap
   use gravier_checkpoint, only: load_checkpoint, checkpoint_name
+  use gravier_memory_report, only: peak_memory
   use gravier_run_log, only: run_log_t
   use gravier_run_summary, only: verdict_text
   use gravier_accuracy_lines, only: goal_name
@@ -58,7 +59,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(config_t) :: config
     type(simulation_t) :: simulation
-    type(body_set_t) :: grains
+    type(body_set_t), allocatable :: grains
     type(run_log_t) :: log
     type(run_output_t) :: output
     type(interruption_t) :: interruption
@@ -70,10 +71,13 @@ contains
     call reset_timers()
     call log%init(comm)
     call read_config(comm, path, config, error)
+    allocate (grains)
     if (.not. allocated(error)) call simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
     if (restart) call claim_directory(comm, config, command, lock, error)
     if (.not. allocated(error)) call start(simulation, grains, restart, error)
+    ! what they took is for the steps
+    deallocate (grains)
     if (.not. restart) call claim_directory(comm, config, command, lock, error)
     if (.not. allocated(error)) then
       call write_beginning(simulation, log, restart, lock%unknown, error)
@@ -142,10 +146,13 @@ contains
     type(step_figures_t) :: figures
     type(run_log_t) :: log
     type(scene_scales_t) :: scales
+    !> held before there was a scene [MiB]
+    real(dp) :: libraries
     integer :: warnings
 
     call log%init(comm)
     call read_config(comm, path, config, error)
+    libraries = peak_memory()
     if (.not. allocated(error)) call simulation%init(comm, config, error)
     call check_start_overlap(simulation, error)
     if (allocated(error)) return
@@ -154,7 +161,7 @@ contains
     call simulation%assemble(figures)
     call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
     call log%write_scales(simulation, scales, .true., warnings, error)
-    call log%write_memory(simulation, error)
+    call log%write_memory(simulation, libraries, error)
     select case (warnings)
     case (0)
       call log%line("checked     no error found; nothing was run", error)

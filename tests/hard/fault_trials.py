@@ -8,6 +8,7 @@
 What is wrong is printed trial by trial; the last line has the figure. Exit status 1 where anything was wrong. The suite runs a few
 trials of each (test_run_fault_trials.py)."""
 import argparse
+import contextlib
 import os
 import random
 import re
@@ -290,44 +291,46 @@ def kills(random_seed, trials, directory, all_ranks=(1, 2, 4)):
         raise AssertionError(said)
     length = time.monotonic() - started
     wanted = state(os.path.join(straight, "results"))
-    for ranks in all_ranks:
-        draw = random.Random(f"{random_seed} {ranks}")
-        for trial in range(trials):
-            place = os.path.join(directory, f"killed {ranks} {trial}")
-            whom = draw.choice(("all ranks", "one rank", "the launcher"))
-            # a run begins with the start of its ranks, which writes nothing
-            moment = draw.uniform(0.1, 1.1) * length
-            name = f"{ranks} ranks, trial {trial}: {whom} after {moment:.3f} s"
-            run = Going(case, ranks, place)
-            time.sleep(moment)
-            if whom == "the launcher":
-                run.process.kill()
-            else:
-                run.send(signal.SIGKILL, 1 if whom == "one rank" else None)
-            results = os.path.join(place, "results")
-            problems, end = [], f"{ranks} ranks"
-            if whom == "the launcher":
-                # a restart at once, while ranks may still live
-                run.process.wait()
-            else:
-                begun = os.path.exists(results)
+    # a command that is interrupted has the figure of what it did
+    with contextlib.suppress(KeyboardInterrupt):
+        for ranks in all_ranks:
+            draw = random.Random(f"{random_seed} {ranks}")
+            for trial in range(trials):
+                place = os.path.join(directory, f"killed {ranks} {trial}")
+                whom = draw.choice(("all ranks", "one rank", "the launcher"))
+                # a run begins with the start of its ranks, which writes nothing
+                moment = draw.uniform(0.1, 1.1) * length
+                name = f"{ranks} ranks, trial {trial}: {whom} after {moment:.3f} s"
+                run = Going(case, ranks, place)
+                time.sleep(moment)
+                if whom == "the launcher":
+                    run.process.kill()
+                else:
+                    run.send(signal.SIGKILL, 1 if whom == "one rank" else None)
+                results = os.path.join(place, "results")
+                problems, end = [], f"{ranks} ranks"
+                if whom == "the launcher":
+                    # a restart at once, while ranks may still live
+                    run.process.wait()
+                else:
+                    begun = os.path.exists(results)
+                    try:
+                        run.end(timeout=300)
+                    except AssertionError as what:
+                        # Open MPI's launcher may wait for ever for a rank that dies while it starts, before the program has begun
+                        end = f"{ranks} ranks whose launcher hung before the program began"
+                        problems = [str(what)] if begun else []
+                    problems += unreadable(results, os.path.join(straight, "results"))
                 try:
-                    run.end(timeout=300)
+                    again = gravier("--restart", "case.nml", ranks=draw.choice((1, 2)), directory=place)
+                    problems += what_is_said(again, (0,)) + unreadable(results, os.path.join(straight, "results"))
+                    if again.status == 0:
+                        problems += [f"differs: {name}" for name in differences(wanted, state(results))[:3]]
                 except AssertionError as what:
-                    # Open MPI's launcher may wait for ever for a rank that dies while it starts, before the program has begun
-                    end = f"{ranks} ranks whose launcher hung before the program began"
-                    problems = [str(what)] if begun else []
-                problems += unreadable(results, os.path.join(straight, "results"))
-            try:
-                again = gravier("--restart", "case.nml", ranks=draw.choice((1, 2)), directory=place)
-                problems += what_is_said(again, (0,)) + unreadable(results, os.path.join(straight, "results"))
-                if again.status == 0:
-                    problems += [f"differs: {name}" for name in differences(wanted, state(results))[:3]]
-            except AssertionError as what:
-                problems.append(str(what))
-            run.end()
-            figure.note(end, name, problems)
-            shutil.rmtree(place)
+                    problems.append(str(what))
+                run.end()
+                figure.note(end, name, problems)
+                shutil.rmtree(place)
     return figure
 
 

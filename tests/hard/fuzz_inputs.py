@@ -215,8 +215,12 @@ def not_in_force(text, said):
     return problems[:2]
 
 
+def written(cell):
+    return float(re.sub("[dD]", "e", cell))
+
+
 def number(cell):
-    value = float(re.sub("[dD]", "e", cell))
+    value = written(cell)
     return 0.0 if abs(value) < TINY and re.search("[1-9]", re.split("[eEdD]", cell)[0]) else value
 
 
@@ -483,7 +487,7 @@ class Kinds:
             """The table as Python reads it, written anew, gives the same run."""
             found = kept(os.path.join(place, "results"))
             names, rows = table_rows(read(path).decode("utf-8", errors="surrogateescape"))
-            write(path, "\n".join([",".join(names), *(",".join(repr(number(cell)) for cell in row) for row in rows)]) + "\n")
+            write(path, "\n".join([",".join(names), *(",".join(repr(written(cell)) for cell in row) for row in rows)]) + "\n")
             again = alone([program("gravier"), case + ".nml"], place)
             if again.status != 0:
                 return [f"Python reads what is refused: {again.stderr[:200]!r}"]

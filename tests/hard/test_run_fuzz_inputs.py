@@ -73,6 +73,20 @@ class Found(RunTestCase):
         self.refuse("contacts.vtkhdf", replaced("VTKHDF/Vertices/Offsets", shape=(2**58,), chunks=(1024,), dtype="i8"), "Offsets")
         self.refuse("bodies.vtkhdf", lambda file: file["VTKHDF/Steps"].attrs.modify("NSteps", 2**32), "rows, but at least 4294967296")
 
+    def test_lost_chunk(self):
+        """A table whose rows cannot be read is refused before the first step, not when the step after the restart is written there."""
+        def lost(name):
+            def damage(file):
+                address = file[name].id.get_chunk_info(0).byte_offset
+                path = file.filename
+                file.close()
+                whole = fuzz_inputs.read(path)
+                self.assertEqual(whole.count(address.to_bytes(8, "little")), 1)
+                write(path, whole.replace(address.to_bytes(8, "little"), (2**32 + address).to_bytes(8, "little")))
+            return damage
+        for name in ("Steps/ConnectivityIdOffsets", "Points", "Steps/Values", "PointData/radius"):
+            self.refuse("bodies.vtkhdf", lost("VTKHDF/" + name), f"/VTKHDF/{name}: cannot read")
+
     def test_states(self):
         def no_group(file):
             del file["steps"]
@@ -102,7 +116,7 @@ class Found(RunTestCase):
         self.refuse("checkpoint.h5", changed("arrays/partition", 12, nan), "partition is none of this scene")
         self.refuse("checkpoint.h5", changed("arrays/boundaries", 3, nan), "the array boundaries: a number of at most 1e30", " was expected: the file is damaged")
         self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 3), 99), "table grains: grain")
-        self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 6), nan), "table grains: grain", "a number of at most 1e30")
+        self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 6), nan), "table grains: grain", "a value of position that no grain has", "the file is damaged")
         self.refuse("checkpoint.h5", lambda file: file["scalars"].attrs.modify("law_row", 2**40), "law_row: 1099511627776")
 
     def test_python(self):

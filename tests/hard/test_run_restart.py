@@ -172,10 +172,6 @@ class Restart(RunTestCase):
                 stopped = merged(base, layouts[before], {"time": {"steps": 25}, "output": {"checkpoint_every": 25}})
                 self.assert_status(run_case(stopped, 2, directory), 0)
                 write(os.path.join(directory, "case.nml"), namelist(merged(base, layouts[after])))
-                # history has columns of its own where contacts sleep, and is refused as it is
-                if "sleeping" in (before, after):
-                    self.assert_refused(restart(directory, 1), r"history\.csv: line 1: step,time,.* was expected")
-                    os.remove(os.path.join(directory, "results", "history.csv"))
                 run = restart(directory, 1)
                 self.assert_status(run, 0)
                 self.assertIn("from the checkpoint of step 25\n", run.stdout)
@@ -370,6 +366,15 @@ class Restart(RunTestCase):
         refused(merged(longer, {"time": {"step": 2e-3}}), r"case\.nml: &time step: expected 0?\.?0?1?.*E?-?")
         refused(merged(longer, {"time": {"theta": 0.6}}), r"case\.nml: &time theta: expected")
         refused(merged(case, {"time": {"steps": 3}}), r"case\.nml: &time steps = 3: expected 4 at least")
+        for option in ("energy", "stress", "structure", "boundary_forces"):
+            other = not longer["output"].get(option, False)
+            run = run_case(merged(longer, {"output": {option: other}}), 1, directory, options=["--restart"])
+            self.assert_refused(run, rf"results/history\.csv: line 1: (no|a) column [\w: ]+: &output {option} = \.{str(other).lower()}\., "
+                                     rf"but \.{str(not other).lower()}\. was expected, with which this table was begun$")
+            # the log is begun by then
+            self.assertTrue(files()["run.log"].startswith(now["run.log"]))
+            self.assertEqual({**files(), "run.log": now["run.log"]}, now)
+        write(os.path.join(results, "run.log"), now["run.log"])
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.011\n")
         refused(longer, r"checkpoint\.h5: the run began with 2 grains")
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.012\n")

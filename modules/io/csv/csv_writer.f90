@@ -11,7 +11,13 @@ module gravier_csv_writer
   use gravier_text_file, only: text_file_t
   implicit none
   private
-  public :: csv_writer_t
+  public :: csv_writer_t, csv_option_t
+
+  !> A logical option of the input with which a table has columns more, and the first of them.
+  type :: csv_option_t
+    character(len=24) :: column = ""
+    character(len=24) :: option = ""
+  end type csv_option_t
 
   !> An open table. A row is built with `add`, cell by cell, and written by `end_row`.
   type :: csv_writer_t
@@ -59,13 +65,15 @@ contains
   !> has no end, and append to them. A table that is missing or died within its header is begun anew. What is kept
   !> replaces the older file in one indivisible operation; after a failure that file is as it was. Failure: status_input
   !> for another header, or a row that has not a step and numbers under the names, status_failure where the system refuses.
-  subroutine csv_resume(self, path, header, last_step, error)
+  subroutine csv_resume(self, path, header, last_step, error, options)
     class(csv_writer_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     !> the names of the columns with commas between
     character(len=*), intent(in) :: header
     integer, intent(in) :: last_step
     type(error_t), allocatable, intent(inout) :: error
+    !> what the message about another header names, where one of these is the reason
+    type(csv_option_t), intent(in), optional :: options(:)
     integer(i8) :: kept
     logical :: exists
 
@@ -73,7 +81,7 @@ contains
     call begin(self, path, header)
     kept = 0
     inquire (file=path, exist=exists)
-    if (exists) call find_kept(path, header//new_line("a"), self%n_columns, last_step, kept, error)
+    if (exists) call find_kept(path, header//new_line("a"), self%n_columns, last_step, kept, error, options)
     call self%file%begin(path, error)
     if (kept == 0) call self%file%append(header//new_line("a"), error)
     call copy(path, kept, self%file, error)
@@ -96,13 +104,14 @@ contains
   end subroutine begin
 
   !> Number of bytes up to the end of the last whole row of a step not above `last_step`; 0 for part of a header.
-  subroutine find_kept(path, first_line, n_columns, last_step, kept, error)
+  subroutine find_kept(path, first_line, n_columns, last_step, kept, error, options)
     character(len=*), intent(in) :: path
     !> the header with its end
     character(len=*), intent(in) :: first_line
     integer, intent(in) :: n_columns, last_step
     integer(i8), intent(out) :: kept
     type(error_t), allocatable, intent(inout) :: error
+    type(csv_option_t), intent(in), optional :: options(:)
     character(len=:), allocatable :: text, row
     integer(i8) :: position, length, step
     integer :: line, unit, first, last
@@ -112,7 +121,10 @@ contains
     if (allocated(error)) return
     call read_text(path, unit, narrow(min(length, len(first_line, i8))), text, error)
     if (text /= first_line(1:len(text))) then
-      call raise(error, status_input, path//": line 1: "//first_line(1:len(first_line) - 1)//" was expected")
+      rewind (unit)
+      call read_text(path, unit, narrow(min(length, int(block_length, i8))), text, error)
+      last = index(text, new_line("a"))
+      call refuse_header(path, text(1:merge(last - 1, len(text), last > 0)), first_line(1:len(first_line) - 1), error, options)
     end if
     position = len(text)
     if (position == len(first_line)) kept = position
@@ -138,6 +150,60 @@ contains
     end do rows
     close (unit)
   end subroutine find_kept
+
+  !> Say which column a header lacks or has beside those expected, and what option makes it.
+  subroutine refuse_header(path, found, expected, error, options)
+    character(len=*), intent(in) :: path, found, expected
+    type(error_t), allocatable, intent(inout) :: error
+    type(csv_option_t), intent(in), optional :: options(:)
+    character(len=:), allocatable :: lacking, beside, message
+
+    lacking = first_beyond(expected, found)
+    beside = first_beyond(found, expected)
+    if (lacking /= "") then
+      message = "no column "//lacking//reason(lacking, ".true.", ".false.", ", but one was expected")
+    else if (beside /= "") then
+      message = "a column "//beside(1:min(len(beside), longest_quote))// &
+        & reason(beside, ".false.", ".true.", ", but none was expected")
+    else
+      message = expected//" was expected"
+    end if
+    call raise(error, status_input, path//": line 1: "//message)
+
+  contains
+
+    !> The option behind a column, or `otherwise`.
+    function reason(column, now, before, otherwise) result(text)
+      character(len=*), intent(in) :: column, now, before, otherwise
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = otherwise
+      if (.not. present(options)) return
+      do k = 1, size(options)
+        if (index(column, trim(options(k)%column)) == 1) text = ": "//trim(options(k)%option)//" = "//now//", but "//before// &
+          & " was expected, with which this table was begun"
+      end do
+    end function reason
+
+  end subroutine refuse_header
+
+  !> The first name of a header that another one has not; empty where there is none.
+  pure function first_beyond(header, other) result(name)
+    character(len=*), intent(in) :: header, other
+    character(len=:), allocatable :: name
+    integer :: first, last
+
+    first = 1
+    do while (first <= len(header))
+      last = index(header(first:), ",")
+      last = merge(len(header), first + last - 2, last == 0)
+      name = header(first:last)
+      if (index(","//other//",", ","//name//",") == 0) return
+      first = last + 2
+    end do
+    name = ""
+  end function first_beyond
 
   !> Check that a row has numbers only, as many as the header has names; the first is the number of a step.
   subroutine check_row(path, line, n_columns, row, step, error)

@@ -3,17 +3,18 @@ module gravier_hdf5_datasets
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5FD_MPIO_COLLECTIVE_F, H5FD_MPIO_INDEPENDENT_F, &
     & H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_FLOAT_F, H5T_IEEE_F64LE, &
-    & H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING_F, H5_INTEGER_KIND, H5_REAL_KIND, h5dclose_f, h5dcreate_f, h5dget_space_f, &
-    & h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5kind_to_type, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
-    & h5pset_chunk_f, h5pset_dxpl_mpio_f, h5pset_fill_time_f, h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, &
-    & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sget_simple_extent_npoints_f, h5sselect_all_f, &
-    & h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tget_class_f, h5tget_size_f, hid_t, hsize_t, size_t
+    & H5T_NO_CLASS_F, H5T_STD_I64LE, H5T_STRING_F, H5_INTEGER_KIND, H5_REAL_KIND, h5dclose_f, h5dcreate_f, &
+    & h5dget_create_plist_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, h5kind_to_type, h5pclose_f, &
+    & h5pcreate_f, h5pget_chunk_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_dxpl_mpio_f, h5pset_fill_time_f, &
+    & h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
+    & h5sget_simple_extent_npoints_f, h5sselect_all_f, h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tget_class_f, &
+    & h5tget_size_f, hid_t, hsize_t, size_t
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_hdf5_tree, only: h5_tree_t
   implicit none
   private
-  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, class_of, type_of
+  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, chunk_rows, class_of, type_of
 
   !> Rows of this rank in memory.
   type :: rows_t
@@ -243,6 +244,21 @@ contains
     end if
     call h5dclose_f(dataset, stat)
   end function can_grow
+
+  !> Rows of a chunk of a dataset, 1 at least.
+  integer(i8) function chunk_rows(dataset) result(rows)
+    integer(hid_t), intent(in) :: dataset
+    integer(hid_t) :: creation
+    integer(hsize_t) :: chunk(2)
+    integer :: n_dims, ignored
+
+    chunk(:) = 1
+    call h5dget_create_plist_f(dataset, creation, ignored)
+    call h5pget_chunk_f(creation, size(chunk), chunk, n_dims)
+    call h5pclose_f(creation, ignored)
+    rows = 1
+    if (n_dims == 1 .or. n_dims == 2) rows = max(1_i8, int(chunk(n_dims), i8))
+  end function chunk_rows
 
   !> Class of the elements of a dataset, one of the H5T_ class constants.
   integer function class_of(self, path) result(data_class)

@@ -11,8 +11,8 @@ module gravier_hdf5_rows
   use gravier_random_hash, only: hash_rows
   use gravier_hdf5_properties, only: text_type, is_ascii
   use gravier_hdf5_attributes, only: h5_attributes_t
-  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, class_of, &
-    & type_of
+  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, chunk_rows, &
+    & class_of, type_of
   implicit none
   private
   public :: h5_rows_t
@@ -254,7 +254,8 @@ contains
     call self%comm%agree(error)
   end subroutine h5_make_table
 
-  !> Check that a table of a file to go on with is one that make_table made, with n_rows rows at least.
+  !> Check that a table of a file to go on with is one that make_table made, with n_rows rows at least, and that its chunks from
+  !> the last of these rows on can be read.
   subroutine h5_check_table(self, path, n_columns, kind, n_rows, error)
     class(h5_rows_t), intent(in) :: self
     character(len=*), intent(in) :: path
@@ -282,7 +283,43 @@ contains
       call self%fail(path, to_text(total)//" rows, but at least "//to_text(n_rows)//" were expected", error)
     end if
     call self%comm%agree(error)
+    call check_chunks(self, path, max(n_rows - 1, 0_i8), total, error)
   end subroutine h5_check_table
+
+  !> Refuse a table of which a chunk cannot be read: from row `first` on, one row of each chunk is.
+  subroutine check_chunks(self, path, first, total, error)
+    class(h5_rows_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(i8), intent(in) :: first, total
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable, target :: words(:)
+    type(rows_t) :: row
+    integer(hid_t) :: place, dataset
+    character(len=:), allocatable :: name
+    integer(i8) :: at, rows_a_chunk
+    integer :: stat, ignored
+
+    if (allocated(error)) return
+    call self%locate(path, place, name)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat == 0) then
+      call type_of(dataset, self%columns(path), row)
+      allocate (words(max(1, row%words)))
+      row%buffer = c_loc(words)
+      ! all ranks read the same rows, so that they fail together
+      row%n = 1
+      rows_a_chunk = chunk_rows(dataset)
+      at = first
+      do while (at < total .and. stat == 0)
+        call transfer_rows(dataset, row, at, .false., stat)
+        at = (at/rows_a_chunk + 1)*rows_a_chunk
+      end do
+      call row%close()
+      call h5dclose_f(dataset, ignored)
+    end if
+    if (stat < 0) call self%fail(path, "cannot read this table: the file is damaged", error)
+    call self%comm%agree(error)
+  end subroutine check_chunks
 
   !> Leave the first rows of a table alone.
   subroutine h5_cut_rows(self, path, n_rows, error)

@@ -1,6 +1,6 @@
 !> Bytes of a case: what --check prints of an item is what its arrays take, and what a scene does not have takes none.
 program test_memory_report
-  use gravier_kinds, only: i8
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
@@ -69,7 +69,7 @@ contains
     call simulation%init(comm, config, error)
     call check(.not. allocated(error), "scene")
     call simulation%assemble(figures)
-    call report_memory(simulation, report)
+    call report_memory(simulation, 0.0_dp, report)
     bytes(:) = report%items%bytes
     call check(all(report%items%number > 0), "items of every kind")
     call sum_arrays(simulation, arrays)

@@ -6,7 +6,7 @@ program test_io_csv_writer
   use gravier_errors, only: error_t, status_input, status_failure
   use gravier_finite, only: is_finite
   use gravier_file_system, only: remove_file
-  use gravier_csv_writer, only: csv_writer_t
+  use gravier_csv_writer, only: csv_writer_t, csv_option_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -199,6 +199,7 @@ contains
   !> What is refused stays as it was, and so does what a full disk keeps from being copied.
   subroutine test_resume_refused()
     character(len=*), parameter :: rows = "step,x"//newline//"1,1"//newline//"two,2"//newline
+    type(csv_option_t), parameter :: options(2) = [csv_option_t("x", "&output x"), csv_option_t("w_", "&output w")]
     type(csv_writer_t) :: table
     type(error_t), allocatable :: error
 
@@ -214,11 +215,19 @@ contains
     call expect(error, "csv_writer.csv: line 3: 1 cells, but the header has 2", "a row that is too short", status_input)
     call put(rows)
     call table%resume(path, "step,y", 5, error)
-    call expect(error, "csv_writer.csv: line 1: step,y was expected", "another header", status_input)
+    call expect(error, "csv_writer.csv: line 1: no column y, but one was expected", "another header", status_input)
     call table%resume(path, "step,x,y", 5, error)
-    call expect(error, "csv_writer.csv: line 1: step,x,y was expected", "a shorter header", status_input)
+    call expect(error, "csv_writer.csv: line 1: no column y, but one was expected", "a shorter header", status_input)
     call table%resume(path, "step", 5, error)
-    call expect(error, "csv_writer.csv: line 1: step was expected", "a longer header", status_input)
+    call expect(error, "csv_writer.csv: line 1: a column x, but none was expected", "a longer header", status_input)
+    call table%resume(path, "x,step", 5, error)
+    call expect(error, "csv_writer.csv: line 1: x,step was expected", "another order", status_input)
+    call table%resume(path, "step,x,w_1,w_2", 5, error, options)
+    call expect(error, "csv_writer.csv: line 1: no column w_1: &output w = .true., but .false. was expected, with which this "// &
+      & "table was begun", "a header without the columns of an option", status_input)
+    call table%resume(path, "step", 5, error, options)
+    call expect(error, "csv_writer.csv: line 1: a column x: &output x = .false., but .true. was expected, with which this "// &
+      & "table was begun", "a header with the columns of an option", status_input)
     call check_equal(content(), rows, "the file after refusals")
     call table%resume(path//"/none.csv", "step", 5, error)
     call expect(error, "cannot create this file: Not a directory", "no such directory", status_failure)

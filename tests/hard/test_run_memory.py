@@ -1,0 +1,57 @@
+"""Memory: what `--check` expects a rank to hold at most is what runs hold, and the least that a grain takes is what it takes."""
+import re
+import unittest
+
+from gravier_runs import RunTestCase, gravier, merged, namelist, run_case, write
+
+#: grains of one radius on a lattice touch each other; of two radii most touch none
+TOUCHING, LOOSE = {"radius_min": 0.01, "radius_max": 0.01}, {"radius_min": 0.008, "radius_max": 0.012}
+PLANE, SPACE = {"dimension": 2, "lattice_count": [250, 200]}, {"dimension": 3, "lattice_count": [40, 40, 32]}
+CASE = {"scene": {"bodies": "lattice", "friction": 0.3}, "time": {"step": 1e-3, "steps": 2},
+        "solver": {"method": "nscdd", "max_iterations": 20}, "decomposition": {"subdomains": 4}, "output": {"directory": "results", "every": 0}}
+#: bytes that src/run/run_memory.f90 takes for a grain, by dimension and friction
+LEAST = {(2, 0.0): 605, (3, 0.0): 730, (2, 0.3): 730, (3, 0.3): 985}
+
+
+class Memory(RunTestCase):
+
+    def peak(self, case, ranks=1):
+        """[MiB] that --check expects, and that a run held."""
+        write(self.here("case.nml"), namelist(case))
+        check = gravier("--check", "case.nml", ranks=ranks, directory=self.scratch)
+        self.assert_status(check, 0)
+        run = run_case(case, ranks, self.here("run"))
+        self.assertIn(run.status, (0, 3), run)
+        return (int(re.search(r"\n  about (\d+) MiB at most on a rank", check.stdout)[1]),
+                int(re.search(r"\nmemory      at most (\d+) MiB on a rank", run.stdout)[1]))
+
+    def test_estimate(self):
+        for name, changes, ranks in (
+                ("touching", {"scene": {**PLANE, **TOUCHING}}, 1),
+                ("loose", {"scene": {**PLANE, **LOOSE}}, 2),
+                ("touching spheres", {"scene": {**SPACE, **TOUCHING}}, 1),
+                ("on two ranks", {"scene": {**SPACE, **TOUCHING}}, 2),
+                ("without friction", {"scene": {**SPACE, **TOUCHING, "friction": 0.0}}, 1),
+                ("pictures", {"scene": {**SPACE, **TOUCHING}, "output": {"vtk": True}}, 1),
+                ("no contacts written", {"scene": {**SPACE, **TOUCHING}, "output": {"contacts": False}}, 1)):
+            with self.subTest(name):
+                expected, held = self.peak(merged(CASE, changes), ranks)
+                self.assertGreaterEqual(expected, held)
+                self.assertLessEqual(expected, 1.25 * held)
+
+    def test_least_of_a_grain(self):
+        """The peaks of two numbers of grains that touch no others."""
+        for shape, counts in ((PLANE, ([250, 200], [500, 300])), (SPACE, ([40, 40, 32], [60, 60, 42]))):
+            for friction in (0.0, 0.3):
+                with self.subTest(dimension=shape["dimension"], friction=friction):
+                    held = [self.peak(merged(CASE, {"scene": {**shape, **LOOSE, "lattice_count": count, "friction": friction}}))[1]
+                            for count in counts]
+                    grains = [int(count[0]) * count[1] * (count[2] if len(count) > 2 else 1) for count in counts]
+                    least = LEAST[shape["dimension"], friction]
+                    # the log has whole MiB
+                    taken = 2**20 * (held[1] - held[0]) / (grains[1] - grains[0])
+                    self.assertLess(abs(taken - least), 0.03 * least + 2**21 / (grains[1] - grains[0]))
+
+
+if __name__ == "__main__":
+    unittest.main()
