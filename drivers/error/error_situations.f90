@@ -325,26 +325,26 @@ contains
     real(dp) :: jump, seconds, began
     integer :: k, n
 
-    associate (problem => simulation%problem, scheme => simulation%scheme)
-      call scheme%start(problem, error)
+    associate (problem => simulation%problem, method => simulation%method)
+      call method%start(problem, error)
       if (allocated(error)) return
       call velocity%start(problem, 0.1_dp*problem%error_scale)
       seconds = 0.0_dp
       n = 1
       do k = 1, plan%iterations(size(plan%iterations))
         began = clock()
-        call scheme%iterate(problem, .false., jump, error)
+        call method%iterate(problem, .false., jump, error)
         if (allocated(error)) return
         seconds = seconds + clock() - began
         if (k == plan%iterations(n)) then
           call look(simulation, velocity, k, seen(n))
           seen(n)%situation = name
-          seen(n)%sweeps = real(k*scheme%sweeps, dp)
+          seen(n)%sweeps = real(k*method%sweeps, dp)
           seen(n)%seconds = seconds
           call take_velocities(problem, states(:, n))
           n = n + 1
         end if
-        call velocity%keep_copy(problem, scheme, k)
+        call velocity%keep_copy(problem, method, k)
       end do
     end associate
     call solve_tightly(plan, simulation, reference, error)
@@ -368,7 +368,7 @@ contains
     row%iterations = iterations
     associate (problem => simulation%problem)
       call problem%evaluate()
-      call velocity%assess(problem, simulation%scheme, iterations, row%residual, defect)
+      call velocity%assess(problem, simulation%method, iterations, row%residual, defect)
       row%bound = merge(velocity%bound_by_rest, -1.0_dp, problem%rest_is_admissible)
       row%mass = velocity%mass
       if (.not. row%residual > 0.0_dp) return
@@ -465,7 +465,7 @@ contains
     control%max_iterations = plan%limit
     control%check_every = check_interval
     control%layered = .false.
-    call solve_contacts(simulation%problem, simulation%scheme, control, report, error)
+    call solve_contacts(simulation%problem, simulation%method, control, report, error)
     reference%residual = report%residual
     reference%estimate = report%velocity_error
     reference%iterations = report%iterations
@@ -487,14 +487,14 @@ contains
     integer :: k, n
     logical :: accelerated
 
-    associate (problem => simulation%problem, scheme => simulation%scheme)
-      accelerated = scheme%momentum%on
-      scheme%momentum%on = .false.
-      call scheme%start(problem, error)
+    associate (problem => simulation%problem, method => simulation%method)
+      accelerated = method%momentum%on
+      method%momentum%on = .false.
+      call method%start(problem, error)
       if (.not. allocated(error)) call velocity%start(problem, 0.1_dp*problem%error_scale)
       n = 0
       do k = 1, plan%sweeps
-        call scheme%iterate(problem, .false., jump, error)
+        call method%iterate(problem, .false., jump, error)
         if (allocated(error)) exit
         if (mod(k, check_interval) == 0 .or. k == plan%sweeps) then
           call look(simulation, velocity, k, row)
@@ -504,9 +504,9 @@ contains
             call take_velocities(problem, states(:, n))
           end if
         end if
-        call velocity%keep_copy(problem, scheme, k)
+        call velocity%keep_copy(problem, method, k)
       end do
-      scheme%momentum%on = accelerated
+      method%momentum%on = accelerated
       if (allocated(error)) return
       reference%residual = row%residual
       reference%estimate = row%estimate
@@ -566,7 +566,7 @@ contains
 
     do k = 1, repetitions
       call set_impulses(simulation%problem)
-      call solve_contacts(simulation%problem, simulation%scheme, simulation%control, report, error, simulation%exact)
+      call solve_contacts(simulation%problem, simulation%method, simulation%control, report, error, simulation%exact)
       if (allocated(error)) return
       seconds = min(seconds, report%seconds)
     end do
@@ -611,10 +611,10 @@ contains
         seen(k)%situation = cold_text//", by the program"
       end if
       call set_impulses(simulation%problem)
-      relaxed = simulation%scheme%work%relaxations
-      call solve_contacts(simulation%problem, simulation%scheme, control, report, error, simulation%exact)
+      relaxed = simulation%method%work%relaxations
+      call solve_contacts(simulation%problem, simulation%method, control, report, error, simulation%exact)
       if (allocated(error)) return
-      seen(k)%sweeps = real(simulation%scheme%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
+      seen(k)%sweeps = real(simulation%method%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
       if (k == size(seen)) call time_again(simulation, report%seconds, error)
       if (allocated(error)) return
       call take_figures(simulation, seen(k))

@@ -131,22 +131,22 @@ contains
         call items(1)%add("impulse of projections", 8, kernels%nc)
         call items(1)%add("velocity of projections", 8, kernels%nc)
       end if
-      call simulation%scheme%held(kernels%nc, nv, held)
+      call simulation%method%held(kernels%nc, nv, held)
       call add_held(items(1), of_contacts=.true.)
       items(2)%name = "near pair"
       call items(2)%add("candidate", 4, 1)
       call items(2)%add("antagonist", 4, 1)
       call items(2)%add("shift", 4, merge(1, 0, ni > 0))
-      call items(2)%add("impulse", 8, simulation%neighbourhoods%memory%n_impulse)
-      call items(2)%add("state", 4, simulation%neighbourhoods%memory%n_states())
+      call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
+      call items(2)%add("state", 4, simulation%halo%memory%n_states())
       items(3)%name = "body in contact, in each subdomain"
       call items(3)%add("id", 8, 1)
-      call items(3)%add("home", 4, 1)
+      call items(3)%add("owned", 4, 1)
       call items(3)%add("place", 4, 1)
       call items(3)%add("multiplicity", 4, 1)
       call items(3)%add("radius", 8, 1)
       call items(3)%add("v_free", 8, nv)
-      if (simulation%physics%laws%attracts) call items(3)%add("pull", 8, nv)
+      if (simulation%physics%laws%attracts) call items(3)%add("attraction_load", 8, nv)
       call items(3)%add("velocity", 8, nv)
       call items(3)%add("v_global", 8, nv)
       call items(3)%add("reaction", 8, nv)
@@ -156,7 +156,7 @@ contains
       items(4)%name = "grain seen, ghosts included"
       call add_grain(items(4))
       call items(4)%add("owner", 4, 2)
-      items(5)%name = "grain at home"
+      items(5)%name = "grain owned"
       call add_grain(items(5))
       call items(5)%add("reference", 8, nd)
     end associate
@@ -216,12 +216,12 @@ contains
 
     counts(:) = 0
     do s = 1, size(simulation%problem%sub)
-      associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+      associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
         counts(1) = counts(1) + sub%n_contacts
         counts(2) = counts(2) + view%list%n
         counts(3) = counts(3) + sub%n_columns
         counts(4) = counts(4) + view%bodies%n
-        counts(5) = counts(5) + simulation%decomposition%home(s)%n
+        counts(5) = counts(5) + simulation%decomposition%owned(s)%n
       end associate
     end do
   end subroutine count_items

@@ -130,11 +130,11 @@ contains
   end function place_of
 
   !> List the near pairs that belong to a subdomain, in sweep order, with nothing kept.
-  subroutine find_neighbours(bodies, home, boundaries, period, region, subdomain, rule, memory, list)
+  subroutine find_neighbours(bodies, owned, boundaries, period, region, subdomain, rule, memory, list)
     !> the grains that the subdomain sees, wrapped into the period
     type(body_set_t), intent(in) :: bodies
     !> (n) subdomain that holds each grain's centre
-    integer, intent(in), contiguous :: home(:)
+    integer, intent(in), contiguous :: owned(:)
     type(boundary_t), intent(in) :: boundaries(:)
     type(period_t), intent(in) :: period
     class(region_t), intent(in) :: region
@@ -188,7 +188,7 @@ contains
       real(dp) :: distance, normal(bodies%nd)
 
       do k = 1, bodies%n
-        if (home(k) /= subdomain .or. bodies%glued(k) > 0) cycle
+        if (owned(k) /= subdomain .or. bodies%glued(k) > 0) cycle
         do b = 1, size(boundaries)
           if (.not. boundaries(b)%touches()) cycle
           call boundaries(b)%locate(bodies%position(:, k), distance, normal)
