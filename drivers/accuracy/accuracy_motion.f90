@@ -51,16 +51,16 @@ contains
     integer :: s, k, n, nd
 
     nd = simulation%decomposition%nd
-    allocate (records(1 + 2*nd, sum(simulation%decomposition%home%n)), motion(2*nd, sum(simulation%decomposition%home%n)))
+    allocate (records(1 + 2*nd, sum(simulation%decomposition%owned%n)), motion(2*nd, sum(simulation%decomposition%owned%n)))
     n = 0
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        do k = 1, home%n
+    do s = 1, size(simulation%decomposition%owned)
+      associate (owned => simulation%decomposition%owned(s))
+        do k = 1, owned%n
           n = n + 1
-          records(1, n) = home%id(k)
-          motion(1:nd, n) = home%position(:, k)
-          if (home%ni > 0) motion(1:nd, n) = motion(1:nd, n) + home%image(:, k)*simulation%decomposition%period%length(1:nd)
-          motion(nd + 1:, n) = home%velocity(1:nd, k)
+          records(1, n) = owned%id(k)
+          motion(1:nd, n) = owned%position(:, k)
+          if (owned%ni > 0) motion(1:nd, n) = motion(1:nd, n) + owned%image(:, k)*simulation%decomposition%period%length(1:nd)
+          motion(nd + 1:, n) = owned%velocity(1:nd, k)
         end do
       end associate
     end do
@@ -146,15 +146,15 @@ contains
       motion%restitution = boundaries(1)%contact%restitution
       ! the rank that has the grain tells the others
       along(:) = 0.0_dp
-      do s = 1, size(simulation%decomposition%home)
-        associate (home => simulation%decomposition%home(s))
-          if (home%n == 0) cycle
-          gap = dot_product(home%position(:, 1) - boundaries(1)%surface%point(1:nd), motion%normal) - home%radius(1)
-          speed = dot_product(home%velocity(1:nd, 1), motion%normal)
+      do s = 1, size(simulation%decomposition%owned)
+        associate (owned => simulation%decomposition%owned(s))
+          if (owned%n == 0) cycle
+          gap = dot_product(owned%position(:, 1) - boundaries(1)%surface%point(1:nd), motion%normal) - owned%radius(1)
+          speed = dot_product(owned%velocity(1:nd, 1), motion%normal)
           along(1) = max(gap, 0.0_dp)
           along(2) = max(speed, 0.0_dp)
           along(3) = max(-speed, 0.0_dp)
-          along(4) = max(-gap, 0.0_dp) + norm2(home%velocity(1:nd, 1) - speed*motion%normal) + sum(abs(home%velocity(nd + 1:, 1)))
+          along(4) = max(-gap, 0.0_dp) + norm2(owned%velocity(1:nd, 1) - speed*motion%normal) + sum(abs(owned%velocity(nd + 1:, 1)))
         end associate
       end do
       call simulation%comm%highest_of(along)

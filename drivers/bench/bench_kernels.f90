@@ -10,7 +10,7 @@ module gravier_bench_kernels
   use gravier_effects, only: effects_t
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: subproblem_t
-  use gravier_scheme, only: start_sweeps
+  use gravier_method, only: start_sweeps
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_machine, only: last_cache
   use gravier_bench_options, only: options_t
@@ -195,7 +195,7 @@ contains
       associate (sub => simulation%problem%sub(1))
         if (index(name, "restitution") > 0) sub%hot(:, packing%nd + 1, :) = 0.5_dp*sub%hot(:, packing%nd + 1, :)
       end associate
-      call start_sweeps(simulation%scheme, simulation%problem, shared_masses=.false.)
+      call start_sweeps(simulation%method, simulation%problem, shared_masses=.false.)
       problem%name = name
       problem%kernels = simulation%problem%kernels
       call move_alloc(simulation%problem%sub, problem%sub)

@@ -176,11 +176,11 @@ contains
     logical, intent(in) :: middle
     integer :: s, k
 
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        do k = 1, home%n
-          call packing%place(home%id(k), home%position(:, k), home%velocity(:, k))
-          if (.not. middle) home%position(:, k) = home%position(:, k) - 0.5_dp*step*home%velocity(1:packing%nd, k)
+    do s = 1, size(simulation%decomposition%owned)
+      associate (owned => simulation%decomposition%owned(s))
+        do k = 1, owned%n
+          call packing%place(owned%id(k), owned%position(:, k), owned%velocity(:, k))
+          if (.not. middle) owned%position(:, k) = owned%position(:, k) - 0.5_dp*step*owned%velocity(1:packing%nd, k)
         end do
       end associate
     end do

@@ -8,7 +8,7 @@ module gravier_bench_scene
     & phase_interface, phase_setup, phase_sweep, phase_exchange, phase_interface_solve, phase_factorise, phase_check, &
     & phase_reduction
   use gravier_nscdd, only: average_copies
-  use gravier_scheme, only: work_t
+  use gravier_method, only: work_t
   use gravier_solve, only: solve_report_t, solve_contacts
   use gravier_file_system, only: make_directory, remove_directory
   use gravier_own_files, only: remove_own
@@ -73,7 +73,7 @@ contains
       call reset_grains(self%packing, simulation, middle=.true.)
       call simulation%comm%barrier()
       start = MPI_Wtime()
-      call simulation%neighbourhoods%build(simulation%decomposition)
+      call simulation%halo%build(simulation%decomposition)
       call simulation%comm%barrier()
     end associate
     seconds = MPI_Wtime() - start
@@ -118,7 +118,7 @@ contains
       if (allocated(error)) return
       call gather_timers(simulation%comm, mean, least, most)
       start = MPI_Wtime()
-      call solve_contacts(simulation%problem, simulation%scheme, simulation%control, report, error)
+      call solve_contacts(simulation%problem, simulation%method, simulation%control, report, error)
       call simulation%comm%barrier()
       times%solve = MPI_Wtime() - start
     end associate
@@ -211,9 +211,9 @@ contains
       sent(2) = (problem%shared%values - sent(2))/n
       call comm%sum_counts(sent)
       call record%note(self%of, "exchange", "s", one)
-      call record%note(self%of, "shared_bodies", "1", real(self%figures%sharing%bodies, dp))
-      call record%note(self%of, "copies_values", "1", real(self%figures%sharing%values, dp))
-      call record%note(self%of, "seconds_per_value", "s", one/self%figures%sharing%values)
+      call record%note(self%of, "shared_bodies", "1", real(self%figures%interface_statistics%bodies, dp))
+      call record%note(self%of, "copies_values", "1", real(self%figures%interface_statistics%values, dp))
+      call record%note(self%of, "seconds_per_value", "s", one/self%figures%interface_statistics%values)
       if (comm%size == 1) return
       call record%note(self%of, "messages_between_ranks", "1", real(sent(1), dp))
       call record%note(self%of, "values_between_ranks", "1", real(sent(2), dp))
@@ -228,13 +228,13 @@ contains
     type(work_t) :: before, after
     real(dp) :: mean(n_phases), least(n_phases), most(n_phases)
 
-    before = self%simulation%scheme%work_done()
+    before = self%simulation%method%work_done()
     call reset_grains(self%packing, self%simulation, middle=.false.)
     call reset_timers()
     call self%simulation%advance(self%figures, error)
     if (allocated(error)) return
     call gather_timers(self%simulation%comm, mean, least, most)
-    after = self%simulation%scheme%work_done()
+    after = self%simulation%method%work_done()
     call record%note(self%of, "factorisation", "s", mean(phase_factorise))
     call record%note(self%of, "interface_solve", "s", &
       & mean(phase_interface_solve)/real(after%interface_solves - before%interface_solves, dp))
@@ -249,8 +249,8 @@ contains
     integer :: m
 
     n = 0
-    do m = 2, size(self%figures%sharing%multiplicity)
-      n = n + (m - 1)*self%figures%sharing%multiplicity(m)
+    do m = 2, size(self%figures%interface_statistics%multiplicity)
+      n = n + (m - 1)*self%figures%interface_statistics%multiplicity(m)
     end do
     n = n*self%simulation%problem%kernels%nv
   end function bench_scene_unknowns

@@ -121,26 +121,26 @@ contains
     real(dp) :: jump, seconds, began
     integer :: k, n
 
-    associate (problem => simulation%problem, scheme => simulation%scheme)
-      call scheme%start(problem, error)
+    associate (problem => simulation%problem, method => simulation%method)
+      call method%start(problem, error)
       if (allocated(error)) return
       call velocity%start(problem, 0.1_dp*problem%error_scale)
       seconds = 0.0_dp
       n = 1
       do k = 1, plan%iterations(size(plan%iterations))
         began = clock()
-        call scheme%iterate(problem, .false., jump, error)
+        call method%iterate(problem, .false., jump, error)
         if (allocated(error)) return
         seconds = seconds + clock() - began
         if (k == plan%iterations(n)) then
           call look(simulation, velocity, k, seen(n))
           seen(n)%situation = name
-          seen(n)%sweeps = real(k*scheme%sweeps, dp)
+          seen(n)%sweeps = real(k*method%sweeps, dp)
           seen(n)%seconds = seconds
           call take_velocities(problem, states(:, n))
           n = n + 1
         end if
-        call velocity%keep_copy(problem, scheme, k)
+        call velocity%keep_copy(problem, method, k)
       end do
     end associate
     call solve_tightly(plan, simulation, reference, error)
@@ -177,10 +177,10 @@ contains
         seen(k)%situation = cold_text//", by the program"
       end if
       call set_impulses(simulation%problem)
-      relaxed = simulation%scheme%work%relaxations
-      call solve_contacts(simulation%problem, simulation%scheme, control, report, error, simulation%exact)
+      relaxed = simulation%method%work%relaxations
+      call solve_contacts(simulation%problem, simulation%method, control, report, error, simulation%exact)
       if (allocated(error)) return
-      seen(k)%sweeps = real(simulation%scheme%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
+      seen(k)%sweeps = real(simulation%method%work%relaxations - relaxed, dp)/max(1_i8, simulation%problem%n_contacts)
       if (k == size(seen)) call time_again(simulation, report%seconds, error)
       if (allocated(error)) return
       call take_figures(simulation, seen(k))
@@ -214,7 +214,7 @@ contains
 
     do k = 1, repetitions
       call set_impulses(simulation%problem)
-      call solve_contacts(simulation%problem, simulation%scheme, simulation%control, report, error, simulation%exact)
+      call solve_contacts(simulation%problem, simulation%method, simulation%control, report, error, simulation%exact)
       if (allocated(error)) return
       seconds = min(seconds, report%seconds)
     end do

@@ -40,7 +40,7 @@ contains
     row%iterations = iterations
     associate (problem => simulation%problem)
       call problem%evaluate()
-      call velocity%assess(problem, simulation%scheme, iterations, row%residual, defect)
+      call velocity%assess(problem, simulation%method, iterations, row%residual, defect)
       row%bound = merge(velocity%bound_by_rest, -1.0_dp, problem%rest_is_admissible)
       row%mass = velocity%mass
       if (.not. row%residual > 0.0_dp) return
@@ -69,7 +69,7 @@ contains
     control%max_iterations = plan%limit
     control%check_every = check_interval
     control%layered = .false.
-    call solve_contacts(simulation%problem, simulation%scheme, control, report, error)
+    call solve_contacts(simulation%problem, simulation%method, control, report, error)
     reference%residual = report%residual
     reference%estimate = report%velocity_error
     reference%iterations = report%iterations
@@ -91,14 +91,14 @@ contains
     integer :: k, n
     logical :: accelerated
 
-    associate (problem => simulation%problem, scheme => simulation%scheme)
-      accelerated = scheme%momentum%on
-      scheme%momentum%on = .false.
-      call scheme%start(problem, error)
+    associate (problem => simulation%problem, method => simulation%method)
+      accelerated = method%momentum%on
+      method%momentum%on = .false.
+      call method%start(problem, error)
       if (.not. allocated(error)) call velocity%start(problem, 0.1_dp*problem%error_scale)
       n = 0
       do k = 1, plan%sweeps
-        call scheme%iterate(problem, .false., jump, error)
+        call method%iterate(problem, .false., jump, error)
         if (allocated(error)) exit
         if (mod(k, check_interval) == 0 .or. k == plan%sweeps) then
           call look(simulation, velocity, k, row)
@@ -108,9 +108,9 @@ contains
             call take_velocities(problem, states(:, n))
           end if
         end if
-        call velocity%keep_copy(problem, scheme, k)
+        call velocity%keep_copy(problem, method, k)
       end do
-      scheme%momentum%on = accelerated
+      method%momentum%on = accelerated
       if (allocated(error)) return
       reference%residual = row%residual
       reference%estimate = row%estimate

@@ -124,9 +124,9 @@ contains
         where (boundaries(b)%free) boundaries(b)%velocity = keep*min(max(boundaries(b)%velocity, -limit), limit)
       end do
     end associate
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        home%velocity(:, :) = keep*home%velocity
+    do s = 1, size(simulation%decomposition%owned)
+      associate (owned => simulation%decomposition%owned(s))
+        owned%velocity(:, :) = keep*owned%velocity
       end associate
     end do
   end subroutine press
@@ -143,12 +143,12 @@ contains
     real(dp), allocatable :: mass(:)
     integer :: s, n
 
-    allocate (mass(sum(simulation%decomposition%home%n)))
+    allocate (mass(sum(simulation%decomposition%owned%n)))
     n = 0
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        mass(n + 1:n + home%n) = home%mass
-        n = n + home%n
+    do s = 1, size(simulation%decomposition%owned)
+      associate (owned => simulation%decomposition%owned(s))
+        mass(n + 1:n + owned%n) = owned%mass
+        n = n + owned%n
       end associate
     end do
     total_mass = simulation%comm%sum_real(mass)
@@ -203,8 +203,8 @@ contains
     type(simulation_t), intent(inout) :: simulation
     integer :: s
 
-    do s = 1, size(simulation%decomposition%home)
-      simulation%decomposition%home(s)%velocity(:, :) = 0.0_dp
+    do s = 1, size(simulation%decomposition%owned)
+      simulation%decomposition%owned(s)%velocity(:, :) = 0.0_dp
     end do
   end subroutine stop_grains
 
@@ -254,15 +254,15 @@ contains
 
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
-      allocate (volume(sum(decomposition%home%n)), moment(sum(decomposition%home%n)))
+      allocate (volume(sum(decomposition%owned%n)), moment(sum(decomposition%owned%n)))
       floor = decomposition%boundaries(1)%surface%point(nd)
       n = 0
-      do s = 1, size(decomposition%home)
-        associate (home => decomposition%home(s))
-          do k = 1, home%n
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s))
+          do k = 1, owned%n
             n = n + 1
-            volume(n) = grain_volume(nd, home%radius(k))
-            moment(n) = volume(n)*(home%position(nd, k) - floor)
+            volume(n) = grain_volume(nd, owned%radius(k))
+            moment(n) = volume(n)*(owned%position(nd, k) - floor)
           end do
         end associate
       end do

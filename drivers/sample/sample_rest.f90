@@ -118,14 +118,14 @@ contains
     integer :: s, k, n, nd
 
     nd = simulation%decomposition%nd
-    allocate (mass(sum(simulation%decomposition%home%n)), volume(sum(simulation%decomposition%home%n)))
+    allocate (mass(sum(simulation%decomposition%owned%n)), volume(sum(simulation%decomposition%owned%n)))
     n = 0
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        do k = 1, home%n
+    do s = 1, size(simulation%decomposition%owned)
+      associate (owned => simulation%decomposition%owned(s))
+        do k = 1, owned%n
           n = n + 1
-          mass(n) = home%mass(k)
-          volume(n) = grain_volume(nd, home%radius(k))
+          mass(n) = owned%mass(k)
+          volume(n) = grain_volume(nd, owned%radius(k))
         end do
       end associate
     end do

@@ -28,7 +28,7 @@ module gravier_shared_exchange
     !> slot of each sharer, 0 for this subdomain
     integer, allocatable :: slot(:)
     !> place of this subdomain among the sharers of each shared body, from 1 (n_shared)
-    integer, allocatable :: rung(:)
+    integer, allocatable :: copy_rank(:)
     integer :: n_slots = 0
     !> shared body that each slot is a copy of, and its local number (n_slots)
     integer, allocatable :: slot_shared(:), slot_body(:)
@@ -131,12 +131,12 @@ contains
     next(:) = part%neighbour_first(1:size(next))
     part%n_slots = part%neighbour_first(size(next) + 1) - 1
     allocate (part%slot(size(part%sharer)), source=0)
-    allocate (part%slot_shared(part%n_slots), part%slot_body(part%n_slots), part%rung(part%n_shared))
+    allocate (part%slot_shared(part%n_slots), part%slot_body(part%n_slots), part%copy_rank(part%n_shared))
     allocate (part%send(width, part%n_slots), part%recv(width, part%n_slots), source=0.0_dp)
     do k = 1, part%n_shared
       do j = part%first(k), part%first(k + 1) - 1
         if (part%sharer(j) == part%subdomain) then
-          part%rung(k) = j - part%first(k) + 1
+          part%copy_rank(k) = j - part%first(k) + 1
         else
           s = place_of(part%neighbour, part%sharer(j))
           part%slot(j) = next(s)

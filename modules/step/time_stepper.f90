@@ -9,15 +9,15 @@ module gravier_time_stepper
   use gravier_time_table, only: time_table_t
   use gravier_effects, only: effects_t
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t
-  use gravier_descent, only: effort_t
+  use gravier_method, only: method_t
+  use gravier_convergence_history, only: effort_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
   use gravier_decomposition, only: decomposition_t
-  use gravier_departures, only: some_leave, let_grains_out
-  use gravier_neighbourhood, only: neighbourhoods_t
-  use gravier_division, only: division_rule_t, divide_again, division_is_due
-  use gravier_interface, only: interface_figures_t
+  use gravier_removal, only: some_leave, remove_grains
+  use gravier_halo, only: halo_t
+  use gravier_repartition, only: repartition_rule_t, repartition, repartition_is_due
+  use gravier_interface, only: interface_statistics_t
   use gravier_physics, only: physics_t
   use gravier_load_areas, only: find_load_areas
   use gravier_problem_builder, only: build_problem
@@ -46,7 +46,7 @@ module gravier_time_stepper
   !> Figures of a step, the same on every rank.
   type :: step_figures_t
     type(solve_report_t) :: solve
-    type(interface_figures_t) :: sharing
+    type(interface_statistics_t) :: interface_statistics
     integer(i8) :: contacts = 0
     !> grains that left by an outlet; grains that move by more than their radius in a step
     integer(i8) :: left = 0, fast = 0
@@ -70,7 +70,7 @@ module gravier_time_stepper
     type(communicator_t), pointer :: comm => null()
     ! ---- what moves, and what acts on it
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: neighbourhoods
+    type(halo_t) :: halo
     type(physics_t) :: physics
     !> what the scene has
     type(effects_t) :: effects
@@ -83,8 +83,8 @@ module gravier_time_stepper
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
-    type(division_rule_t) :: division
-    class(scheme_t), allocatable :: scheme
+    type(repartition_rule_t) :: division
+    class(method_t), allocatable :: method
     type(solve_control_t) :: control
     !> where it is known
     class(exact_solution_t), allocatable :: exact
@@ -143,7 +143,7 @@ contains
 
     if (allocated(error)) return
     call self%assemble(figures)
-    call solve_contacts(self%problem, self%scheme, self%control, figures%solve, error, self%exact, watch)
+    call solve_contacts(self%problem, self%method, self%control, figures%solve, error, self%exact, watch)
     call note_solve(self, figures, error)
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
@@ -173,19 +173,20 @@ contains
     self%physics%first = self%step == 0
     call move_to_middle(self%decomposition, self%physics, self%theta, self%time, self%n_glued > 0, listed)
     call drive(self%decomposition, self%physics, self%gravity_table, self%time, changed)
-    if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%neighbourhoods)
+    if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%halo)
     figures%fast = count_fast(self%decomposition, self%physics)
     call stop_timer(phase_bodies)
     call start_timer(phase_neighbourhood)
-    if (.not. listed) listed = self%neighbourhoods%are_due(self%decomposition)
+    if (.not. listed) listed = self%halo%are_due(self%decomposition)
     if (.not. listed) listed = some_leave(self%decomposition)
-    figures%divided = division_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
+    figures%divided = repartition_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
     figures%listed = listed .or. figures%divided
     call list_neighbours(self, figures)
     call stop_timer(phase_neighbourhood)
-    call build_problem(self%decomposition, self%neighbourhoods, self%problem%kernels, self%physics, self%problem, figures%sharing)
+    call build_problem(self%decomposition, self%halo, self%problem%kernels, self%physics, self%problem, &
+      & figures%interface_statistics)
     call start_timer(phase_setup)
-    if (self%warm_start) call recall_impulses(self%neighbourhoods, self%problem)
+    if (self%warm_start) call recall_impulses(self%halo, self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
     figures%contacts = self%problem%n_contacts
@@ -196,12 +197,13 @@ contains
     figures%max_overlap = self%comm%highest(figures%max_overlap)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
-    if (figures%contacts > 0) self%imbalance = real(figures%sharing%most_contacts, dp)*self%decomposition%n_subdomains/ &
+    if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, &
+      & dp)*self%decomposition%n_subdomains/ &
       & real(figures%contacts, dp)
     if (figures%divided) then
       self%reached_imbalance = self%imbalance
-      call self%scheme%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
-      call self%scheme%forget_times()
+      call self%method%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
+      call self%method%forget_times()
     end if
     call measure_velocity_scale(self)
   end subroutine time_stepper_assemble
@@ -212,10 +214,10 @@ contains
     type(step_figures_t), intent(in) :: figures
 
     if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
-      & self%neighbourhoods, self%problem)
-    if (self%warm_start) call keep_impulses(self%problem, self%neighbourhoods)
+      & self%halo, self%problem)
+    if (self%warm_start) call keep_impulses(self%problem, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
-      & self%neighbourhoods)
+      & self%halo)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
@@ -227,7 +229,7 @@ contains
     type(step_figures_t), intent(in) :: figures
 
     solved%decomposition => self%decomposition
-    solved%neighbourhoods => self%neighbourhoods
+    solved%halo => self%halo
     solved%physics => self%physics
     solved%problem => self%problem
     solved%boundary_impulses => self%boundary_impulses
@@ -253,7 +255,7 @@ contains
         return
       end if
       if (solve%status == solve_unbounded) call find_largest_impulse(self%problem, figures%cause)
-      call self%effort%add(solve%descent, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
+      call self%effort%add(solve%history, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
   end subroutine note_solve
 
@@ -297,17 +299,17 @@ contains
     integer(i8) :: n_glued
     logical :: remembered
 
-    if (self%neighbourhoods%builds > 0) call self%neighbourhoods%refresh(self%decomposition)
+    if (self%halo%builds > 0) call self%halo%refresh(self%decomposition)
     if (.not. figures%listed) return
-    remembered = self%neighbourhoods%memory%words() > 0 .and. self%neighbourhoods%builds > 0
-    if (remembered) call gather_impulses(self%decomposition, self%neighbourhoods, records)
-    call let_grains_out(self%decomposition, self%n_glued > 0, figures%left, n_glued)
+    remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
+    if (remembered) call gather_impulses(self%decomposition, self%halo, records)
+    call remove_grains(self%decomposition, self%n_glued > 0, figures%left, n_glued)
     self%n_grains = self%n_grains - figures%left - n_glued
     self%n_glued = self%n_glued - n_glued
-    if (figures%divided) call divide_again(self%division, self%neighbourhoods, self%decomposition, figures%refused)
-    call self%decomposition%settle()
-    call self%neighbourhoods%build(self%decomposition)
-    if (remembered) call spread_impulses(self%decomposition, records, self%neighbourhoods)
+    if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refused)
+    call self%decomposition%migrate()
+    call self%halo%build(self%decomposition)
+    if (remembered) call spread_impulses(self%decomposition, records, self%halo)
   end subroutine list_neighbours
 
   !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
@@ -319,11 +321,11 @@ contains
     integer :: s, k, b
 
     if (.not. is_finite(figures%kinetic_energy)) then
-      do s = 1, size(self%decomposition%home)
-        associate (home => self%decomposition%home(s))
-          do k = 1, home%n
-            if (.not. is_finite(home%mass(k)*sum(home%velocity(:, k)**2))) &
-              & call refuse("kinetic energy of body "//to_text(home%id(k)))
+      do s = 1, size(self%decomposition%owned)
+        associate (owned => self%decomposition%owned(s))
+          do k = 1, owned%n
+            if (.not. is_finite(owned%mass(k)*sum(owned%velocity(:, k)**2))) &
+              & call refuse("kinetic energy of body "//to_text(owned%id(k)))
           end do
         end associate
       end do
@@ -359,14 +361,14 @@ contains
   subroutine time_stepper_free(self)
     class(time_stepper_t), intent(inout) :: self
 
-    if (allocated(self%scheme)) then
-      call self%scheme%free()
-      deallocate (self%scheme)
+    if (allocated(self%method)) then
+      call self%method%free()
+      deallocate (self%method)
     end if
     if (allocated(self%exact)) deallocate (self%exact)
     if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
-    if (allocated(self%neighbourhoods%view)) deallocate (self%neighbourhoods%view)
-    self%neighbourhoods%builds = 0
+    if (allocated(self%halo%view)) deallocate (self%halo%view)
+    self%halo%builds = 0
     self%step = 0
     self%time = 0.0_dp
     self%failed = 0

@@ -68,7 +68,7 @@ contains
     if (.not. allocated(error)) call read_others(config, found, report, error)
     if (.not. allocated(error)) call check_owned_groups(config, found, error)
     if (allocated(error)) return
-    call settle(config, report)
+    call apply_defaults(config, report)
     call check_config(config, report, error)
   end subroutine parse_config
 
@@ -282,7 +282,7 @@ contains
   end subroutine check_owned_groups
 
   !> Sets the values that hang on others.
-  subroutine settle(config, report)
+  subroutine apply_defaults(config, report)
     type(config_t), intent(inout) :: config
     type(report_t), intent(inout) :: report
     type(given_coefficients_t) :: given
@@ -296,7 +296,7 @@ contains
       given%tangential_restitution = is_given(report, "scene", "wall_tangential_restitution")
       given%rolling_friction = is_given(report, "scene", "wall_rolling_friction")
       given%pivoting_friction = is_given(report, "scene", "wall_pivoting_friction")
-      call settle_contact(given, scene%contact, scene%wall_contact)
+      call apply_contact_defaults(given, scene%contact, scene%wall_contact)
       call fill_third(scene%dimension, scene%lattice_count)
       call fill_third(scene%dimension, parts%grid)
       where (.not. abs(sample%box) > 0.0_dp) sample%box = scene%period
@@ -318,12 +318,12 @@ contains
     end do
     do i = 1, size(config%boundaries)
       report%instance = i
-      call settle_boundary(config%scene, report, config%boundaries(i))
+      call apply_boundary_defaults(config%scene, report, config%boundaries(i))
     end do
     report%instance = 1
-  end subroutine settle
+  end subroutine apply_defaults
 
-  subroutine settle_boundary(scene, report, boundary)
+  subroutine apply_boundary_defaults(scene, report, boundary)
     type(scene_config_t), intent(in) :: scene
     !> of the instance of the boundary
     type(report_t), intent(in) :: report
@@ -333,13 +333,13 @@ contains
     if (.not. is_given(report, "boundary", "name")) boundary%name = "boundary "//to_text(report%instance)
     point = surface_value(boundary, "point")
     where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = point
-    call settle_contact(boundary%contact_given, scene%wall_contact, boundary%contact)
+    call apply_contact_defaults(boundary%contact_given, scene%wall_contact, boundary%contact)
     if (.not. boundary%material_given) boundary%material = scene%wall_material
     if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)
-  end subroutine settle_boundary
+  end subroutine apply_boundary_defaults
 
   !> Take the coefficients that are not given from others.
-  pure subroutine settle_contact(given, others, contact)
+  pure subroutine apply_contact_defaults(given, others, contact)
     type(given_coefficients_t), intent(in) :: given
     type(coefficients_t), intent(in) :: others
     type(coefficients_t), intent(inout) :: contact
@@ -349,7 +349,7 @@ contains
     if (.not. given%tangential_restitution) contact%tangential_restitution = others%tangential_restitution
     if (.not. given%rolling_friction) contact%rolling_friction = others%rolling_friction
     if (.not. given%pivoting_friction) contact%pivoting_friction = others%pivoting_friction
-  end subroutine settle_contact
+  end subroutine apply_contact_defaults
 
   !> One layer along the third axis in 2D, when counts are given and this one is not.
   pure subroutine fill_third(dimension, counts)

@@ -11,22 +11,22 @@ module gravier_body_collector
 
 contains
 
-  !> Grains at home on this rank: the table `bodies` with the key `id`, and the fields that gravier_body_store has for files.
+  !> Grains owned by this rank: the table `bodies` with the key `id`, and the fields that gravier_body_store has for files.
   subroutine collect_bodies(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table
     integer :: s, k, n
 
-    associate (home => simulation%decomposition%home)
-      call table%init("bodies", "id", sum(home%n))
+    associate (owned => simulation%decomposition%owned)
+      call table%init("bodies", "id", sum(owned%n))
       n = 0
-      do s = 1, size(home)
-        do k = 1, home(s)%n
+      do s = 1, size(owned)
+        do k = 1, owned(s)%n
           n = n + 1
-          table%key(1, n) = home(s)%id(k)
+          table%key(1, n) = owned(s)%id(k)
         end do
       end do
-      call collect_fields(simulation%decomposition%layout(), home, table)
+      call collect_fields(simulation%decomposition%layout(), owned, table)
     end associate
   end subroutine collect_bodies
 

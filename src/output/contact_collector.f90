@@ -112,7 +112,7 @@ contains
     integer(i8), intent(out) :: key(:, :)
     integer :: c, p
 
-    associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
       do c = 1, sub%n_contacts
         p = sub%source(c)
         key(1, c) = view%bodies%id(view%list%candidate(p))
@@ -207,7 +207,7 @@ contains
 
     nd = simulation%problem%kernels%nd
     point(:, :) = 0.0_dp
-    associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
       do c = 1, sub%n_contacts
         p = sub%source(c)
         associate (candidate => view%list%candidate(p), antagonist => view%list%antagonist(p))

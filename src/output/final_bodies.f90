@@ -64,23 +64,23 @@ contains
     associate (decomposition => simulation%decomposition)
       nd = decomposition%nd
       nv = decomposition%nv
-      call allocate_bodies(data, nd, sum(decomposition%home%n), .true., path, error)
+      call allocate_bodies(data, nd, sum(decomposition%owned%n), .true., path, error)
       call allocate_walls(data, nd, simulation%n_walls, path, error)
       call simulation%comm%agree(error)
       if (allocated(error)) return
       data%total = simulation%n_grains
       n = 0
-      do s = 1, size(decomposition%home)
-        associate (home => decomposition%home(s))
-          do k = 1, home%n
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s))
+          do k = 1, owned%n
             n = n + 1
-            data%id(n) = home%id(k)
-            data%position(:, n) = home%position(:, k)
-            data%velocity(1:nv, n) = home%velocity(:, k)
-            data%radius(n) = home%radius(k)
-            data%mass(n) = home%mass(k)
-            data%material(n) = home%material(k)
-            if (home%glued(k) > 0) data%group(n) = decomposition%boundaries(home%glued(k))%group
+            data%id(n) = owned%id(k)
+            data%position(:, n) = owned%position(:, k)
+            data%velocity(1:nv, n) = owned%velocity(:, k)
+            data%radius(n) = owned%radius(k)
+            data%mass(n) = owned%mass(k)
+            data%material(n) = owned%material(k)
+            if (owned%glued(k) > 0) data%group(n) = decomposition%boundaries(owned%glued(k))%group
           end do
         end associate
       end do

@@ -134,9 +134,9 @@ contains
     call table%add_whole("id", "", id)
     allocate (subdomain(1, n))
     n = 0
-    do s = 1, size(simulation%decomposition%home)
-      subdomain(1, n + 1:n + simulation%decomposition%home(s)%n) = simulation%decomposition%subdomain_of(s)
-      n = n + simulation%decomposition%home(s)%n
+    do s = 1, size(simulation%decomposition%owned)
+      subdomain(1, n + 1:n + simulation%decomposition%owned(s)%n) = simulation%decomposition%subdomain_of(s)
+      n = n + simulation%decomposition%owned(s)%n
     end do
     call table%add_whole("subdomain", "", subdomain)
     call table%add_reals("velocity", "m/s", velocity)

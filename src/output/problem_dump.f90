@@ -108,11 +108,11 @@ contains
       if (is_first(bodies, k)) place = place + 1
     end do
     place = problem%comm%offset(place)
-    associate (home => bodies%field(bodies%place("place"))%whole)
+    associate (owned => bodies%field(bodies%place("place"))%whole)
       do k = 1, bodies%n_items()
         if (is_first(bodies, k)) place = place + 1
-        destination(k) = narrow(home(1, k))
-        answers(1:2, k) = home(2:3, k)
+        destination(k) = narrow(owned(1, k))
+        answers(1:2, k) = owned(2:3, k)
         answers(3, k) = place
       end do
     end associate

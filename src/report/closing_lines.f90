@@ -4,8 +4,8 @@ module gravier_closing_lines
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: gather_timers, phase_names, n_phases
-  use gravier_scheme, only: work_t
-  use gravier_descent, only: effort_t, tenfold
+  use gravier_method, only: work_t
+  use gravier_convergence_history, only: effort_t, tenfold
   use gravier_energy_balance, only: energy_balance_t
   use gravier_simulation, only: simulation_t
   use gravier_memory_report, only: peak_memory
@@ -51,7 +51,7 @@ contains
     integer(i8) :: counts(5)
     real(dp) :: ranks, subdomains
 
-    work = simulation%scheme%work_done()
+    work = simulation%method%work_done()
     counts(1) = work%relaxations
     counts(2) = work%analyses
     counts(3) = work%factorisations
@@ -65,17 +65,17 @@ contains
       & " factorisations"//newline
     if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
       & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance"//newline
-    if (simulation%scheme%direction_text /= "") text = text//"direction   "//simulation%scheme%direction_text//"; lowered "// &
+    if (simulation%method%direction_text /= "") text = text//"direction   "//simulation%method%direction_text//"; lowered "// &
       & to_text(work%lowered)//" times"//newline
-    if (work%shortened + work%put_off > 0) text = text//"momentum    memory shortened "//to_text(work%shortened)// &
-      & " times, put off "//to_text(work%put_off)//" times"//newline
+    if (work%restarted + work%suspended > 0) text = text//"momentum    restarted "//to_text(work%restarted)// &
+      & " times, suspended "//to_text(work%suspended)//" times"//newline
     if (work%relaxed > 0) text = text//"relaxation  lowered "//to_text(work%relaxed)//" times, to "// &
       & to_text(work%least_factor, 3)//" at least"//newline
     if (simulation%decomposition%n_subdomains > 1) then
-      call simulation%scheme%measure_balance(comm, simulation%decomposition%n_subdomains, ranks, subdomains)
+      call simulation%method%measure_balance(comm, simulation%decomposition%n_subdomains, ranks, subdomains)
       text = text//"balance     "//balance_text(ranks, subdomains)//" of the mean since the last partition"//newline
     end if
-    text = text//"lists       made "//to_text(simulation%neighbourhoods%builds)//" times"//newline// &
+    text = text//"lists       made "//to_text(simulation%halo%builds)//" times"//newline// &
       & "memory      at most "//to_text(nint(comm%highest(peak_memory())))//" MiB on a rank"//newline// &
       & "messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB"//newline
   end function work_lines

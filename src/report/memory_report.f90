@@ -113,19 +113,19 @@ contains
     type(item_t), intent(inout) :: items(5)
     type(held_list_t) :: held
 
-    call simulation%scheme%held(simulation%problem%kernels%nc, simulation%problem%kernels%nv, held)
+    call simulation%method%held(simulation%problem%kernels%nc, simulation%problem%kernels%nv, held)
     call describe_contact(simulation, held, items(1))
     items(2)%name = "near pair"
     call items(2)%add("candidate", 4, 1)
     call items(2)%add("antagonist", 4, 1)
     call items(2)%add("shift", 4, merge(1, 0, simulation%decomposition%ni > 0))
-    call items(2)%add("impulse", 8, simulation%neighbourhoods%memory%n_impulse)
-    call items(2)%add("state", 4, simulation%neighbourhoods%memory%n_states())
+    call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
+    call items(2)%add("state", 4, simulation%halo%memory%n_states())
     call describe_body(simulation, held, items(3))
     items(4)%name = "grain seen, ghosts included"
     call add_grain(simulation, items(4))
     call items(4)%add("owner", 4, 2)
-    items(5)%name = "grain at home"
+    items(5)%name = "grain owned"
     call add_grain(simulation, items(5))
     call items(5)%add("reference", 8, simulation%decomposition%nd)
   end subroutine describe
@@ -163,12 +163,12 @@ contains
     associate (kernels => simulation%problem%kernels)
       item%name = "body in contact, in each subdomain"
       call item%add("id", 8, 1)
-      call item%add("home", 4, 1)
+      call item%add("owned", 4, 1)
       call item%add("place", 4, 1)
       call item%add("multiplicity", 4, 1)
       call item%add("radius", 8, 1)
       call item%add("v_free", 8, kernels%nv)
-      if (simulation%physics%laws%attracts) call item%add("pull", 8, kernels%nv)
+      if (simulation%physics%laws%attracts) call item%add("attraction_load", 8, kernels%nv)
       call item%add("velocity", 8, kernels%nv)
       call item%add("v_global", 8, kernels%nv)
       call item%add("reaction", 8, kernels%nv)
@@ -231,12 +231,12 @@ contains
 
     counts(:) = 0
     do s = 1, size(simulation%problem%sub)
-      associate (sub => simulation%problem%sub(s), view => simulation%neighbourhoods%view(s))
+      associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
         counts(1) = counts(1) + sub%n_contacts
         counts(2) = counts(2) + view%list%n
         counts(3) = counts(3) + sub%n_columns
         counts(4) = counts(4) + view%bodies%n
-        counts(5) = counts(5) + simulation%decomposition%home(s)%n
+        counts(5) = counts(5) + simulation%decomposition%owned(s)%n
       end associate
     end do
   end subroutine count_items

@@ -14,7 +14,7 @@ module gravier_progress
   integer, parameter :: n_kinds = 8
   !> what the closing line calls them; a note is not counted there
   character(len=*), parameter :: kind_names(6) = [character(len=44) :: "solves above the tolerance", &
-    & "grains too fast for the step", "search directions lowered", "momentum put off", "relaxation factors lowered", &
+    & "grains too fast for the step", "search directions lowered", "momentum suspended", "relaxation factors lowered", &
     & "partitions refused"]
   !> said in full, of each kind
   integer(i8), parameter :: first_ones = 5

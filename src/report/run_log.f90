@@ -8,7 +8,7 @@ module gravier_run_log
   use gravier_timers, only: n_phases
   use gravier_file_system, only: terminal_width
   use gravier_text_file, only: text_file_t
-  use gravier_scheme, only: work_t
+  use gravier_method, only: work_t
   use gravier_solve, only: solve_watch_t, solve_report_t, solve_converged, solve_diverged
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -366,25 +366,25 @@ contains
       & failure_text(simulation, figures)//" in step "//to_text(simulation%step), error)
   end subroutine write_warnings
 
-  !> By what means a solve got over growth or standstill: l lowered, momentum put off, relaxation lowered.
+  !> By what means a solve got over growth or standstill: l lowered, momentum suspended, relaxation lowered.
   subroutine write_recoveries(self, simulation, step, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
     integer, intent(in) :: step
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: lowered, put_off, relaxed
+    integer(i8) :: lowered, suspended, relaxed
 
-    associate (work => simulation%scheme%work)
+    associate (work => simulation%method%work)
       lowered = work%lowered - self%told%lowered
-      put_off = work%put_off - self%told%put_off
+      suspended = work%suspended - self%told%suspended
       relaxed = work%relaxed - self%told%relaxed
       self%told = work
     end associate
     if (lowered > 0) call warn(self, warn_lowered, lowered, &
       & "warning     changes grew or went round in circles under l: lowered "//to_text(lowered)//" times in step "// &
       & to_text(step), error)
-    if (put_off > 0) call warn(self, warn_momentum, put_off, "warning     no progress with momentum: put off "// &
-      & to_text(put_off)//" times in step "//to_text(step), error)
+    if (suspended > 0) call warn(self, warn_momentum, suspended, "warning     no progress with momentum: suspended "// &
+      & to_text(suspended)//" times in step "//to_text(step), error)
     if (relaxed > 0) call warn(self, warn_relaxation, relaxed, &
       & "warning     changes of the neighbours' loads alternate and grow: relaxation lowered "//to_text(relaxed)// &
       & " times in step "//to_text(step), error)

@@ -4,7 +4,7 @@ module gravier_run_summary
   use gravier_text, only: to_text
   use gravier_timers, only: phase_names, n_phases, phase_neighbourhood, phase_exchange, phase_factorise, phase_interface, &
     & phase_interface_solve, phase_reduction, phase_output
-  use gravier_descent, only: at_tolerance
+  use gravier_convergence_history, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
   use gravier_accuracy_lines, only: goal_name, percent, plain

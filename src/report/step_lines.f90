@@ -3,7 +3,7 @@ module gravier_step_lines
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
   use gravier_solve, only: solve_report_t, solve_diverged, solve_stagnated, solve_unbounded
-  use gravier_interface, only: interface_figures_t, n_multiplicities
+  use gravier_interface, only: interface_statistics_t, n_multiplicities
   use gravier_config_types, only: solver_config_t
   use gravier_simulation, only: simulation_t, step_figures_t
   implicit none
@@ -21,29 +21,34 @@ contains
     character(len=:), allocatable :: text
     integer :: m
 
-    associate (sharing => figures%sharing)
-      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(sharing%least_contacts)//" to "// &
-        & to_text(sharing%most_contacts)//" a subdomain); interface: "//to_text(sharing%bodies)//" bodies, "// &
-        & to_text(sharing%interactions)//" interactions; multiplicity"
+    associate (interface_statistics => figures%interface_statistics)
+      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(interface_statistics%least_contacts)//" to "// &
+        & to_text(interface_statistics%most_contacts)//" a subdomain); interface: "//to_text(interface_statistics%bodies)// &
+        & " bodies, "// &
+        & to_text(interface_statistics%interactions)//" interactions; multiplicity"
       do m = 2, n_multiplicities
-        if (sharing%multiplicity(m) == 0) cycle
-        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "//to_text(sharing%multiplicity(m))
+        if (interface_statistics%multiplicity(m) == 0) cycle
+        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "// &
+          & to_text(interface_statistics%multiplicity(m))
       end do
-      if (sharing%bodies == 0) text = text//" 1 only"
+      if (interface_statistics%bodies == 0) text = text//" 1 only"
     end associate
     text = text//newline
-    if (figures%sharing%neighbours > 0) text = text//"exchange    "//exchange_text(figures%sharing, subdomains)//newline
+    if (figures%interface_statistics%neighbours > 0) text = text//"exchange    "//exchange_text(figures%interface_statistics, &
+      & subdomains)//newline
   end function interface_lines
 
   !> What an exchange of the interface costs a subdomain, whether its neighbours are on other ranks or on its own.
-  function exchange_text(sharing, subdomains) result(text)
-    type(interface_figures_t), intent(in) :: sharing
+  function exchange_text(interface_statistics, subdomains) result(text)
+    type(interface_statistics_t), intent(in) :: interface_statistics
     integer, intent(in) :: subdomains
     character(len=:), allocatable :: text
 
-    text = "a subdomain sends "//tenths(real(sharing%neighbours, dp)/subdomains)//" messages (at most "// &
-      & to_text(sharing%most_neighbours)//") with "//to_text(8*sharing%values/subdomains)//" bytes (at most "// &
-      & to_text(8*sharing%most_values)//") an iteration, and "//to_text(sharing%ghosts/subdomains)//" ghosts a step"
+    text = "a subdomain sends "//tenths(real(interface_statistics%neighbours, dp)/subdomains)//" messages (at most "// &
+      & to_text(interface_statistics%most_neighbours)//") with "//to_text(8*interface_statistics%values/subdomains)// &
+      & " bytes (at most "// &
+      & to_text(8*interface_statistics%most_values)//") an iteration, and "//to_text(interface_statistics%ghosts/subdomains)// &
+      & " ghosts a step"
   end function exchange_text
 
   !> A number of moderate size with one decimal.

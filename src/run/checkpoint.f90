@@ -66,8 +66,8 @@ contains
     call file%write_scalar("left", simulation%left, error)
     call file%write_scalar("fast", simulation%fast, error)
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
-    call file%write_scalar("lists_made", simulation%neighbourhoods%builds, error)
-    associate (memory => simulation%neighbourhoods%memory)
+    call file%write_scalar("lists_made", simulation%halo%builds, error)
+    associate (memory => simulation%halo%memory)
       call file%write_scalar("impulse_entries", int(memory%n_impulse, i8), error)
       call file%write_scalar("law_row", int(memory%law_row, i8), error)
       call file%write_scalar("rest_row", int(memory%rest_row, i8), error)
@@ -76,8 +76,8 @@ contains
     call file%write_scalar("reached_imbalance", simulation%reached_imbalance, error)
     call pack_boundaries(simulation%decomposition%boundaries, words)
     call file%write_array("boundaries", words, error)
-    if (simulation%neighbourhoods%builds > 0) then
-      call pack_boundaries(simulation%neighbourhoods%reference_boundaries, words)
+    if (simulation%halo%builds > 0) then
+      call pack_boundaries(simulation%halo%reference_boundaries, words)
       call file%write_array("boundaries_when_listed", words, error)
     end if
     words = real_words(simulation%boundary_impulses, size(simulation%boundary_impulses))

@@ -49,32 +49,32 @@ contains
     integer :: s, n, k, n_subdomains
 
     n_subdomains = simulation%decomposition%n_subdomains
-    associate (home => simulation%decomposition%home)
-      allocate (counts(size(home)))
+    associate (owned => simulation%decomposition%owned)
+      allocate (counts(size(owned)))
       call pack_grains(simulation, records, counts)
       call file%write_table("grains", n_subdomains, records, counts, error)
-      if (simulation%neighbourhoods%builds > 0) then
-        do s = 1, size(home)
-          counts(s) = simulation%neighbourhoods%view(s)%list%n_kept()
+      if (simulation%halo%builds > 0) then
+        do s = 1, size(owned)
+          counts(s) = simulation%halo%view(s)%list%n_kept()
         end do
         deallocate (records)
-        allocate (records(2 + simulation%neighbourhoods%memory%words(), sum(counts)))
+        allocate (records(2 + simulation%halo%memory%words(), sum(counts)))
         n = 0
-        do s = 1, size(home)
-          call list_impulses(simulation%neighbourhoods%view(s), 0, own)
+        do s = 1, size(owned)
+          call list_impulses(simulation%halo%view(s), 0, own)
           records(:, n + 1:n + size(own, 2)) = own
           n = n + size(own, 2)
         end do
         call file%write_table("impulses", n_subdomains, records, counts, error)
       end if
       deallocate (records)
-      do s = 1, size(home)
+      do s = 1, size(owned)
         call simulation%decomposition%partition%get_map(simulation%decomposition%subdomain_of(s), map)
         counts(s) = size(map)
       end do
       allocate (records(1, sum(counts)))
       n = 0
-      do s = 1, size(home)
+      do s = 1, size(owned)
         call simulation%decomposition%partition%get_map(simulation%decomposition%subdomain_of(s), map)
         do k = 1, size(map)
           records(1, n + k) = map(k)
@@ -97,20 +97,20 @@ contains
     nd = simulation%decomposition%nd
     layout = simulation%decomposition%layout()
     words = layout%record_words()
-    associate (home => simulation%decomposition%home)
-      do s = 1, size(home)
-        counts(s) = home(s)%n
+    associate (owned => simulation%decomposition%owned)
+      do s = 1, size(owned)
+        counts(s) = owned(s)%n
       end do
       allocate (records(words + nd, sum(counts)))
       n = 0
-      do s = 1, size(home)
-        do k = 1, home(s)%n
+      do s = 1, size(owned)
+        do k = 1, owned(s)%n
           n = n + 1
-          call home(s)%get_record(k, records(1:words, n))
+          call owned(s)%get_record(k, records(1:words, n))
           do d = 1, nd
-            records(words + d, n) = transfer(home(s)%position(d, k), 0_i8)
-            if (simulation%neighbourhoods%builds > 0) records(place_word - 1 + d, n) = &
-              & transfer(simulation%neighbourhoods%reference(s)%position(d, k), 0_i8)
+            records(words + d, n) = transfer(owned(s)%position(d, k), 0_i8)
+            if (simulation%halo%builds > 0) records(place_word - 1 + d, n) = &
+              & transfer(simulation%halo%reference(s)%position(d, k), 0_i8)
           end do
         end do
       end do
@@ -137,7 +137,7 @@ contains
     call simulation%decomposition%partition%restore(simulation%comm, head, words, lengths)
   end subroutine load_partition
 
-  !> Grains into their homes as when the lists were made, then the lists with their impulses, then everything to where it
+  !> Grains to their owners as when the lists were made, then the lists with their impulses, then everything to where it
   !> was when the checkpoint was written.
   subroutine load_grains(simulation, file, path, builds, error)
     type(simulation_t), intent(inout) :: simulation
@@ -163,27 +163,27 @@ contains
       call simulation%comm%agree(error)
       if (allocated(error)) return
       n = 0
-      do s = 1, size(decomposition%home)
-        call decomposition%home(s)%init(nd, decomposition%nv, decomposition%ni, narrow(counts(s)))
-        do k = 1, decomposition%home(s)%n
-          call decomposition%home(s)%set_record(k, records(1:n_words, n + k))
+      do s = 1, size(decomposition%owned)
+        call decomposition%owned(s)%init(nd, decomposition%nv, decomposition%ni, narrow(counts(s)))
+        do k = 1, decomposition%owned(s)%n
+          call decomposition%owned(s)%set_record(k, records(1:n_words, n + k))
         end do
-        n = n + decomposition%home(s)%n
+        n = n + decomposition%owned(s)%n
       end do
       if (builds > 0) then
         call unpack_boundaries(words, decomposition%boundaries)
-        call simulation%neighbourhoods%build(decomposition)
-        simulation%neighbourhoods%builds = builds
+        call simulation%halo%build(decomposition)
+        simulation%halo%builds = builds
         call load_impulses(simulation, file, path, error)
       end if
       n = 0
-      do s = 1, size(decomposition%home)
-        do k = 1, decomposition%home(s)%n
+      do s = 1, size(decomposition%owned)
+        do k = 1, decomposition%owned(s)%n
           do d = 1, nd
-            decomposition%home(s)%position(d, k) = transfer(records(n_words + d, n + k), 0.0_dp)
+            decomposition%owned(s)%position(d, k) = transfer(records(n_words + d, n + k), 0.0_dp)
           end do
         end do
-        n = n + decomposition%home(s)%n
+        n = n + decomposition%owned(s)%n
       end do
       call unpack_boundaries(now, decomposition%boundaries)
     end associate
@@ -244,8 +244,8 @@ contains
     call file%read_table("impulses", simulation%decomposition%n_subdomains, 2 + kept%words(), records, counts, error)
     if (allocated(error)) return
     n = 0
-    do s = 1, size(simulation%neighbourhoods%view)
-      call match_impulses(records(:, n + 1:n + narrow(counts(s))), kept, simulation%neighbourhoods%view(s))
+    do s = 1, size(simulation%halo%view)
+      call match_impulses(records(:, n + 1:n + narrow(counts(s))), kept, simulation%halo%view(s))
       n = n + narrow(counts(s))
     end do
   end subroutine load_impulses

@@ -16,7 +16,8 @@ contains
 
   !> Do what the command line asks for, and end the process with the status that the usage names.
   subroutine run_program()
-    type(communicator_t), target :: comm
+    ! pointers to it outlive this routine
+    type(communicator_t), target, save :: comm
     type(arguments_t) :: arguments
     type(error_t), allocatable :: error
     integer :: status

@@ -1,7 +1,7 @@
 !> A scene in time: the time stepper of a case, made from its configuration.
 module gravier_simulation
   use gravier_kinds, only: dp, i8
-  use gravier_heap, only: keep_heap
+  use gravier_allocator_tuning, only: keep_heap
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
@@ -10,7 +10,7 @@ module gravier_simulation
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_solve, only: by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
-  use gravier_division, only: division_rule_t, divide
+  use gravier_repartition, only: repartition_rule_t, divide
   use gravier_boundary_loads, only: set_glued_velocities
   use gravier_sleeping, only: sleeping_rule_t
   use gravier_impulse_memory, only: memory_of
@@ -18,7 +18,7 @@ module gravier_simulation
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
-  use gravier_scheme_choice, only: choose_scheme
+  use gravier_method_choice, only: choose_scheme
   use gravier_column_solution, only: column_solution_t
   implicit none
   private
@@ -91,7 +91,7 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     call set_control(self)
-    call choose_scheme(config, self%scheme)
+    call choose_scheme(config, self%method)
     self%decomposition%boundaries = scene%boundaries
     ! one subdomain until it is known that the scene has room for so many
     call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
@@ -111,13 +111,13 @@ contains
 
     if (allocated(error)) return
     newcomers(1) = grains
-    call divide(self%division, self%neighbourhoods, newcomers, self%decomposition, error)
+    call divide(self%division, self%halo, newcomers, self%decomposition, error)
     if (allocated(error)) then
       error%message = self%config%file//": "//error%message
       return
     end if
     call self%make_subdomains()
-    call self%decomposition%settle(grains)
+    call self%decomposition%migrate(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
     call self%start_diagnostics()
   end subroutine simulation_start
@@ -156,7 +156,7 @@ contains
       self%physics%sleep_after = self%sleeping%after
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)
-      self%neighbourhoods%memory = memory_of(self%problem%kernels, self%config%solver%warm_start, scene%laws%remembers, &
+      self%halo%memory = memory_of(self%problem%kernels, self%config%solver%warm_start, scene%laws%remembers, &
         & self%sleeping%after > 0)
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
@@ -207,7 +207,7 @@ contains
       self%theta = config%time%theta
       self%warm_start = config%solver%warm_start
       associate (parts => config%decomposition)
-        self%division = division_rule_t(parts%partition == "metis", parts%grid, parts%subdomains, parts%repartition_every, &
+        self%division = repartition_rule_t(parts%partition == "metis", parts%grid, parts%subdomains, parts%repartition_every, &
           & parts%repartition_imbalance)
       end associate
     end associate

@@ -101,22 +101,22 @@ contains
 
     nd = simulation%decomposition%nd
     n = size(simulation%decomposition%boundaries)
-    allocate (parts(1 + 4*n, size(simulation%decomposition%home)), source=0.0_dp)
+    allocate (parts(1 + 4*n, size(simulation%decomposition%owned)), source=0.0_dp)
     allocate (sums(1 + 4*n))
     far(:) = -huge(1.0_dp)
-    do s = 1, size(simulation%decomposition%home)
-      associate (home => simulation%decomposition%home(s))
-        do k = 1, home%n
-          b = home%glued(k)
+    do s = 1, size(simulation%decomposition%owned)
+      associate (owned => simulation%decomposition%owned(s))
+        do k = 1, owned%n
+          b = owned%glued(k)
           if (b > 0) then
             parts(4*b - 2, s) = parts(4*b - 2, s) + 1.0_dp
-            parts(4*b - 1:4*b - 2 + nd, s) = parts(4*b - 1:4*b - 2 + nd, s) + home%position(:, k)
+            parts(4*b - 1:4*b - 2 + nd, s) = parts(4*b - 1:4*b - 2 + nd, s) + owned%position(:, k)
             cycle
           end if
-          parts(1, s) = parts(1, s) + grain_volume(nd, home%radius(k))
-          far(1:nd) = max(far(1:nd), home%radius(k) - home%position(:, k))
-          far(4:3 + nd) = max(far(4:3 + nd), home%radius(k) + home%position(:, k))
-          far(7) = max(far(7), -home%radius(k))
+          parts(1, s) = parts(1, s) + grain_volume(nd, owned%radius(k))
+          far(1:nd) = max(far(1:nd), owned%radius(k) - owned%position(:, k))
+          far(4:3 + nd) = max(far(4:3 + nd), owned%radius(k) + owned%position(:, k))
+          far(7) = max(far(7), -owned%radius(k))
         end do
       end associate
     end do

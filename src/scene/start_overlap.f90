@@ -5,7 +5,7 @@ module gravier_start_overlap
   use gravier_text, only: to_text
   use gravier_periodic, only: shift_of_code
   use gravier_neighbour_search, only: neighbour_rule_t
-  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -31,7 +31,7 @@ contains
     !> comes back as it was
     type(simulation_t), intent(inout) :: simulation
     type(error_t), allocatable, intent(inout) :: error
-    type(neighbourhoods_t) :: touching
+    type(halo_t) :: touching
     type(neighbour_rule_t) :: rule
     type(overlap_t) :: worst
     real(dp) :: limit, most
@@ -62,7 +62,7 @@ contains
   !> Largest overlap in a view, if it exceeds that found so far, and the number of those above the limit.
   subroutine find_worst(simulation, view, limit, worst, number)
     type(simulation_t), intent(in) :: simulation
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     real(dp), intent(in) :: limit
     type(overlap_t), intent(inout) :: worst
     integer(i8), intent(inout) :: number
@@ -80,7 +80,7 @@ contains
   !> Overlap of pair `p`; none with a boundary that is taken away before the first step.
   subroutine measure(simulation, view, p, overlap)
     type(simulation_t), intent(in) :: simulation
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
     type(overlap_t), intent(out) :: overlap
     real(dp) :: branch(simulation%decomposition%nd), distance

@@ -84,7 +84,7 @@ class FailedSolves(RunTestCase):
                     self.assertLessEqual(end - onset, 20)
 
     def test_recoveries_are_said(self):
-        """Where relaxation is lowered, or momentum put off, the log says so in the step, counts it and sums it up at the end."""
+        """Where relaxation is lowered, or momentum suspended, the log says so in the step, counts it and sums it up at the end."""
         alone = {"time": {"steps": 1}}
         run = run_case(merged(self.case, DIVERGING["schwarz"], alone, {"solver": {"relaxation": None, "max_iterations": 60}}), 2,
                        self.here("relaxation"))
@@ -99,9 +99,9 @@ class FailedSolves(RunTestCase):
         run = run_case(merged(self.case, alone, {
             "scene": {"bodies_file": self.here("heavy.csv")}, "boundary": {"shape": "plane", "normal": [0.0, 1.0]},
             "solver": {"method": "nlgs", "max_iterations": 1000}}), 1, self.here("momentum"))
-        self.assertRegex(run.stdout, r"warning +no progress with momentum: put off 2 times in step 1")
-        self.assertRegex(run.stdout, r"\nmomentum +memory shortened \d+ times, put off 2 times")
-        self.assertRegex(run.stdout, r"\nwarnings .*momentum put off 2")
+        self.assertRegex(run.stdout, r"warning +no progress with momentum: suspended 2 times in step 1")
+        self.assertRegex(run.stdout, r"\nmomentum +restarted \d+ times, suspended 2 times")
+        self.assertRegex(run.stdout, r"\nwarnings .*momentum suspended 2")
 
     def test_divergence_after_good_steps(self):
         """A method that diverges only when the grains have met the ground: the steps before stay, whole and right."""

@@ -85,7 +85,7 @@ class Found(RunTestCase):
                 write(path, whole.replace(address.to_bytes(8, "little"), (2**32 + address).to_bytes(8, "little")))
             return damage
         for name in ("Steps/ConnectivityIdOffsets", "Points", "Steps/Values", "PointData/radius"):
-            self.refuse("bodies.vtkhdf", lost("VTKHDF/" + name), f"/VTKHDF/{name}: cannot read")
+            self.refuse("bodies.vtkhdf", lost("VTKHDF/" + name), f"/VTKHDF/{name}: ", "cannot read this table: the file is damaged")
 
     def test_states(self):
         def no_group(file):

@@ -57,10 +57,11 @@ class Commands(RunTestCase):
             self.assert_status(run, 0)
             self.assertEqual(run.stderr, "")
             for expected in ("a few disks", "30 grains, 3 boundaries", "subdomains 3", "2D: friction, rotation, gravity", "off         restitution",
-                             "contacts", "interface", "multiplicity", "bytes of each item", " a contact, ", "nothing was run", "tolerance = 0.001"):
+                             "contacts", "interface", "multiplicity", "bytes of each item", "MiB at most on a rank while it runs", " a contact, ",
+                             "nothing was run", "tolerance = 0.001"):
                 self.assertIn(expected, run.stdout)
             outputs.append([line for line in run.stdout.splitlines()
-                            if not line.startswith("ranks") and "on the rank with most" not in line])
+                            if not line.startswith("ranks") and "on the rank with most" not in line and "at most on a rank while" not in line])
         self.assertEqual(*outputs)
         self.assertEqual(os.listdir(directory), before)
 

@@ -218,7 +218,7 @@ contains
       call decomposition%partition%init_grid(lower, upper, boxes, 0.1_dp, error)
     end if
     call check(.not. allocated(error), "partition")
-    call decomposition%settle(newcomers(1))
+    call decomposition%migrate(newcomers(1))
   end subroutine make_decomposition
 
 end module gravier_test_scenes

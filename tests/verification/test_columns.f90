@@ -146,8 +146,8 @@ contains
           end do
         end associate
       end do
-      do s = 1, size(simulation%decomposition%home)
-        call check(all(abs(simulation%decomposition%home(s)%velocity) < 1.0e-10_dp), "the column stays at rest")
+      do s = 1, size(simulation%decomposition%owned)
+        call check(all(abs(simulation%decomposition%owned(s)%velocity) < 1.0e-10_dp), "the column stays at rest")
       end do
       call simulation%free()
     end do

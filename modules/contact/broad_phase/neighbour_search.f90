@@ -149,12 +149,12 @@ contains
   end function place_of
 
   !> List the near pairs that belong to the subdomain, in sweep order, with nothing kept.
-  subroutine search_find(self, bodies, home, region, memory, list)
+  subroutine search_find(self, bodies, owned, region, memory, list)
     class(neighbour_search_t), intent(in) :: self
     !> the grains that the subdomain sees, wrapped into the period
     type(body_set_t), intent(in) :: bodies
     !> (n) subdomain that holds each grain's centre
-    integer, intent(in), contiguous :: home(:)
+    integer, intent(in), contiguous :: owned(:)
     !> which says the subdomain of a point
     class(region_t), intent(in) :: region
     !> what the list keeps of each pair
@@ -166,7 +166,7 @@ contains
     if (bodies%n > 0) then
       call make_entries(bodies, self%period, self%rule, entries)
       call hash_entries(entries, bodies, self%rule)
-      call search_boundaries(self, bodies, home, list)
+      call search_boundaries(self, bodies, owned, list)
       call search_class(self, bodies, region, entries, list)
       if (count(entries%used) > 1) call search_larger(self, bodies, region, entries, list)
     end if
@@ -208,16 +208,16 @@ contains
   end function entries_place
 
   !> List the grains of the subdomain that are near a boundary.
-  subroutine search_boundaries(self, bodies, home, list)
+  subroutine search_boundaries(self, bodies, owned, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
-    integer, intent(in), contiguous :: home(:)
+    integer, intent(in), contiguous :: owned(:)
     type(neighbour_list_t), intent(inout) :: list
     integer :: k, b
     real(dp) :: distance, normal(bodies%nd)
 
     do k = 1, bodies%n
-      if (home(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
+      if (owned(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
       do b = 1, size(self%boundaries)
         if (.not. self%boundaries(b)%touches()) cycle
         call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)

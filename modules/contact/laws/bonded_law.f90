@@ -68,7 +68,7 @@ contains
     if (pair%state /= intact) return
     pair%terms%friction = self%bond_friction
     pair%terms%attraction = self%bond_strength
-    pair%terms%play = 0.0_dp
+    pair%terms%free_gap = 0.0_dp
   end subroutine bonded_evaluate
 
 end module gravier_bonded_law

@@ -24,7 +24,7 @@ module gravier_contact_law
     !> [N]
     real(dp) :: attraction = 0.0_dp
     !> gap that the bodies may close in the step [m]
-    real(dp) :: play = 0.0_dp
+    real(dp) :: free_gap = 0.0_dp
   end type contact_terms_t
 
   !> A pair of bodies under its law.
@@ -39,7 +39,7 @@ module gravier_contact_law
     real(dp) :: normal_velocity = 0.0_dp, slip = 0.0_dp
     !> what the pair remembers from step to step under a law with memory, 0 at first
     integer :: state = 0
-    !> made by `evaluate`, from an ordinary contact without friction: its play is the gap where that is open
+    !> made by `evaluate`, from an ordinary contact without friction: its free gap is the gap where that is open
     type(contact_terms_t) :: terms
     !> once the step is solved: r~_n and |r_t| [N s]
     real(dp) :: normal = 0.0_dp, tangential = 0.0_dp

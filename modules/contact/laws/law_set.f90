@@ -19,7 +19,7 @@ module gravier_law_set
   !> A law of the scene.
   type :: scene_law_t
     class(contact_law_t), allocatable :: law
-    !> of a law that has the same terms for all its pairs: these, but for the play
+    !> of a law that has the same terms for all its pairs: these, but for the free gap
     type(contact_terms_t) :: terms
   end type scene_law_t
 
@@ -157,7 +157,8 @@ contains
     if (min(a, b) > 0) l = self%of_pair(a, b)
   end function law_set_number_of
 
-  !> Place of the default law of pairs of grains, b = 0, or of pairs in which boundary `b` takes part; a boundary that has none is under
+  !> Place of the default law of pairs of grains, b = 0, or of pairs in which boundary `b` takes part; a boundary that has none is
+  !> under
   !> that of grains.
   pure integer function law_set_default_of(self, b) result(l)
     class(law_set_t), intent(in) :: self

@@ -23,19 +23,19 @@ module gravier_decomposition
     integer :: n_subdomains = 1
     !> space dimension, degrees of freedom of a grain, entries of an image
     integer :: nd = 2, nv = 3, ni = 0
-    !> first subdomain of this rank; home(s) belongs to subdomain first + s - 1
+    !> first subdomain of this rank; owned(s) belongs to subdomain first + s - 1
     integer :: first = 1
-    type(body_set_t), allocatable :: home(:)
+    type(body_set_t), allocatable :: owned(:)
     type(boundary_t), allocatable :: boundaries(:)
   contains
     procedure :: init => decomposition_init
-    procedure :: settle => decomposition_settle
+    procedure :: migrate => decomposition_migrate
     procedure :: deliver => decomposition_deliver
     procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
     procedure :: subdomain_of => decomposition_subdomain_of
     procedure :: layout => decomposition_layout
-    procedure :: find_home => decomposition_find_home
+    procedure :: find_owned => decomposition_find_owned
   end type decomposition_t
 
 contains
@@ -57,10 +57,10 @@ contains
     if (.not. allocated(self%boundaries)) allocate (self%boundaries(0))
     self%first = comm%first_subdomain(comm%rank, n_subdomains)
     last = comm%first_subdomain(comm%rank + 1, n_subdomains) - 1
-    if (allocated(self%home)) deallocate (self%home)
-    allocate (self%home(last - self%first + 1))
-    do s = 1, size(self%home)
-      call self%home(s)%init(nd, nv, self%ni, 0)
+    if (allocated(self%owned)) deallocate (self%owned)
+    allocate (self%owned(last - self%first + 1))
+    do s = 1, size(self%owned)
+      call self%owned(s)%init(nd, nv, self%ni, 0)
     end do
   end subroutine decomposition_init
 
@@ -78,16 +78,16 @@ contains
     layout = body_layout_t(self%nd, self%nv, self%ni)
   end function decomposition_layout
 
-  !> Subdomain of this rank and place in its home of a grain.
-  pure subroutine decomposition_find_home(self, key, h, place)
+  !> Subdomain of this rank and place among its owned bodies of a grain.
+  pure subroutine decomposition_find_owned(self, key, h, place)
     class(decomposition_t), intent(in) :: self
     !> owner and identifier
     integer(i8), intent(in) :: key(2)
     integer, intent(out) :: h, place
 
     h = narrow(key(1)) - self%first + 1
-    place = find_sorted(self%home(h)%id, key(2))
-  end subroutine decomposition_find_home
+    place = find_sorted(self%owned(h)%id, key(2))
+  end subroutine decomposition_find_owned
 
   !> Corners of the box that holds all grains, radii included [m], and along periodic axes just the period; an empty
   !> scene has the unit box. Collective.
@@ -125,17 +125,17 @@ contains
 
   !> Bring every grain to the subdomain that holds its centre, wrapped into the period; grains of a subdomain are kept by
   !> ascending identifier. Collective.
-  subroutine decomposition_settle(self, newcomers)
+  subroutine decomposition_migrate(self, newcomers)
     class(decomposition_t), intent(inout) :: self
-    !> grains of this rank without a home so far
+    !> grains of this rank without an owner so far
     type(body_set_t), intent(in), optional :: newcomers
     type(body_set_t) :: leaving
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer :: k, s
 
     if (self%ni > 0) then
-      do s = 1, size(self%home)
-        call wrap_grains(self%period, self%home(s))
+      do s = 1, size(self%owned)
+        call wrap_grains(self%period, self%owned(s))
       end do
     end if
     call collect_leaving(self, leaving)
@@ -147,7 +147,7 @@ contains
     end do
     call self%deliver(place_word + 1, records, received)
     call take_in(self, received)
-  end subroutine decomposition_settle
+  end subroutine decomposition_migrate
 
   !> Bring grains into the period, counting their images.
   pure subroutine wrap_grains(period, bodies)
@@ -252,14 +252,14 @@ contains
     integer :: s, k
 
     call leaving%init(self%nd, self%nv, self%ni, 0)
-    do s = 1, size(self%home)
-      allocate (stays(self%home(s)%n))
-      do k = 1, self%home(s)%n
-        stays(k) = self%partition%owner(self%home(s)%position(:, k)) == self%subdomain_of(s)
+    do s = 1, size(self%owned)
+      allocate (stays(self%owned(s)%n))
+      do k = 1, self%owned(s)%n
+        stays(k) = self%partition%owner(self%owned(s)%position(:, k)) == self%subdomain_of(s)
       end do
       if (.not. all(stays)) then
-        gone = self%home(s)
-        call self%home(s)%keep_only(stays)
+        gone = self%owned(s)
+        call self%owned(s)%keep_only(stays)
         stays(:) = .not. stays
         call gone%keep_only(stays)
         call append_bodies(leaving, gone)
@@ -278,12 +278,12 @@ contains
     integer :: s
 
     call self%unpack_by_subdomain(received, 1, arrived)
-    do s = 1, size(self%home)
+    do s = 1, size(self%owned)
       if (arrived(s)%n == 0) cycle
-      call append_bodies(self%home(s), arrived(s))
-      allocate (order(self%home(s)%n))
-      call argsort(self%home(s)%id, order)
-      call self%home(s)%reorder(order)
+      call append_bodies(self%owned(s), arrived(s))
+      allocate (order(self%owned(s)%n))
+      call argsort(self%owned(s)%id, order)
+      call self%owned(s)%reorder(order)
       deallocate (order)
     end do
   end subroutine take_in
@@ -298,7 +298,7 @@ contains
     integer, allocatable :: counts(:)
     integer :: k, s
 
-    allocate (sets(size(self%home)), counts(size(self%home)))
+    allocate (sets(size(self%owned)), counts(size(self%owned)))
     counts(:) = 0
     do k = 1, size(received, 2)
       s = narrow(received(1, k)) - self%first + 1

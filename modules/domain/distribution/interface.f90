@@ -7,16 +7,16 @@ module gravier_interface
   use gravier_shared_exchange, only: shared_part_t
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_halo, only: halo_t
   implicit none
   private
-  public :: interface_figures_t, find_interface, count_figures, n_multiplicities
+  public :: interface_statistics_t, find_interface, count_figures, n_multiplicities
 
   !> multiplicities counted apart; the last counts that many and more
   integer, parameter :: n_multiplicities = 8
 
   !> The interface that a partition makes, over all subdomains.
-  type :: interface_figures_t
+  type :: interface_statistics_t
     !> bodies that carry contacts in several subdomains
     integer(i8) :: bodies = 0
     !> contacts between grains whose centres lie in different subdomains
@@ -30,11 +30,11 @@ module gravier_interface
     integer(i8) :: neighbours = 0, values = 0, most_neighbours = 0, most_values = 0
     !> ghosts of all subdomains
     integer(i8) :: ghosts = 0
-  end type interface_figures_t
+  end type interface_statistics_t
 
   !> Columns of a subproblem by what else is known of a body.
   type :: columns_t
-    !> column of each grain at home in the subdomain, 0 where no contact touches it
+    !> column of each grain owned by the subdomain, 0 where no contact touches it
     integer, allocatable :: at_home(:)
     !> columns of the other bodies, and their identifiers, ascending
     integer, allocatable :: away(:)
@@ -45,9 +45,9 @@ module gravier_interface
 
 contains
 
-  !> Find out which subdomains hold a copy of each body: every subdomain tells the owner of a grain at home elsewhere that it
+  !> Find out which subdomains hold a copy of each body: every subdomain tells the owner of a grain owned elsewhere that it
   !> touches it, and so of boundaries that forces move; the owner tells all of them, itself included, of each other. Most
-  !> grains are touched at home only, and are in no record. Collective.
+  !> grains are touched by their owner only, and are in no record. Collective.
   subroutine find_interface(decomposition, problem)
     type(decomposition_t), intent(in) :: decomposition
     type(contact_problem_t), intent(inout) :: problem
@@ -61,7 +61,7 @@ contains
       n = 0
       do s = 1, size(problem%sub)
         associate (sub => problem%sub(s))
-          if (round == 1) call columns(s)%init(sub, decomposition%home(s)%n)
+          if (round == 1) call columns(s)%init(sub, decomposition%owned(s)%n)
           do b = 1, sub%n_bodies
             if (b <= sub%n_grains) then
               if (sub%place(b) > 0) cycle
@@ -70,8 +70,8 @@ contains
             if (round == 1) cycle
             records(1, n) = sub%id(b)
             records(2, n) = sub%subdomain
-            records(3, n) = merge(sub%home(b), 0, b <= sub%n_grains)
-            destination(n) = decomposition%comm%rank_of(sub%home(b), decomposition%n_subdomains)
+            records(3, n) = merge(sub%owner(b), 0, b <= sub%n_grains)
+            destination(n) = decomposition%comm%rank_of(sub%owner(b), decomposition%n_subdomains)
           end do
         end associate
       end do
@@ -92,7 +92,7 @@ contains
   subroutine columns_init(self, sub, n_home)
     class(columns_t), intent(inout) :: self
     type(subproblem_t), intent(in) :: sub
-    !> grains at home in the subdomain
+    !> grains owned by the subdomain
     integer, intent(in) :: n_home
     integer, allocatable :: away(:), order(:)
     integer :: b, n
@@ -147,7 +147,7 @@ contains
         end if
         key(1) = touch(3)
         key(2) = touch(1)
-        call decomposition%find_home(key, h, place)
+        call decomposition%find_owned(key, h, place)
         if (columns(h)%at_home(place) == 0) cycle
         n = n + 1
         longer(1, n) = touch(1)
@@ -217,8 +217,8 @@ contains
         last = last + 1
       end do
       part(s)%subdomain = problem%sub(s)%subdomain
-      associate (home => decomposition%home(s))
-        call fill_part(received, order(k:last), home%id(1:home%n), columns(s), problem%sub(s), part(s))
+      associate (owned => decomposition%owned(s))
+        call fill_part(received, order(k:last), owned%id(1:owned%n), columns(s), problem%sub(s), part(s))
       end associate
       k = last + 1
     end do
@@ -228,7 +228,7 @@ contains
     integer(i8), intent(in), contiguous :: received(:, :)
     !> places in `received` of the records of this subdomain, by body and sharer
     integer, intent(in), contiguous :: order(:)
-    !> identifiers of the grains at home here, ascending
+    !> identifiers of the grains owned here, ascending
     integer(i8), intent(in), contiguous :: home_id(:)
     type(columns_t), intent(in) :: columns
     type(subproblem_t), intent(inout) :: sub
@@ -304,14 +304,14 @@ contains
       type(subproblem_t) :: old
 
       call move_alloc(sub%id, old%id)
-      call move_alloc(sub%home, old%home)
+      call move_alloc(sub%owner, old%owner)
       call move_alloc(sub%place, old%place)
       call move_alloc(sub%multiplicity, old%multiplicity)
       call move_alloc(sub%radius, old%radius)
       call move_alloc(sub%v_free, old%v_free)
       call move_alloc(sub%inverse_mass, old%inverse_mass)
       allocate (sub%id, source=old%id)
-      allocate (sub%home, source=old%home)
+      allocate (sub%owner, source=old%owner)
       allocate (sub%place, mold=old%place)
       allocate (sub%multiplicity, source=old%multiplicity)
       allocate (sub%radius, mold=old%radius)
@@ -320,7 +320,7 @@ contains
       do n = 1, sub%n_grains
         b = grain(n)
         sub%id(n) = old%id(b)
-        sub%home(n) = old%home(b)
+        sub%owner(n) = old%owner(b)
         sub%place(n) = old%place(b)
         sub%multiplicity(n) = old%multiplicity(b)
         sub%radius(n) = old%radius(b)
@@ -332,11 +332,11 @@ contains
   end subroutine number_shared_first
 
   !> Count the interface. Each grain is counted in the first of the subdomains that share it. Collective.
-  subroutine count_figures(decomposition, neighbourhoods, problem, figures)
+  subroutine count_figures(decomposition, halo, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(inout) :: problem
-    type(interface_figures_t), intent(out) :: figures
+    type(interface_statistics_t), intent(out) :: figures
     integer(i8) :: counts(n_multiplicities + 6)
     real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
@@ -349,7 +349,7 @@ contains
       associate (sub => problem%sub(s), part => problem%shared%part(s))
         allocate (counted_elsewhere(sub%n_bodies), source=.false.)
         do k = 1, part%n_shared
-          counted_elsewhere(part%body(k)) = part%rung(k) > 1
+          counted_elsewhere(part%body(k)) = part%copy_rank(k) > 1
         end do
         do b = 1, sub%n_bodies
           if (counted_elsewhere(b)) cycle
@@ -358,14 +358,15 @@ contains
         end do
         do c = 1, sub%n_contacts
           if (any(sub%pair(:, c) > sub%n_grains)) cycle
-          if (sub%home(sub%pair(1, c)) /= sub%home(sub%pair(2, c))) counts(n_multiplicities + 1) = counts(n_multiplicities + 1) + 1
+          if (sub%owner(sub%pair(1, c)) /= sub%owner(sub%pair(2, &
+            & c))) counts(n_multiplicities + 1) = counts(n_multiplicities + 1) + 1
         end do
         counts(n_multiplicities + 2) = counts(n_multiplicities + 2) + sub%n_contacts
         extremes(1) = max(extremes(1), real(sub%n_contacts, dp))
         extremes(2) = max(extremes(2), -real(sub%n_contacts, dp))
         counts(n_multiplicities + 3) = counts(n_multiplicities + 3) + size(part%neighbour)
         counts(n_multiplicities + 4) = counts(n_multiplicities + 4) + int(part%n_slots, i8)*problem%shared%width
-        counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(neighbourhoods%view(s)%origin == 0)
+        counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(halo%view(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
         counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_awake

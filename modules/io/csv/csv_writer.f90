@@ -156,19 +156,19 @@ contains
     character(len=*), intent(in) :: path, found, expected
     type(error_t), allocatable, intent(inout) :: error
     type(csv_option_t), intent(in), optional :: options(:)
-    character(len=:), allocatable :: lacking, beside, message
+    character(len=:), allocatable :: lacking, beside
 
     lacking = first_beyond(expected, found)
     beside = first_beyond(found, expected)
     if (lacking /= "") then
-      message = "no column "//lacking//reason(lacking, ".true.", ".false.", ", but one was expected")
+      call raise(error, status_input, path//": line 1: no column "//lacking// &
+        & reason(lacking, ".true.", ".false.", ", but one was expected"))
     else if (beside /= "") then
-      message = "a column "//beside(1:min(len(beside), longest_quote))// &
-        & reason(beside, ".false.", ".true.", ", but none was expected")
+      call raise(error, status_input, path//": line 1: a column "//beside(1:min(len(beside), longest_quote))// &
+        & reason(beside, ".false.", ".true.", ", but none was expected"))
     else
-      message = expected//" was expected"
+      call raise(error, status_input, path//": line 1: "//expected//" was expected")
     end if
-    call raise(error, status_input, path//": line 1: "//message)
 
   contains
 

@@ -4,13 +4,13 @@ module gravier_nscdd
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_sweeps, sweep_and_pass
+  use gravier_method, only: method_t, start_sweeps, sweep_and_pass
   use gravier_method_options, only: method_features_t, default_always
   implicit none
   private
   public :: nscdd_t, average_copies
 
-  type, extends(scheme_t) :: nscdd_t
+  type, extends(method_t) :: nscdd_t
   contains
     procedure, nopass :: features => nscdd_features
     procedure :: start => nscdd_start

@@ -12,7 +12,7 @@ module gravier_nscdd_ep
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve, phase_factorise
   use gravier_body_mass, only: subtract_inverse_mass
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: work_t, start_sweeps
+  use gravier_method, only: work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, default_on_active
   use gravier_nscdd, only: nscdd_t, average_copies
   use gravier_search_direction, only: chosen_direction

@@ -10,7 +10,7 @@ module gravier_enriched_matrix
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: diagonal_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: scheme_t, begin_sweeps, sweep_once, end_sweeps
+  use gravier_method, only: method_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
   use gravier_search_direction, only: search_direction_t
   implicit none
@@ -338,20 +338,20 @@ contains
   end subroutine enriched_matrix_free
 
   !> As sweep_all, keeping in the last sweep the velocity that solved each contact's law.
-  subroutine sweep_all_recording(scheme, problem, matrix)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine sweep_all_recording(method, problem, matrix)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     type(enriched_matrix_t), intent(inout) :: matrix
     integer :: s, k
 
-    call begin_sweeps(scheme, problem)
+    call begin_sweeps(method, problem)
     do s = 1, size(problem%sub)
-      do k = 1, scheme%sweeps - 1
-        call sweep_once(scheme, problem, s, k)
+      do k = 1, method%sweeps - 1
+        call sweep_once(method, problem, s, k)
       end do
-      call sweep_once(scheme, problem, s, scheme%sweeps, matrix%part(s)%law_velocity)
+      call sweep_once(method, problem, s, method%sweeps, matrix%part(s)%law_velocity)
     end do
-    call end_sweeps(scheme, problem)
+    call end_sweeps(method, problem)
   end subroutine sweep_all_recording
 
 end module gravier_enriched_matrix

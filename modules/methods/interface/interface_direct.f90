@@ -87,7 +87,7 @@ contains
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s))
         do k = 1, part%n_shared
-          if (part%rung(k) < part%multiplicity(k)) mine = mine + nv
+          if (part%copy_rank(k) < part%multiplicity(k)) mine = mine + nv
         end do
       end associate
     end do
@@ -107,7 +107,7 @@ contains
       associate (part => problem%shared%part(s), block => self%blocks(s))
         allocate (block%upper(part%n_shared), block%lower(part%n_shared), source=0)
         do k = 1, part%n_shared
-          if (part%rung(k) == part%multiplicity(k)) cycle
+          if (part%copy_rank(k) == part%multiplicity(k)) cycle
           block%upper(k) = narrow(next)
           next = next + nv
         end do
@@ -120,7 +120,7 @@ contains
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), block => self%blocks(s))
         do k = 1, part%n_shared
-          at = part%first(k) + part%rung(k) - 1
+          at = part%first(k) + part%copy_rank(k) - 1
           if (at > part%first(k)) block%lower(k) = nint(part%recv(1, part%slot(at - 1)))
         end do
       end associate
@@ -308,7 +308,7 @@ contains
     do s = 1, size(x)
       associate (part => problem%shared%part(s))
         do k = 1, part%n_shared
-          at = part%first(k) + part%rung(k) - 1
+          at = part%first(k) + part%copy_rank(k) - 1
           if (at > part%first(k)) &
             & call extended_add(x(s)%lower(:, k), x(s)%lower_low(:, k), part%recv(:, part%slot(at - 1)))
         end do
@@ -363,7 +363,7 @@ contains
       do s = 1, size(x)
         associate (part => problem%shared%part(s))
           do k = 1, part%n_shared
-            at = part%first(k) + part%rung(k) - 1
+            at = part%first(k) + part%copy_rank(k) - 1
             if (at < part%first(k + 1) - 1) &
               & call extended_add(y(s)%upper(:, k), y(s)%upper_low(:, k), part%recv(:, part%slot(at + 1)))
           end do

@@ -1,7 +1,7 @@
 !> The interface problem of the enriched dual method, X_eta F = b, X_eta = sum_E A_E M_eta,E^-1 A_E^T (paper, (28)-(29)).
 !>
 !> The rows of A_E tie the copies of a body one to the next, over its sharers in ascending order: multiplier p of a body
-!> of multiplicity m, p = 1 to m - 1, says V_p - V_(p+1) = 0. The subdomain on rung p of a body holds multiplier p as
+!> of multiplicity m, p = 1 to m - 1, says V_p - V_(p+1) = 0. The subdomain with copy rank p of a body holds multiplier p as
 !> `upper` and p - 1 as `lower`, and so does its neighbour on the chain: both compute the same bits.
 module gravier_interface_problem
   use gravier_kinds, only: dp, i8
@@ -87,7 +87,7 @@ contains
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s), y => matrix%part(s)%body_work)
         do k = 1, part%n_shared
-          at = part%first(k) + part%rung(k) - 1
+          at = part%first(k) + part%copy_rank(k) - 1
           field(s)%upper(:, k) = 0.0_dp
           field(s)%lower(:, k) = 0.0_dp
           if (at < part%first(k + 1) - 1) field(s)%upper(:, k) = y(:, part%body(k)) - part%recv(:, part%slot(at + 1))

@@ -12,7 +12,7 @@ module gravier_newton
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
   use gravier_contact_kernels, only: project_on_cones
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: work_t, start_sweeps
+  use gravier_method, only: work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t

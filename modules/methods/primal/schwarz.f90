@@ -5,7 +5,7 @@ module gravier_schwarz
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_body_mass, only: add_inverse_mass, inverse_product
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
+  use gravier_method, only: method_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
   use gravier_method_options, only: method_features_t, method_options_t
   implicit none
   private
@@ -47,7 +47,7 @@ module gravier_schwarz
     procedure :: adapt => relaxation_adapt
   end type relaxation_t
 
-  type, extends(scheme_t) :: schwarz_t
+  type, extends(method_t) :: schwarz_t
     type(relaxation_t) :: relaxation
     type(neighbour_load_t), allocatable :: load(:)
   contains

@@ -4,7 +4,7 @@ module gravier_schwarz_ec
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, take_options, work_t, start_sweeps
+  use gravier_method, only: method_t, take_options, work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t
   use gravier_direction_guard, only: direction_guard_t
   use gravier_search_direction, only: chosen_direction
@@ -18,7 +18,7 @@ module gravier_schwarz_ec
   !> l where none is given [1/W_aa]
   real(dp), parameter :: usual_direction = 3.0_dp
 
-  type, extends(scheme_t) :: schwarz_ec_t
+  type, extends(method_t) :: schwarz_ec_t
     type(enriched_matrix_t) :: matrix
     type(relaxation_t) :: relaxation
     type(neighbour_load_t), allocatable :: load(:)

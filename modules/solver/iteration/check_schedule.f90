@@ -1,14 +1,15 @@
 !> When the state of a solve is checked.
 !>
 !> A residual costs as much as two sweeps, the estimate of the velocity error as much again. What sweeps move impulses by goes with
-!> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from the
+!> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from
+!> the
 !> goal; with momentum, whose sums are there after each iteration, it comes as soon as they speak for one.
 module gravier_check_schedule
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t
-  use gravier_descent, only: descent_t
+  use gravier_method, only: method_t
+  use gravier_convergence_history, only: convergence_history_t
   implicit none
   private
   public :: check_schedule_t, growth_limit
@@ -48,41 +49,41 @@ module gravier_check_schedule
 contains
 
   !> The first iteration that may be followed by a check.
-  pure integer function check_schedule_first_check(self, scheme) result(first)
+  pure integer function check_schedule_first_check(self, method) result(first)
     class(check_schedule_t), intent(in) :: self
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
 
     first = self%check_every
-    if (self%chooses .and. scheme%momentum%on) first = min(early_check, self%check_every)
+    if (self%chooses .and. method%momentum%on) first = min(early_check, self%check_every)
   end function check_schedule_first_check
 
   !> Whether a check comes after an iteration that is about to be made. Collective.
-  logical function check_schedule_calls(self, problem, scheme, iteration, goal, reference, descent) result(calls)
+  logical function check_schedule_calls(self, problem, method, iteration, goal, reference, history) result(calls)
     class(check_schedule_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
     !> what the figure is compared with, and what a growing defect is
     real(dp), intent(in) :: goal, reference
     !> takes the figures that are expected
-    type(descent_t), intent(inout) :: descent
+    type(convergence_history_t), intent(inout) :: history
 
     calls = mod(iteration, self%check_every) == 0
     ! sums of the iterations before are there with momentum
-    if (self%chooses .and. (calls .or. (scheme%momentum%on .and. iteration >= early_check))) &
-      & calls = is_worth_a_check(self, problem, scheme, iteration, calls, goal, reference, descent)
+    if (self%chooses .and. (calls .or. (method%momentum%on .and. iteration >= early_check))) &
+      & calls = is_worth_a_check(self, problem, method, iteration, calls, goal, reference, history)
   end function check_schedule_calls
 
   !> Whether the sweeps of the iteration before speak for a check. Collective.
-  logical function is_worth_a_check(self, problem, scheme, iteration, regular, goal, reference, descent) result(is_worth)
+  logical function is_worth_a_check(self, problem, method, iteration, regular, goal, reference, history) result(is_worth)
     class(check_schedule_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
     !> whether check_every asks for one
     logical, intent(in) :: regular
     real(dp), intent(in) :: goal, reference
-    type(descent_t), intent(inout) :: descent
+    type(convergence_history_t), intent(inout) :: history
     real(dp) :: sums(2), expected, enough
     logical :: due
 
@@ -96,26 +97,26 @@ contains
       if (sums(2) > 0.0_dp) self%progress = sqrt(sums(1)/sums(2))
       expected = self%ratio*self%progress
       enough = worth_a_check
-      if (scheme%momentum%on) then
+      if (method%momentum%on) then
         if (.not. self%ratio > 0.0_dp) expected = first_ratio*self%progress
         enough = 1.0_dp
       end if
       if (expected > 0.0_dp) is_worth = (expected <= enough*goal .and. &
         & (regular .or. iteration - self%last_check > max(self%pause, least_pause*iteration))) .or. &
-        & (regular .and. (.not. self%ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth(scheme)*reference))
+        & (regular .and. (.not. self%ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth(method)*reference))
     end if
     if (is_worth) then
       self%skips = 0
     else
       if (regular) self%skips = self%skips + 1
-      if (regular .or. self%ratio > 0.0_dp) call descent%note(iteration, expected, goal)
+      if (regular .or. self%ratio > 0.0_dp) call history%note(iteration, expected, goal)
     end if
   end function is_worth_a_check
 
   !> Growth of the changes that is worth a check: methods that lower what makes them grow are left to do so.
-  pure real(dp) function watched_growth(scheme) result(growth)
-    class(scheme_t), intent(in) :: scheme
-    growth = merge(growth_limit, 1.0_dp, scheme%mends_growth())
+  pure real(dp) function watched_growth(method) result(growth)
+    class(method_t), intent(in) :: method
+    growth = merge(growth_limit, 1.0_dp, method%mends_growth())
   end function watched_growth
 
   !> A check was made after an iteration, and found this figure.

@@ -1,10 +1,11 @@
-!> Passes over layers (gravier_layered_start) tried in the course of a solve: where there is much to carry and a long way to carry it,
+!> Passes over layers (gravier_layered_start) tried in the course of a solve: where there is much to carry and a long way to carry
+!> it,
 !> and kept only where they have brought something.
 module gravier_layer_trial
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_layered_start, only: carry_loads
   use gravier_vain_impulses, only: kept_impulses_t
@@ -12,7 +13,8 @@ module gravier_layer_trial
   private
   public :: layer_trial_t
 
-  !> a pass is tried after the first iterations if the residual at the start, the velocity error over its scale and the way to supports
+  !> a pass is tried after the first iterations if the residual at the start, the velocity error over its scale and the way to
+  !> supports
   !> are above these [1, 1, mean diameters]
   real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, deep = 25.0_dp
   !> and after a part of the depth, where the way is above another [mean diameters]; the depth is found after so many iterations
@@ -61,10 +63,10 @@ contains
   end function layer_trial_calls
 
   !> After a check that did not end the solve: judge a pass or try one, where it is time. Collective.
-  subroutine layer_trial_advance(self, problem, scheme, velocity, iteration, allowed, anew, error)
+  subroutine layer_trial_advance(self, problem, method, velocity, iteration, allowed, anew, error)
     class(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
     !> velocity error over its scale
@@ -74,22 +76,22 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     anew = .false.
-    if (iteration == self%ends) call judge(self, problem, scheme, velocity, iteration, anew, error)
+    if (iteration == self%ends) call judge(self, problem, method, velocity, iteration, anew, error)
     if (allocated(error)) return
     if (self%wants_first .and. iteration == copies_ready) &
-      & call try(self, problem, scheme, velocity, iteration, much, deep, anew, error)
+      & call try(self, problem, method, velocity, iteration, much, deep, anew, error)
     if (allocated(error)) return
     if (self%may_try .and. velocity%levels%most_depth < 0 .and. iteration >= many) call velocity%levels%find_depth(problem)
     if (self%may_try .and. velocity%levels%most_depth > very_deep .and. iteration >= self%ends .and. &
       & (self%layered .or. iteration > late*velocity%levels%most_depth)) &
-      & call try(self, problem, scheme, velocity, iteration, allowed, very_deep, anew, error)
+      & call try(self, problem, method, velocity, iteration, allowed, very_deep, anew, error)
   end subroutine layer_trial_advance
 
   !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
-  subroutine try(self, problem, scheme, velocity, iteration, least_error, least_way, anew, error)
+  subroutine try(self, problem, method, velocity, iteration, least_error, least_way, anew, error)
     type(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
     !> error over its scale, and way to supports in mean diameters, above which it is tried
@@ -104,7 +106,7 @@ contains
       self%may_try = .false.
       return
     end if
-    call velocity%complete(problem, scheme, iteration)
+    call velocity%complete(problem, method, iteration)
     if (velocity%criterion() <= least_error*problem%error_scale) return
     self%may_try = .false.
     if (.not. allocated(self%before)) allocate (self%before(size(problem%sub)))
@@ -112,27 +114,27 @@ contains
       self%before(s)%value = problem%sub(s)%impulse
     end do
     self%error_before = velocity%criterion()
-    call carry_loads(problem, least_way, scheme%work, sweeps)
+    call carry_loads(problem, least_way, method%work, sweeps)
     if (.not. sweeps > 0.0_dp) return
     self%sweeps = self%sweeps + sweeps
     self%layered = .true.
     self%ends = iteration + trial
-    call begin_anew(self, problem, scheme, velocity, iteration, error)
+    call begin_anew(self, problem, method, velocity, iteration, error)
     anew = .true.
   end subroutine try
 
   !> Go on from the pass where it has brought something, else from the impulses before it. Collective.
-  subroutine judge(self, problem, scheme, velocity, iteration, anew, error)
+  subroutine judge(self, problem, method, velocity, iteration, anew, error)
     type(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
     logical, intent(inout) :: anew
     type(error_t), allocatable, intent(inout) :: error
     integer :: s
 
-    call velocity%complete(problem, scheme, iteration)
+    call velocity%complete(problem, method, iteration)
     if (velocity%criterion() < worth_keeping*self%error_before) then
       ! what errors of the layers have left, another pass lowers again
       self%may_try = velocity%levels%most_depth > very_deep
@@ -142,21 +144,21 @@ contains
     do s = 1, size(problem%sub)
       problem%sub(s)%impulse(:, :, :) = self%before(s)%value
     end do
-    call begin_anew(self, problem, scheme, velocity, iteration, error)
+    call begin_anew(self, problem, method, velocity, iteration, error)
     anew = .true.
   end subroutine judge
 
   !> The method starts anew from the impulses that the problem holds now. Collective.
-  subroutine begin_anew(self, problem, scheme, velocity, iteration, error)
+  subroutine begin_anew(self, problem, method, velocity, iteration, error)
     type(layer_trial_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
     type(error_t), allocatable, intent(inout) :: error
 
-    call scheme%start(problem, error)
-    scheme%work%solves = scheme%work%solves - 1
+    call method%start(problem, error)
+    method%work%solves = method%work%solves - 1
     call velocity%begin_anew(iteration, self%layered)
   end subroutine begin_anew
 

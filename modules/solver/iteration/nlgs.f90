@@ -3,13 +3,13 @@ module gravier_nlgs
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t, start_sweeps, sweep_all
+  use gravier_method, only: method_t, start_sweeps, sweep_all
   use gravier_method_options, only: method_features_t, default_always
   implicit none
   private
   public :: nlgs_t
 
-  type, extends(scheme_t) :: nlgs_t
+  type, extends(method_t) :: nlgs_t
   contains
     procedure, nopass :: features => nlgs_features
     procedure :: start => nlgs_start

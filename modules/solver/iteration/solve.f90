@@ -5,8 +5,8 @@ module gravier_solve
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_setup, phase_check, clock
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t
-  use gravier_descent, only: descent_t
+  use gravier_method, only: method_t
+  use gravier_convergence_history, only: convergence_history_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_check_schedule, only: check_schedule_t, growth_limit
   use gravier_stagnation, only: stagnation_t
@@ -83,7 +83,7 @@ module gravier_solve
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
     !> how the figure came down
-    type(descent_t) :: descent
+    type(convergence_history_t) :: history
     !> on this rank: the whole solve, and what comes before its first check [s]
     real(dp) :: seconds = 0.0_dp, start_seconds = 0.0_dp
     !> one column a check, n_trace of them: iteration, residual, jump, error, velocity error, seconds of this rank without those of
@@ -128,10 +128,10 @@ module gravier_solve
 contains
 
   !> Solve. The state is checked at the start, at the end and in between as gravier_check_schedule says. Collective.
-  subroutine solve_contacts(problem, scheme, control, report, error, exact, watch)
+  subroutine solve_contacts(problem, method, control, report, error, exact, watch)
     !> with its velocity scale
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
@@ -141,40 +141,40 @@ contains
     type(solve_state_t) :: state
     logical :: measure, done, anew
 
-    call prepare(state, problem, scheme, control, report, error)
+    call prepare(state, problem, method, control, report, error)
     if (allocated(error)) return
-    call check(state, problem, scheme, control, report, done, exact)
+    call check(state, problem, method, control, report, done, exact)
     state%settled = report%residual <= control%tolerance
     if (state%by_estimate .and. control%layered) call state%trial%start(problem, report%residual)
     do while (.not. done)
       report%iterations = report%iterations + 1
-      measure = state%schedule%calls(problem, scheme, report%iterations, report%goal, state%reference, report%descent)
-      measure = measure .or. scheme%check_next .or. report%iterations == control%max_iterations .or. &
+      measure = state%schedule%calls(problem, method, report%iterations, report%goal, state%reference, report%history)
+      measure = measure .or. method%check_next .or. report%iterations == control%max_iterations .or. &
         & (state%settled .and. state%by_estimate .and. report%iterations == copies_ready) .or. state%trial%calls(report%iterations)
-      call scheme%iterate(problem, measure, report%jump, error)
+      call method%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (measure) then
-        call check(state, problem, scheme, control, report, done, exact)
+        call check(state, problem, method, control, report, done, exact)
         if (done) exit
-        call state%trial%advance(problem, scheme, state%velocity, report%iterations, control%accuracy, anew, error)
+        call state%trial%advance(problem, method, state%velocity, report%iterations, control%accuracy, anew, error)
         if (allocated(error)) return
         if (anew) call state%schedule%forget_ratio()
       end if
-      call state%velocity%keep_copy(problem, scheme, report%iterations)
+      call state%velocity%keep_copy(problem, method, report%iterations)
       if (present(watch)) call watch%look(report)
     end do
     report%layered = state%trial%layered
     report%layered_sweeps = state%trial%sweeps
-    if (report%status /= solve_converged .and. report%status /= solve_diverged .and. scheme%keeps_best) &
-      & call take_best(state, problem, scheme, control, report, exact)
+    if (report%status /= solve_converged .and. report%status /= solve_diverged .and. method%keeps_best) &
+      & call take_best(state, problem, method, control, report, exact)
     report%seconds = clock() - state%began
   end subroutine solve_contacts
 
   !> All that comes before the first check. Collective.
-  subroutine prepare(state, problem, scheme, control, report, error)
+  subroutine prepare(state, problem, method, control, report, error)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     type(error_t), allocatable, intent(inout) :: error
@@ -189,37 +189,37 @@ contains
     report%velocity_scale = problem%error_scale
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
     call start_timer(phase_setup)
-    call scheme%start(problem, error)
+    call method%start(problem, error)
     if (.not. allocated(error)) call state%velocity%start(problem, control%accuracy*problem%error_scale)
     call stop_timer(phase_setup)
     if (allocated(error)) return
     report%start_seconds = clock() - state%began
-    report%descent%first_check = state%schedule%first_check(scheme)
+    report%history%first_check = state%schedule%first_check(method)
   end subroutine prepare
 
   !> The best impulses of a method that keeps them, where a solve ends without success, and their figures. Collective.
-  subroutine take_best(state, problem, scheme, control, report, exact)
+  subroutine take_best(state, problem, method, control, report, exact)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     class(exact_solution_t), intent(in), optional :: exact
     real(dp) :: ignored
 
-    call scheme%conclude(problem)
+    call method%conclude(problem)
     call problem%residual(report%residual, ignored)
     call state%velocity%bound(problem)
-    call complete_estimate(state, problem, scheme, report)
+    call complete_estimate(state, problem, method, report)
     if (control%criterion == by_error) report%error = exact%error(problem)
     call take_figure(state, problem, control, report)
   end subroutine take_best
 
   !> Judge the state after the iterations made. Collective.
-  subroutine check(state, problem, scheme, control, report, finished, exact)
+  subroutine check(state, problem, method, control, report, finished, exact)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: finished
@@ -231,15 +231,15 @@ contains
     if (report%iterations > 0) call problem%evaluate()
     ! where the last residual was within its tolerance, the velocity error is likely to be asked for
     if (state%by_estimate .and. report%iterations >= copies_ready .and. report%residual <= control%tolerance) then
-      call state%velocity%assess(problem, scheme, report%iterations, report%residual, defect)
+      call state%velocity%assess(problem, method, report%iterations, report%residual, defect)
     else
       call problem%residual(report%residual, defect)
       call state%velocity%bound(problem)
     end if
     if (control%criterion == by_error) report%error = exact%error(problem)
-    call judge(state, problem, scheme, control, report, defect, finished)
+    call judge(state, problem, method, control, report, defect, finished)
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
-    if (ieee_is_finite(report%figure)) call report%descent%note(report%iterations, report%figure, report%goal)
+    if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
     call state%schedule%note_check(report%iterations, report%figure)
     if (.not. finished .and. problem%n_asleep > 0) call wake_if_due(state, problem, control, report)
     state%checking = state%checking + clock() - start
@@ -262,10 +262,10 @@ contains
   end subroutine wake_if_due
 
   !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
-  subroutine find_whether_met(state, problem, scheme, control, report, is_met)
+  subroutine find_whether_met(state, problem, method, control, report, is_met)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: is_met
@@ -278,17 +278,17 @@ contains
     case (by_error)
       is_met = report%error <= control%tolerance
     case default
-      call find_whether_velocity_met(state, problem, scheme, control, report, is_met)
+      call find_whether_velocity_met(state, problem, method, control, report, is_met)
     end select
   end subroutine find_whether_met
 
   !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
   !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
   !> zero impulses neither before some iterations. Collective.
-  subroutine find_whether_velocity_met(state, problem, scheme, control, report, is_met)
+  subroutine find_whether_velocity_met(state, problem, method, control, report, is_met)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: is_met
@@ -304,7 +304,7 @@ contains
       else if (report%iterations < copies_ready) then
         return
       end if
-      call state%velocity%assess(problem, scheme, report%iterations, report%residual, defect)
+      call state%velocity%assess(problem, method, report%iterations, report%residual, defect)
     end if
     if (state%velocity%criterion() <= limit) call state%velocity%add_levels(problem)
     report%velocity_error = state%velocity%estimate()
@@ -312,15 +312,15 @@ contains
   end subroutine find_whether_velocity_met
 
   !> The whole estimate. Where the residual is rounding the velocities are exact. Collective.
-  subroutine complete_estimate(state, problem, scheme, report)
+  subroutine complete_estimate(state, problem, method, report)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_report_t), intent(inout) :: report
 
     report%velocity_error = 0.0_dp
     if (.not. report%residual > 0.0_dp) return
-    call state%velocity%complete(problem, scheme, report%iterations)
+    call state%velocity%complete(problem, method, report%iterations)
     report%velocity_error = state%velocity%estimate()
     report%violation = state%velocity%largest_violation
   end subroutine complete_estimate
@@ -345,10 +345,10 @@ contains
   end subroutine take_figure
 
   !> Whether the solve ends here, and why. Collective.
-  subroutine judge(state, problem, scheme, control, report, defect, finished)
+  subroutine judge(state, problem, method, control, report, defect, finished)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     real(dp), intent(in) :: defect
@@ -364,7 +364,7 @@ contains
     if (report%iterations == 0) state%reference = max(defect, problem%force_scale)
     report%velocity_error = 0.0_dp
     if (report%residual > 0.0_dp) report%velocity_error = state%velocity%estimate()
-    call find_whether_met(state, problem, scheme, control, report, met)
+    call find_whether_met(state, problem, method, control, report, met)
     call take_figure(state, problem, control, report)
     if (met) then
       report%status = solve_converged
@@ -373,20 +373,20 @@ contains
         if (normals_are_in_vain(problem)) report%status = solve_unbounded
       end if
     else if (defect > growth_limit*state%reference .and. &
-        & .not. (scheme%guarded .and. report%iterations < control%max_iterations)) then
+        & .not. (method%guarded .and. report%iterations < control%max_iterations)) then
       report%status = solve_diverged
     else
-      call note_growth(state, scheme%mends_growth(), report%iterations, defect)
+      call note_growth(state, method%mends_growth(), report%iterations, defect)
       if (state%grows) then
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
       else
-        call judge_stagnation(state, problem, scheme, control, report, finished)
+        call judge_stagnation(state, problem, method, control, report, finished)
       end if
     end if
     if (control%trace .or. (finished .and. .not. (met .and. state%by_estimate))) &
-      & call complete_estimate(state, problem, scheme, report)
+      & call complete_estimate(state, problem, method, report)
     if (control%trace) call take_figure(state, problem, control, report)
   end subroutine judge
 
@@ -410,10 +410,10 @@ contains
 
   !> Whether nothing is to be expected of more iterations: because there is no solution, or because the method finds none.
   !> Collective.
-  subroutine judge_stagnation(state, problem, scheme, control, report, has_stagnated)
+  subroutine judge_stagnation(state, problem, method, control, report, has_stagnated)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: has_stagnated
@@ -422,7 +422,7 @@ contains
     has_stagnated = .false.
     ! the residual of no impulses is relative to something else
     if (report%iterations == 0) return
-    call state%stagnation%note(problem, report%iterations, report%figure, scheme%momentum%on, &
+    call state%stagnation%note(problem, report%iterations, report%figure, method%momentum%on, &
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
     if (.not. due) return
     if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)
@@ -430,7 +430,7 @@ contains
     if (in_vain) then
       report%status = solve_unbounded
     else
-      has_stagnated = has_stagnated .and. .not. scheme%persists
+      has_stagnated = has_stagnated .and. .not. method%persists
       if (has_stagnated) report%status = solve_stagnated
     end if
   end subroutine judge_stagnation

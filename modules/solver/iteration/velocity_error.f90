@@ -4,7 +4,8 @@
 !> What is looked at is the velocity by which a contact violates its law, w = W (P(r - (v + s n)/W) - r). With e = V - V* and
 !> the set of pressing and sticking contacts known, H^T e = -w there, so that any test impulse y gives y . w = -(M^-1 H y, e)_M.
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
-!>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those one
+!>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those
+!> one
 !>      iteration before with momentum, which keeps them; else those of some iterations before.
 !>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
@@ -12,7 +13,8 @@
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
-!> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its law by
+!> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
+!> law by
 !> much, and no body sink by much onto what is below it. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
@@ -20,7 +22,7 @@ module gravier_velocity_error
   use gravier_contact_kernels, only: lanes
   use gravier_body_mass, only: inverse_products, inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   use gravier_levels, only: levels_t
   implicit none
   private
@@ -140,14 +142,14 @@ contains
   end subroutine velocity_error_start
 
   !> Keep a copy of the impulses after an iteration, where one is due and the method keeps none.
-  subroutine velocity_error_keep_copy(self, problem, scheme, iteration)
+  subroutine velocity_error_keep_copy(self, problem, method, iteration)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
     integer :: s
 
-    if (scheme%momentum%on .or. iteration < self%next_copy) return
+    if (method%momentum%on .or. iteration < self%next_copy) return
     self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
     self%taken_at = iteration
     do s = 1, size(self%part)
@@ -226,10 +228,10 @@ contains
 
   !> C, Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
   !> the contacts and one reduction. Collective.
-  subroutine velocity_error_assess(self, problem, scheme, iteration, residual, defect)
+  subroutine velocity_error_assess(self, problem, method, iteration, residual, defect)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
     !> as `residual` of the problem returns them
     real(dp), intent(out) :: residual, defect
@@ -249,8 +251,8 @@ contains
         if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
         if (sub%n_contacts == 0) cycle
         ! without earlier impulses the third test impulse is 0, which tells nothing
-        if (scheme%momentum%on .and. iteration > 0) then
-          call test(sub, part, scheme%momentum%part(s)%impulse)
+        if (method%momentum%on .and. iteration > 0) then
+          call test(sub, part, method%momentum%part(s)%impulse)
         else if (self%taken_at > 0 .and. self%taken_at < iteration) then
           call test(sub, part, part%previous)
         else
@@ -368,7 +370,8 @@ contains
     end do
   end function projection_of
 
-  !> L, after `assess`; and how fast each body sinks, where all else is within the error allowed and bounds do not tell enough. Where few
+  !> L, after `assess`; and how fast each body sinks, where all else is within the error allowed and bounds do not tell enough.
+  !> Where few
   !> heavy bodies have most of the mass, E says little of the others. Collective.
   subroutine velocity_error_add_levels(self, problem)
     class(velocity_error_t), intent(inout) :: self
@@ -383,14 +386,14 @@ contains
   end subroutine velocity_error_add_levels
 
   !> The whole estimate, with v_global and the reactions evaluated. Collective.
-  subroutine velocity_error_complete(self, problem, scheme, iteration)
+  subroutine velocity_error_complete(self, problem, method, iteration)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(in) :: scheme
+    class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
     real(dp) :: residual, defect
 
-    if (.not. self%is_assessed) call self%assess(problem, scheme, iteration, residual, defect)
+    if (.not. self%is_assessed) call self%assess(problem, method, iteration, residual, defect)
     call self%add_levels(problem)
   end subroutine velocity_error_complete
 

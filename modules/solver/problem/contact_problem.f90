@@ -21,7 +21,8 @@ module gravier_contact_problem
   !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed.
   !>
   !> Attractions F of contacts are loads of the solve, and unilateral contact holds for r~_n = r_n + h F. `impulse`, `reaction` and
-  !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what belongs
+  !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what
+  !> belongs
   !> to it are asked of `normal_impulse`, `contact_reaction`, `free_velocity` and `impulse_on_candidate`.
   type :: subproblem_t
     !> global number of the subdomain, from 1
@@ -34,8 +35,8 @@ module gravier_contact_problem
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
-    integer, allocatable :: home(:)
-    !> place of each grain among those at home in this subdomain, 0 for those at home elsewhere (n_grains)
+    integer, allocatable :: owner(:)
+    !> place of each grain among those owned by this subdomain, 0 for those owned elsewhere (n_grains)
     integer, allocatable :: place(:)
     !> subdomains in which each body carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
@@ -47,15 +48,15 @@ module gravier_contact_problem
     real(dp), allocatable :: v_free(:, :)
     !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
     real(dp) :: largest_term = 0.0_dp
-    !> velocity under the scheme's present loads (nv, n_columns)
+    !> velocity under the method's present loads (nv, n_columns)
     real(dp), allocatable :: velocity(:, :)
     !> velocity of the undivided bodies under all impulses (nv, n_columns), made by `evaluate`
     real(dp), allocatable :: v_global(:, :)
-    !> H r~ (nv, n_columns), of all copies after `evaluate`; work space of schemes [N s, N m s]
+    !> H r~ (nv, n_columns), of all copies after `evaluate`; work space of methods [N s, N m s]
     real(dp), allocatable :: reaction(:, :)
     !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (nw, n_columns)
     real(dp), allocatable :: inverse_mass(:, :)
-    !> the same as the scheme shares masses out (nw, n_columns)
+    !> the same as the method shares masses out (nw, n_columns)
     real(dp), allocatable :: weight(:, :)
     !> (2, lanes*blocks), (lanes, nh, blocks), (lanes, nc, blocks): see gravier_contact_kernels
     integer, allocatable :: pair(:, :)
@@ -64,7 +65,7 @@ module gravier_contact_problem
     real(dp), allocatable :: impulse(:, :, :)
     !> where some law of the scene attracts: h F of the attraction F of each contact (lanes, blocks) [N s], and their load on the
     !> bodies, H (-h F n), of all copies (nv, n_columns) [N s, N m s]
-    real(dp), allocatable :: attraction(:, :), pull(:, :)
+    real(dp), allocatable :: attraction(:, :), attraction_load(:, :)
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
@@ -235,7 +236,7 @@ contains
     integer, intent(in) :: d, b
 
     reaction = self%reaction(d, b)
-    if (allocated(self%pull)) reaction = reaction + self%pull(d, b)
+    if (allocated(self%attraction_load)) reaction = reaction + self%attraction_load(d, b)
   end function subproblem_contact_reaction
 
   !> Velocity of body `b` without contacts and without their attractions, component `d` [m/s, rad/s].
@@ -245,7 +246,8 @@ contains
 
     velocity = self%v_free(d, b)
     ! the product is rounded by itself
-    if (allocated(self%pull)) velocity = velocity - (self%inverse_mass(min(d, size(self%inverse_mass, 1)), b)*self%pull(d, b))
+    if (allocated(self%attraction_load)) velocity = velocity - (self%inverse_mass(min(d, size(self%inverse_mass, 1)), &
+      & b)*self%attraction_load(d, b))
   end function subproblem_free_velocity
 
   !> Impulse r of contact `c` of subdomain `s` of this rank on its candidate, in global axes [N s].
@@ -263,7 +265,7 @@ contains
     end associate
   end subroutine contact_problem_impulse_on_candidate
 
-  !> Add the attractions to the loads, v_free := v_free + M^-1 pull with pull = H (-h F n). Collective.
+  !> Add the attractions to the loads, v_free := v_free + M^-1 attraction_load with attraction_load = H (-h F n). Collective.
   subroutine contact_problem_load_attraction(self)
     class(contact_problem_t), intent(inout) :: self
     real(dp), allocatable :: load(:, :, :)
@@ -273,19 +275,19 @@ contains
       associate (sub => self%sub(s))
         allocate (load(lanes, self%kernels%nc, size(sub%attraction, 2)), source=0.0_dp)
         load(:, 1, :) = -sub%attraction
-        if (.not. allocated(sub%pull)) allocate (sub%pull, mold=sub%v_free)
-        sub%pull(:, :) = 0.0_dp
-        call self%kernels%add_reaction(sub%pair, sub%hot, load, sub%pull)
-        call self%shared%load(s, sub%pull)
+        if (.not. allocated(sub%attraction_load)) allocate (sub%attraction_load, mold=sub%v_free)
+        sub%attraction_load(:, :) = 0.0_dp
+        call self%kernels%add_reaction(sub%pair, sub%hot, load, sub%attraction_load)
+        call self%shared%load(s, sub%attraction_load)
         deallocate (load)
       end associate
     end do
     call self%shared%pass()
     do s = 1, size(self%sub)
       associate (sub => self%sub(s))
-        call self%shared%sum_copies(s, sub%pull, mean=.false.)
+        call self%shared%sum_copies(s, sub%attraction_load, mean=.false.)
         do b = 1, sub%n_columns
-          call add_inverse_mass(sub%inverse_mass(:, b), sub%pull(:, b), sub%v_free(:, b))
+          call add_inverse_mass(sub%inverse_mass(:, b), sub%attraction_load(:, b), sub%v_free(:, b))
         end do
       end associate
     end do
@@ -358,7 +360,8 @@ contains
   !> The residual by its sums over all subdomains, as `residual` returns it.
   subroutine contact_problem_take_residual(self, all_sums, residual, defect)
     class(contact_problem_t), intent(inout) :: self
-    !> of the squared defect, of the squared impulses and of r_n times the shift, of contacts that are awake and of those that sleep;
+    !> of the squared defect, of the squared impulses and of r_n times the shift, of contacts that are awake and of those that
+    !> sleep;
     !> |V|_M^2 where rest is admissible
     real(dp), intent(in) :: all_sums(n_residual_sums)
     real(dp), intent(out) :: residual, defect

@@ -6,15 +6,15 @@ module gravier_narrow_phase
   use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhood_t
+  use gravier_halo, only: local_bodies_t
   use gravier_pair_laws, only: law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: found_t, find_contacts
+  public :: contact_list_t, find_contacts
 
   !> Gaps and normals of the pairs of a list that are contacts.
-  type :: found_t
+  type :: contact_list_t
     integer :: n = 0
     !> those that do not sleep: the first ones, in whole blocks where others follow
     integer :: n_awake = 0
@@ -24,17 +24,17 @@ module gravier_narrow_phase
     real(dp), allocatable :: gap(:), normal(:, :)
     !> where some law has other terms for each pair (n)
     type(contact_terms_t), allocatable :: terms(:)
-  end type found_t
+  end type contact_list_t
 
 contains
 
   !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
   !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
   subroutine find_contacts(view, decomposition, physics, found)
-    type(neighbourhood_t), intent(inout) :: view
+    type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    type(found_t), intent(inout) :: found
+    type(contact_list_t), intent(inout) :: found
     integer :: p, i, j, nd, row
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
     type(contact_terms_t) :: terms

@@ -7,7 +7,7 @@ module gravier_pair_laws
   use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_surface_velocity, only: find_start_velocity, find_surface_velocity, find_wall_point
   implicit none
   private
@@ -30,7 +30,7 @@ contains
 
   !> Number of the boundary that takes part in pair `p`, by itself or by a grain glued to it; 0 between free grains.
   pure integer function boundary_of(view, p) result(b)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
 
     if (view%list%antagonist(p) < 0) then
@@ -43,7 +43,7 @@ contains
   !> Place of the law of pair `p` in the set of laws: that of its materials, or the default law of the boundary that takes part or
   !> of grains.
   pure integer function law_of(view, boundaries, laws, p) result(l)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
     integer, intent(in) :: p
@@ -63,12 +63,12 @@ contains
     real(dp), intent(in) :: gap
 
     if (allocated(laws%of)) terms = laws%of(l)%terms
-    terms%play = max(gap, 0.0_dp)
+    terms%free_gap = max(gap, 0.0_dp)
   end function terms_of
 
   !> Number of the material of grain `k` of a view, or of boundary -k. Grains glued to a boundary that has one are of its material.
   pure integer function material_of(view, boundaries, k) result(material)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: k
     integer :: b
@@ -85,7 +85,7 @@ contains
 
   !> The terms of pair `p` over a step under law `l`, and its state.
   pure subroutine evaluate_pair(view, boundaries, laws, l, p, normal, pair)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
     integer, intent(in) :: l, p
@@ -112,7 +112,7 @@ contains
     v(:) = v - w
     pair%normal_velocity = sum(v*normal)
     pair%slip = norm2(v - pair%normal_velocity*normal)
-    pair%terms%play = max(pair%gap, 0.0_dp)
+    pair%terms%free_gap = max(pair%gap, 0.0_dp)
     associate (law => laws%of(l)%law)
       pair%terms%rolling_friction = law%largest%rolling_friction
       pair%terms%pivoting_friction = law%largest%pivoting_friction
@@ -121,16 +121,16 @@ contains
   end subroutine evaluate_pair
 
   !> The states of the pairs of a solved problem, whose impulses are those of the solve.
-  subroutine conclude_pairs(problem, boundaries, laws, neighbourhoods)
+  subroutine conclude_pairs(problem, boundaries, laws, halo)
     type(contact_problem_t), intent(in) :: problem
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    type(halo_t), intent(inout) :: halo
     type(contact_pair_t) :: pair
     integer :: s, c, q, g, l, p
 
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => neighbourhoods%view(s))
+      associate (sub => problem%sub(s), view => halo%view(s))
         do c = 1, sub%n_contacts
           p = sub%source(c)
           l = law_of(view, boundaries, laws, p)

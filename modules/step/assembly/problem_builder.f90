@@ -9,13 +9,13 @@ module gravier_problem_builder
   use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_surface_velocity, only: find_start_velocity, find_wall_point, approach_velocity
   use gravier_pair_laws, only: boundary_of, law_of, terms_of
   use gravier_physics, only: physics_t
-  use gravier_narrow_phase, only: found_t, find_contacts
+  use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_sleeping, only: put_sleepers_last
-  use gravier_interface, only: interface_figures_t, find_interface, count_figures
+  use gravier_interface, only: interface_statistics_t, find_interface, count_figures
   implicit none
   private
   public :: build_problem
@@ -25,7 +25,8 @@ module gravier_problem_builder
     integer, allocatable :: of_grain(:), of_boundary(:)
   end type numbers_t
 
-  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs, its
+  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs,
+  !> its
   !> candidate and its antagonist, a grain or minus a boundary, and the boundary that takes part, 0 for none.
   type :: packed_t
     integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0
@@ -36,24 +37,24 @@ contains
   !> Find the contacts among the near pairs at the present places (q_m) and pack them, subdomain by subdomain. Impulses
   !> start from zero. Boundaries hold the velocities that they have at the end of the step as far as no contact acts on
   !> them. Collective.
-  subroutine build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+  subroutine build_problem(decomposition, halo, kernels, physics, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
     !> states of pairs are those of the step afterwards
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    type(halo_t), intent(inout) :: halo
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(inout) :: problem
-    type(interface_figures_t), intent(out) :: figures
-    type(found_t) :: found
+    type(interface_statistics_t), intent(out) :: figures
+    type(contact_list_t) :: found
     integer :: s
 
     problem%comm => decomposition%comm
     problem%kernels = kernels
     problem%n_subdomains = decomposition%n_subdomains
     if (allocated(problem%sub)) deallocate (problem%sub)
-    allocate (problem%sub(size(neighbourhoods%view)))
+    allocate (problem%sub(size(halo%view)))
     do s = 1, size(problem%sub)
-      associate (view => neighbourhoods%view(s))
+      associate (view => halo%view(s))
         call start_timer(phase_detection)
         call find_contacts(view, decomposition, physics, found)
         if (physics%sleep_after > 0) call put_sleepers_last(view, decomposition%boundaries, physics%sleep_after, found)
@@ -66,7 +67,7 @@ contains
     end do
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
-    call count_figures(decomposition, neighbourhoods, problem, figures)
+    call count_figures(decomposition, halo, problem, figures)
     if (physics%laws%attracts) call problem%load_attraction()
     call find_scales(problem)
     call stop_timer(phase_interface)
@@ -77,8 +78,8 @@ contains
   !> boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, or one a contact where
   !> the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(decomposition_t), intent(in) :: decomposition
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
@@ -139,7 +140,7 @@ contains
     integer, intent(in) :: n_columns
     type(subproblem_t), intent(inout) :: sub
 
-    allocate (sub%id(n_columns), sub%home(sub%n_bodies), sub%place(sub%n_grains), sub%radius(sub%n_grains))
+    allocate (sub%id(n_columns), sub%owner(sub%n_bodies), sub%place(sub%n_grains), sub%radius(sub%n_grains))
     allocate (sub%v_free(kernels%nv, n_columns), sub%inverse_mass(kernels%nw, n_columns), source=0.0_dp)
     ! what the solve sets before it reads them
     allocate (sub%velocity(kernels%nv, n_columns), sub%v_global(kernels%nv, n_columns), sub%reaction(kernels%nv, n_columns), &
@@ -149,7 +150,7 @@ contains
   end subroutine allocate_bodies
 
   subroutine pack_grains(view, number_of, kernels, physics, sub)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     integer, intent(in), contiguous :: number_of(:)
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
@@ -160,7 +161,7 @@ contains
       b = number_of(k)
       if (b == 0) cycle
       sub%id(b) = view%bodies%id(k)
-      sub%home(b) = view%home(k)
+      sub%owner(b) = view%owner(k)
       sub%place(b) = view%origin(k)
       sub%radius(b) = view%bodies%radius(k)
       sub%v_free(:, b) = view%bodies%velocity(1:kernels%nv, k)
@@ -186,7 +187,7 @@ contains
     sub%boundary(column) = b
     sub%v_free(1:kernels%nd, column) = boundary%velocity(1:kernels%nd)
     if (column > sub%n_bodies) return
-    sub%home(column) = mod(b - 1, n_subdomains) + 1
+    sub%owner(column) = mod(b - 1, n_subdomains) + 1
     do d = 1, kernels%nd
       if (.not. boundary%free(d)) cycle
       sub%inverse_mass(d, column) = 1.0_dp/boundary%mass
@@ -197,8 +198,8 @@ contains
 
   !> Pack the contacts in the order in which they are swept, with the columns of boundaries that turn.
   subroutine pack_contacts(view, found, boundaries, numbers, kernels, physics, sub)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(numbers_t), intent(in) :: numbers
     type(kernels_t), intent(in) :: kernels
@@ -242,8 +243,8 @@ contains
   !> Columns of candidates and antagonists in the order in which contacts were found; of a boundary that turns, one that cannot move
   !> stands for the columns that `add_column` makes.
   subroutine find_pairs(view, found, boundaries, numbers, sub, pair)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(numbers_t), intent(in) :: numbers
     type(subproblem_t), intent(in) :: sub
@@ -270,8 +271,8 @@ contains
 
   !> The point of a turning boundary that a contact touches, as a body of its own.
   subroutine add_column(view, found, boundary, kernels, this, sub)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundary
     type(kernels_t), intent(in) :: kernels
     type(packed_t), intent(in) :: this
@@ -298,8 +299,8 @@ contains
 
   !> The contact data: normal and levers, and what the law of the pair makes of the step.
   subroutine pack_terms(view, found, boundaries, kernels, physics, this, sub)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
@@ -317,7 +318,7 @@ contains
       if (terms%restitution > 0.0_dp) then
         sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, this, sub)
       else
-        sub%hot(q, row%shift, g) = terms%play/physics%h
+        sub%hot(q, row%shift, g) = terms%free_gap/physics%h
       end if
       if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) return
@@ -337,8 +338,8 @@ contains
   !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
   !> the contact comes to rest.
   real(dp) function returned_velocity(view, found, boundaries, this, sub) result(returned)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(in) :: sub
@@ -353,8 +354,8 @@ contains
 
   !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
   subroutine pack_tangential_shift(view, found, boundaries, kernels, restitution, this, sub)
-    type(neighbourhood_t), intent(in) :: view
-    type(found_t), intent(in) :: found
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
     !> tangential

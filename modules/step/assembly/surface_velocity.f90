@@ -4,7 +4,7 @@
 module gravier_surface_velocity
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
-  use gravier_neighbourhood, only: neighbourhood_t
+  use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
@@ -14,7 +14,7 @@ contains
   !> Velocity of body `k`: of a free grain, translation and spin; of a boundary, the velocity of its material at a point, as a
   !> translation without spin.
   pure subroutine find_start_velocity(view, boundaries, k, point, v)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: k
     !> (nd) where a boundary is touched, which a free grain does not read [m]
@@ -35,7 +35,7 @@ contains
 
   !> Velocity of grain `k` at the point of its surface that `arm` leads to from its centre.
   pure subroutine find_surface_velocity(view, boundaries, k, arm, v)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: k
     !> (nd) [m]
@@ -63,7 +63,7 @@ contains
 
   !> Point of the surface of a boundary that grain `i` is nearest to.
   pure subroutine find_wall_point(view, i, gap, normal, point)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: i
     !> [m]
     real(dp), intent(in) :: gap
@@ -76,7 +76,7 @@ contains
 
   !> Normal velocity of pair `p` [m/s], positive where the two part. Of round grains it is that of their centres.
   pure real(dp) function approach_velocity(view, boundaries, p, gap, normal) result(approach)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: p
     !> [m]

@@ -209,7 +209,7 @@ contains
       associate (sub => problem%sub(s), part => problem%shared%part(s))
         allocate (counted_elsewhere(sub%n_bodies), source=.false.)
         do k = 1, part%n_shared
-          counted_elsewhere(part%body(k)) = part%rung(k) > 1
+          counted_elsewhere(part%body(k)) = part%copy_rank(k) > 1
           call problem%shared%add_copies(s, k, tally(s)%ends(:, part%body(k)))
         end do
         do b = 1, sub%n_grains

@@ -4,7 +4,7 @@ module gravier_diagnostic
   use gravier_kinds, only: dp, i8
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_halo, only: halo_t
   use gravier_physics, only: physics_t
   implicit none
   private
@@ -37,11 +37,11 @@ module gravier_diagnostic
 
   !> A step that is solved, as diagnostics see it. They change nothing of it: the problem is theirs for its exchange alone.
   type :: solved_step_t
-    !> grains at home and boundaries, with the velocities of the end of the step; in `take_step` places are those of its middle, in
+    !> owned grains and boundaries, with the velocities of the end of the step; in `take_step` places are those of its middle, in
     !> `measure` those of its end
     type(decomposition_t), pointer :: decomposition => null()
     !> the views have the velocities of the start of the step and the places of its middle
-    type(neighbourhoods_t), pointer :: neighbourhoods => null()
+    type(halo_t), pointer :: halo => null()
     type(physics_t), pointer :: physics => null()
     type(contact_problem_t), pointer :: problem => null()
     !> of the contacts on each boundary (nd, boundaries) [N s]

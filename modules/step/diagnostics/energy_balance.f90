@@ -8,7 +8,7 @@ module gravier_energy_balance
   use gravier_contact_kernels, only: global_moment, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhood_t
+  use gravier_halo, only: local_bodies_t
   use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
@@ -83,7 +83,7 @@ contains
   subroutine energy_begin(self, decomposition)
     class(energy_balance_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
-    real(dp) :: parts(2, size(decomposition%home)), sums(2)
+    real(dp) :: parts(2, size(decomposition%owned)), sums(2)
     integer :: s, k, b
 
     self%load_work = 0.0_dp
@@ -92,10 +92,10 @@ contains
     self%dissipated_friction = 0.0_dp
     self%carried_away = 0.0_dp
     parts(:, :) = 0.0_dp
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) call add_kinetic(home, k, home%velocity(:, k), parts(1, s), parts(2, s))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) == 0) call add_kinetic(owned, k, owned%velocity(:, k), parts(1, s), parts(2, s))
         end do
       end associate
     end do
@@ -145,8 +145,8 @@ contains
     end do
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
-      call add_grains(step%neighbourhoods%view(s), step%decomposition%home(s), step%physics, parts(:, s))
-      call add_contacts(step%neighbourhoods%view(s), earlier, step%problem, s, parts(:, s))
+      call add_grains(step%halo%view(s), step%decomposition%owned(s), step%physics, parts(:, s))
+      call add_contacts(step%halo%view(s), earlier, step%problem, s, parts(:, s))
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
     if (step%some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
@@ -160,18 +160,18 @@ contains
   end subroutine energy_take_step
 
   !> Energies of the grains of a subdomain, and the work of the loads on them, h F . (V_i + V_{i+1})/2.
-  pure subroutine add_grains(view, home, physics, part)
-    type(neighbourhood_t), intent(in) :: view
-    type(body_set_t), intent(in) :: home
+  pure subroutine add_grains(view, owned, physics, part)
+    type(local_bodies_t), intent(in) :: view
+    type(body_set_t), intent(in) :: owned
     type(physics_t), intent(in) :: physics
     real(dp), intent(inout) :: part(n_sums)
-    real(dp) :: fall(home%nv), rotation
+    real(dp) :: fall(owned%nv), rotation
     integer :: k
 
     rotation = 0.0_dp
     do k = 1, view%bodies%n
       if (view%origin(k) == 0 .or. view%bodies%glued(k) > 0) cycle
-      associate (before => view%bodies%velocity(:, k), after => home%velocity(:, view%origin(k)))
+      associate (before => view%bodies%velocity(:, k), after => owned%velocity(:, view%origin(k)))
         call add_kinetic(view%bodies, k, after, part(in_translation), part(in_rotation))
         call add_kinetic(view%bodies, k, before, part(in_start), rotation)
         fall(:) = 0.0_dp
@@ -185,7 +185,7 @@ contains
   !> Dissipation in the contacts of a subdomain, -r . (v_i + v_{i+1})/2 with the H of q_m, and the work of boundaries at
   !> them.
   subroutine add_contacts(view, earlier, problem, s, part)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     !> boundaries with the velocities of the start of the step
     type(boundary_t), intent(in) :: earlier(:)
     type(contact_problem_t), intent(in) :: problem
@@ -236,7 +236,7 @@ contains
 
   !> Velocities of the columns of a subproblem at the start of the step.
   subroutine find_start(view, earlier, nd, sub, start)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: earlier(:)
     integer, intent(in) :: nd
     type(subproblem_t), intent(in) :: sub
@@ -316,18 +316,18 @@ contains
     type(energy_balance_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    real(dp) :: part(size(decomposition%home)), x
+    real(dp) :: part(size(decomposition%owned)), x
     integer :: s, k, d
 
     part(:) = 0.0_dp
     do s = 1, size(part)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) > 0) cycle
-          do d = 1, home%nd
-            x = home%position(d, k)
-            if (home%ni > 0) x = x + home%image(d, k)*decomposition%period%length(d)
-            part(s) = part(s) - (home%mass(k)*physics%gravity(d) + grain_volume(home%nd, home%radius(k))*physics%body_force(d))*x
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) > 0) cycle
+          do d = 1, owned%nd
+            x = owned%position(d, k)
+            if (owned%ni > 0) x = x + owned%image(d, k)*decomposition%period%length(d)
+            part(s) = part(s) - (owned%mass(k)*physics%gravity(d) + grain_volume(owned%nd, owned%radius(k))*physics%body_force(d))*x
           end do
         end do
       end associate

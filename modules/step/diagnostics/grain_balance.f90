@@ -43,12 +43,12 @@ contains
     class(grain_balance_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    real(dp) :: parts(n_sums, size(decomposition%home)), sums(n_sums)
+    real(dp) :: parts(n_sums, size(decomposition%owned)), sums(n_sums)
     integer :: s
 
     parts(:, :) = 0.0_dp
     do s = 1, size(parts, 2)
-      call add_grains(decomposition%home(s), physics, parts(:, s))
+      call add_grains(decomposition%owned(s), physics, parts(:, s))
     end do
     call decomposition%comm%sum_parts(parts, sums)
     call keep_motion(self, sums)
@@ -70,7 +70,7 @@ contains
       kinetic = self%kinetic
       parts(:, :) = 0.0_dp
       do s = 1, size(parts, 2)
-        associate (view => step%neighbourhoods%view(s))
+        associate (view => step%halo%view(s))
           call add_grains(view%bodies, step%physics, parts(:, s), view%origin)
         end associate
       end do
@@ -82,7 +82,7 @@ contains
     flux(:) = self%flux
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
-      call add_grains(step%decomposition%home(s), step%physics, parts(:, s))
+      call add_grains(step%decomposition%owned(s), step%physics, parts(:, s))
       call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%kernels%nv, parts(in_contacts, s))
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
@@ -105,7 +105,7 @@ contains
     self%flux(:) = sums(in_flux + 1:in_flux + 3)
   end subroutine keep_motion
 
-  !> Sums over the free grains that are at home in a subdomain.
+  !> Sums over the free grains that are owned by a subdomain.
   pure subroutine add_grains(bodies, physics, part, origin)
     type(body_set_t), intent(in) :: bodies
     type(physics_t), intent(in) :: physics

@@ -74,9 +74,9 @@ contains
     parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
       call add_contacts(problem, s, parts(1:nd**2, s))
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          parts(nd**2 + 1, s) = parts(nd**2 + 1, s) + grain_volume(nd, home%radius(k))
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          parts(nd**2 + 1, s) = parts(nd**2 + 1, s) + grain_volume(nd, owned%radius(k))
         end do
       end associate
     end do
@@ -132,11 +132,11 @@ contains
 
     nd = decomposition%nd
     extremes(:) = -huge(1.0_dp)
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          extremes(1:nd) = max(extremes(1:nd), home%radius(k) - home%position(:, k))
-          extremes(nd + 1:) = max(extremes(nd + 1:), home%radius(k) + home%position(:, k))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          extremes(1:nd) = max(extremes(1:nd), owned%radius(k) - owned%position(:, k))
+          extremes(nd + 1:) = max(extremes(nd + 1:), owned%radius(k) + owned%position(:, k))
         end do
       end associate
     end do

@@ -29,10 +29,10 @@ contains
     taken_away = .false.
     nd = decomposition%nd
     part = (1.0_dp - theta)*physics%h
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) home%position(:, k) = predict_position(home%position(:, k), home%velocity(1:nd, k), &
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) == 0) owned%position(:, k) = predict_position(owned%position(:, k), owned%velocity(1:nd, k), &
             & physics%h, theta)
         end do
       end associate
@@ -93,10 +93,10 @@ contains
 
     nd = decomposition%nd
     counts(:) = 0
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (physics%h**2*sum(home%velocity(1:nd, k)**2) > home%radius(k)**2) counts(1) = counts(1) + 1
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (physics%h**2*sum(owned%velocity(1:nd, k)**2) > owned%radius(k)**2) counts(1) = counts(1) + 1
         end do
       end associate
     end do
@@ -113,10 +113,10 @@ contains
     integer :: s, b, k, nd
 
     nd = decomposition%nd
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) home%position(:, k) = advance_position(home%position(:, k), home%velocity(1:nd, k), &
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) == 0) owned%position(:, k) = advance_position(owned%position(:, k), owned%velocity(1:nd, k), &
             & physics%h, theta)
         end do
       end associate

@@ -85,11 +85,11 @@ contains
     do b = 1, size(decomposition%boundaries)
       call decomposition%boundaries(b)%shift(ways((b - 1)*nd + 1:b*nd))
     end do
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          b = home%glued(k)
-          if (b > 0) home%position(:, k) = home%position(:, k) + ways((b - 1)*nd + 1:b*nd)
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          b = owned%glued(k)
+          if (b > 0) owned%position(:, k) = owned%position(:, k) + ways((b - 1)*nd + 1:b*nd)
         end do
       end associate
     end do
@@ -102,10 +102,10 @@ contains
     real(dp), intent(in) :: duration
     integer :: s, k
 
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) > 0) call decomposition%boundaries(home%glued(k))%carry(duration, home%position(:, k))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) > 0) call decomposition%boundaries(owned%glued(k))%carry(duration, owned%position(:, k))
         end do
       end associate
     end do
@@ -117,12 +117,12 @@ contains
     integer :: s, k, nd
 
     nd = decomposition%nd
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) cycle
-          home%velocity(:, k) = 0.0_dp
-          call decomposition%boundaries(home%glued(k))%velocity_at(home%position(:, k), home%velocity(1:nd, k))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) == 0) cycle
+          owned%velocity(:, k) = 0.0_dp
+          call decomposition%boundaries(owned%glued(k))%velocity_at(owned%position(:, k), owned%velocity(1:nd, k))
         end do
       end associate
     end do

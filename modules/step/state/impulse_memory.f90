@@ -11,7 +11,7 @@ module gravier_impulse_memory
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_neighbour_search, only: owner_point
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_halo, only: local_bodies_t, halo_t
   implicit none
   private
   public :: memory_of, impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses, list_impulses, &
@@ -43,16 +43,16 @@ contains
   end function impulse_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists, whose memory has them.
-  subroutine keep_impulses(problem, neighbourhoods)
+  subroutine keep_impulses(problem, halo)
     type(contact_problem_t), intent(in) :: problem
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    type(halo_t), intent(inout) :: halo
     integer :: s, c, q, g
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
     rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
+      associate (sub => problem%sub(s), list => halo%view(s)%list)
         list%impulse(:, :) = 0.0_dp
         do g = 1, n_blocks(sub%n_contacts)
           if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
@@ -77,8 +77,8 @@ contains
 
   !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now; a
   !> moment keeps its vector.
-  subroutine recall_impulses(neighbourhoods, problem)
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+  subroutine recall_impulses(halo, problem)
+    type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, c, q, g
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
@@ -88,7 +88,7 @@ contains
     vector(:, :) = 0.0_dp
     moment(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), list => neighbourhoods%view(s)%list)
+      associate (sub => problem%sub(s), list => halo%view(s)%list)
         do g = 1, n_blocks(sub%n_contacts)
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
@@ -112,7 +112,7 @@ contains
   !> Identifiers of candidate and antagonist, the impulse and the states, for the pairs of a list that keep something; the
   !> antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, records)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     !> words left free before those of a record
     integer, intent(in) :: lead
     !> (lead + 2 + words of the memory, pairs that keep something)
@@ -136,7 +136,7 @@ contains
   end subroutine list_impulses
 
   pure integer(i8) function antagonist_id(view, p) result(id)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
 
     id = view%list%antagonist(p)
@@ -145,24 +145,24 @@ contains
 
   !> All impulses and states kept on this rank, each with the point that decides the owner of its pair, as records for
   !> spread_impulses. The views must be up to date.
-  subroutine gather_impulses(decomposition, neighbourhoods, records)
+  subroutine gather_impulses(decomposition, halo, records)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(halo_t), intent(in) :: halo
     !> (1 + nd + 2 + words of the memory, n): subdomain (to be set), point, candidate, antagonist, impulse, states
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer(i8), allocatable :: own(:, :)
     integer :: s, n, words
 
-    words = 3 + decomposition%nd + neighbourhoods%memory%words()
+    words = 3 + decomposition%nd + halo%memory%words()
     n = 0
-    do s = 1, size(neighbourhoods%view)
-      n = n + neighbourhoods%view(s)%list%n_kept()
+    do s = 1, size(halo%view)
+      n = n + halo%view(s)%list%n_kept()
     end do
     allocate (records(words, n))
     n = 0
-    do s = 1, size(neighbourhoods%view)
-      call list_impulses(neighbourhoods%view(s), 1 + decomposition%nd, own)
-      call write_points(decomposition, neighbourhoods%view(s), own)
+    do s = 1, size(halo%view)
+      call list_impulses(halo%view(s), 1 + decomposition%nd, own)
+      call write_points(decomposition, halo%view(s), own)
       records(:, n + 1:n + size(own, 2)) = own
       n = n + size(own, 2)
     end do
@@ -171,7 +171,7 @@ contains
   !> The owner points of the pairs that keep something.
   subroutine write_points(decomposition, view, records)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     integer(i8), intent(inout), contiguous :: records(:, :)
     real(dp) :: point(decomposition%nd), candidate(decomposition%nd), antagonist(decomposition%nd)
     integer :: p, n, d, shift(3)
@@ -201,11 +201,11 @@ contains
   end subroutine write_points
 
   !> Bring each impulse and state to the subdomain that owns its pair now. Collective.
-  subroutine spread_impulses(decomposition, records, neighbourhoods)
+  subroutine spread_impulses(decomposition, records, halo)
     type(decomposition_t), intent(in) :: decomposition
     !> of gather_impulses
     integer(i8), intent(inout), contiguous :: records(:, :)
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    type(halo_t), intent(inout) :: halo
     integer(i8), allocatable :: received(:, :), keys(:, :), mine(:, :)
     integer, allocatable :: order(:)
     integer :: s, k, first, lead
@@ -219,13 +219,13 @@ contains
       mine(:, k) = received(lead + 1:, order(k))
     end do
     k = 1
-    do s = 1, size(neighbourhoods%view)
+    do s = 1, size(halo%view)
       first = k
       do while (k <= size(order))
         if (received(1, order(k)) /= decomposition%subdomain_of(s)) exit
         k = k + 1
       end do
-      call match_impulses(mine(:, first:k - 1), neighbourhoods%memory, neighbourhoods%view(s))
+      call match_impulses(mine(:, first:k - 1), halo%memory, halo%view(s))
     end do
   end subroutine spread_impulses
 
@@ -234,7 +234,7 @@ contains
     !> (2 + words of `kept`, n): candidate, antagonist, impulse, states
     integer(i8), intent(in), contiguous :: records(:, :)
     type(pair_memory_t), intent(in) :: kept
-    type(neighbourhood_t), intent(inout) :: view
+    type(local_bodies_t), intent(inout) :: view
     integer(i8), allocatable :: keys(:, :)
     integer, allocatable :: order(:)
     integer :: p, k, e

@@ -18,9 +18,9 @@ module gravier_sleeping
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
-  use gravier_neighbourhood, only: neighbourhood_t, neighbourhoods_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_pair_laws, only: boundary_of
-  use gravier_narrow_phase, only: found_t
+  use gravier_narrow_phase, only: contact_list_t
   implicit none
   private
   public :: sleeping_rule_t, count_rest, put_sleepers_last, wake_all
@@ -43,23 +43,23 @@ module gravier_sleeping
 contains
 
   !> Count the steps at rest of the contacts of a solved problem, before its impulses are kept. Collective.
-  subroutine count_rest(rule, boundaries, woken, neighbourhoods, problem)
+  subroutine count_rest(rule, boundaries, woken, halo, problem)
     type(sleeping_rule_t), intent(in) :: rule
     type(boundary_t), intent(in) :: boundaries(:)
     !> contacts that slept were woken: nothing is stopped. Else grains at rest stand still: their v_global becomes zero
     logical, intent(in) :: woken
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+    type(halo_t), intent(inout) :: halo
     !> v_global is evaluated, and `reaction` what it is evaluated with
     type(contact_problem_t), intent(inout) :: problem
     type(sums_t) :: sums(size(problem%sub))
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call sum_impulses(boundaries, neighbourhoods%view(s)%list, problem%sub(s), problem%kernels%nv, sums(s))
+      call sum_impulses(boundaries, halo%view(s)%list, problem%sub(s), problem%kernels%nv, sums(s))
     end do
     call sum_over_copies(problem, sums)
     do s = 1, size(problem%sub)
-      call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, neighbourhoods%view(s)%list, problem%sub(s), &
+      call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, halo%view(s)%list, problem%sub(s), &
         & problem%kernels%nd, sums(s))
     end do
     if (woken) return
@@ -74,11 +74,11 @@ contains
   !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
   !> whole blocks. A contact with a boundary that moves as prescribed does not sleep.
   subroutine put_sleepers_last(view, boundaries, after, found)
-    type(neighbourhood_t), intent(in) :: view
+    type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: after
-    type(found_t), intent(inout) :: found
-    type(found_t) :: old
+    type(contact_list_t), intent(inout) :: found
+    type(contact_list_t) :: old
     logical, allocatable :: asleep(:)
     integer :: c, b, n, round
 
@@ -112,13 +112,13 @@ contains
   end subroutine put_sleepers_last
 
   !> No contact is at rest any more.
-  pure subroutine wake_all(neighbourhoods)
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+  pure subroutine wake_all(halo)
+    type(halo_t), intent(inout) :: halo
     integer :: s
 
-    if (.not. allocated(neighbourhoods%view)) return
-    do s = 1, size(neighbourhoods%view)
-      associate (list => neighbourhoods%view(s)%list)
+    if (.not. allocated(halo%view)) return
+    do s = 1, size(halo%view)
+      associate (list => halo%view(s)%list)
         list%state(list%memory%rest_row, :) = 0
       end associate
     end do
@@ -195,7 +195,7 @@ contains
       rests(b) = .not. is_moved(boundaries, sub, b)
       if (b > sub%n_bodies) cycle
       rests(b) = max(momentum(b), sums%of(2, b)/settled) <= min(limit, share*sums%of(1, b))
-      if (.not. allocated(sub%pull)) cycle
+      if (.not. allocated(sub%attraction_load)) cycle
       do d = 1, nd
         reaction(d) = sub%contact_reaction(d, b)
       end do

@@ -1,4 +1,4 @@
-!> From the solved problem of a step back to the grains: velocities, and displacements of projections, where they are at home.
+!> From the solved problem of a step back to the grains: velocities, and displacements of projections, to their owners.
 module gravier_velocity_return
   use gravier_kinds, only: dp, i8
   use gravier_sparse_exchange, only: sparse_exchange
@@ -20,10 +20,10 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer :: s, k
 
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) call physics%accelerate(home, k, home%velocity(:, k))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) == 0) call physics%accelerate(owned, k, owned%velocity(:, k))
         end do
       end associate
     end do
@@ -37,7 +37,7 @@ contains
     call bring_home(decomposition, problem, displace=.true.)
   end subroutine take_displacements
 
-  !> Bring v_global of the grains in contact to where they are at home: in this subdomain by their places, in others by
+  !> Bring v_global of the grains in contact to their owners: in this subdomain by their places, in others by
   !> records (owner, grain, velocity). Collective.
   subroutine bring_home(decomposition, problem, displace)
     type(decomposition_t), intent(inout) :: decomposition
@@ -59,7 +59,7 @@ contains
     call list_returns(decomposition, problem, records, destination)
     call sparse_exchange(decomposition%comm, records, destination, received)
     do k = 1, size(received, 2)
-      call decomposition%find_home(received(1:2, k), h, place)
+      call decomposition%find_owned(received(1:2, k), h, place)
       do d = 1, size(v)
         v(d) = transfer(received(2 + d, k), 0.0_dp)
       end do
@@ -74,18 +74,18 @@ contains
       !> (nv)
       real(dp), intent(in) :: v(:)
 
-      associate (home => decomposition%home(h))
+      associate (owned => decomposition%owned(h))
         if (displace) then
-          home%position(:, place) = home%position(:, place) + v(1:decomposition%nd)
+          owned%position(:, place) = owned%position(:, place) + v(1:decomposition%nd)
         else
-          home%velocity(1:size(v), place) = v
+          owned%velocity(1:size(v), place) = v
         end if
       end associate
     end subroutine put
 
   end subroutine bring_home
 
-  !> Records (owner, grain, velocity) of the grains in contact that are at home in none of their sharers, from the first of
+  !> Records (owner, grain, velocity) of the grains in contact that are owned by none of their sharers, from the first of
   !> them.
   subroutine list_returns(decomposition, problem, records, destination)
     type(decomposition_t), intent(in) :: decomposition
@@ -106,14 +106,14 @@ contains
           do k = 1, part%n_shared
             b = part%body(k)
             if (b > sub%n_grains) cycle
-            sends(b) = part%rung(k) == 1 .and. .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%home(b))
+            sends(b) = part%copy_rank(k) == 1 .and. .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%owner(b))
           end do
           do b = 1, sub%n_grains
             if (.not. sends(b)) cycle
             n = n + 1
             if (round == 1) cycle
-            destination(n) = decomposition%comm%rank_of(sub%home(b), decomposition%n_subdomains)
-            records(1, n) = sub%home(b)
+            destination(n) = decomposition%comm%rank_of(sub%owner(b), decomposition%n_subdomains)
+            records(1, n) = sub%owner(b)
             records(2, n) = sub%id(b)
             do d = 1, problem%kernels%nv
               records(2 + d, n) = transfer(sub%v_global(d, b), 0_i8)

@@ -208,7 +208,7 @@ contains
     do b = 1, sub%n_grains
       m = 1.0_dp/sub%inverse_mass(1, b)
       v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*grain_volume(nd, sub%radius(b))/m)
-      if (allocated(sub%pull)) v(:) = v - sub%inverse_mass(1, b)*sub%pull(1:nd, b)
+      if (allocated(sub%attraction_load)) v(:) = v - sub%inverse_mass(1, b)*sub%attraction_load(1:nd, b)
       v(:) = v - frame(1:nd)
       m = m/sub%multiplicity(b)
       sums(1) = sums(1) + m

@@ -113,7 +113,7 @@ contains
       call decomposition%partition%init_grid(lower, upper, boxes, 0.1_dp, error)
     end if
     call check(.not. allocated(error), "partition")
-    call decomposition%settle(newcomers(1))
+    call decomposition%migrate(newcomers(1))
   end subroutine make
 
   !> Identifiers are in another order than grains.
@@ -128,13 +128,13 @@ contains
     integer(i8) :: total
 
     call decomposition%init(comm, 7, 3, 6, none)
-    homes = size(decomposition%home)
+    homes = size(decomposition%owned)
     total = comm%total(int(homes, i8))
-    call check_equal(total, 7_i8, "one home for each subdomain")
+    call check_equal(total, 7_i8, "one owned for each subdomain")
     call check_equal(decomposition%first, comm%first_subdomain(comm%rank, 7), "first subdomain of the rank")
     do s = 1, homes
-      call check(decomposition%home(s)%n == 0 .and. decomposition%home(s)%nd == 3 .and. decomposition%home(s)%nv == 6 .and. &
-        & decomposition%home(s)%ni == 0, "an empty home")
+      call check(decomposition%owned(s)%n == 0 .and. decomposition%owned(s)%nd == 3 .and. decomposition%owned(s)%nv == 6 .and. &
+        & decomposition%owned(s)%ni == 0, "an empty owned")
       call check_equal(decomposition%subdomain_of(s), decomposition%first + s - 1, "number of a subdomain")
     end do
     call choose_period(2, cell)
@@ -177,7 +177,7 @@ contains
     call check_close(upper(2), 1.25_dp, 0.0_dp, "upper end of a period")
   end subroutine test_bounding_box
 
-  !> Grains come home, move, come home again.
+  !> Grains come to their owners, move, and come to their owners again.
   subroutine test_settle(nd, n_subdomains, by_cells, period)
     integer, intent(in) :: nd, n_subdomains
     logical, intent(in) :: by_cells
@@ -188,21 +188,21 @@ contains
     call make(nd, n_subdomains, by_cells, period, decomposition)
     call check_homes(decomposition, 0)
     do t = 1, 4
-      do s = 1, size(decomposition%home)
-        associate (home => decomposition%home(s))
-          do k = 1, home%n
-            g = nint(home%mass(k))
-            call find_place(g, t, home%position(:, k))
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s))
+          do k = 1, owned%n
+            g = nint(owned%mass(k))
+            call find_place(g, t, owned%position(:, k))
             ! as if it had come from the place of grain g in the first cell without a jump
-            home%image(:, k) = g
+            owned%image(:, k) = g
           end do
         end associate
       end do
-      call decomposition%settle()
+      call decomposition%migrate()
       call check_homes(decomposition, t)
     end do
     ! nobody has moved since
-    call decomposition%settle()
+    call decomposition%migrate()
     call check_homes(decomposition, 4)
   end subroutine test_settle
 
@@ -218,14 +218,14 @@ contains
     own = .true.
     placed = .true.
     ordered = .true.
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          g = nint(home%mass(k))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          g = nint(owned%mass(k))
           met(g) = met(g) + 1
-          own = own .and. is_grain(decomposition, home, k, g, t)
-          placed = placed .and. decomposition%partition%owner(home%position(:, k)) == decomposition%first + s - 1
-          if (k > 1) ordered = ordered .and. home%id(k) > home%id(k - 1)
+          own = own .and. is_grain(decomposition, owned, k, g, t)
+          placed = placed .and. decomposition%partition%owner(owned%position(:, k)) == decomposition%first + s - 1
+          if (k > 1) ordered = ordered .and. owned%id(k) > owned%id(k - 1)
         end do
       end associate
     end do

@@ -86,9 +86,9 @@ contains
     real(dp) :: jump
     integer :: k
 
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     do k = 1, n
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
     end do
     call check(.not. allocated(error), "iterations")
   end subroutine iterate
@@ -180,13 +180,13 @@ contains
       associate (part => sim%problem%shared%part(s), sub => sim%problem%sub(s))
         do k = 1, part%n_shared
           most = max(most, part%multiplicity(k))
-          at = part%first(k) + part%rung(k) - 1
+          at = part%first(k) + part%copy_rank(k) - 1
           do d = 1, sim%problem%kernels%nv
             upper = 0.0_dp
             lower = 0.0_dp
-            if (part%rung(k) < part%multiplicity(k)) upper = copy_of(sub%id(part%body(k)), sub%subdomain, d, 1) - &
+            if (part%copy_rank(k) < part%multiplicity(k)) upper = copy_of(sub%id(part%body(k)), sub%subdomain, d, 1) - &
               & copy_of(sub%id(part%body(k)), part%sharer(at + 1), d, 1)
-            if (part%rung(k) > 1) lower = copy_of(sub%id(part%body(k)), part%sharer(at - 1), d, 1) - &
+            if (part%copy_rank(k) > 1) lower = copy_of(sub%id(part%body(k)), part%sharer(at - 1), d, 1) - &
               & copy_of(sub%id(part%body(k)), sub%subdomain, d, 1)
             right = right .and. abs(f(s)%upper(d, k) - upper) <= 2*epsilon(1.0_dp)
             right = right .and. abs(f(s)%lower(d, k) - lower) <= 2*epsilon(1.0_dp)
@@ -236,13 +236,13 @@ contains
     do s = 1, size(f)
       associate (part => problem%shared%part(s))
         do k = 1, part%n_shared
-          at = part%first(k) + part%rung(k) - 1
-          if (part%rung(k) == 1) then
+          at = part%first(k) + part%copy_rank(k) - 1
+          if (part%copy_rank(k) == 1) then
             same = same .and. maxval(abs(f(s)%lower(:, k))) <= 0.0_dp
           else
             same = same .and. same_bits(f(s)%lower(:, k:k), part%recv(:, part%slot(at - 1):part%slot(at - 1)))
           end if
-          if (part%rung(k) == part%multiplicity(k)) same = same .and. maxval(abs(f(s)%upper(:, k))) <= 0.0_dp
+          if (part%copy_rank(k) == part%multiplicity(k)) same = same .and. maxval(abs(f(s)%upper(:, k))) <= 0.0_dp
         end do
       end associate
     end do

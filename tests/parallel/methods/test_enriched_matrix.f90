@@ -78,9 +78,9 @@ contains
     real(dp) :: jump
     integer :: k
 
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     do k = 1, n
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
     end do
     call check(.not. allocated(error), "iterations")
   end subroutine iterate

@@ -9,7 +9,7 @@ module free_plate
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_part_t
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_nlgs, only: nlgs_t
   use gravier_nscdd, only: nscdd_t
@@ -87,7 +87,7 @@ contains
     sub%n_columns = sub%n_bodies
     sub%n_contacts = n
     sub%n_awake = n
-    allocate (sub%id(sub%n_bodies), sub%home(sub%n_bodies), sub%multiplicity(sub%n_bodies))
+    allocate (sub%id(sub%n_bodies), sub%owner(sub%n_bodies), sub%multiplicity(sub%n_bodies))
     allocate (sub%v_free(problem%kernels%nv, sub%n_bodies), source=0.0_dp)
     allocate (sub%velocity, sub%v_global, sub%reaction, mold=sub%v_free)
     allocate (sub%inverse_mass(problem%kernels%nw, sub%n_bodies), source=0.0_dp)
@@ -102,7 +102,7 @@ contains
       b = b + 1
       number_of(g) = b
       sub%id(b) = g
-      sub%home(b) = subdomain
+      sub%owner(b) = subdomain
       call share(g, b)
       do d = 1, nd
         sub%v_free(d, b) = 2*hash_uniform(1, int(g, i8), d) - 1.0_dp
@@ -146,7 +146,7 @@ contains
       column = g - merge(n_columns, 0, g > n_columns)
       sub%multiplicity(b) = 0
       do s = 1, problem%n_subdomains
-        here = g == plate .or. s == home(column, problem%n_subdomains) .or. s == home(max(column - 1, 1), problem%n_subdomains)
+        here = g == plate .or. s == owned(column, problem%n_subdomains) .or. s == owned(max(column - 1, 1), problem%n_subdomains)
         if (here) sub%multiplicity(b) = sub%multiplicity(b) + 1
         if (here) part%sharer(n_sharers + sub%multiplicity(b)) = s
       end do
@@ -181,10 +181,10 @@ contains
   end subroutine make_part
 
   !> Subdomain of a column.
-  pure integer function home(column, n_subdomains)
+  pure integer function owned(column, n_subdomains)
     integer, intent(in) :: column, n_subdomains
-    home = 1 + (column - 1)*n_subdomains/n_columns
-  end function home
+    owned = 1 + (column - 1)*n_subdomains/n_columns
+  end function owned
 
   subroutine test_methods(dimension, friction)
     integer, intent(in) :: dimension
@@ -229,20 +229,20 @@ contains
   contains
 
     !> Three subdomains against one, twice: the second solve starts from the impulses of the first.
-    subroutine compare(scheme, method)
-      class(scheme_t), intent(inout) :: scheme
-      character(len=*), intent(in) :: method
+    subroutine compare(method, word)
+      class(method_t), intent(inout) :: method
+      character(len=*), intent(in) :: word
       real(dp) :: found(6, plate)
       integer :: round
 
       call make(comm, dimension, n_parts, friction, problem)
       do round = 1, 2
         if (round == 2) call disturb(problem)
-        call solve(problem, scheme, name//method)
+        call solve(problem, method, name//word)
         call gather(problem, found)
-        call check_close(maxval(abs(found - wanted)), 0.0_dp, 1.0e-8_dp, name//method//": velocities of one domain")
+        call check_close(maxval(abs(found - wanted)), 0.0_dp, 1.0e-8_dp, name//word//": velocities of one domain")
       end do
-      call scheme%free()
+      call method%free()
     end subroutine compare
 
   end subroutine test_methods
@@ -298,18 +298,18 @@ contains
     end do
   end subroutine disturb
 
-  subroutine solve(problem, scheme, name)
+  subroutine solve(problem, method, name)
     type(contact_problem_t), intent(inout) :: problem
-    class(scheme_t), intent(inout) :: scheme
+    class(method_t), intent(inout) :: method
     character(len=*), intent(in) :: name
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
 
-    scheme%sweeps = 5
+    method%sweeps = 5
     control%tolerance = 1.0e-12_dp
     control%max_iterations = 3000
-    call solve_contacts(problem, scheme, control, report, error)
+    call solve_contacts(problem, method, control, report, error)
     call check(.not. allocated(error), name//": no error")
     call check_equal(report%status, solve_converged, name//": converges")
   end subroutine solve

@@ -1,4 +1,4 @@
-!> NSCDD: the copies' velocities after an exchange, momentum, monotone descent, one subdomain, any number of ranks.
+!> NSCDD: the copies' velocities after an exchange, momentum, monotone history, one subdomain, any number of ranks.
 program test_nscdd
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
@@ -85,9 +85,9 @@ contains
     real(dp) :: jump
     integer :: k
 
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     do k = 1, n
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
     end do
     call check(.not. allocated(error), "iterations")
   end subroutine iterate
@@ -264,7 +264,7 @@ contains
       end do
       call check(same, "velocities of the undivided bodies")
       ! a start from these impulses has these velocities
-      call sim%scheme%start(sim%problem, error)
+      call sim%method%start(sim%problem, error)
       same = .true.
       do s = 1, size(sim%problem%sub)
         same = same .and. same_bits(sim%problem%sub(s)%velocity, sim%problem%sub(s)%v_global)
@@ -313,11 +313,11 @@ contains
     logical :: falls
 
     call make(comm, dimension, 9, 0.0_dp, keys, sim)
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     energy = 0.0_dp
     falls = .true.
     do k = 1, 60
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
       next = energy_of(sim%problem)
       if (k < 10) call check(next < energy, "energy falls")
       falls = falls .and. next <= energy + 1.0e-12_dp*abs(energy)
@@ -363,9 +363,9 @@ contains
     call make(alone, dimension, 1, 0.0_dp, "&solver acceleration = 'none' /", one)
     many%control%tolerance = 1.0e-9_dp
     one%control%tolerance = 1.0e-9_dp
-    call solve_contacts(many%problem, many%scheme, many%control, report, error)
+    call solve_contacts(many%problem, many%method, many%control, report, error)
     call check_equal(report%status, solve_converged, "NSCDD converges")
-    call solve_contacts(one%problem, one%scheme, one%control, report, error)
+    call solve_contacts(one%problem, one%method, one%control, report, error)
     call check_equal(report%status, solve_converged, "NLGS converges")
     call collect(many%problem, int(many%n_grains), velocity)
     call collect(one%problem, int(one%n_grains), other)
@@ -402,17 +402,17 @@ contains
     integer(i8) :: contacts
 
     call make(comm, 2, 9, 0.4_dp, keys, sim)
-    call sim%scheme%start(sim%problem, error)
-    call sim%scheme%iterate(sim%problem, .false., jump, error)
+    call sim%method%start(sim%problem, error)
+    call sim%method%iterate(sim%problem, .false., jump, error)
     call check_close(jump, 0.0_dp, 0.0_dp, "no jump unless asked for")
-    call sim%scheme%iterate(sim%problem, .true., jump, error)
+    call sim%method%iterate(sim%problem, .true., jump, error)
     call check(jump > 0.01_dp, "copies differ after the sweeps")
     call check_close(sim%problem%jump(), 0.0_dp, 0.0_dp, "and agree after the exchange")
     contacts = 0
     do s = 1, size(sim%problem%sub)
       contacts = contacts + sim%problem%sub(s)%n_contacts
     end do
-    associate (work => sim%scheme%work_done())
+    associate (work => sim%method%work_done())
       call check_equal(work%solves, 1_i8, "solves")
       call check_equal(work%iterations, 2_i8, "iterations")
       call check_equal(work%sweeps, 4_i8, "sweeps")

@@ -9,7 +9,7 @@ program test_nscdd_ep
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   use gravier_nscdd_ep, only: nscdd_ep_t
   use gravier_solve, only: solve_report_t, solve_contacts, solve_converged
   use gravier_config, only: config_t, parse_config
@@ -95,9 +95,9 @@ contains
     real(dp) :: jump
     integer :: k
 
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     do k = 1, n
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
     end do
     call check(.not. allocated(error), "iterations")
   end subroutine iterate
@@ -199,8 +199,8 @@ contains
     call make(comm, dimension, 9, friction, enriched//direction, sim)
     ! the second round starts from impulses
     do n = 1, 4
-      if (mod(n, 2) == 1) call sim%scheme%start(sim%problem, error)
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      if (mod(n, 2) == 1) call sim%method%start(sim%problem, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
       call check(.not. allocated(error), "iteration")
       call check_condition(sim)
     end do
@@ -220,11 +220,11 @@ contains
     nv = sim%problem%kernels%nv
     own = .true.
     balanced = .true.
-    select type (scheme => sim%scheme)
+    select type (method => sim%method)
     type is (nscdd_ep_t)
       do s = 1, size(sim%problem%sub)
         call sim%problem%own_reactions(s)
-        associate (sub => sim%problem%sub(s), part => scheme%matrix%part(s))
+        associate (sub => sim%problem%sub(s), part => method%matrix%part(s))
           ! A^T F = M~ (V_free - V) + H r, into `reaction`, and M~ V + H l v
           do b = 1, sub%n_bodies
             do d = 1, nv
@@ -242,7 +242,7 @@ contains
               force(d, b) = force(d, b) + sub%velocity(d, b)/sub%weight(min(d, size(sub%weight, 1)), b)
             end do
           end do
-          call scheme%matrix%solve(sim%problem, s, force, error)
+          call method%matrix%solve(sim%problem, s, force, error)
           part%body_work(:, :) = force
           deallocate (force)
         end associate
@@ -258,13 +258,13 @@ contains
           call sim%problem%shared%add_copies(s, k, total)
           balanced = balanced .and. all(abs(total) <= rounding)
         end do
-        call sim%problem%shared%load(s, scheme%matrix%part(s)%body_work)
+        call sim%problem%shared%load(s, method%matrix%part(s)%body_work)
       end do
       call check(balanced, "multipliers sum to zero over the copies")
       call sim%problem%shared%pass()
       own = .true.
       do s = 1, size(sim%problem%sub)
-        associate (part => sim%problem%shared%part(s), work => scheme%matrix%part(s)%body_work)
+        associate (part => sim%problem%shared%part(s), work => method%matrix%part(s)%body_work)
           do k = 1, part%n_slots
             own = own .and. all(abs(part%recv(:, k) - work(:, part%body(part%slot_shared(k)))) <= 10*rounding)
           end do
@@ -272,7 +272,7 @@ contains
       end do
       call check(own, "enriched velocities are the same in all copies")
     class default
-      call check(.false., "an NSCDD-EP scheme")
+      call check(.false., "an NSCDD-EP method")
     end select
   end subroutine check_condition
 
@@ -289,15 +289,15 @@ contains
 
     call make(comm, dimension, 9, friction, plain, nscdd)
     call make(comm, dimension, 9, friction, "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched "//keys, ep)
-    call ep%scheme%start(ep%problem, error)
+    call ep%method%start(ep%problem, error)
     gained = 0.0_dp
     do n = 1, 6
       do s = 1, size(ep%problem%sub)
         nscdd%problem%sub(s)%impulse(:, :, :) = ep%problem%sub(s)%impulse
       end do
-      call nscdd%scheme%start(nscdd%problem, error)
-      call nscdd%scheme%iterate(nscdd%problem, .false., jump, error)
-      call ep%scheme%iterate(ep%problem, .false., jump, error)
+      call nscdd%method%start(nscdd%problem, error)
+      call nscdd%method%iterate(nscdd%problem, .false., jump, error)
+      call ep%method%iterate(ep%problem, .false., jump, error)
       call check(.not. allocated(error), "iteration")
       reached(1) = energy(nscdd%problem)
       reached(2) = energy(ep%problem)
@@ -367,7 +367,7 @@ contains
     call iterate(direct, 3)
     call iterate(cg, 3)
     call check_close(distance(direct%problem, cg%problem), 0.0_dp, 1.0e-8_dp, "direct and iterative interface solves")
-    associate (work => cg%scheme%work_done())
+    associate (work => cg%method%work_done())
       call check(work%interface_iterations > work%interface_solves, "iterations of the conjugate gradient")
     end associate
     call direct%free()
@@ -387,7 +387,7 @@ contains
     call make(comm, dimension, 9, 0.0_dp, plain, nscdd)
     call make(comm, dimension, 9, 0.0_dp, enriched//"1 /", ep)
     nscdd%control%tolerance = 1.0e-10_dp
-    call solve_contacts(nscdd%problem, nscdd%scheme, nscdd%control, report, error)
+    call solve_contacts(nscdd%problem, nscdd%method, nscdd%control, report, error)
     call check_equal(report%status, solve_converged, "NSCDD converges")
     do s = 1, size(ep%problem%sub)
       ep%problem%sub(s)%impulse(:, :, :) = nscdd%problem%sub(s)%impulse
@@ -413,18 +413,18 @@ contains
       if (sim%problem%sub(s)%n_bodies > 0) mine = mine + 1
     end do
     call iterate(sim, 4)
-    call expect(sim%scheme, 1, 4, mine)
+    call expect(sim%method, 1, 4, mine)
     call iterate(sim, 3)
-    call expect(sim%scheme, 2, 7, mine)
+    call expect(sim%method, 2, 7, mine)
     call sim%free()
   end subroutine test_work
 
-  subroutine expect(scheme, solves, iterations, factorisations)
-    class(scheme_t), intent(in) :: scheme
+  subroutine expect(method, solves, iterations, factorisations)
+    class(method_t), intent(in) :: method
     integer, intent(in) :: solves, iterations
     integer(i8), intent(in) :: factorisations
 
-    associate (work => scheme%work_done())
+    associate (work => method%work_done())
       call check_equal(work%solves, int(solves, i8), "solves")
       call check_equal(work%iterations, int(iterations, i8), "iterations")
       call check_equal(work%interface_solves, int(iterations, i8), "interface solves")

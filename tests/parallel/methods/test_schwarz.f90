@@ -97,9 +97,9 @@ contains
     real(dp) :: jump
     integer :: k
 
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     do k = 1, n
-      call sim%scheme%iterate(sim%problem, .false., jump, error)
+      call sim%method%iterate(sim%problem, .false., jump, error)
     end do
     call check(.not. allocated(error), "iterations")
   end subroutine iterate
@@ -341,11 +341,11 @@ contains
     logical :: right
 
     call make(comm, dimension, 9, friction, enriched//direction, sim)
-    select type (scheme => sim%scheme)
+    select type (method => sim%method)
     type is (schwarz_ec_t)
-      method%matrix%direction = scheme%matrix%direction
+      method%matrix%direction = method%matrix%direction
     class default
-      call check(.false., "a Schwarz-EC scheme")
+      call check(.false., "a Schwarz-EC method")
     end select
     call method%start(sim%problem, error)
     allocate (expected(sim%problem%kernels%nv))

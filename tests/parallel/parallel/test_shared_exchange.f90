@@ -143,7 +143,7 @@ contains
 
     right = .true.
     do k = 1, part%n_shared
-      right = right .and. part%multiplicity(k) >= 2 .and. part%sharer(part%first(k) + part%rung(k) - 1) == part%subdomain
+      right = right .and. part%multiplicity(k) >= 2 .and. part%sharer(part%first(k) + part%copy_rank(k) - 1) == part%subdomain
       do j = part%first(k), part%first(k + 1) - 1
         right = right .and. holds(part%sharer(j), id(part%body(k)), n, trial)
         if (part%sharer(j) == part%subdomain) then

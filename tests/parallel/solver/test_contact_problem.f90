@@ -151,7 +151,8 @@ contains
     square_of = comm%sum_real(parts)
   end function square_of
 
-  !> Attractions as loads, and the impulses on bodies without them: velocities are the same from both, and the reactions are those of
+  !> Attractions as loads, and the impulses on bodies without them: velocities are the same from both, and the reactions are those
+  !> of
   !> the impulses that are left. What is asked changes nothing of the problem as it was solved.
   subroutine test_attractions(dimension)
     integer, intent(in) :: dimension
@@ -167,7 +168,7 @@ contains
     call make(dimension, 3, 0.3_dp, sim)
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
-        call check(.not. allocated(sub%pull), "no pull without attractions")
+        call check(.not. allocated(sub%attraction_load), "no attraction_load without attractions")
         allocate (sub%attraction(size(sub%hot, 1), size(sub%hot, 3)), source=0.0_dp)
         do c = 1, sub%n_contacts
           sub%attraction(lane_of(c), block_of(c)) = load

@@ -9,9 +9,9 @@ program test_solver_parts
   use gravier_memory_need, only: check_memory
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_scheme, only: work_t
+  use gravier_method, only: work_t
   use gravier_nlgs, only: nlgs_t
-  use gravier_descent, only: descent_t
+  use gravier_convergence_history, only: convergence_history_t
   use gravier_supports, only: supports_t, find_supports
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   use gravier_levels, only: levels_t
@@ -279,51 +279,51 @@ contains
     logical, intent(in) :: chooses
     type(simulation_t) :: sim
     type(check_schedule_t) :: schedule
-    type(nlgs_t) :: scheme
+    type(nlgs_t) :: method
     integer :: iteration, made
 
     call make_column(3, 2, "&solver method = 'nscdd' /", sim)
     schedule%check_every = 10
     schedule%chooses = chooses
-    scheme%momentum%on = .false.
-    call check_equal(schedule%first_check(scheme), 10, "the first check of plain sweeps")
+    method%momentum%on = .false.
+    call check_equal(schedule%first_check(method), 10, "the first check of plain sweeps")
     call set_progress(sim%problem, 1.0e-2_dp)
-    call check(.not. calls(schedule, sim%problem, scheme, 9), "no check before it is due")
-    call check(calls(schedule, sim%problem, scheme, 10), "the first one is made")
+    call check(.not. calls(schedule, sim%problem, method, 9), "no check before it is due")
+    call check(calls(schedule, sim%problem, method, 10), "the first one is made")
     call schedule%note_check(10, 0.05_dp)
     ! the ratio is 5 from here on
     call set_progress(sim%problem, 2.3e-4_dp)
-    call check(calls(schedule, sim%problem, scheme, 20), "1.15 times the goal is expected")
+    call check(calls(schedule, sim%problem, method, 20), "1.15 times the goal is expected")
     call set_progress(sim%problem, 2.5e-4_dp)
-    call check(calls(schedule, sim%problem, scheme, 30) .neqv. chooses, "1.25 times the goal is expected")
+    call check(calls(schedule, sim%problem, method, 30) .neqv. chooses, "1.25 times the goal is expected")
     made = 0
     do iteration = 40, 160, 10
-      if (calls(schedule, sim%problem, scheme, iteration)) made = made + 1
+      if (calls(schedule, sim%problem, method, iteration)) made = made + 1
       if (made == 1 .and. chooses) exit
     end do
     call check_equal(iteration, merge(120, 170, chooses), "nine checks in a row are left out, and no tenth")
     call schedule%forget_ratio()
-    call check(calls(schedule, sim%problem, scheme, 200), "without a ratio a check is made")
-    scheme%momentum%on = .true.
+    call check(calls(schedule, sim%problem, method, 200), "without a ratio a check is made")
+    method%momentum%on = .true.
     call set_progress(sim%problem, 1.0e-2_dp)
-    call check(calls(schedule, sim%problem, scheme, 210), "and so with momentum")
+    call check(calls(schedule, sim%problem, method, 210), "and so with momentum")
     ! the figure has fallen, the ratio is 4, and no pause is longer than 0.06 of the iterations made
     call schedule%note_check(210, 0.04_dp)
     call set_progress(sim%problem, 2.0e-4_dp)
-    call check(.not. calls(schedule, sim%problem, scheme, 223), "0.8 times the goal is expected, but too soon")
-    call check(calls(schedule, sim%problem, scheme, 225) .eqv. chooses, "and late enough")
-    call check_equal(schedule%first_check(scheme), merge(2, 10, chooses), "the first check of sweeps with momentum")
+    call check(.not. calls(schedule, sim%problem, method, 223), "0.8 times the goal is expected, but too soon")
+    call check(calls(schedule, sim%problem, method, 225) .eqv. chooses, "and late enough")
+    call check_equal(schedule%first_check(method), merge(2, 10, chooses), "the first check of sweeps with momentum")
     call sim%free()
   end subroutine test_schedule
 
   !> Whether a schedule calls for a check after an iteration, with the goal 1e-3.
-  logical function calls(schedule, problem, scheme, iteration)
+  logical function calls(schedule, problem, method, iteration)
     type(check_schedule_t), intent(inout) :: schedule
     type(contact_problem_t), intent(inout) :: problem
-    type(nlgs_t), intent(in) :: scheme
+    type(nlgs_t), intent(in) :: method
     integer, intent(in) :: iteration
-    type(descent_t) :: descent
-    calls = schedule%calls(problem, scheme, iteration, 1.0e-3_dp, 1.0_dp, descent)
+    type(convergence_history_t) :: history
+    calls = schedule%calls(problem, method, iteration, 1.0e-3_dp, 1.0_dp, history)
   end function calls
 
   !> A solve has stagnated when waves have run to and fro, six times the depth, and not before; the impulses of a column are not in
@@ -466,9 +466,9 @@ contains
     if (.not. allocated(error)) call sim%init(comm, config, error)
     call check(.not. allocated(error), "a column for Newton's method")
     if (allocated(error)) return
-    select type (scheme => sim%scheme)
+    select type (method => sim%method)
     type is (newton_t)
-      call check(scheme%sweeps > 0, "the method is Newton's")
+      call check(method%sweeps > 0, "the method is Newton's")
     class default
       call check(.false., "the method is Newton's")
     end select

@@ -1,4 +1,5 @@
-!> The estimate of the velocity error, the ways it rests on, and a pass over layers, on a column of disks, where all of them are known:
+!> The estimate of the velocity error, the ways it rests on, and a pass over layers, on a column of disks, where all of them are
+!> known:
 !> impulses a share of the exact ones leave every disk with the same velocity.
 program test_velocity_error
   use gravier_kinds, only: dp
@@ -49,7 +50,7 @@ contains
     call sim%init(comm, config, error)
     call sim%assemble(figures)
     call check(.not. allocated(error), "assembly")
-    call sim%scheme%start(sim%problem, error)
+    call sim%method%start(sim%problem, error)
     call check(.not. allocated(error), "start")
   end subroutine make
 
@@ -110,7 +111,8 @@ contains
     call sim%free()
   end subroutine test_ways
 
-  !> Nine tenths of the exact impulses: everything falls with a tenth of g h. Y and C are that exactly, because the velocities that the
+  !> Nine tenths of the exact impulses: everything falls with a tenth of g h. Y and C are that exactly, because the velocities that
+  !> the
   !> impulses make are uniform; all sink as one, and the estimate is the smaller of E and C.
   subroutine test_share(n_subdomains)
     integer, intent(in) :: n_subdomains
@@ -126,7 +128,7 @@ contains
     call check(sim%problem%rest_is_admissible, "rest is admissible on a ground at rest")
     call check_close(velocity%mass, count*mass, 1e-12_dp*count*mass, "mass")
     call set_impulses(sim%problem, count, 0.9_dp)
-    call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
     call check_close(velocity%projection, expected, 1e-9_dp*expected, "Y of a uniform velocity")
     call check_close(velocity%bound_by_rest, expected, 1e-9_dp*expected, "C of a uniform velocity")
     ! the disk on the ground violates its law by what it falls with, the others by nothing
@@ -148,10 +150,10 @@ contains
     ! with earlier impulses, which tell something else, Y is as large: the impulses alone see all of a uniform velocity
     do s = 1, size(sim%problem%sub)
       associate (impulse => sim%problem%sub(s)%impulse)
-        sim%scheme%momentum%part(s)%impulse = impulse*(1.0_dp + 0.5_dp*sin(impulse/(mass*gravity*step)))
+        sim%method%momentum%part(s)%impulse = impulse*(1.0_dp + 0.5_dp*sin(impulse/(mass*gravity*step)))
       end associate
     end do
-    call velocity%assess(sim%problem, sim%scheme, 1, residual, defect)
+    call velocity%assess(sim%problem, sim%method, 1, residual, defect)
     call check_close(velocity%projection, expected, 1e-9_dp*expected, "Y with earlier impulses")
     ! C of bodies at rest whose impulses work on shifts
     sim%problem%kinetic = 0.0_dp
@@ -197,7 +199,7 @@ contains
       end associate
     end do
     call sim%problem%evaluate()
-    call velocity%assess(sim%problem, sim%scheme, 0, found(4), defect)
+    call velocity%assess(sim%problem, sim%method, 0, found(4), defect)
     call velocity%add_levels(sim%problem)
     found(1) = velocity%projection
     found(2) = velocity%levels%error
@@ -218,7 +220,7 @@ contains
     call make(count, 4, sim)
     call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
     call set_impulses(sim%problem, count, 1.0_dp)
-    call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
     call velocity%add_levels(sim%problem)
     call check(velocity%estimate() <= 1e-9_dp*gravity*step, "estimate of the exact impulses: "//to_text(velocity%estimate(), 3))
     call check(velocity%criterion() <= 1e-6_dp*gravity*step, "criterion of the exact impulses")
@@ -235,14 +237,14 @@ contains
 
     call make(count, n_subdomains, sim)
     call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
-    call carry_loads(sim%problem, 25.0_dp, sim%scheme%work, sweeps)
+    call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps)
     call check(sweeps >= 20.0_dp .and. sweeps <= 1.5_dp*200.0_dp, "sweeps of a pass: "//to_text(sweeps, 3))
     call sim%problem%evaluate()
-    call velocity%assess(sim%problem, sim%scheme, 0, residual, defect)
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
     call check(velocity%bound_by_rest <= 0.1_dp*gravity*step, "velocities after a pass: "//to_text(velocity%bound_by_rest, 3))
     call sim%free()
     call make(count/5, n_subdomains, sim)
-    call carry_loads(sim%problem, 25.0_dp, sim%scheme%work, sweeps)
+    call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps)
     call check_close(sweeps, 0.0_dp, 0.0_dp, "no pass on what is not deep")
     call sim%free()
   end subroutine test_layers

@@ -12,9 +12,9 @@ program test_impulse_memory
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_halo, only: halo_t
   use gravier_physics, only: physics_t
-  use gravier_interface, only: interface_figures_t
+  use gravier_interface, only: interface_statistics_t
   use gravier_problem_builder, only: build_problem
   use gravier_velocity_return, only: take_velocities
   use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
@@ -80,11 +80,11 @@ contains
     call check(.not. allocated(error), "configuration")
     call sim%init(comm, config, error)
     call check(.not. allocated(error), "scene")
-    do s = 1, size(sim%decomposition%home)
-      associate (home => sim%decomposition%home(s))
-        home%velocity(:, :) = 0.0_dp
-        home%velocity(1, :) = 0.31_dp
-        home%velocity(2, :) = 0.17_dp
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        owned%velocity(:, :) = 0.0_dp
+        owned%velocity(1, :) = 0.31_dp
+        owned%velocity(2, :) = 0.17_dp
       end associate
     end do
   end subroutine make
@@ -156,11 +156,11 @@ contains
     call give_impulses(sim, owner)
     call check(count(owner > 0) > 50, "enough contacts to tell")
     ! what a step does after its solve
-    call keep_impulses(sim%problem, sim%neighbourhoods)
+    call keep_impulses(sim%problem, sim%halo)
     call take_velocities(sim%decomposition, sim%physics, sim%problem)
-    do s = 1, size(sim%decomposition%home)
-      associate (home => sim%decomposition%home(s))
-        home%position(:, :) = advance_position(home%position, home%velocity(1:dimension, :), sim%physics%h, 0.6_dp)
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        owned%position(:, :) = advance_position(owned%position, owned%velocity(1:dimension, :), sim%physics%h, 0.6_dp)
       end associate
     end do
     sim%step = 1
@@ -220,7 +220,7 @@ contains
     integer, intent(in) :: nd, axes, kind
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition, other
-    type(neighbourhoods_t) :: before, after
+    type(halo_t) :: before, after
     integer(i8), allocatable :: records(:, :), owner(:, :)
     integer(i8) :: counts(3)
     integer :: s, k
@@ -233,10 +233,10 @@ contains
     call before%build(decomposition)
     allocate (owner(cloud%n, cloud%n), source=0_i8)
     call fill_lists(before, owner)
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          home%position(1, k) = home%position(1, k) + 0.3_dp
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          owned%position(1, k) = owned%position(1, k) + 0.3_dp
         end do
       end associate
     end do
@@ -244,7 +244,7 @@ contains
     call gather_impulses(decomposition, before, records)
     call make_decomposition(comm, cloud, 7, nd, .true., other)
     decomposition%partition = other%partition
-    call decomposition%settle()
+    call decomposition%migrate()
     after%memory%n_impulse = 4
     call after%build(decomposition)
     call spread_impulses(decomposition, records, after)
@@ -256,13 +256,13 @@ contains
   end subroutine test_new_partition
 
   !> Give every pair of the lists its impulse, and note who owns it.
-  subroutine fill_lists(neighbourhoods, owner)
-    type(neighbourhoods_t), intent(inout) :: neighbourhoods
+  subroutine fill_lists(halo, owner)
+    type(halo_t), intent(inout) :: halo
     integer(i8), intent(inout), contiguous :: owner(:, :)
     integer :: s, p, e, i, j
 
-    do s = 1, size(neighbourhoods%view)
-      associate (list => neighbourhoods%view(s)%list, id => neighbourhoods%view(s)%bodies%id)
+    do s = 1, size(halo%view)
+      associate (list => halo%view(s)%list, id => halo%view(s)%bodies%id)
         do p = 1, list%n
           i = int(id(list%candidate(p)))
           j = int(id(list%antagonist(p)))
@@ -285,17 +285,17 @@ contains
   end function given
 
   !> Pairs whose impulse is wrong, that were there before, and of these the ones of another subdomain than before.
-  subroutine count_pairs(decomposition, neighbourhoods, owner, counts)
+  subroutine count_pairs(decomposition, halo, owner, counts)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(halo_t), intent(in) :: halo
     integer(i8), intent(in) :: owner(:, :)
     integer(i8), intent(out) :: counts(3)
     integer :: s, p, e, i, j
     logical :: right
 
     counts(:) = 0
-    do s = 1, size(neighbourhoods%view)
-      associate (list => neighbourhoods%view(s)%list, id => neighbourhoods%view(s)%bodies%id)
+    do s = 1, size(halo%view)
+      associate (list => halo%view(s)%list, id => halo%view(s)%bodies%id)
         do p = 1, list%n
           i = int(id(list%candidate(p)))
           j = int(id(list%antagonist(p)))
@@ -318,11 +318,11 @@ contains
   subroutine test_turned_frames()
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: seen
+    type(halo_t) :: seen
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
     real(dp), allocatable :: kept(:, :, :)
     integer :: s, k, d
 
@@ -338,11 +338,11 @@ contains
     allocate (kept(3, cloud%n, cloud%n), source=0.0_dp)
     call set_tangential(problem, kept)
     call keep_impulses(problem, seen)
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
           do d = 1, 3
-            home%position(d, k) = home%position(d, k) + 0.02_dp*(draw_number(8, int(home%id(k)), d) - 0.5_dp)
+            owned%position(d, k) = owned%position(d, k) + 0.02_dp*(draw_number(8, int(owned%id(k)), d) - 0.5_dp)
           end do
         end do
       end associate
@@ -358,11 +358,11 @@ contains
   subroutine test_rolling()
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: seen
+    type(halo_t) :: seen
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
     real(dp), allocatable :: before(:, :, :)
     real(dp) :: impulse(6)
     integer :: s, c, e
@@ -461,17 +461,17 @@ contains
 
     call make(2, 3, 0.3_dp, "partition = 'grid'", sim)
     call sim%assemble(figures)
-    call recall_impulses(sim%neighbourhoods, sim%problem)
+    call recall_impulses(sim%halo, sim%problem)
     call check(.not. sim%problem%any_impulse(), "nothing kept, nothing recalled")
-    call gather_impulses(sim%decomposition, sim%neighbourhoods, records)
+    call gather_impulses(sim%decomposition, sim%halo, records)
     call check_equal(size(records, 2), 0, "zero impulses are not gathered")
     do s = 1, size(sim%problem%sub)
       do c = 1, sim%problem%sub(s)%n_contacts
         sim%problem%sub(s)%impulse(lane_of(c), 1, block_of(c)) = 1.0_dp
       end do
     end do
-    call keep_impulses(sim%problem, sim%neighbourhoods)
-    call gather_impulses(sim%decomposition, sim%neighbourhoods, records)
+    call keep_impulses(sim%problem, sim%halo)
+    call gather_impulses(sim%decomposition, sim%halo, records)
     call check_equal(comm%total(size(records, 2, kind=i8)), sim%problem%n_contacts, "all impulses are gathered")
     call check_equal(size(records, 1), 7, "words of a record")
     call sim%free()

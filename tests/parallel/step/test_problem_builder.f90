@@ -12,12 +12,12 @@ program test_problem_builder
   use gravier_contact_problem, only: contact_problem_t
   use gravier_nlgs, only: nlgs_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_halo, only: halo_t
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities, set_glued_velocities, carry_glued
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_pair_laws, only: set_default_laws
   use gravier_physics, only: physics_t
-  use gravier_interface, only: interface_figures_t, n_multiplicities
+  use gravier_interface, only: interface_statistics_t, n_multiplicities
   use gravier_problem_builder, only: build_problem
   use gravier_velocity_return, only: take_velocities
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw_number => draw, plane, make_decomposition
@@ -33,7 +33,7 @@ program test_problem_builder
     integer :: nd = 2
     type(cloud_t) :: cloud
     !> subdomain of the centre of each grain
-    integer :: home(n_grains) = 0
+    integer :: owned(n_grains) = 0
     !> owner of the contact of grain i (lower) and grain j, or wall j - n_grains; 0 where there is none
     integer, allocatable :: owner(:, :)
     !> whether grain i carries a contact in subdomain s (n_grains, n_subdomains)
@@ -64,7 +64,7 @@ program test_problem_builder
   end do
   call check(manifold > 0, "some grains are in three subdomains and more")
   call check(comm%total(int(grouped, i8)) > 0, "some contacts are relaxed together")
-  call check(visitors > 0, "some shared grains carry no contact at home")
+  call check(visitors > 0, "some shared grains carry no contact owned")
   do nd = 2, 3
     do k = 1, size(counts)
       call test_spins(nd, counts(k))
@@ -137,12 +137,12 @@ contains
         call note(truth, pairs(p)%i, pairs(p)%j, decomposition%partition%owner(point), pairs(p)%gap, branch)
       end do
       do i = 1, n_grains
-        truth%home(i) = decomposition%partition%owner(place(:, i))
+        truth%owned(i) = decomposition%partition%owner(place(:, i))
         point(:) = place(:, i)
         do w = 1, n_walls
           branch(:) = boundaries(w)%surface%axis(1:nd)
           gap = sum((point - boundaries(w)%surface%point(1:nd))*branch) - truth%cloud%radius(i)
-          call note(truth, i, n_grains + w, truth%home(i), gap, branch)
+          call note(truth, i, n_grains + w, truth%owned(i), gap, branch)
         end do
       end do
     end associate
@@ -166,12 +166,12 @@ contains
     integer, intent(in) :: nd, axes, n_subdomains, kind
     logical, intent(in) :: friction, by_cells
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: neighbourhoods
+    type(halo_t) :: halo
     type(truth_t) :: truth
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
     integer :: s
 
     call make_scene(nd, axes, n_subdomains, friction, kind, by_cells, decomposition, truth)
@@ -179,10 +179,10 @@ contains
     physics%gravity(:) = gravity
     call set_default_laws(physics%laws, coefficients_t(friction=0.25_dp), decomposition%boundaries)
     physics%h = h
-    neighbourhoods%memory%n_impulse = 4
-    call neighbourhoods%build(decomposition)
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
-    call check_equal(size(problem%sub), size(decomposition%home), "one problem for each subdomain")
+    halo%memory%n_impulse = 4
+    call halo%build(decomposition)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
+    call check_equal(size(problem%sub), size(decomposition%owned), "one problem for each subdomain")
     call check_equal(problem%n_subdomains, n_subdomains, "subdomains of the scene")
     do s = 1, size(problem%sub)
       call check_bodies(problem, s, decomposition, truth)
@@ -226,7 +226,7 @@ contains
       do b = 1, sub%n_bodies
         g = int(sub%id(b))
         right = right .and. truth%touches(g, sub%subdomain) .and. count(sub%id == g) == 1
-        right = right .and. sub%home(b) == truth%home(g)
+        right = right .and. sub%owner(b) == truth%owned(g)
         right = right .and. sub%multiplicity(b) == count(truth%touches(g, :))
         right = right .and. abs(sub%radius(b) - truth%cloud%radius(g)) <= 0.0_dp
         ! one rounding of numbers of size 1
@@ -352,7 +352,7 @@ contains
 
   subroutine check_figures(problem, figures, truth)
     type(contact_problem_t), intent(in) :: problem
-    type(interface_figures_t), intent(in) :: figures
+    type(interface_statistics_t), intent(in) :: figures
     type(truth_t), intent(in) :: truth
     integer(i8) :: expected(n_multiplicities)
     integer :: i, j, m, s, interactions, most, least
@@ -363,7 +363,7 @@ contains
       m = min(count(truth%touches(i, :)), n_multiplicities)
       if (m > 0) expected(m) = expected(m) + 1
       do j = i + 1, n_grains
-        if (truth%owner(i, j) > 0 .and. truth%home(i) /= truth%home(j)) interactions = interactions + 1
+        if (truth%owner(i, j) > 0 .and. truth%owned(i) /= truth%owned(j)) interactions = interactions + 1
       end do
     end do
     most = 0
@@ -403,7 +403,7 @@ contains
     call check_close(problem%force_scale, strongest, 32*epsilon(1.0_dp), "force scale")
   end subroutine check_scales
 
-  !> Velocities come home from wherever the grain has contacts; grains without contacts fly on.
+  !> Velocities come to the owner from wherever the grain has contacts; grains without contacts fly on.
   subroutine check_velocities(decomposition, problem, physics, truth)
     type(decomposition_t), intent(inout) :: decomposition
     type(contact_problem_t), intent(inout) :: problem
@@ -422,22 +422,22 @@ contains
     end do
     call take_velocities(decomposition, physics, problem)
     right = .true.
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do b = 1, home%n
-          g = int(home%id(b))
-          if (any(truth%touches(g, :)) .and. .not. truth%touches(g, truth%home(g))) visitors = visitors + 1
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do b = 1, owned%n
+          g = int(owned%id(b))
+          if (any(truth%touches(g, :)) .and. .not. truth%touches(g, truth%owned(g))) visitors = visitors + 1
           do d = 1, nv
             if (any(truth%touches(g, :))) then
-              right = right .and. abs(home%velocity(d, b) - 8*draw(g, 20 + d)) <= 0.0_dp
+              right = right .and. abs(owned%velocity(d, b) - 8*draw(g, 20 + d)) <= 0.0_dp
             else
-              right = right .and. abs(home%velocity(d, b) - free_velocity(g, d, truth%nd)) <= 4*epsilon(1.0_dp)
+              right = right .and. abs(owned%velocity(d, b) - free_velocity(g, d, truth%nd)) <= 4*epsilon(1.0_dp)
             end if
           end do
         end do
       end associate
     end do
-    call check(right, "velocities at home")
+    call check(right, "velocities owned")
     visitors = int(comm%total(int(visitors, i8)))
   end subroutine check_velocities
 
@@ -446,12 +446,12 @@ contains
   subroutine test_spins(nd, n_subdomains)
     integer, intent(in) :: nd, n_subdomains
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: neighbourhoods
+    type(halo_t) :: halo
     type(truth_t) :: truth
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
     type(nlgs_t) :: nlgs
     type(error_t), allocatable :: error
     real(dp) :: jump
@@ -463,9 +463,9 @@ contains
     call kernels%choose(nd, effects_t(friction=.false.))
     physics%gravity(:) = gravity
     physics%h = h
-    neighbourhoods%memory%n_impulse = 4
-    call neighbourhoods%build(decomposition)
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    halo%memory%n_impulse = 4
+    call halo%build(decomposition)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
     call check_equal(problem%kernels%nv, nd, "spins: unknowns of a body")
     small = .true.
     do s = 1, size(problem%sub)
@@ -481,15 +481,15 @@ contains
     call take_velocities(decomposition, physics, problem)
     kept = .true.
     pushed = 0
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          g = int(home%id(k))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          g = int(owned%id(k))
           do d = nd + 1, 3*nd - 3
-            kept = kept .and. abs(home%velocity(d, k) - (draw(g, 6 + d) - 0.5_dp)) <= 0.0_dp
+            kept = kept .and. abs(owned%velocity(d, k) - (draw(g, 6 + d) - 0.5_dp)) <= 0.0_dp
           end do
           do d = 1, nd
-            if (abs(home%velocity(d, k) - free_velocity(g, d, nd)) > 0.01_dp) pushed = pushed + 1
+            if (abs(owned%velocity(d, k) - free_velocity(g, d, nd)) > 0.01_dp) pushed = pushed + 1
           end do
         end do
       end associate
@@ -501,35 +501,35 @@ contains
   !> Without contacts: no bodies in the problem, figures of nothing, free velocities.
   subroutine test_free_flight()
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: neighbourhoods
+    type(halo_t) :: halo
     type(truth_t) :: truth
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
     integer :: s, k
 
     call make_scene(2, 0, 3, .false., rule_dual, .false., decomposition, truth)
     decomposition%rule%alert_distance = -1.0_dp
     decomposition%rule%skin = 0.0_dp
-    do s = 1, size(decomposition%home)
-      decomposition%home(s)%radius(:) = 1.0e-6_dp
+    do s = 1, size(decomposition%owned)
+      decomposition%owned(s)%radius(:) = 1.0e-6_dp
     end do
     call kernels%choose(2, effects_t(friction=.false.))
     physics%gravity(:) = gravity
     physics%h = h
-    neighbourhoods%memory%n_impulse = 4
-    call neighbourhoods%build(decomposition)
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    halo%memory%n_impulse = 4
+    call halo%build(decomposition)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 0_i8, "flight: no contacts")
     call check(figures%bodies == 0 .and. all(figures%multiplicity == 0) .and. figures%most_contacts == 0 .and. &
       & figures%least_contacts == 0 .and. figures%interactions == 0, "flight: figures")
     call check_close(problem%force_scale, 0.0_dp, 0.0_dp, "flight: force scale")
     call take_velocities(decomposition, physics, problem)
-    do s = 1, size(decomposition%home)
-      do k = 1, decomposition%home(s)%n
-        call check_close(decomposition%home(s)%velocity(2, k), &
-          & free_velocity(int(decomposition%home(s)%id(k)), 2, 2), 4*epsilon(1.0_dp), "flight: velocity")
+    do s = 1, size(decomposition%owned)
+      do k = 1, decomposition%owned(s)%n
+        call check_close(decomposition%owned(s)%velocity(2, k), &
+          & free_velocity(int(decomposition%owned(s)%id(k)), 2, 2), 4*epsilon(1.0_dp), "flight: velocity")
       end do
     end do
   end subroutine test_free_flight
@@ -574,10 +574,10 @@ contains
     if (turning) glue%spin(3) = 1.0_dp
     decomposition%boundaries(3) = glue
     call make_decomposition(comm, cloud, n_subdomains, 3, .false., decomposition)
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        where (home%id == 2) home%glued = 3
-        where (home%id == 1) home%velocity(2, :) = -0.7_dp
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        where (owned%id == 2) owned%glued = 3
+        where (owned%id == 1) owned%velocity(2, :) = -0.7_dp
       end associate
     end do
     call set_glued_velocities(decomposition)
@@ -587,11 +587,11 @@ contains
     integer, intent(in) :: n_subdomains
     logical, intent(in) :: turning
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: neighbourhoods
+    type(halo_t) :: halo
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
     integer :: s, c
     integer(i8) :: id
 
@@ -599,9 +599,9 @@ contains
     call kernels%choose(2, effects_t(friction=.true.))
     call set_default_laws(physics%laws, coefficients_t(friction=0.1_dp), decomposition%boundaries)
     physics%h = h
-    neighbourhoods%memory%n_impulse = 2
-    call neighbourhoods%build(decomposition)
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    halo%memory%n_impulse = 2
+    call halo%build(decomposition)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 3_i8, "boundaries: contacts")
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -657,7 +657,7 @@ contains
       call check_close(sub%v_free(2, j), -0.25_dp, 0.0_dp, "lid: free velocity")
       call check_close(sub%inverse_mass(2, j), 0.25_dp, 0.0_dp, "lid: inertia of the free component")
       call check(all(abs(sub%inverse_mass([1, 3], j)) <= 0.0_dp), "lid: other components cannot move")
-      call check_equal(sub%home(j), mod(1, problem%n_subdomains) + 1, "lid: one subdomain keeps account of it")
+      call check_equal(sub%owner(j), mod(1, problem%n_subdomains) + 1, "lid: one subdomain keeps account of it")
       call check(.not. sub%moves(1, j) .and. sub%moves(2, j) .and. .not. sub%moves(3, j), "lid: what moves")
     end associate
   end subroutine check_lid
@@ -705,14 +705,14 @@ contains
     call check_close(decomposition%boundaries(2)%velocity(2), 0.5_dp, rounding, "velocity of the lid")
     call check_close(decomposition%boundaries(1)%velocity(2), 0.0_dp, 0.0_dp, "velocity of the floor")
     call carry_glued(decomposition, 0.5_dp)
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          if (home%id(k) /= 2) cycle
-          call check_close(home%velocity(1, k), merge(0.025_dp, 0.125_dp, turning), rounding, "a glued grain keeps its velocity")
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%id(k) /= 2) cycle
+          call check_close(owned%velocity(1, k), merge(0.025_dp, 0.125_dp, turning), rounding, "a glued grain keeps its velocity")
           ! an arm of 0.1 m that turns by half a radian
-          call check_close(home%position(1, k), 0.8625_dp - merge(0.1_dp*sin(0.5_dp), 0.0_dp, turning), rounding, "carried, x")
-          call check_close(home%position(2, k), 0.25_dp + merge(0.1_dp*cos(0.5_dp), 0.1_dp, turning), rounding, "carried, y")
+          call check_close(owned%position(1, k), 0.8625_dp - merge(0.1_dp*sin(0.5_dp), 0.0_dp, turning), rounding, "carried, x")
+          call check_close(owned%position(2, k), 0.25_dp + merge(0.1_dp*cos(0.5_dp), 0.1_dp, turning), rounding, "carried, y")
         end do
       end associate
     end do
@@ -722,24 +722,24 @@ contains
   subroutine test_restitution_gap(n_subdomains)
     integer, intent(in) :: n_subdomains
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: neighbourhoods
+    type(halo_t) :: halo
     type(kernels_t) :: kernels
     type(physics_t) :: physics
     type(contact_problem_t) :: problem
-    type(interface_figures_t) :: figures
+    type(interface_statistics_t) :: figures
 
     call make_boundary_scene(n_subdomains, 0.01_dp, .false., decomposition)
     call kernels%choose(2, effects_t(friction=.true.))
     call set_default_laws(physics%laws, coefficients_t(), decomposition%boundaries)
-    neighbourhoods%memory%n_impulse = 2
-    call neighbourhoods%build(decomposition)
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    halo%memory%n_impulse = 2
+    call halo%build(decomposition)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "restitution: no contact before touching")
     call physics%laws%set_default(1, coefficients_t())
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 3_i8, "no restitution: contacts within the alert distance")
     decomposition%boundaries(1)%present = .false.
-    call build_problem(decomposition, neighbourhoods, kernels, physics, problem, figures)
+    call build_problem(decomposition, halo, kernels, physics, problem, figures)
     call check_equal(problem%n_contacts, 2_i8, "a boundary that was removed has no contact")
   end subroutine test_restitution_gap
 

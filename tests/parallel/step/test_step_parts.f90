@@ -10,10 +10,10 @@ program test_step_parts
   use gravier_grain_balance, only: grain_balance_t
   use gravier_mean_stress, only: mean_stress_t
   use gravier_contact_structure, only: contact_structure_t, bin_width
-  use gravier_departures, only: some_leave, let_grains_out
+  use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: wake_all, put_sleepers_last, count_rest
-  use gravier_narrow_phase, only: found_t, find_contacts
+  use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_contact_kernels, only: lanes
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -126,14 +126,14 @@ contains
     integer :: s, k
 
     grain = -huge(1.0_dp)
-    do s = 1, size(sim%decomposition%home)
-      associate (home => sim%decomposition%home(s))
-        do k = 1, home%n
-          if (home%id(k) /= id) cycle
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%id(k) /= id) cycle
           if (present(of_place)) then
-            grain = home%position(d, k)
+            grain = owned%position(d, k)
           else
-            grain = home%velocity(d, k)
+            grain = owned%velocity(d, k)
           end if
         end do
       end associate
@@ -502,7 +502,7 @@ contains
       & "&boundary shape = 'outlet', point = 0, 0, normal = 0, 1 /"//newline//"&boundary shape = 'grains', group = 1 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call check(.not. some_leave(sim%decomposition), "nobody is behind the outlet, and glued grains stay there")
-    call let_grains_out(sim%decomposition, .true., n_free, n_glued)
+    call remove_grains(sim%decomposition, .true., n_free, n_glued)
     call check_equal(n_free + n_glued, 0_i8, "nobody leaves")
     call advance(sim, figures)
     call check_equal(figures%left, 1_i8, "the falling grain leaves")
@@ -517,7 +517,7 @@ contains
     call check_close(sim%balance%error(), 0.0_dp, solved, "balance of grains: it closes")
     sim%decomposition%boundaries(2)%present = .false.
     call check(some_leave(sim%decomposition), "glued grains leave with their boundary")
-    call let_grains_out(sim%decomposition, .true., n_free, n_glued)
+    call remove_grains(sim%decomposition, .true., n_free, n_glued)
     call check_equal(n_free, 0_i8, "no free one leaves")
     call check_equal(n_glued, 2_i8, "both glued ones leave")
     call sim%free()
@@ -545,8 +545,8 @@ contains
     real(dp) :: most
 
     most = -1.0_dp
-    do s = 1, size(sim%neighbourhoods%view)
-      associate (view => sim%neighbourhoods%view(s))
+    do s = 1, size(sim%halo%view)
+      associate (view => sim%halo%view(s))
         do p = 1, view%list%n
           if (view%bodies%id(view%list%candidate(p)) == id .and. (view%list%antagonist(p) > 0 .eqv. present(with_grains))) &
             & most = max(most, real(view%list%state(view%list%memory%rest_row, p), dp))
@@ -563,8 +563,8 @@ contains
     real(dp), intent(in) :: factor
     integer :: s, p
 
-    do s = 1, size(sim%neighbourhoods%view)
-      associate (view => sim%neighbourhoods%view(s))
+    do s = 1, size(sim%halo%view)
+      associate (view => sim%halo%view(s))
         do p = 1, view%list%n
           if (view%bodies%id(view%list%candidate(p)) == id .and. view%list%antagonist(p) < 0) &
             & view%list%impulse(1, p) = factor*view%list%impulse(1, p)
@@ -604,9 +604,9 @@ contains
     do k = 1, size(sim%problem%sub)
       sim%problem%sub(k)%v_global(3, 1:sim%problem%sub(k)%n_grains) = 1.0_dp
     end do
-    call count_rest(sim%sleeping, sim%decomposition%boundaries, .true., sim%neighbourhoods, sim%problem)
+    call count_rest(sim%sleeping, sim%decomposition%boundaries, .true., sim%halo, sim%problem)
     call check_equal(counted(sim, 1), 0, "a disk that spins is not at rest")
-    call wake_all(sim%neighbourhoods)
+    call wake_all(sim%halo)
     call check_equal(counted(sim, 1), 0, "woken contacts count from the start")
     call advance(sim, figures)
     call check_equal(figures%asleep, 0_i8, "and are awake")
@@ -639,7 +639,7 @@ contains
   subroutine check_sleepers_last()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
-    type(found_t) :: found
+    type(contact_list_t) :: found
     integer :: k, s, c, awake, n_asleep
 
     do k = 1, 40
@@ -649,8 +649,8 @@ contains
       & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1 /"//newline//"&time step = 0.01, steps = 99 /"//newline// &
       & exact//", sleeping = T, sleep_after = 3 /"//newline)
     call advance(sim, figures)
-    do s = 1, size(sim%neighbourhoods%view)
-      associate (view => sim%neighbourhoods%view(s))
+    do s = 1, size(sim%halo%view)
+      associate (view => sim%halo%view(s))
         ! every contact but those of each third grain sleeps
         do k = 1, view%list%n
           view%list%state(view%list%memory%rest_row, k) = merge(0, 3, mod(view%bodies%id(view%list%candidate(k)), 3_i8) == 0)
@@ -769,7 +769,7 @@ contains
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
     call advance(sim, figures)
     top = sim%decomposition%boundaries(1)%surface%point(2)
-    call check_equal(figures%sharing%bodies, 1_i8, "two subdomains share the lid")
+    call check_equal(figures%interface_statistics%bodies, 1_i8, "two subdomains share the lid")
     call check_close(figures%max_overlap, overlap, solved, "the overlap of the lid")
     call check_close(top, 0.095_dp + 0.5_dp*(overlap - allowed), solved, "the lid goes up by half of the excess")
     call check_close(grain(sim, 1, 2, .true.), -0.5_dp*(overlap - allowed), solved, "the first disk goes down by the other half")

@@ -85,13 +85,13 @@ contains
       allocate (sim%decomposition%boundaries(0))
     end if
     speed = scene%units%length/scene%units%time
-    do s = 1, size(sim%decomposition%home)
-      associate (home => sim%decomposition%home(s))
-        do k = 1, home%n
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
           do d = 1, scene%nd
-            home%velocity(d, k) = scene%motion*speed*(2.0_dp*hash_uniform(5, home%id(k), d) - 1.0_dp)
+            owned%velocity(d, k) = scene%motion*speed*(2.0_dp*hash_uniform(5, owned%id(k), d) - 1.0_dp)
           end do
-          home%velocity(1, k) = home%velocity(1, k) + scene%wind*speed
+          owned%velocity(1, k) = owned%velocity(1, k) + scene%wind*speed
         end do
       end associate
     end do

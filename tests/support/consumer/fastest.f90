@@ -31,10 +31,10 @@ contains
     integer :: s, k
 
     speed = 0.0_dp
-    do s = 1, size(step%decomposition%home)
-      associate (home => step%decomposition%home(s))
-        do k = 1, home%n
-          if (home%glued(k) == 0) speed = max(speed, norm2(home%velocity(1:home%nd, k)))
+    do s = 1, size(step%decomposition%owned)
+      associate (owned => step%decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%glued(k) == 0) speed = max(speed, norm2(owned%velocity(1:owned%nd, k)))
         end do
       end associate
     end do

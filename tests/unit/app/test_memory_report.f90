@@ -98,8 +98,8 @@ contains
     integer(i8), intent(out) :: bytes(5)
     integer :: room
 
-    associate (sub => simulation%problem%sub(1), view => simulation%neighbourhoods%view(1), &
-      & home => simulation%decomposition%home(1))
+    associate (sub => simulation%problem%sub(1), view => simulation%halo%view(1), &
+      & owned => simulation%decomposition%owned(1))
       room = lanes*n_blocks(sub%n_contacts)
       bytes(contact) = (4*size(sub%pair) + 8*size(sub%hot) + 8*size(sub%impulse))/room + &
         & (8*size(sub%gap) + 4*size(sub%source))/sub%n_contacts
@@ -107,11 +107,11 @@ contains
       bytes(near_pair) = (4*size(view%list%candidate) + 4*size(view%list%antagonist) + 4*size(view%list%shift) + &
         & 8*size(view%list%impulse) + 4*size(view%list%state))/view%list%n
       bytes(body) = (8*size(sub%id) + 8*size(sub%v_free) + 8*size(sub%velocity) + 8*size(sub%v_global) + 8*size(sub%reaction) + &
-        & 8*size(sub%inverse_mass) + 8*size(sub%weight))/sub%n_columns + (4*size(sub%home) + &
+        & 8*size(sub%inverse_mass) + 8*size(sub%weight))/sub%n_columns + (4*size(sub%owner) + &
         & 4*size(sub%multiplicity))/sub%n_bodies + (4*size(sub%place) + 8*size(sub%radius))/sub%n_grains
-      if (allocated(sub%pull)) bytes(body) = bytes(body) + 8*size(sub%pull)/sub%n_columns
-      bytes(seen) = grain_bytes(view%bodies) + (4*size(view%home) + 4*size(view%origin))/view%bodies%n
-      bytes(at_home) = grain_bytes(home) + 8*size(simulation%neighbourhoods%reference(1)%position)/home%n
+      if (allocated(sub%attraction_load)) bytes(body) = bytes(body) + 8*size(sub%attraction_load)/sub%n_columns
+      bytes(seen) = grain_bytes(view%bodies) + (4*size(view%owner) + 4*size(view%origin))/view%bodies%n
+      bytes(at_home) = grain_bytes(owned) + 8*size(simulation%halo%reference(1)%position)/owned%n
     end associate
   end subroutine sum_arrays
 

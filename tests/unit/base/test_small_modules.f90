@@ -1,11 +1,12 @@
-!> Modules of a few lines: what numbers a scene may have, pauses, memory that stays with the process, the planes that shut a scene in.
+!> Modules of a few lines: what numbers a scene may have, pauses, memory that stays with the process, the planes that shut a scene
+!> in.
 program test_small_modules
   use, intrinsic :: iso_fortran_env, only: int64
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf
   use gravier_kinds, only: dp
   use gravier_magnitude, only: is_bounded, is_size, sharpest
   use gravier_process, only: pause_for
-  use gravier_heap, only: keep_heap
+  use gravier_allocator_tuning, only: keep_heap
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes

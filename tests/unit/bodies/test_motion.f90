@@ -1,4 +1,4 @@
-!> Motion of bodies: masses, inertias, the steps of the Moreau-Jean scheme.
+!> Motion of bodies: masses, inertias, the steps of the Moreau-Jean method.
 program test_motion
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
@@ -61,7 +61,7 @@ contains
     call check_close(advance_position(1.0_dp, 2.0_dp, 0.25_dp, 1.0_dp), 1.5_dp, rounding, "a whole step")
   end subroutine test_positions
 
-  !> A flight under constant gravity: with theta = 1/2 the scheme is exact, x = x0 + v0 t + g t^2/2; in general it is off
+  !> A flight under constant gravity: with theta = 1/2 the method is exact, x = x0 + v0 t + g t^2/2; in general it is off
   !> by (theta - 1/2) g h t. 1000 steps of roundings of numbers below 100.
   subroutine test_free_flight()
     real(dp), parameter :: h = 0.01_dp, g = -9.81_dp, thetas(3) = [0.5_dp, 0.7_dp, 1.0_dp]
@@ -82,7 +82,7 @@ contains
     end do
   end subroutine test_free_flight
 
-  !> A unit mass on a unit spring whose force is taken at q_m: with theta = 1/2 this is a symplectic scheme, and the
+  !> A unit mass on a unit spring whose force is taken at q_m: with theta = 1/2 this is a symplectic method, and the
   !> error over one period falls as h^2.
   subroutine test_spring()
     real(dp) :: error(2), x, v, h

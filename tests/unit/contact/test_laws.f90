@@ -65,7 +65,7 @@ contains
     real(dp), intent(in) :: gap
     pair%gap = gap
     pair%radius = 0.25_dp
-    pair%terms%play = max(gap, 0.0_dp)
+    pair%terms%free_gap = max(gap, 0.0_dp)
   end function pair_at
 
   !> Each law under its word, and every key once, with the laws that have it.
@@ -166,14 +166,14 @@ contains
     call check_close(frictionless%largest%restitution, 0.3_dp, 0.0_dp, "frictionless: largest restitution")
   end subroutine check_coulomb
 
-  subroutine check_terms(pair, friction, attraction, play, what)
+  subroutine check_terms(pair, friction, attraction, free_gap, what)
     type(contact_pair_t), intent(in) :: pair
-    real(dp), intent(in) :: friction, attraction, play
+    real(dp), intent(in) :: friction, attraction, free_gap
     character(len=*), intent(in) :: what
 
     call check_close(pair%terms%friction, friction, rounding, what//": friction")
     call check_close(pair%terms%attraction, attraction, rounding*max(attraction, 1.0_dp), what//": attraction")
-    call check_close(pair%terms%play, play, 0.0_dp, what//": play")
+    call check_close(pair%terms%free_gap, free_gap, 0.0_dp, what//": free_gap")
   end subroutine check_terms
 
   !> mu = mu_d + (mu_s - mu_d) exp(-v_t/v_s), mu_s at rest and mu_d far above v_s.
@@ -278,7 +278,7 @@ contains
     pair = pair_at(0.005_dp)
     pair%first = .true.
     call law%evaluate(pair)
-    call check_terms(pair, 0.8_dp, 9.0_dp, 0.0_dp, "bonded: a bond holds the distance, without play")
+    call check_terms(pair, 0.8_dp, 9.0_dp, 0.0_dp, "bonded: a bond holds the distance, without free_gap")
     call check_equal(pair%state, 1, "bonded: the bond is remembered")
     pair = pair_at(0.011_dp)
     pair%first = .true.

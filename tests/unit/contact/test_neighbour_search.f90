@@ -154,15 +154,15 @@ contains
     call bodies%reorder(order)
   end subroutine shuffled_bodies
 
-  subroutine find_homes(bodies, region, home)
+  subroutine find_homes(bodies, region, owned)
     type(body_set_t), intent(in) :: bodies
     type(sites_t), intent(in) :: region
-    integer, allocatable, intent(out) :: home(:)
+    integer, allocatable, intent(out) :: owned(:)
     integer :: k
 
-    allocate (home(bodies%n))
+    allocate (owned(bodies%n))
     do k = 1, bodies%n
-      home(k) = region%owner(bodies%position(:, k))
+      owned(k) = region%owner(bodies%position(:, k))
     end do
   end subroutine find_homes
 
@@ -191,17 +191,17 @@ contains
     type(neighbour_list_t) :: list
     type(boundary_t) :: boundaries(2)
     !> subdomain of each pair found, and of each grain near a boundary; -1 where it was found twice
-    integer, allocatable :: found(:, :, :), near(:, :), home(:)
+    integer, allocatable :: found(:, :, :), near(:, :), owned(:)
     integer :: s, p, i, j
     logical :: right, ordered
 
     boundaries(:) = two_planes(cloud%nd)
-    call find_homes(bodies, region, home)
+    call find_homes(bodies, region, owned)
     allocate (found(cloud%n, cloud%n, 0:26), near(cloud%n, 2), source=0)
     right = .true.
     ordered = .true.
     do s = 1, size(region%site, 2)
-      call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies, home, region, pair_memory_t(3), list)
+      call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies, owned, region, pair_memory_t(3), list)
       right = right .and. size(list%candidate) == list%n .and. size(list%impulse, 1) == 3 .and. size(list%impulse, 2) == list%n
       right = right .and. size(list%shift) == merge(list%n, 0, cloud%period%on()) .and. all(abs(list%impulse) <= 0.0_dp)
       do p = 1, list%n
@@ -331,7 +331,7 @@ contains
     type(body_set_t) :: bodies(2)
     type(neighbour_list_t) :: list(2)
     type(boundary_t) :: boundaries(2)
-    integer, allocatable :: home(:)
+    integer, allocatable :: owned(:)
     integer :: s, k, p
     logical :: same
 
@@ -340,8 +340,8 @@ contains
     do s = 1, size(region%site, 2)
       do k = 1, 2
         call shuffled_bodies(cloud, merge(53, 67, k == 1), bodies(k))
-        call find_homes(bodies(k), region, home)
-        call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies(k), home, region, pair_memory_t(1), list(k))
+        call find_homes(bodies(k), region, owned)
+        call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies(k), owned, region, pair_memory_t(1), list(k))
       end do
       same = same .and. list(1)%n == list(2)%n
       if (.not. same) exit
@@ -435,15 +435,15 @@ contains
     type(neighbour_list_t), intent(inout) :: list
     type(neighbour_rule_t) :: rule
     type(sites_t) :: whole
-    integer :: home(bodies%n)
+    integer :: owned(bodies%n)
 
     rule%alert_distance = 0.125_dp
     rule%skin = 0.375_dp
     rule%largest_radius = 1.0_dp
     rule%mean_radius = 1.0_dp
     call make_sites(bodies%nd, 1, whole)
-    home(:) = 1
-    call find_pairs(neighbour_search_t(rule, period, boundaries, 1), bodies, home, whole, pair_memory_t(1), list)
+    owned(:) = 1
+    call find_pairs(neighbour_search_t(rule, period, boundaries, 1), bodies, owned, whole, pair_memory_t(1), list)
   end subroutine list_units
 
   !> A gap equal to alert distance and skin is listed, a larger one is not; all numbers are exact in binary.
@@ -549,7 +549,7 @@ contains
     type(boundary_t) :: ground(1)
     type(sites_t) :: whole
     real(dp) :: x(2, 1)
-    integer, parameter :: home(2) = 1
+    integer, parameter :: owned(2) = 1
 
     ground(1) = plane(100, [0.0_dp, 0.0_dp], [0.0_dp, 1.0_dp])
     call unit_bodies(x(:, 1:0), bodies)
@@ -564,7 +564,7 @@ contains
     call unit_bodies(reshape([1.0_dp, 2.0_dp, 1.0_dp, 2.0_dp], [2, 2]), bodies)
     bodies%radius(:) = 0.0_dp
     call make_sites(2, 1, whole)
-    call find_pairs(neighbour_search_t(point_like, period, ground, 1), bodies, home, whole, pair_memory_t(1), list)
+    call find_pairs(neighbour_search_t(point_like, period, ground, 1), bodies, owned, whole, pair_memory_t(1), list)
     call check_equal(list%n, 1, "points that coincide")
   end subroutine test_few_bodies
 
@@ -584,14 +584,14 @@ contains
   end subroutine test_sweep_order
 
   !> One search, as of a subdomain.
-  subroutine find_pairs(search, bodies, home, region, memory, list)
+  subroutine find_pairs(search, bodies, owned, region, memory, list)
     type(neighbour_search_t), intent(in) :: search
     type(body_set_t), intent(in) :: bodies
-    integer, intent(in), contiguous :: home(:)
+    integer, intent(in), contiguous :: owned(:)
     type(sites_t), intent(in) :: region
     type(pair_memory_t), intent(in) :: memory
     type(neighbour_list_t), intent(inout) :: list
-    call search%find(bodies, home, region, memory, list)
+    call search%find(bodies, owned, region, memory, list)
   end subroutine find_pairs
 
 end program test_neighbour_search

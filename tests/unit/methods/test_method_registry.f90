@@ -2,7 +2,7 @@
 program test_method_registry
   use gravier_kinds, only: dp
   use gravier_check, only: check, check_equal, finish_checks
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t, default_always, default_on_active
   use gravier_method_registry, only: method_holder_t, registered_methods, make_method, features_of, method_words, quoted_names, &
     & all_methods, that_decompose, with_moments, with_sleeping, that_relax, with_momentum, with_momentum_on_active
@@ -20,7 +20,7 @@ contains
   subroutine test_names()
     type(method_holder_t), allocatable :: methods(:)
     type(method_features_t) :: features, found
-    class(scheme_t), allocatable :: made
+    class(method_t), allocatable :: made
     integer :: k
 
     call registered_methods(methods)
@@ -50,7 +50,7 @@ contains
 
   !> Sweeps and momentum reach every method; Newton's always has momentum.
   subroutine test_options()
-    class(scheme_t), allocatable :: method
+    class(method_t), allocatable :: method
     type(method_holder_t), allocatable :: methods(:)
     type(method_features_t) :: features
     integer :: k
@@ -72,7 +72,7 @@ contains
 
   !> The search direction that the log names.
   subroutine test_directions()
-    class(scheme_t), allocatable :: method
+    class(method_t), allocatable :: method
 
     call make_method("nlgs", method_options_t(), method)
     call check_equal(method%direction_text, "", "no direction")
@@ -88,7 +88,7 @@ contains
 
   !> Momentum holds the impulses and velocities of one iteration, Newton's method more.
   subroutine test_held()
-    class(scheme_t), allocatable :: method
+    class(method_t), allocatable :: method
     type(held_list_t) :: plain, momentum, newton
     integer :: k, bytes
 

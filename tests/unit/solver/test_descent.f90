@@ -1,8 +1,8 @@
-!> What a run notes of the descent of its solves, and what it makes of it for other tolerances.
+!> What a run notes of the history of its solves, and what it makes of it for other tolerances.
 program test_descent
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
-  use gravier_descent, only: descent_t, effort_t, tenfold, unknown_effort
+  use gravier_convergence_history, only: convergence_history_t, effort_t, tenfold, unknown_effort
   use gravier_check, only: check_close, check_equal, finish_checks
   implicit none
 
@@ -23,18 +23,18 @@ contains
 
   !> A figure at a level counts, the first one stays, and what lies above all levels is the start.
   subroutine test_levels()
-    type(descent_t) :: descent
+    type(convergence_history_t) :: history
 
-    call descent%note(0, 1.0_dp, 1.0e-3_dp)
-    call check_equal(descent%first(tenfold), -1, "above all levels")
-    call descent%note(10, 2.0e-2_dp, 1.0e-3_dp)
-    call descent%note(20, 1.0e-2_dp, 1.0e-3_dp)
-    call descent%note(30, 5.0e-2_dp, 1.0e-3_dp)
-    call descent%note(40, 2.0e-3_dp, 1.0e-3_dp)
-    call descent%note(50, 9.0e-4_dp, 1.0e-3_dp)
-    call check_equal(descent%first(tenfold), 20, "ten times the tolerance")
-    call check_equal(descent%first(1), 40, "half a decade above it")
-    call check_equal(descent%first(0), 50, "the tolerance")
+    call history%note(0, 1.0_dp, 1.0e-3_dp)
+    call check_equal(history%first(tenfold), -1, "above all levels")
+    call history%note(10, 2.0e-2_dp, 1.0e-3_dp)
+    call history%note(20, 1.0e-2_dp, 1.0e-3_dp)
+    call history%note(30, 5.0e-2_dp, 1.0e-3_dp)
+    call history%note(40, 2.0e-3_dp, 1.0e-3_dp)
+    call history%note(50, 9.0e-4_dp, 1.0e-3_dp)
+    call check_equal(history%first(tenfold), 20, "ten times the tolerance")
+    call check_equal(history%first(1), 40, "half a decade above it")
+    call check_equal(history%first(0), 50, "the tolerance")
   end subroutine test_levels
 
   !> Add solves whose figure at iteration i, checked every `every` of them, is `figure`(i); they give up after 10^5.
@@ -48,18 +48,18 @@ contains
         integer, intent(in) :: i
       end function figure
     end interface
-    type(descent_t) :: descent
+    type(convergence_history_t) :: history
     integer :: k, i
 
     do k = 1, number
-      descent = descent_t(first_check=every)
+      history = convergence_history_t(first_check=every)
       i = 0
       do
-        call descent%note(i, figure(i), 1.0e-4_dp)
+        call history%note(i, figure(i), 1.0e-4_dp)
         if (figure(i) <= 1.0e-4_dp .or. i >= 100000) exit
         i = i + every
       end do
-      call effort%add(descent, i, figure(i), 1.0_dp, 0.25_dp)
+      call effort%add(history, i, figure(i), 1.0_dp, 0.25_dp)
     end do
   end subroutine add_solves
 

@@ -5,7 +5,7 @@ module test_solve_schemes
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   use gravier_method_options, only: method_features_t
   use gravier_solve, only: exact_solution_t
   implicit none
@@ -13,7 +13,7 @@ module test_solve_schemes
   public :: growing_t, first_impulse_t
 
   !> Not a method: multiplies the impulses at each iteration.
-  type, extends(scheme_t) :: growing_t
+  type, extends(method_t) :: growing_t
     real(dp) :: factor = 1.0_dp
     !> iteration that fails, iteration that makes a NaN; 0 for never
     integer :: fails_at = 0, nan_at = 0
@@ -289,7 +289,7 @@ contains
   !> Checks at the start, every check_every iterations and at the last one; the trace has one column for each.
   subroutine test_checks()
     type(simulation_t) :: sim
-    type(growing_t) :: scheme
+    type(growing_t) :: method
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
@@ -301,11 +301,11 @@ contains
     control%check_every = 7
     control%max_iterations = 20
     control%trace = .true.
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    call solve_contacts(sim%problem, method, control, report, error)
     call check_equal(report%status, solve_exhausted, "gives up")
     call check_equal(report%iterations, 20, "iterations until it gives up")
-    call check_equal(scheme%done, 20, "iterations of the scheme")
-    call check_equal(scheme%measured, 3, "iterations that measure the jump")
+    call check_equal(method%done, 20, "iterations of the method")
+    call check_equal(method%measured, 3, "iterations that measure the jump")
     call check_equal(report%n_trace, 4, "checks")
     do k = 1, min(4, report%n_trace)
       call check_equal(nint(report%trace(1, k)), expected(k), "iteration of a check")
@@ -318,13 +318,13 @@ contains
     ! more checks than the trace has room for at first
     control%check_every = 1
     control%max_iterations = 200
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    call solve_contacts(sim%problem, method, control, report, error)
     call check_equal(report%n_trace, 201, "a long trace")
     do k = 1, report%n_trace
       call check_close(report%trace(1, k), k - 1.0_dp, 0.0_dp, "iterations of a long trace")
     end do
     control%trace = .false.
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    call solve_contacts(sim%problem, method, control, report, error)
     call check(report%n_trace == 0 .and. .not. allocated(report%trace), "no trace unless asked for")
     call sim%free()
   end subroutine test_checks
@@ -348,25 +348,25 @@ contains
     call make_column(sim, 2, 20, 0.0_dp)
     call solve_contacts(sim%problem, nlgs, control, report, error)
     call sim%free()
-    call check_equal(report%iterations, traced%iterations, "descent: iterations")
-    call check_equal(report%descent%first(0), report%iterations, "descent: the tolerance")
-    call check(traced%descent%first(0) - traced%descent%first(2) > 10*control%check_every, "descent: a decade takes many checks")
+    call check_equal(report%iterations, traced%iterations, "history: iterations")
+    call check_equal(report%history%first(0), report%iterations, "history: the tolerance")
+    call check(traced%history%first(0) - traced%history%first(2) > 10*control%check_every, "history: a decade takes many checks")
     do k = 1, 2
-      call check(abs(report%descent%first(k) - traced%descent%first(k)) <= control%check_every, "descent: levels")
+      call check(abs(report%history%first(k) - traced%history%first(k)) <= control%check_every, "history: levels")
     end do
-    call check_equal(report%descent%first_check, control%check_every, "descent: the first check")
+    call check_equal(report%history%first_check, control%check_every, "history: the first check")
     accelerated%momentum%on = .true.
     call make_column(sim, 2, 20, 0.0_dp)
     call solve_contacts(sim%problem, accelerated, control, report, error)
     call sim%free()
-    call check_equal(report%descent%first_check, 2, "descent with momentum: the first check")
-    call check(mod(report%descent%first(2), control%check_every) /= 0, "descent with momentum: a level between checks")
+    call check_equal(report%history%first_check, 2, "history with momentum: the first check")
+    call check(mod(report%history%first(2), control%check_every) /= 0, "history with momentum: a level between checks")
     control%trace = .true.
     call make_column(sim, 2, 20, 0.0_dp)
     call solve_contacts(sim%problem, accelerated, control, traced, error)
     call sim%free()
-    call check_equal(traced%descent%first_check, control%check_every, "descent with momentum: the first check of a trace")
-    call check_close(report%figure, report%residual, 0.0_dp, "descent: the figure is the residual")
+    call check_equal(traced%history%first_check, control%check_every, "history with momentum: the first check of a trace")
+    call check_close(report%figure, report%residual, 0.0_dp, "history: the figure is the residual")
     call check(report%start_seconds > 0.0_dp .and. report%seconds > report%start_seconds, "seconds of the solve")
     ! of a check: not before the one before it, and not after the solve
     do k = 2, traced%n_trace
@@ -378,14 +378,14 @@ contains
   !> Impulses that are right already take no iteration, and a tolerance is met when the residual equals it.
   subroutine test_at_the_start()
     type(simulation_t) :: sim
-    type(growing_t) :: scheme
+    type(growing_t) :: method
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
 
     call make_column(sim, 2, 1, 0.0_dp)
     control%tolerance = 0.0_dp
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    call solve_contacts(sim%problem, method, control, report, error)
     call check_equal(report%status, solve_converged, "right from the start")
     call check_equal(report%iterations, 0, "right from the start: iterations")
     call check_close(report%residual, 0.0_dp, 0.0_dp, "right from the start: residual")
@@ -436,17 +436,17 @@ contains
   !> With an exact solution the error decides, whatever the residual says.
   subroutine test_exact_criterion()
     type(simulation_t) :: sim
-    type(growing_t) :: scheme
+    type(growing_t) :: method
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
 
     call make_column(sim, 2, 2, 0.0_dp)
-    scheme%factor = 2.0_dp
+    method%factor = 2.0_dp
     control%criterion = by_error
     control%tolerance = 1.0e-6_dp
     control%check_every = 1
-    call solve_contacts(sim%problem, scheme, control, report, error, first_impulse_t(value=16.0_dp))
+    call solve_contacts(sim%problem, method, control, report, error, first_impulse_t(value=16.0_dp))
     call check_equal(report%status, solve_converged, "exact solution: converged")
     call check_equal(report%iterations, 4, "exact solution: iterations")
     call check_close(report%error, 0.0_dp, rounding, "exact solution: error")
@@ -457,7 +457,7 @@ contains
   !> Growth beyond ten thousand times the defect at the start is divergence; less is not; a NaN is, at once.
   subroutine test_divergence()
     type(simulation_t) :: sim
-    type(growing_t) :: scheme
+    type(growing_t) :: method
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
@@ -467,24 +467,24 @@ contains
     control%tolerance = 1.0e-12_dp
     control%check_every = 1
     control%max_iterations = 1000
-    scheme%factor = 10.0_dp
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    method%factor = 10.0_dp
+    call solve_contacts(sim%problem, method, control, report, error)
     call check_equal(report%status, solve_diverged, "growth: diverged")
     ! the defect at the start is of size 1, and grows ten times an iteration
     call check(report%iterations >= 4 .and. report%iterations <= 6, "growth: soon")
     ! builds for debugging stop at the first operation on a NaN
     call ieee_get_halting_mode(ieee_invalid, halting)
     if (.not. halting) then
-      scheme%factor = 1.0_dp
-      scheme%nan_at = 3
-      call solve_contacts(sim%problem, scheme, control, report, error)
+      method%factor = 1.0_dp
+      method%nan_at = 3
+      call solve_contacts(sim%problem, method, control, report, error)
       call check_equal(report%status, solve_diverged, "NaN: diverged")
       call check_equal(report%iterations, 3, "NaN: at once")
-      scheme%nan_at = 0
+      method%nan_at = 0
     end if
-    scheme%factor = 10.0_dp
+    method%factor = 10.0_dp
     control%max_iterations = 3
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    call solve_contacts(sim%problem, method, control, report, error)
     call check_equal(report%status, solve_exhausted, "some growth is no divergence")
     call check(.not. allocated(error), "divergence is not an error")
     call sim%free()
@@ -541,20 +541,20 @@ contains
   !> Iterations that change nothing end a solve 500 of them after twice the first, at which the figure was known last to fall.
   subroutine test_stagnation()
     type(simulation_t) :: sim
-    type(growing_t) :: scheme
+    type(growing_t) :: method
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(error_t), allocatable :: error
 
     call make_column(sim, 2, 2, 0.0_dp)
-    call solve_contacts(sim%problem, scheme, velocity_control(), report, error)
+    call solve_contacts(sim%problem, method, velocity_control(), report, error)
     call check_equal(report%status, solve_stagnated, "stagnation")
     call check_equal(report%iterations, 2002, "stagnation: iterations")
     ! a method that has other means goes on
     control = velocity_control()
     control%max_iterations = 2000
-    scheme%persists = .true.
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    method%persists = .true.
+    call solve_contacts(sim%problem, method, control, report, error)
     call check_equal(report%status, solve_exhausted, "persistence")
     call sim%free()
   end subroutine test_stagnation
@@ -598,7 +598,7 @@ contains
   !> An error of the method ends the solve, and an error from before starts none.
   subroutine test_errors()
     type(simulation_t) :: sim
-    type(growing_t) :: scheme
+    type(growing_t) :: method
     type(nlgs_t) :: nlgs
     type(solve_control_t) :: control
     type(solve_report_t) :: report
@@ -606,8 +606,8 @@ contains
 
     call make_column(sim, 2, 2, 0.0_dp)
     control%tolerance = 1.0e-12_dp
-    scheme%fails_at = 5
-    call solve_contacts(sim%problem, scheme, control, report, error)
+    method%fails_at = 5
+    call solve_contacts(sim%problem, method, control, report, error)
     call check(allocated(error), "an error ends a solve")
     call check_equal(report%iterations, 5, "where it happened")
     call solve_contacts(sim%problem, nlgs, control, report, error)

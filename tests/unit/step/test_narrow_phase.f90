@@ -7,11 +7,11 @@ program test_narrow_phase
   use gravier_contact_law, only: contact_pair_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: pair_memory_t
-  use gravier_neighbourhood, only: neighbourhood_t
+  use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
   use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
-  use gravier_narrow_phase, only: found_t, find_contacts
+  use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_test_scenes, only: plane
   use gravier_test_law_names, only: add_law
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -39,7 +39,7 @@ contains
     integer, intent(in) :: nd
     !> (nd, n)
     real(dp), intent(in) :: places(:, :)
-    type(neighbourhood_t), intent(out) :: view
+    type(local_bodies_t), intent(out) :: view
     type(decomposition_t), intent(out) :: decomposition
     real(dp) :: normal(nd), point(nd)
     integer :: k
@@ -68,7 +68,7 @@ contains
 
   !> A list of pairs; boundaries are negative.
   subroutine list(view, pairs, memory, shifts)
-    type(neighbourhood_t), intent(inout) :: view
+    type(local_bodies_t), intent(inout) :: view
     !> (2, n)
     integer, intent(in) :: pairs(:, :)
     type(pair_memory_t), intent(in) :: memory
@@ -91,10 +91,10 @@ contains
   !> Gaps within the alert distance, normals from antagonist to candidate; coincident centres; a plane that is gone.
   subroutine check_gaps(nd)
     integer, intent(in) :: nd
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
-    type(found_t) :: found
+    type(contact_list_t) :: found
     real(dp) :: places(nd, 6), along(nd), up(nd)
 
     along(:) = 0.0_dp
@@ -130,10 +130,10 @@ contains
 
   !> The antagonist is shifted by whole periods to where it meets the candidate.
   subroutine check_periods()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
-    type(found_t) :: found
+    type(contact_list_t) :: found
     integer :: codes(1)
 
     codes(1) = shift_code([-1, 0, 0])
@@ -149,10 +149,10 @@ contains
 
   !> A law with restitution acts from touching on, whatever the alert distance; boundaries have values of their own.
   subroutine check_restitution()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
-    type(found_t) :: found
+    type(contact_list_t) :: found
 
     call make(2, reshape([0.0_dp, 0.105_dp, 0.205_dp, 0.105_dp], [2, 2]), view, decomposition)
     call list(view, reshape([1, 2, 1, -1], [2, 2]), pair_memory_t())
@@ -169,17 +169,17 @@ contains
     call check_equal(found%n, 1, "a pair that touches is a contact")
     associate (terms => terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, 1), -0.25_dp))
       call check_close(terms%restitution, 0.5_dp, 0.0_dp, "grains have the coefficients of the scene")
-      call check_close(terms%play, 0.0_dp, 0.0_dp, "an overlap gives no play")
+      call check_close(terms%free_gap, 0.0_dp, 0.0_dp, "an overlap gives no free_gap")
     end associate
     associate (terms => terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, 2), 0.25_dp))
       call check_close(terms%friction, 0.1_dp, 0.0_dp, "a boundary has its own")
-      call check_close(terms%play, 0.25_dp, 0.0_dp, "an open gap is the play")
+      call check_close(terms%free_gap, 0.25_dp, 0.0_dp, "an open gap is the free_gap")
     end associate
   end subroutine check_restitution
 
   !> The boundary and the law of pairs with glued grains, in either order of the two.
   subroutine check_materials()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
 
@@ -210,10 +210,10 @@ contains
 
   !> Beyond the alert distance a pair is a contact while it remembers something: a bridge between grains that part.
   subroutine check_memory()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
-    type(found_t) :: found
+    type(contact_list_t) :: found
     type(pair_memory_t) :: memory
     real(dp) :: force
 
@@ -234,7 +234,7 @@ contains
     ! the geometric mean of the radii, and a gap of half the decay length
     force = 50.0_dp*sqrt(0.1_dp*0.12_dp)*exp(-0.5_dp)
     call check_close(found%terms(1)%attraction, force, 100*rounding*force, "its force")
-    call check_close(found%terms(1)%play, 0.01_dp, rounding, "its play")
+    call check_close(found%terms(1)%free_gap, 0.01_dp, rounding, "its free_gap")
     ! overlaps: the full force
     view%bodies%position(1, 2) = 0.2_dp
     call find_contacts(view, decomposition, physics, found)
@@ -247,7 +247,7 @@ contains
 
   !> Normal velocity and slip of two grains that move and turn, against velocities of their points of contact.
   subroutine check_velocities()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
     type(contact_pair_t) :: pair
@@ -294,7 +294,7 @@ contains
 
   !> A glued grain moves with the boundary that turns, and not with a spin of its own, whether it is candidate or antagonist.
   subroutine check_turning_boundary()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     type(physics_t) :: physics
     type(contact_pair_t) :: pair
@@ -328,7 +328,7 @@ contains
 
   !> Velocities at the start of a step: of a grain that turns, of a glued one, of a boundary, and of a pair along its normal.
   subroutine check_start_velocities()
-    type(neighbourhood_t) :: view
+    type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
     real(dp) :: v(3), w(2), point(2)
 

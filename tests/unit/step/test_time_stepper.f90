@@ -1,4 +1,5 @@
-!> The step and its parts on scenes of a few disks whose answers are known: motion to the middle and to the end, areas of loads, when
+!> The step and its parts on scenes of a few disks whose answers are known: motion to the middle and to the end, areas of loads,
+!> when
 !> space is divided, the contact in which a solve failed, the tally of a run.
 program test_time_stepper
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
@@ -8,7 +9,7 @@ program test_time_stepper
   use gravier_time_table, only: time_table_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_solve, only: solve_report_t, solve_converged, solve_stagnated, solve_diverged
-  use gravier_division, only: division_rule_t, division_is_due
+  use gravier_repartition, only: repartition_rule_t, repartition_is_due
   use gravier_load_areas, only: facing_area, find_load_areas
   use gravier_body_motion, only: move_to_middle, move_to_end, drive, count_fast
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
@@ -58,15 +59,16 @@ contains
 
   !> By schedule; by an imbalance that exceeds the limit and 1.1 times what the last division reached; never in step 0 or alone.
   subroutine test_division()
-    call check(.not. division_is_due(division_rule_t(subdomains=4), 7, 9.0_dp, 1.0_dp), "never without a rule")
-    call check(division_is_due(division_rule_t(subdomains=4, every=5), 10, 1.0_dp, 1.0_dp), "each fifth step")
-    call check(.not. division_is_due(division_rule_t(subdomains=4, every=5), 11, 1.0_dp, 1.0_dp), "not in between")
-    call check(.not. division_is_due(division_rule_t(subdomains=4, every=5), 0, 9.0_dp, 1.0_dp), "not in step 0")
-    call check(.not. division_is_due(division_rule_t(subdomains=1, every=5), 10, 9.0_dp, 1.0_dp), "not of one subdomain")
-    call check(division_is_due(division_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.6_dp, 1.2_dp), "uneven")
-    call check(.not. division_is_due(division_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.4_dp, 1.2_dp), "even enough")
-    call check(.not. division_is_due(division_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.7_dp, 1.6_dp), "tried in vain before")
-    call check(division_is_due(division_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.8_dp, 1.6_dp), "worse than reached")
+    call check(.not. repartition_is_due(repartition_rule_t(subdomains=4), 7, 9.0_dp, 1.0_dp), "never without a rule")
+    call check(repartition_is_due(repartition_rule_t(subdomains=4, every=5), 10, 1.0_dp, 1.0_dp), "each fifth step")
+    call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, every=5), 11, 1.0_dp, 1.0_dp), "not in between")
+    call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, every=5), 0, 9.0_dp, 1.0_dp), "not in step 0")
+    call check(.not. repartition_is_due(repartition_rule_t(subdomains=1, every=5), 10, 9.0_dp, 1.0_dp), "not of one subdomain")
+    call check(repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.6_dp, 1.2_dp), "uneven")
+    call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.4_dp, 1.2_dp), "even enough")
+    call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.7_dp, 1.6_dp), &
+      & "tried in vain before")
+    call check(repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.8_dp, 1.6_dp), "worse than reached")
   end subroutine test_division
 
   !> A box of 2 by 4 m whose right side forces move along x, and a segment of 1.5 m that they move along y.
@@ -98,23 +100,23 @@ contains
 
     call make(column//"&boundary name = 'ceiling', shape = 'plane', normal = 0, -1, point = 0, 9, velocity = 0, -2, "// &
       & "remove_at = 1 / &time step = 0.01, steps = 1 /", simulation)
-    associate (home => simulation%decomposition%home(1), ceiling => simulation%decomposition%boundaries(2))
-      start(:) = home%position(:, 1)
-      home%velocity(1:2, 1) = v
+    associate (owned => simulation%decomposition%owned(1), ceiling => simulation%decomposition%boundaries(2))
+      start(:) = owned%position(:, 1)
+      owned%velocity(1:2, 1) = v
       call move_to_middle(simulation%decomposition, simulation%physics, theta, 0.0_dp, .false., taken)
       call check(.not. taken, "nothing is taken away before its time")
-      call check_close(norm2(home%position(:, 1) - start - (1.0_dp - theta)*h*v), 0.0_dp, 1e-15_dp, "q_m")
+      call check_close(norm2(owned%position(:, 1) - start - (1.0_dp - theta)*h*v), 0.0_dp, 1e-15_dp, "q_m")
       call check_close(ceiling%surface%point(2), 9.0_dp - 2.0_dp*(1.0_dp - theta)*h, 1e-12_dp, "boundary at the middle")
       call drive(simulation%decomposition, simulation%physics, none, 0.0_dp, changed)
       call check(.not. changed, "constant gravity")
       call move_to_end(simulation%decomposition, simulation%physics, theta, .false.)
-      call check_close(norm2(home%position(:, 1) - start - h*v), 0.0_dp, 1e-15_dp, "q_i+1")
+      call check_close(norm2(owned%position(:, 1) - start - h*v), 0.0_dp, 1e-15_dp, "q_i+1")
       call check_close(ceiling%surface%point(2), 9.0_dp - 2.0_dp*h, 1e-12_dp, "boundary at the end")
       call move_to_middle(simulation%decomposition, simulation%physics, theta, 1.0_dp, .false., taken)
       call check(taken .and. .not. ceiling%present, "taken away when its time has come")
       call check_equal(int(count_fast(simulation%decomposition, simulation%physics)), 0, "none is fast")
-      home%velocity(2, 2) = 1.01_dp*home%radius(2)/h
-      home%velocity(1, 3) = 0.99_dp*home%radius(3)/h
+      owned%velocity(2, 2) = 1.01_dp*owned%radius(2)/h
+      owned%velocity(1, 3) = 0.99_dp*owned%radius(3)/h
       call check_equal(int(count_fast(simulation%decomposition, simulation%physics)), 1, "more than a radius in a step")
     end associate
     call simulation%free()
@@ -132,16 +134,16 @@ contains
     call make(one//"&time step = 0.01, steps = 9 /", simulation)
     stepper => simulation
     ! away from the walls of the lattice
-    stepper%decomposition%home(1)%position(2, 1) = 5.0_dp
-    stepper%neighbourhoods%builds = 0
-    start = stepper%decomposition%home(1)%position(2, 1)
+    stepper%decomposition%owned(1)%position(2, 1) = 5.0_dp
+    stepper%halo%builds = 0
+    start = stepper%decomposition%owned(1)%position(2, 1)
     do n = 1, 5
       call stepper%advance(figures, error)
       call check(.not. allocated(error), "a step is made")
       call check_equal(figures%solve%status, solve_converged, "nothing to solve")
-      associate (home => stepper%decomposition%home(1))
-        call check_close(home%velocity(2, 1), -n*g*h, 1e-12_dp, "velocity of the fall")
-        call check_close(home%position(2, 1), start - 0.5_dp*g*(n*h)**2, 1e-12_dp, "height of the fall")
+      associate (owned => stepper%decomposition%owned(1))
+        call check_close(owned%velocity(2, 1), -n*g*h, 1e-12_dp, "velocity of the fall")
+        call check_close(owned%position(2, 1), start - 0.5_dp*g*(n*h)**2, 1e-12_dp, "height of the fall")
       end associate
     end do
     call check_equal(stepper%step, 5, "steps made")

@@ -7,7 +7,7 @@ program test_neighbourhood
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_search, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_halo, only: halo_t
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape, make_decomposition
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -43,7 +43,7 @@ contains
     logical, intent(in) :: by_cells
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: seen
+    type(halo_t) :: seen
     integer :: t, g, home_of(n_grains)
 
     call cloud%init(nd, n_grains, 0.03_dp, 0.1_dp, 50 + nd)
@@ -56,7 +56,7 @@ contains
       do g = 1, n_grains
         home_of(g) = decomposition%partition%owner(cloud%place(:, g))
       end do
-      call decomposition%settle()
+      call decomposition%migrate()
       seen%memory%n_impulse = 2
       call seen%build(decomposition)
       call check_equal(seen%builds, int(t + 1, i8), "lists made")
@@ -96,20 +96,20 @@ contains
       end do
       cloud%place(:, g) = cloud%place(:, g) + way*direction/norm2(direction)
     end do
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          home%position(:, k) = cloud%place(:, home%id(k))
-          home%velocity(:, k) = 2*home%position(:, k)
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          owned%position(:, k) = cloud%place(:, owned%id(k))
+          owned%velocity(:, k) = 2*owned%position(:, k)
         end do
       end associate
     end do
   end subroutine move
 
-  !> Own grains as they stand in `home`, and ghosts, once each, where they are, with their owners.
+  !> Own grains as they stand in `owned`, and ghosts, once each, where they are, with their owners.
   subroutine check_views(decomposition, seen, cloud, home_of)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: seen
+    type(halo_t), intent(in) :: seen
     type(cloud_t), intent(in) :: cloud
     !> subdomain of each grain when the lists were made
     integer, intent(in) :: home_of(:)
@@ -117,26 +117,26 @@ contains
     logical :: own, ghosts, placed
     real(dp) :: velocity(cloud%nd)
 
-    call check_equal(size(seen%view), size(decomposition%home), "one view for each subdomain")
+    call check_equal(size(seen%view), size(decomposition%owned), "one view for each subdomain")
     own = .true.
     ghosts = .true.
     placed = .true.
     do s = 1, size(seen%view)
-      associate (bodies => seen%view(s)%bodies, home => decomposition%home(s), view => seen%view(s))
-        own = own .and. size(view%home) == bodies%n .and. size(view%origin) == bodies%n
+      associate (bodies => seen%view(s)%bodies, owned => decomposition%owned(s), view => seen%view(s))
+        own = own .and. size(view%owner) == bodies%n .and. size(view%origin) == bodies%n
         if (.not. own) exit
         times(:) = 0
-        own = own .and. count(view%origin > 0) == home%n
+        own = own .and. count(view%origin > 0) == owned%n
         do k = 1, bodies%n
           times(bodies%id(k)) = times(bodies%id(k)) + 1
           placed = placed .and. all(abs(bodies%position(:, k) - cloud%place(:, bodies%id(k))) <= 0.0_dp)
           if (view%origin(k) > 0) then
-            own = own .and. home%id(view%origin(k)) == bodies%id(k) .and. view%home(k) == decomposition%subdomain_of(s)
-            velocity(:) = home%velocity(:, view%origin(k))
+            own = own .and. owned%id(view%origin(k)) == bodies%id(k) .and. view%owner(k) == decomposition%subdomain_of(s)
+            velocity(:) = owned%velocity(:, view%origin(k))
             placed = placed .and. all(abs(bodies%velocity(:, k) - velocity) <= 0.0_dp)
           else
-            ghosts = ghosts .and. view%home(k) /= decomposition%subdomain_of(s)
-            ghosts = ghosts .and. view%home(k) == home_of(bodies%id(k))
+            ghosts = ghosts .and. view%owner(k) /= decomposition%subdomain_of(s)
+            ghosts = ghosts .and. view%owner(k) == home_of(bodies%id(k))
           end if
         end do
         ghosts = ghosts .and. all(times <= 1)
@@ -151,7 +151,7 @@ contains
   !> the lists have just been made.
   subroutine check_pairs(decomposition, seen, cloud, range, fresh)
     type(decomposition_t), intent(in) :: decomposition
-    type(neighbourhoods_t), intent(in) :: seen
+    type(halo_t), intent(in) :: seen
     type(cloud_t), intent(in) :: cloud
     real(dp), intent(in) :: range
     logical, intent(in) :: fresh
@@ -204,7 +204,7 @@ contains
   subroutine test_due_grains()
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: seen
+    type(halo_t) :: seen
     integer :: g
 
     call cloud%init(2, n_grains, 0.03_dp, 0.1_dp, 70)
@@ -228,9 +228,9 @@ contains
     real(dp), intent(in) :: way
     integer :: s
 
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        where (home%id == g) home%position(2, :) = home%position(2, :) - way
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        where (owned%id == g) owned%position(2, :) = owned%position(2, :) - way
       end associate
     end do
   end subroutine shift_grain
@@ -286,7 +286,7 @@ contains
     real(dp), intent(in) :: part
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition
-    type(neighbourhoods_t) :: seen
+    type(halo_t) :: seen
     integer :: k
 
     call cloud%init(3, 20, 0.03_dp, 0.1_dp, 70)

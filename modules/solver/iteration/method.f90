@@ -1,5 +1,5 @@
 !> What every method is: something that improves the impulses of a contact problem by iterations.
-module gravier_scheme
+module gravier_method
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
@@ -9,7 +9,7 @@ module gravier_scheme
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   implicit none
   private
-  public :: scheme_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
+  public :: method_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
     & end_sweeps, extrapolate
 
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
@@ -34,8 +34,8 @@ module gravier_scheme
     integer(i8) :: analyses = 0, factorisations = 0
     !> times that the safeguard of an enriched method has lowered its search direction
     integer(i8) :: lowered = 0
-    !> times that the memory of momentum was shortened, and that momentum gave way to plain iterations
-    integer(i8) :: shortened = 0, put_off = 0
+    !> times that the memory of momentum was restarted, and that momentum gave way to plain iterations
+    integer(i8) :: restarted = 0, suspended = 0
     !> times that the automatic relaxation factor of a Schwarz method was lowered, and how far at most
     integer(i8) :: relaxed = 0
     real(dp) :: least_factor = 1.0_dp
@@ -60,8 +60,8 @@ module gravier_scheme
     logical :: resting = .false.
     !> the local operators in place are those of whole local solves
     logical :: whole_in_place = .true.
-    !> times that the memory was shortened in this solve
-    integer :: shortened = 0
+    !> times that the memory was restarted in this solve
+    integer :: restarted = 0
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
@@ -73,7 +73,7 @@ module gravier_scheme
     procedure :: whole => momentum_whole
   end type momentum_t
 
-  type, abstract :: scheme_t
+  type, abstract :: method_t
     !> whether growth is left to a safeguard of the method, which mends it
     logical :: guarded = .false.
     !> what the log says of the search direction, empty without one
@@ -97,14 +97,14 @@ module gravier_scheme
     procedure(start_solve), deferred :: start
     procedure(iterate_once), deferred :: iterate
     procedure :: set => take_options
-    procedure :: held => scheme_held
-    procedure :: conclude => scheme_conclude
-    procedure :: mends_growth => scheme_mends_growth
-    procedure :: free => scheme_free
-    procedure :: work_done => scheme_work_done
-    procedure :: measure_balance => scheme_measure_balance
-    procedure :: forget_times => scheme_forget_times
-  end type scheme_t
+    procedure :: held => method_held
+    procedure :: conclude => method_conclude
+    procedure :: mends_growth => method_mends_growth
+    procedure :: free => method_free
+    procedure :: work_done => method_work_done
+    procedure :: measure_balance => method_measure_balance
+    procedure :: forget_times => method_forget_times
+  end type method_t
 
   abstract interface
     !> What the method is called and what it serves.
@@ -116,17 +116,17 @@ module gravier_scheme
     !> Make ready for a new problem, from the impulses it holds, and evaluate v_global. Collective; an error is the same on all
     !> ranks.
     subroutine start_solve(self, problem, error)
-      import :: scheme_t, contact_problem_t, error_t
+      import :: method_t, contact_problem_t, error_t
       implicit none
-      class(scheme_t), intent(inout) :: self
+      class(method_t), intent(inout) :: self
       type(contact_problem_t), intent(inout) :: problem
       type(error_t), allocatable, intent(inout) :: error
     end subroutine start_solve
     !> One iteration: sweeps in every subdomain, then one exchange. Collective; an error is the same on all ranks.
     subroutine iterate_once(self, problem, measure, jump, error)
-      import :: scheme_t, contact_problem_t, error_t, dp
+      import :: method_t, contact_problem_t, error_t, dp
       implicit none
-      class(scheme_t), intent(inout) :: self
+      class(method_t), intent(inout) :: self
       type(contact_problem_t), intent(inout) :: problem
       !> whether `jump` is asked for
       logical, intent(in) :: measure
@@ -140,7 +140,7 @@ contains
 
   !> Take what the input says to the method; methods with options of their own take these, too.
   subroutine take_options(self, options)
-    class(scheme_t), intent(inout) :: self
+    class(method_t), intent(inout) :: self
     type(method_options_t), intent(in) :: options
 
     self%sweeps = options%sweeps
@@ -149,8 +149,8 @@ contains
   end subroutine take_options
 
   !> The arrays that the method holds beside those of all methods; methods with arrays of their own add them.
-  pure subroutine scheme_held(self, nc, nv, held)
-    class(scheme_t), intent(in) :: self
+  pure subroutine method_held(self, nc, nv, held)
+    class(method_t), intent(in) :: self
     !> components of a contact, of a body
     integer, intent(in) :: nc, nv
     type(held_list_t), intent(inout) :: held
@@ -158,41 +158,41 @@ contains
     if (.not. self%momentum%on) return
     call held%add("impulse of momentum", .true., 8, nc)
     call held%add("velocity of momentum", .false., 8, nv)
-  end subroutine scheme_held
+  end subroutine method_held
 
   !> The end of a solve without success, with v_global evaluated: what is left are the impulses of the last iteration; methods
   !> that keep better ones override it. Collective.
-  subroutine scheme_conclude(self, problem)
-    class(scheme_t), intent(inout) :: self
+  subroutine method_conclude(self, problem)
+    class(method_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
 
     self%check_next = .false.
     call problem%evaluate()
-  end subroutine scheme_conclude
+  end subroutine method_conclude
 
   !> Whether something in the method works against growth: a safeguard, momentum that gives way, a factor that is lowered, or
   !> impulses kept from before.
-  pure logical function scheme_mends_growth(self) result(mends)
-    class(scheme_t), intent(in) :: self
+  pure logical function method_mends_growth(self) result(mends)
+    class(method_t), intent(in) :: self
     mends = self%guarded .or. self%adapts .or. self%keeps_best .or. self%momentum%on
-  end function scheme_mends_growth
+  end function method_mends_growth
 
   !> Give back what the method holds; methods that hold something override it.
-  subroutine scheme_free(self)
-    class(scheme_t), intent(inout) :: self
+  subroutine method_free(self)
+    class(method_t), intent(inout) :: self
     self%work = work_t()
-  end subroutine scheme_free
+  end subroutine method_free
 
   !> Work done since the method was made; methods with factors of their own override it.
-  type(work_t) function scheme_work_done(self) result(work)
-    class(scheme_t), intent(in) :: self
+  type(work_t) function method_work_done(self) result(work)
+    class(method_t), intent(in) :: self
     work = self%work
-  end function scheme_work_done
+  end function method_work_done
 
   !> How unevenly the seconds in sweeps lie, of the ranks and of the subdomains: the most over the mean, 1 without any.
   !> Collective.
-  subroutine scheme_measure_balance(self, comm, n_subdomains, ranks, subdomains)
-    class(scheme_t), intent(in) :: self
+  subroutine method_measure_balance(self, comm, n_subdomains, ranks, subdomains)
+    class(method_t), intent(in) :: self
     type(communicator_t), intent(in) :: comm
     !> of the scene
     integer, intent(in) :: n_subdomains
@@ -216,17 +216,17 @@ contains
       ranks = 1.0_dp
       subdomains = 1.0_dp
     end if
-  end subroutine scheme_measure_balance
+  end subroutine method_measure_balance
 
-  subroutine scheme_forget_times(self)
-    class(scheme_t), intent(inout) :: self
+  subroutine method_forget_times(self)
+    class(method_t), intent(inout) :: self
     if (allocated(self%seconds)) deallocate (self%seconds)
-  end subroutine scheme_forget_times
+  end subroutine method_forget_times
 
   !> Masses as the method wants them, and reactions and velocities that agree with the impulses in all copies, v_global too.
   !> Collective.
-  subroutine start_sweeps(scheme, problem, shared_masses)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine start_sweeps(method, problem, shared_masses)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     !> masses shared between the copies of a body (dual Schur methods), or whole in each
     logical, intent(in) :: shared_masses
@@ -247,8 +247,8 @@ contains
     if (allocated(problem%progress)) deallocate (problem%progress)
     allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)
     problem%progress_is_summed = .false.
-    if (.not. allocated(scheme%seconds)) allocate (scheme%seconds(size(problem%sub)), source=0.0_dp)
-    if (scheme%momentum%on) call start_momentum(scheme%momentum, problem)
+    if (.not. allocated(method%seconds)) allocate (method%seconds(size(problem%sub)), source=0.0_dp)
+    if (method%momentum%on) call start_momentum(method%momentum, problem)
   end subroutine start_sweeps
 
   subroutine start_momentum(momentum, problem)
@@ -265,33 +265,33 @@ contains
   end subroutine start_momentum
 
   !> The sweeps of one iteration in every subdomain of this rank. Collective with momentum.
-  subroutine sweep_all(scheme, problem)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine sweep_all(method, problem)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, k
 
-    call begin_sweeps(scheme, problem)
+    call begin_sweeps(method, problem)
     do s = 1, size(problem%sub)
-      do k = 1, scheme%sweeps
-        call sweep_once(scheme, problem, s, k)
+      do k = 1, method%sweeps
+        call sweep_once(method, problem, s, k)
       end do
     end do
-    call end_sweeps(scheme, problem)
+    call end_sweeps(method, problem)
   end subroutine sweep_all
 
   !> The same, passing on the velocities of shared bodies. Subdomains with neighbours on other ranks come first, so that
   !> messages travel while the others are swept: no subdomain's sweeps depend on another's. Collective.
-  subroutine sweep_and_pass(scheme, problem)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine sweep_and_pass(method, problem)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, k, round
 
-    call begin_sweeps(scheme, problem)
+    call begin_sweeps(method, problem)
     do round = 1, 2
       do s = 1, size(problem%sub)
         if (problem%shared%is_far(s) .neqv. round == 1) cycle
-        do k = 1, scheme%sweeps
-          call sweep_once(scheme, problem, s, k)
+        do k = 1, method%sweeps
+          call sweep_once(method, problem, s, k)
         end do
       end do
       call stop_timer(phase_sweep)
@@ -303,7 +303,7 @@ contains
       call stop_timer(phase_exchange)
       call start_timer(phase_sweep)
     end do
-    call end_sweeps(scheme, problem)
+    call end_sweeps(method, problem)
     call start_timer(phase_exchange)
     call problem%shared%finish()
     call stop_timer(phase_exchange)
@@ -311,21 +311,21 @@ contains
 
   !> With momentum, bring the velocities to those under the extrapolated impulses, from which the first sweep starts:
   !> V depends on r linearly.
-  subroutine begin_sweeps(scheme, problem)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine begin_sweeps(method, problem)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     integer :: s
 
     call start_timer(phase_sweep)
     problem%progress_is_summed = .false.
-    if (.not. scheme%momentum%on) return
+    if (.not. method%momentum%on) return
     ! what alternates between subdomains, which a Schwarz method adapts a factor to, bears no longer steps
-    if (.not. scheme%adapts .and. (scheme%momentum%whole() .neqv. scheme%momentum%whole_in_place)) then
-      call change_shares(scheme%momentum, problem)
+    if (.not. method%adapts .and. (method%momentum%whole() .neqv. method%momentum%whole_in_place)) then
+      call change_shares(method%momentum, problem)
     end if
-    if (scheme%momentum%resting) return
+    if (method%momentum%resting) return
     do s = 1, size(problem%sub)
-      call extrapolate(scheme%momentum%beta, problem%sub(s)%velocity, scheme%momentum%part(s)%velocity)
+      call extrapolate(method%momentum%beta, problem%sub(s)%velocity, method%momentum%part(s)%velocity)
     end do
   end subroutine begin_sweeps
 
@@ -373,8 +373,8 @@ contains
   end subroutine extrapolate_numbers
 
   !> Sweep `k` of an iteration in subdomain `s` of this rank; contacts that have woken come after the others.
-  subroutine sweep_once(scheme, problem, s, k, law_velocity)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine sweep_once(method, problem, s, k, law_velocity)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s, k
     !> takes the velocity that solves the law at each contact (lanes, nc, blocks) [m/s]
@@ -384,15 +384,15 @@ contains
     start = clock()
     associate (sub => problem%sub(s))
       call sweep_blocks(1, n_blocks(sub%n_awake), sub%n_grouped, sums)
-      scheme%work%relaxations = scheme%work%relaxations + sub%n_awake
+      method%work%relaxations = method%work%relaxations + sub%n_awake
       if (problem%n_asleep == 0 .and. sub%n_awake < sub%n_contacts) then
         call sweep_blocks(n_blocks(sub%n_awake) + 1, size(sub%hot, 3), sub%n_grouped_asleep, more)
         sums(:) = sums + more
-        scheme%work%relaxations = scheme%work%relaxations + sub%n_contacts - sub%n_awake
+        method%work%relaxations = method%work%relaxations + sub%n_contacts - sub%n_awake
       end if
     end associate
     if (k == 1) problem%progress(:, s) = sums
-    scheme%seconds(s) = scheme%seconds(s) + clock() - start
+    method%seconds(s) = method%seconds(s) + clock() - start
 
   contains
 
@@ -402,8 +402,8 @@ contains
       real(dp), intent(out) :: sums(2)
 
       associate (sub => problem%sub(s), kernels => problem%kernels, first => (a - 1)*lanes + 1, last => z*lanes)
-        if (scheme%momentum%on .and. k == 1 .and. .not. scheme%momentum%resting) then
-          associate (previous => scheme%momentum%part(s)%impulse, beta => scheme%momentum%beta)
+        if (method%momentum%on .and. k == 1 .and. .not. method%momentum%resting) then
+          associate (previous => method%momentum%part(s)%impulse, beta => method%momentum%beta)
             if (present(law_velocity)) then
               call kernels%sweep_momentum_recording(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, &
                 & sub%velocity, sub%impulse(:, :, a:z), sums, beta, previous(:, :, a:z), law_velocity(:, :, a:z))
@@ -425,22 +425,22 @@ contains
   end subroutine sweep_once
 
   !> Count the sweeps, and choose the extrapolation of the next iteration. Collective with momentum.
-  subroutine end_sweeps(scheme, problem)
-    class(scheme_t), intent(inout) :: scheme
+  subroutine end_sweeps(method, problem)
+    class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     real(dp) :: sums(2)
-    integer :: shortened, plain
+    integer :: restarted, plain
 
-    scheme%work%sweeps = scheme%work%sweeps + scheme%sweeps
-    scheme%work%iterations = scheme%work%iterations + 1
+    method%work%sweeps = method%work%sweeps + method%sweeps
+    method%work%iterations = method%work%iterations + 1
     call stop_timer(phase_sweep)
-    if (.not. scheme%momentum%on) return
+    if (.not. method%momentum%on) return
     call problem%sum_progress(sums)
-    shortened = scheme%momentum%shortened
-    plain = scheme%momentum%plain
-    call scheme%momentum%steer(sums(1))
-    scheme%work%shortened = scheme%work%shortened + scheme%momentum%shortened - shortened
-    if (scheme%momentum%plain > plain) scheme%work%put_off = scheme%work%put_off + 1
+    restarted = method%momentum%restarted
+    plain = method%momentum%plain
+    call method%momentum%steer(sums(1))
+    method%work%restarted = method%work%restarted + method%momentum%restarted - restarted
+    if (method%momentum%plain > plain) method%work%suspended = method%work%suspended + 1
   end subroutine end_sweeps
 
   !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
@@ -452,7 +452,7 @@ contains
 
     if (change > growth_allowed*self%change) then
       self%t = max(1.0_dp, memory_kept*self%t)
-      self%shortened = self%shortened + 1
+      self%restarted = self%restarted + 1
     end if
     self%change = change
     self%window_change = self%window_change + change
@@ -501,4 +501,4 @@ contains
     momentum%window_change = 0.0_dp
   end subroutine close_window
 
-end module gravier_scheme
+end module gravier_method

@@ -1,6 +1,6 @@
 !> What each subdomain sees: its grains, the ghosts near them, and the near pairs it owns; made anew only when grains
 !> have moved far enough.
-module gravier_neighbourhood
+module gravier_halo
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sparse_exchange, only: sparse_exchange
@@ -11,29 +11,29 @@ module gravier_neighbourhood
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: neighbourhood_t, neighbourhoods_t
+  public :: local_bodies_t, halo_t
 
   !> The grains that a subdomain sees, in an order that depends on them alone, and its near pairs.
-  type :: neighbourhood_t
+  type :: local_bodies_t
     type(body_set_t) :: bodies
-    !> subdomain that owns each, and for its own the place in home (n); 0 for ghosts
-    integer, allocatable :: home(:), origin(:)
+    !> subdomain that owns each, and for its own the place among the owned (n); 0 for ghosts
+    integer, allocatable :: owner(:), origin(:)
     type(neighbour_list_t) :: list
-  end type neighbourhood_t
+  end type local_bodies_t
 
   !> Where the grains of a subdomain were when its list was made (nd, n) [m].
   type :: places_t
     real(dp), allocatable :: position(:, :)
   end type places_t
 
-  !> The neighbourhoods of the subdomains of this rank, and who sends which grain to whom.
-  type :: neighbourhoods_t
-    type(neighbourhood_t), allocatable :: view(:)
+  !> The halo of the subdomains of this rank, and who sends which grain to whom.
+  type :: halo_t
+    type(local_bodies_t), allocatable :: view(:)
     !> as they were when the lists were made
     type(places_t), allocatable :: reference(:)
     type(boundary_t), allocatable :: reference_boundaries(:)
-    !> ghosts sent: subdomain of this rank and place in its home (2, n); subdomain that sees it, and its rank (n)
-    integer, allocatable :: sent(:, :), seer(:), destination(:)
+    !> ghosts sent: subdomain of this rank and place among its owned bodies (2, n); subdomain that sees it, and its rank (n)
+    integer, allocatable :: sent(:, :), recipient(:), destination(:)
     !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
     integer, allocatable :: arrival(:, :)
     !> to be set before the first list
@@ -41,16 +41,16 @@ module gravier_neighbourhood
     !> lists made so far
     integer(i8) :: builds = 0
   contains
-    procedure :: build => neighbourhoods_build
-    procedure :: refresh => neighbourhoods_refresh
-    procedure :: are_due => neighbourhoods_are_due
-  end type neighbourhoods_t
+    procedure :: build => halo_build
+    procedure :: refresh => halo_refresh
+    procedure :: are_due => halo_are_due
+  end type halo_t
 
 contains
 
   !> Make views and lists of the grains as they have settled. Collective.
-  subroutine neighbourhoods_build(self, decomposition)
-    class(neighbourhoods_t), intent(inout) :: self
+  subroutine halo_build(self, decomposition)
+    class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(body_set_t), allocatable :: ghosts(:)
     integer(i8), allocatable :: records(:, :), received(:, :)
@@ -63,76 +63,76 @@ contains
     call decomposition%unpack_by_subdomain(received, 2, ghosts)
     if (allocated(self%view)) deallocate (self%view)
     if (allocated(self%reference)) deallocate (self%reference)
-    allocate (self%view(size(decomposition%home)), self%reference(size(decomposition%home)))
+    allocate (self%view(size(decomposition%owned)), self%reference(size(decomposition%owned)))
     call make_views(self, decomposition, ghosts, received)
     search%rule = decomposition%rule
     search%period = decomposition%period
     search%boundaries = decomposition%boundaries
     do s = 1, size(self%view)
-      self%reference(s)%position = decomposition%home(s)%position
-      search%subdomain = decomposition%subdomain_of(s)
+      self%reference(s)%position = decomposition%owned(s)%position
       associate (view => self%view(s))
-        call search%find(view%bodies, view%home, decomposition%partition, self%memory, view%list)
+        search%subdomain = decomposition%subdomain_of(s)
+        call search%find(view%bodies, view%owner, decomposition%partition, self%memory, view%list)
       end associate
     end do
     self%reference_boundaries = decomposition%boundaries
     self%builds = self%builds + 1
-  end subroutine neighbourhoods_build
+  end subroutine halo_build
 
   !> Find the grains of this rank that other subdomains see.
   subroutine plan_ghosts(self, decomposition)
-    class(neighbourhoods_t), intent(inout) :: self
+    class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer, allocatable :: near(:)
     integer :: s, k, j, n_near, n, round
 
-    if (allocated(self%sent)) deallocate (self%sent, self%seer, self%destination)
+    if (allocated(self%sent)) deallocate (self%sent, self%recipient, self%destination)
     allocate (near(32))
     do round = 1, 2
       n = 0
-      do s = 1, size(decomposition%home)
-        associate (home => decomposition%home(s))
-          do k = 1, home%n
-            call decomposition%partition%near(home%position(:, k), decomposition%rule%reach(home%radius(k)), near, n_near)
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s))
+          do k = 1, owned%n
+            call decomposition%partition%near(owned%position(:, k), decomposition%rule%reach(owned%radius(k)), near, n_near)
             do j = 1, n_near
               if (near(j) == decomposition%subdomain_of(s)) cycle
               n = n + 1
               if (round == 1) cycle
               self%sent(1, n) = s
               self%sent(2, n) = k
-              self%seer(n) = near(j)
+              self%recipient(n) = near(j)
               self%destination(n) = decomposition%comm%rank_of(near(j), decomposition%n_subdomains)
             end do
           end do
         end associate
       end do
-      if (round == 1) allocate (self%sent(2, n), self%seer(n), self%destination(n))
+      if (round == 1) allocate (self%sent(2, n), self%recipient(n), self%destination(n))
     end do
   end subroutine plan_ghosts
 
-  !> Records (seer, owner, grain).
+  !> Records (recipient, owner, grain).
   subroutine write_ghosts(self, decomposition, records)
-    class(neighbourhoods_t), intent(in) :: self
+    class(halo_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable, intent(out) :: records(:, :)
     type(body_layout_t) :: layout
     integer :: n
 
     layout = decomposition%layout()
-    allocate (records(2 + layout%record_words(), size(self%seer)))
-    do n = 1, size(self%seer)
-      records(1, n) = self%seer(n)
+    allocate (records(2 + layout%record_words(), size(self%recipient)))
+    do n = 1, size(self%recipient)
+      records(1, n) = self%recipient(n)
       records(2, n) = decomposition%subdomain_of(self%sent(1, n))
-      call decomposition%home(self%sent(1, n))%get_record(self%sent(2, n), records(3:, n))
+      call decomposition%owned(self%sent(1, n))%get_record(self%sent(2, n), records(3:, n))
     end do
   end subroutine write_ghosts
 
   !> Put own grains and ghosts together, in sweep order, and note where each ghost went.
   subroutine make_views(self, decomposition, ghosts, received)
-    class(neighbourhoods_t), intent(inout) :: self
+    class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(body_set_t), intent(in) :: ghosts(:)
-    !> (seer, owner, grain)
+    !> (recipient, owner, grain)
     integer(i8), intent(in), contiguous :: received(:, :)
     integer, allocatable :: next(:)
     integer :: s, k, n
@@ -141,11 +141,11 @@ contains
     allocate (self%arrival(2, size(received, 2)), next(size(self%view)))
     do s = 1, size(self%view)
       associate (view => self%view(s))
-        view%bodies = decomposition%home(s)
+        view%bodies = decomposition%owned(s)
         call append_bodies(view%bodies, ghosts(s))
-        n = decomposition%home(s)%n
-        allocate (view%home(view%bodies%n), view%origin(view%bodies%n))
-        view%home(1:n) = decomposition%subdomain_of(s)
+        n = decomposition%owned(s)%n
+        allocate (view%owner(view%bodies%n), view%origin(view%bodies%n))
+        view%owner(1:n) = decomposition%subdomain_of(s)
         do k = 1, n
           view%origin(k) = k
         end do
@@ -156,7 +156,7 @@ contains
     do k = 1, size(received, 2)
       s = narrow(received(1, k)) - decomposition%first + 1
       next(s) = next(s) + 1
-      self%view(s)%home(next(s)) = narrow(received(2, k))
+      self%view(s)%owner(next(s)) = narrow(received(2, k))
       self%arrival(1, k) = s
       self%arrival(2, k) = next(s)
     end do
@@ -164,10 +164,10 @@ contains
   end subroutine make_views
 
   subroutine sort_views(self, decomposition)
-    class(neighbourhoods_t), intent(inout) :: self
+    class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable :: id(:, :)
-    integer, allocatable :: order(:), home(:), origin(:), place(:), offset(:)
+    integer, allocatable :: order(:), owner(:), origin(:), place(:), offset(:)
     real(dp) :: lower(decomposition%nd)
     integer :: s, k
 
@@ -185,11 +185,11 @@ contains
         if (view%bodies%n > 0) lower(:) = minval(view%bodies%position, dim=2)
         call sweep_order(view%bodies%position, lower, decomposition%rule%sweep_edge(), id, order)
         call view%bodies%reorder(order)
-        call move_alloc(view%home, home)
+        call move_alloc(view%owner, owner)
         call move_alloc(view%origin, origin)
-        allocate (view%home(size(order)), view%origin(size(order)))
+        allocate (view%owner(size(order)), view%origin(size(order)))
         do k = 1, size(order)
-          view%home(k) = home(order(k))
+          view%owner(k) = owner(order(k))
           view%origin(k) = origin(order(k))
           place(offset(s) + order(k)) = k
         end do
@@ -202,35 +202,35 @@ contains
   end subroutine sort_views
 
   !> Bring the places, velocities and what else changes in every step up to date in the views. Collective.
-  subroutine neighbourhoods_refresh(self, decomposition)
-    class(neighbourhoods_t), intent(inout) :: self
+  subroutine halo_refresh(self, decomposition)
+    class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable :: records(:, :), received(:, :)
     type(body_layout_t) :: layout
     integer :: s, k, n
 
     layout = decomposition%layout()
-    allocate (records(layout%renewed_words(), size(self%seer)))
-    do n = 1, size(self%seer)
-      call decomposition%home(self%sent(1, n))%get_renewed(self%sent(2, n), records(:, n))
+    allocate (records(layout%renewed_words(), size(self%recipient)))
+    do n = 1, size(self%recipient)
+      call decomposition%owned(self%sent(1, n))%get_renewed(self%sent(2, n), records(:, n))
     end do
     call sparse_exchange(decomposition%comm, records, self%destination, received)
     do n = 1, size(received, 2)
       call self%view(self%arrival(1, n))%bodies%set_renewed(self%arrival(2, n), received(:, n))
     end do
     do s = 1, size(self%view)
-      associate (view => self%view(s), home => decomposition%home(s))
+      associate (view => self%view(s), owned => decomposition%owned(s))
         do k = 1, view%bodies%n
           if (view%origin(k) == 0) cycle
-          call view%bodies%renew(k, home, view%origin(k))
+          call view%bodies%renew(k, owned, view%origin(k))
         end do
       end associate
     end do
-  end subroutine neighbourhoods_refresh
+  end subroutine halo_refresh
 
   !> Whether some pair outside the lists may have come within the alert distance. Collective.
-  logical function neighbourhoods_are_due(self, decomposition) result(due)
-    class(neighbourhoods_t), intent(in) :: self
+  logical function halo_are_due(self, decomposition) result(due)
+    class(halo_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
     real(dp) :: farthest, boundary
     integer :: s, k, b
@@ -238,10 +238,10 @@ contains
     due = .true.
     if (.not. allocated(self%view)) return
     farthest = 0.0_dp
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        do k = 1, home%n
-          farthest = max(farthest, sum((home%position(:, k) - self%reference(s)%position(:, k))**2))
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          farthest = max(farthest, sum((owned%position(:, k) - self%reference(s)%position(:, k))**2))
         end do
       end associate
     end do
@@ -251,7 +251,7 @@ contains
       boundary = max(boundary, way_of(decomposition%boundaries(b), self%reference_boundaries(b)))
     end do
     due = farthest + max(farthest, boundary) > decomposition%rule%skin
-  end function neighbourhoods_are_due
+  end function halo_are_due
 
   !> How far the surface of a boundary has moved at most [m]. The axis of a drum, which turns about it, picks up roundings,
   !> which are no tilt.
@@ -270,4 +270,4 @@ contains
     end if
   end function way_of
 
-end module gravier_neighbourhood
+end module gravier_halo

@@ -1,10 +1,10 @@
 !> How solves come down to their goal, the accuracy or the tolerance, in a record of fixed size, and between which numbers of
 !> iterations ten times looser and tighter goals would have taken.
-module gravier_descent
+module gravier_convergence_history
   use gravier_kinds, only: dp, i8
   implicit none
   private
-  public :: descent_t, effort_t, at_tolerance, tenfold, unknown_effort
+  public :: convergence_history_t, effort_t, at_tolerance, tenfold, unknown_effort
 
   !> places of the levels: tolerance 10^(k/2), so that the last one is ten times the tolerance
   integer, parameter :: at_tolerance = 0, half_a_decade = 1, tenfold = 2
@@ -17,14 +17,14 @@ module gravier_descent
   real(dp), parameter :: least_looser = 0.5_dp, least_tighter = 0.8_dp, most_tighter = 2.0_dp
 
   !> One solve.
-  type :: descent_t
+  type :: convergence_history_t
     !> iteration of the first figure at or below each level, -1 for none
     integer :: first(at_tolerance:tenfold) = -1
     !> the first iteration that may end a solve
     integer :: first_check = 1
   contains
     procedure :: note => descent_note
-  end type descent_t
+  end type convergence_history_t
 
   !> Many solves with one tolerance.
   type :: effort_t
@@ -50,7 +50,7 @@ contains
 
   !> Note a figure of the iteration, measured or expected from what sweeps move impulses by.
   pure subroutine descent_note(self, iteration, figure, tolerance)
-    class(descent_t), intent(inout) :: self
+    class(convergence_history_t), intent(inout) :: self
     integer, intent(in) :: iteration
     real(dp), intent(in) :: figure, tolerance
     integer :: k
@@ -62,9 +62,9 @@ contains
 
   !> Add a solve. One that took iterations to its tolerance would have taken those to its first check at a looser one: what a
   !> looser tolerance leaves adds up from step to step, until it is too much for that one too.
-  pure subroutine effort_add(self, descent, iterations, figure, seconds, start_seconds)
+  pure subroutine effort_add(self, history, iterations, figure, seconds, start_seconds)
     class(effort_t), intent(inout) :: self
-    type(descent_t), intent(in) :: descent
+    type(convergence_history_t), intent(in) :: history
     integer, intent(in) :: iterations
     !> at its end
     real(dp), intent(in) :: figure
@@ -78,10 +78,10 @@ contains
     self%seconds = self%seconds + seconds
     self%start_seconds = self%start_seconds + start_seconds
     do k = at_tolerance, tenfold
-      if (descent%first(k) < 0) then
+      if (history%first(k) < 0) then
         self%unreached(k) = self%unreached(k) + 1
       else if (iterations > 0) then
-        self%reached(k) = self%reached(k) + max(descent%first(k), min(descent%first_check, iterations))
+        self%reached(k) = self%reached(k) + max(history%first(k), min(history%first_check, iterations))
       end if
     end do
   end subroutine effort_add
@@ -148,4 +148,4 @@ contains
     if (self%iterations > 0) seconds = seconds + (self%seconds - self%start_seconds)*(iterations/real(self%iterations, dp))
   end function effort_seconds_of
 
-end module gravier_descent
+end module gravier_convergence_history

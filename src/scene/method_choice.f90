@@ -1,9 +1,9 @@
 !> From the input to a method: the options of &solver and &enriched.
-module gravier_scheme_choice
+module gravier_method_choice
   use gravier_config_types, only: config_t
   use gravier_method_options, only: method_options_t
   use gravier_method_registry, only: make_method
-  use gravier_scheme, only: scheme_t
+  use gravier_method, only: method_t
   implicit none
   private
   public :: choose_scheme
@@ -11,9 +11,9 @@ module gravier_scheme_choice
 contains
 
   !> Make the method that &solver and &enriched ask for.
-  subroutine choose_scheme(config, scheme)
+  subroutine choose_scheme(config, method)
     type(config_t), intent(in) :: config
-    class(scheme_t), allocatable, intent(out) :: scheme
+    class(method_t), allocatable, intent(out) :: method
     type(method_options_t) :: options
 
     associate (solver => config%solver, enriched => config%enriched)
@@ -28,8 +28,8 @@ contains
       options%interface_cg = enriched%interface == "cg"
       options%cg_tolerance = enriched%cg_tolerance
       options%cg_max_iterations = enriched%cg_max_iterations
-      call make_method(trim(solver%method), options, scheme)
+      call make_method(trim(solver%method), options, method)
     end associate
   end subroutine choose_scheme
 
-end module gravier_scheme_choice
+end module gravier_method_choice

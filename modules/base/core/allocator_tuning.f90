@@ -1,5 +1,5 @@
 !> What the C library does with memory that is given back.
-module gravier_heap
+module gravier_allocator_tuning
   use, intrinsic :: iso_c_binding, only: c_int
   implicit none
   private
@@ -27,4 +27,4 @@ contains
     ignored = c_mallopt(mmap_max, 0_c_int)
   end subroutine keep_heap
 
-end module gravier_heap
+end module gravier_allocator_tuning

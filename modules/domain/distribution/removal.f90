@@ -1,10 +1,10 @@
 !> Grains that leave the scene: behind outlets, or with the boundary that they are glued to.
-module gravier_departures
+module gravier_removal
   use gravier_kinds, only: dp, i8
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: some_leave, let_grains_out
+  public :: some_leave, remove_grains
 
 contains
 
@@ -17,14 +17,14 @@ contains
     real(dp) :: distance, normal(decomposition%nd)
 
     stays = .true.
-    associate (boundaries => decomposition%boundaries, home => decomposition%home(s))
-      if (home%glued(k) > 0) then
-        stays = boundaries(home%glued(k))%present
+    associate (boundaries => decomposition%boundaries, owned => decomposition%owned(s))
+      if (owned%glued(k) > 0) then
+        stays = boundaries(owned%glued(k))%present
         return
       end if
       do b = 1, size(boundaries)
         if (.not. (boundaries(b)%lets_out() .and. boundaries(b)%present)) cycle
-        call boundaries(b)%locate(home%position(:, k), distance, normal)
+        call boundaries(b)%locate(owned%position(:, k), distance, normal)
         if (distance < 0.0_dp) stays = .false.
       end do
     end associate
@@ -48,8 +48,8 @@ contains
 
     some_leave = .false.
     if (.not. has_outlet(decomposition)) return
-    do s = 1, size(decomposition%home)
-      do k = 1, decomposition%home(s)%n
+    do s = 1, size(decomposition%owned)
+      do k = 1, decomposition%owned(s)%n
         if (.not. stays(decomposition, s, k)) some_leave = .true.
       end do
     end do
@@ -57,7 +57,7 @@ contains
   end function some_leave
 
   !> Take the grains that leave out of the scene. Collective.
-  subroutine let_grains_out(decomposition, has_glued, n_free, n_glued)
+  subroutine remove_grains(decomposition, has_glued, n_free, n_glued)
     type(decomposition_t), intent(inout) :: decomposition
     !> some grain of the scene is glued to a boundary
     logical, intent(in) :: has_glued
@@ -71,21 +71,21 @@ contains
     n_glued = 0
     if (.not. has_outlet(decomposition) .and. (.not. has_glued .or. all(decomposition%boundaries%present))) return
     counts(:) = 0
-    do s = 1, size(decomposition%home)
-      associate (home => decomposition%home(s))
-        allocate (mask(home%n))
-        do k = 1, home%n
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        allocate (mask(owned%n))
+        do k = 1, owned%n
           mask(k) = stays(decomposition, s, k)
         end do
-        counts(2) = counts(2) + count(.not. mask .and. home%glued > 0)
-        counts(1) = counts(1) + count(.not. mask .and. home%glued == 0)
-        if (.not. all(mask)) call home%keep_only(mask)
+        counts(2) = counts(2) + count(.not. mask .and. owned%glued > 0)
+        counts(1) = counts(1) + count(.not. mask .and. owned%glued == 0)
+        if (.not. all(mask)) call owned%keep_only(mask)
         deallocate (mask)
       end associate
     end do
     call decomposition%comm%sum_counts(counts)
     n_free = counts(1)
     n_glued = counts(2)
-  end subroutine let_grains_out
+  end subroutine remove_grains
 
-end module gravier_departures
+end module gravier_removal

@@ -1,18 +1,18 @@
 !> When space is divided into subdomains, and how.
-module gravier_division
+module gravier_repartition
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_body_store, only: body_set_t
   use gravier_box_counts, only: choose_boxes, check_subdomains
   use gravier_partition, only: partition_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_neighbourhood, only: neighbourhoods_t
+  use gravier_halo, only: halo_t
   implicit none
   private
-  public :: division_rule_t, divide, divide_again, division_is_due
+  public :: repartition_rule_t, divide, repartition, repartition_is_due
 
   !> How space is to be divided, and how often.
-  type :: division_rule_t
+  type :: repartition_rule_t
     !> cells with grains in them, shared out by METIS; else boxes
     logical :: by_graph = .false.
     !> boxes along each axis; where some are 0, they are chosen by the number of subdomains
@@ -22,7 +22,7 @@ module gravier_division
     integer :: every = 0
     !> largest over mean number of contacts of a subdomain that asks for a new division, 0 for none
     real(dp) :: imbalance = 0.0_dp
-  end type division_rule_t
+  end type repartition_rule_t
 
   !> times the imbalance that the last division reached: one that is worth another division
   real(dp), parameter :: worth_dividing = 1.1_dp
@@ -31,8 +31,8 @@ contains
 
   !> Whether step `step` starts from a new partition: by schedule, or because contacts lie unevenly, and more so than just after
   !> the last one: what that could not cure is not tried again.
-  pure logical function division_is_due(rule, step, imbalance, reached) result(due)
-    type(division_rule_t), intent(in) :: rule
+  pure logical function repartition_is_due(rule, step, imbalance, reached) result(due)
+    type(repartition_rule_t), intent(in) :: rule
     integer, intent(in) :: step
     !> largest over mean number of contacts of a subdomain: in the last step, and just after the last division
     real(dp), intent(in) :: imbalance, reached
@@ -41,13 +41,13 @@ contains
     if (step == 0 .or. rule%subdomains == 1) return
     if (rule%every > 0) due = mod(step, rule%every) == 0
     if (rule%imbalance > 0.0_dp) due = due .or. imbalance > max(rule%imbalance, worth_dividing*reached)
-  end function division_is_due
+  end function repartition_is_due
 
   !> Divide space for the grains given. Collective.
-  subroutine divide(rule, neighbourhoods, bodies, decomposition, error)
-    type(division_rule_t), intent(in) :: rule
+  subroutine divide(rule, halo, bodies, decomposition, error)
+    type(repartition_rule_t), intent(in) :: rule
     !> near pairs as far as they are known
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(halo_t), intent(in) :: halo
     !> of this rank, however grouped
     type(body_set_t), intent(in) :: bodies(:)
     type(decomposition_t), intent(inout) :: decomposition
@@ -73,7 +73,7 @@ contains
       associate (partition => decomposition%partition)
         partition%period(:) = decomposition%period%length
         if (rule%by_graph) then
-          call collect_weights(decomposition%nd, neighbourhoods, bodies, points, weights)
+          call collect_weights(decomposition%nd, halo, bodies, points, weights)
           call partition%init_graph(decomposition%comm, lower, upper, edge, points, weights, rule%subdomains, error)
         else
           boxes(:) = rule%grid
@@ -87,9 +87,9 @@ contains
 
   !> Divide space anew; where the scene has come to fill fewer cells than there are subdomains, the old partition
   !> stays. Collective.
-  subroutine divide_again(rule, neighbourhoods, decomposition, refused)
-    type(division_rule_t), intent(in) :: rule
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+  subroutine repartition(rule, halo, decomposition, refused)
+    type(repartition_rule_t), intent(in) :: rule
+    type(halo_t), intent(in) :: halo
     type(decomposition_t), intent(inout) :: decomposition
     logical, intent(out) :: refused
     type(body_set_t), allocatable :: bodies(:)
@@ -97,17 +97,17 @@ contains
     type(error_t), allocatable :: error
 
     old = decomposition%partition
-    call move_alloc(decomposition%home, bodies)
-    call divide(rule, neighbourhoods, bodies, decomposition, error)
-    call move_alloc(bodies, decomposition%home)
+    call move_alloc(decomposition%owned, bodies)
+    call divide(rule, halo, bodies, decomposition, error)
+    call move_alloc(bodies, decomposition%owned)
     refused = allocated(error)
     if (refused) decomposition%partition = old
-  end subroutine divide_again
+  end subroutine repartition
 
   !> What a subdomain has to carry: grains, and as far as they are known near pairs, at their candidates.
-  subroutine collect_weights(nd, neighbourhoods, bodies, points, weights)
+  subroutine collect_weights(nd, halo, bodies, points, weights)
     integer, intent(in) :: nd
-    type(neighbourhoods_t), intent(in) :: neighbourhoods
+    type(halo_t), intent(in) :: halo
     type(body_set_t), intent(in) :: bodies(:)
     !> (nd, n) [m]; (n)
     real(dp), allocatable, intent(out) :: points(:, :)
@@ -115,9 +115,9 @@ contains
     integer :: s, p, k, n, n_points
 
     n_points = sum(bodies%n)
-    if (neighbourhoods%builds > 0) then
-      do s = 1, size(neighbourhoods%view)
-        n_points = n_points + neighbourhoods%view(s)%bodies%n
+    if (halo%builds > 0) then
+      do s = 1, size(halo%view)
+        n_points = n_points + halo%view(s)%bodies%n
       end do
     end if
     allocate (points(nd, n_points))
@@ -130,9 +130,9 @@ contains
         weights(n) = 1
       end do
     end do
-    if (neighbourhoods%builds == 0) return
-    do s = 1, size(neighbourhoods%view)
-      associate (view => neighbourhoods%view(s))
+    if (halo%builds == 0) return
+    do s = 1, size(halo%view)
+      associate (view => halo%view(s))
         points(:, n + 1:n + view%bodies%n) = view%bodies%position
         do p = 1, view%list%n
           weights(n + view%list%candidate(p)) = weights(n + view%list%candidate(p)) + 1
@@ -142,4 +142,4 @@ contains
     end do
   end subroutine collect_weights
 
-end module gravier_division
+end module gravier_repartition
