@@ -38,6 +38,15 @@ module gravier_hdf5_attributes
     procedure, private :: read_value
   end type h5_attributes_t
 
+  !> The value of an attribute in memory.
+  type :: value_t
+    !> of the value in the file and in memory
+    integer(hid_t) :: file_type = -1, memory_type = -1
+    !> of a list; 0 of a scalar
+    integer :: length = 0
+    type(c_ptr) :: buffer = c_null_ptr
+  end type value_t
+
   !> longest text kept in an object header, whose messages hold 64 KiB; longer ones go to a heap
   integer, parameter :: longest_inline_text = 60000
 
@@ -58,10 +67,10 @@ contains
     address = c_loc(letters)
     if (len(value) > longest_inline_text) then
       type = text_type(0, is_ascii(value))
-      call self%write_value(path, name, type, type, 0, c_loc(address), error)
+      call self%write_value(path, name, value_t(type, type, 0, c_loc(address)), error)
     else
       type = text_type(max(1, len(value)), is_ascii(value))
-      call self%write_value(path, name, type, type, 0, address, error)
+      call self%write_value(path, name, value_t(type, type, 0, address), error)
     end if
     call h5tclose_f(type, stat)
   end subroutine h5_write_text
@@ -82,7 +91,7 @@ contains
     integer(i8), target :: copy
 
     copy = value
-    call self%write_value(path, name, H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), 0, c_loc(copy), error)
+    call self%write_value(path, name, value_t(H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), 0, c_loc(copy)), error)
   end subroutine h5_write_i8
 
   subroutine h5_write_i8_list(self, path, name, value, error)
@@ -94,7 +103,7 @@ contains
     integer(i8), target :: copy(size(value))
 
     copy = value
-    call self%write_value(path, name, H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), size(copy), c_loc(copy), error)
+    call self%write_value(path, name, value_t(H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), size(copy), c_loc(copy)), error)
   end subroutine h5_write_i8_list
 
   subroutine h5_write_real(self, path, name, value, error)
@@ -105,7 +114,7 @@ contains
     real(dp), target :: copy
 
     copy = value
-    call self%write_value(path, name, H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND), 0, c_loc(copy), error)
+    call self%write_value(path, name, value_t(H5T_IEEE_F64LE, h5kind_to_type(dp, H5_REAL_KIND), 0, c_loc(copy)), error)
   end subroutine h5_write_real
 
   !> Give an integer attribute that is there another value, in its place.
@@ -137,13 +146,11 @@ contains
     call self%comm%agree(error)
   end subroutine h5_change_attribute
 
-  !> Write one attribute; length = 0 makes a scalar.
-  subroutine write_value(self, path, name, file_type, memory_type, length, buffer, error)
+  !> Write one attribute.
+  subroutine write_value(self, path, name, value, error)
     class(h5_attributes_t), intent(in) :: self
     character(len=*), intent(in) :: path, name
-    integer(hid_t), intent(in) :: file_type, memory_type
-    integer, intent(in) :: length
-    type(c_ptr), intent(in) :: buffer
+    type(value_t), intent(in) :: value
     type(error_t), allocatable, intent(inout) :: error
     integer(hid_t) :: place, object, space, attribute
     integer(hsize_t) :: extent(1)
@@ -152,19 +159,19 @@ contains
     integer :: stat, ignored
 
     if (allocated(error)) return
-    address = buffer
+    address = value%buffer
     call self%locate(path, place, object_name)
     call h5oopen_f(place, object_name, object, stat)
     if (stat == 0) then
-      if (length == 0) then
+      if (value%length == 0) then
         call h5screate_f(H5S_SCALAR_F, space, ignored)
       else
-        extent = int(length, hsize_t)
+        extent = int(value%length, hsize_t)
         call h5screate_simple_f(1, extent, space, ignored)
       end if
-      call h5acreate_f(object, name, file_type, space, attribute, stat)
+      call h5acreate_f(object, name, value%file_type, space, attribute, stat)
       if (stat == 0) then
-        call h5awrite_f(attribute, memory_type, address, stat)
+        call h5awrite_f(attribute, value%memory_type, address, stat)
         call h5aclose_f(attribute, ignored)
       end if
       call h5sclose_f(space, ignored)

@@ -114,11 +114,12 @@ contains
   end subroutine get_shape
 
   !> A dataset of a given length, or a table that grows by chunks of `rows_a_chunk`.
-  subroutine create_dataset(self, path, file_type, n_columns, n_rows, dataset, stat, rows_a_chunk)
+  subroutine create_dataset(self, path, rows, n_rows, dataset, stat, rows_a_chunk)
     class(h5_tree_t), intent(in) :: self
     character(len=*), intent(in) :: path
-    integer(hid_t), intent(in) :: file_type
-    integer, intent(in) :: n_columns
+    !> whose columns and type the dataset has
+    type(rows_t), intent(in) :: rows
+    !> of all ranks
     integer(i8), intent(in) :: n_rows
     integer(hid_t), intent(out) :: dataset
     integer, intent(out) :: stat
@@ -134,16 +135,16 @@ contains
     ! every row is written, and a file must not tell when it was made
     call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, ignored)
     call h5pset_obj_track_times_f(creation, .false., ignored)
-    call get_shape(n_columns, n_rows, n_dims, extent)
+    call get_shape(rows%n_columns, n_rows, n_dims, extent)
     greatest = extent
     if (present(rows_a_chunk)) then
-      call get_shape(n_columns, rows_a_chunk, n_dims, chunk)
+      call get_shape(rows%n_columns, rows_a_chunk, n_dims, chunk)
       call h5pset_chunk_f(creation, n_dims, chunk(1:n_dims), ignored)
       call h5pset_alloc_time_f(creation, H5D_ALLOC_TIME_EARLY_F, ignored)
       greatest(n_dims) = H5S_UNLIMITED_F
     end if
     call h5screate_simple_f(n_dims, extent(1:n_dims), space, ignored, greatest(1:n_dims))
-    call h5dcreate_f(place, name, file_type, space, dataset, stat, dcpl_id=creation)
+    call h5dcreate_f(place, name, rows%file_type, space, dataset, stat, dcpl_id=creation)
     call h5sclose_f(space, ignored)
     call h5pclose_f(creation, ignored)
   end subroutine create_dataset

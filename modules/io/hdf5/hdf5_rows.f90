@@ -208,7 +208,7 @@ contains
       call self%fail(path, "the number of columns differs between ranks", error)
       return
     end if
-    call create_dataset(self, path, rows%file_type, rows%n_columns, total, dataset, stat)
+    call create_dataset(self, path, rows, total, dataset, stat)
     if (stat < 0) call self%fail(path, "cannot make this dataset", error)
     call self%comm%agree(error)
     if (allocated(error)) return

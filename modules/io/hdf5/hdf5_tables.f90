@@ -65,14 +65,16 @@ contains
     !> the file grows by so many rows at a time; the same on all ranks
     integer(i8), intent(in) :: rows_a_chunk
     type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: dataset, type
+    type(rows_t) :: rows
+    integer(hid_t) :: dataset
     integer :: stat, ignored
 
     if (allocated(error)) return
-    type = H5T_STD_I64LE
-    if (kind == table_single) type = H5T_IEEE_F32LE
-    if (kind == table_double) type = H5T_IEEE_F64LE
-    call create_dataset(self, path, type, n_columns, 0_i8, dataset, stat, rows_a_chunk)
+    rows%n_columns = n_columns
+    rows%file_type = H5T_STD_I64LE
+    if (kind == table_single) rows%file_type = H5T_IEEE_F32LE
+    if (kind == table_double) rows%file_type = H5T_IEEE_F64LE
+    call create_dataset(self, path, rows, 0_i8, dataset, stat, rows_a_chunk)
     if (stat < 0) then
       call self%fail(path, "cannot make this dataset", error)
     else

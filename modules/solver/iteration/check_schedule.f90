@@ -71,24 +71,24 @@ contains
     calls = mod(iteration, self%check_every) == 0
     ! sums of the iterations before are there with momentum
     if (self%chooses .and. (calls .or. (method%momentum%on .and. iteration >= early_check))) &
-      & calls = is_worth_a_check(self, problem, method, iteration, calls, goal, reference, history)
+      & calls = is_worth_a_check(self, problem, method, iteration, goal, reference, history)
   end function check_schedule_calls
 
   !> Whether the sweeps of the iteration before speak for a check. Collective.
-  logical function is_worth_a_check(self, problem, method, iteration, regular, goal, reference, history) result(is_worth)
+  logical function is_worth_a_check(self, problem, method, iteration, goal, reference, history) result(is_worth)
     class(check_schedule_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
-    !> whether check_every asks for one
-    logical, intent(in) :: regular
     real(dp), intent(in) :: goal, reference
     type(convergence_history_t), intent(inout) :: history
     real(dp) :: sums(2), expected, enough
-    logical :: due
+    !> check_every asks for one; so many were left out that one is due
+    logical :: regular, due
 
     call problem%sum_progress(sums)
     self%progress = 0.0_dp
+    regular = mod(iteration, self%check_every) == 0
     is_worth = regular
     expected = 0.0_dp
     due = self%skips >= most_skips

@@ -26,12 +26,21 @@ module gravier_layer_trial
   integer, parameter :: trial = 6
   real(dp), parameter :: worth_keeping = 0.8_dp
 
+  !> A pass is tried where the velocity error over its scale, and the way to supports in mean diameters, are above these.
+  type :: threshold_t
+    real(dp) :: error = 0.0_dp, way = 0.0_dp
+  end type threshold_t
+
   type :: layer_trial_t
     !> sweeps over all contacts that passes took; whether the solve goes on from one
     real(dp) :: sweeps = 0.0_dp
     logical :: layered = .false.
     !> a pass may be tried; after the first iterations
     logical, private :: may_try = .false., wants_first = .false.
+    !> velocity error over its scale at which the solve ends
+    real(dp), private :: allowed = 0.0_dp
+    !> the iterations go on from other impulses
+    logical, private :: anew = .false.
     !> the iteration after which a pass is judged
     integer, private :: ends = 0
     !> what is compared, and the impulses, before the pass [m/s]
@@ -46,11 +55,13 @@ module gravier_layer_trial
 contains
 
   !> Say what a solve starts with, whose control allows passes.
-  subroutine layer_trial_start(self, problem, residual)
+  subroutine layer_trial_start(self, problem, residual, allowed)
     class(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp), intent(in) :: residual
+    !> residual at the start, and velocity error over its scale at which the solve ends
+    real(dp), intent(in) :: residual, allowed
 
+    self%allowed = allowed
     self%may_try = any(abs(problem%load) > 0.0_dp)
     self%wants_first = self%may_try .and. residual > unsettled
   end subroutine layer_trial_start
@@ -63,74 +74,72 @@ contains
   end function layer_trial_calls
 
   !> After a check that did not end the solve: judge a pass or try one, where it is time. Collective.
-  subroutine layer_trial_advance(self, problem, method, velocity, iteration, allowed, anew, error)
+  subroutine layer_trial_advance(self, problem, method, velocity, iteration, anew, error)
     class(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
-    !> velocity error over its scale
-    real(dp), intent(in) :: allowed
     !> the iterations go on from other impulses
     logical, intent(out) :: anew
     type(error_t), allocatable, intent(inout) :: error
 
-    anew = .false.
-    if (iteration == self%ends) call judge(self, problem, method, velocity, iteration, anew, error)
+    self%anew = .false.
+    if (iteration == self%ends) call judge(self, problem, method, velocity, iteration, error)
+    anew = self%anew
     if (allocated(error)) return
     if (self%wants_first .and. iteration == copies_ready) &
-      & call try(self, problem, method, velocity, iteration, much, deep, anew, error)
+      & call try(self, problem, method, velocity, iteration, threshold_t(much, deep), error)
+    anew = self%anew
     if (allocated(error)) return
     if (self%may_try .and. velocity%levels%most_depth < 0 .and. iteration >= many) call velocity%levels%find_depth(problem)
     if (self%may_try .and. velocity%levels%most_depth > very_deep .and. iteration >= self%ends .and. &
       & (self%layered .or. iteration > late*velocity%levels%most_depth)) &
-      & call try(self, problem, method, velocity, iteration, allowed, very_deep, anew, error)
+      & call try(self, problem, method, velocity, iteration, threshold_t(self%allowed, very_deep), error)
+    anew = self%anew
   end subroutine layer_trial_advance
 
   !> Where much of the velocities is missing and the way to the supports is long, go on from a pass over layers. Collective.
-  subroutine try(self, problem, method, velocity, iteration, least_error, least_way, anew, error)
+  subroutine try(self, problem, method, velocity, iteration, above, error)
     type(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
-    !> error over its scale, and way to supports in mean diameters, above which it is tried
-    real(dp), intent(in) :: least_error, least_way
-    logical, intent(inout) :: anew
+    type(threshold_t), intent(in) :: above
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: sweeps
     integer :: s
 
     if (velocity%levels%most_depth < 0) call velocity%levels%find_depth(problem)
-    if (velocity%levels%most_depth < nearly*least_way) then
+    if (velocity%levels%most_depth < nearly*above%way) then
       self%may_try = .false.
       return
     end if
     call velocity%complete(problem, method, iteration)
-    if (velocity%criterion() <= least_error*problem%error_scale) return
+    if (velocity%criterion() <= above%error*problem%error_scale) return
     self%may_try = .false.
     if (.not. allocated(self%before)) allocate (self%before(size(problem%sub)))
     do s = 1, size(problem%sub)
       self%before(s)%value = problem%sub(s)%impulse
     end do
     self%error_before = velocity%criterion()
-    call carry_loads(problem, least_way, method%work, sweeps)
+    call carry_loads(problem, above%way, method%work, sweeps)
     if (.not. sweeps > 0.0_dp) return
     self%sweeps = self%sweeps + sweeps
     self%layered = .true.
     self%ends = iteration + trial
     call begin_anew(self, problem, method, velocity, iteration, error)
-    anew = .true.
+    self%anew = .true.
   end subroutine try
 
   !> Go on from the pass where it has brought something, else from the impulses before it. Collective.
-  subroutine judge(self, problem, method, velocity, iteration, anew, error)
+  subroutine judge(self, problem, method, velocity, iteration, error)
     type(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
-    logical, intent(inout) :: anew
     type(error_t), allocatable, intent(inout) :: error
     integer :: s
 
@@ -145,7 +154,7 @@ contains
       problem%sub(s)%impulse(:, :, :) = self%before(s)%value
     end do
     call begin_anew(self, problem, method, velocity, iteration, error)
-    anew = .true.
+    self%anew = .true.
   end subroutine judge
 
   !> The method starts anew from the impulses that the problem holds now. Collective.

@@ -145,7 +145,7 @@ contains
     if (allocated(error)) return
     call check(state, problem, method, control, report, done, exact)
     state%settled = report%residual <= control%tolerance
-    if (state%by_estimate .and. control%layered) call state%trial%start(problem, report%residual)
+    if (state%by_estimate .and. control%layered) call state%trial%start(problem, report%residual, control%accuracy)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = state%schedule%calls(problem, method, report%iterations, report%goal, state%reference, report%history)
@@ -156,7 +156,7 @@ contains
       if (measure) then
         call check(state, problem, method, control, report, done, exact)
         if (done) exit
-        call state%trial%advance(problem, method, state%velocity, report%iterations, control%accuracy, anew, error)
+        call state%trial%advance(problem, method, state%velocity, report%iterations, anew, error)
         if (allocated(error)) return
         if (anew) call state%schedule%forget_ratio()
       end if

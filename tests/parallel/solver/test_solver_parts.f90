@@ -244,13 +244,13 @@ contains
     type(layer_trial_t) :: trial
 
     call make_column(3, 2, "&solver method = 'nscdd' /", sim)
-    call trial%start(sim%problem, 0.5_dp)
+    call trial%start(sim%problem, 0.5_dp, 0.01_dp)
     call check(trial%calls(copies_ready), "a check to try a pass")
     call check(.not. trial%calls(copies_ready + 1), "and no other one")
-    call trial%start(sim%problem, 0.05_dp)
+    call trial%start(sim%problem, 0.05_dp, 0.01_dp)
     call check(.not. trial%calls(copies_ready), "none near the solution")
     sim%problem%load(:) = 0.0_dp
-    call trial%start(sim%problem, 0.5_dp)
+    call trial%start(sim%problem, 0.5_dp, 0.01_dp)
     call check(.not. trial%calls(copies_ready), "none without a load")
     call check(.not. trial%layered, "nothing was tried")
     call sim%free()
