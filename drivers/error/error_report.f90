@@ -6,7 +6,7 @@ module gravier_error_report
   use gravier_csv_writer, only: csv_writer_t
   use gravier_build_info, only: version, revision, compiler, build_type
   use gravier_machine, only: processor_model, compiler_flags, date_text
-  use gravier_error_situations, only: plan_t, row_t
+  use gravier_error_plan, only: plan_t, row_t
   implicit none
   private
   public :: write_rows, print_rows

@@ -1,51 +1,29 @@
 !> gravier_error CASE.nml: the estimated velocity error of unfinished solves beside the true one.
 program gravier_error
   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
-  use gravier_kinds, only: dp
-  use gravier_errors, only: error_t, raise, status_ok, status_input
-  use gravier_text, only: to_text
+  use gravier_errors, only: error_t, status_ok
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_config, only: parse_config
   use gravier_run, only: read_input
-  use gravier_command_line, only: argument, option_value, positive_integer, positive_real, leave
-  use gravier_error_situations, only: plan_t, situation_t, row_t, measure_case, start_cold, start_lost, start_turned, start_loose
+  use gravier_command_line, only: leave
+  use gravier_error_options, only: options_t, read_options, usage
+  use gravier_error_plan, only: row_t
+  use gravier_error_measure, only: measure_case
   use gravier_error_report, only: write_rows, print_rows
   implicit none
 
-  character(len=*), parameter :: nl = new_line("a")
-  character(len=*), parameter :: usage = &
-    & "usage: gravier_error CASE.nml [OPTION]...    the estimated velocity error of unfinished solves beside the true one"//nl// &
-    & "  --out FILE          table, one row a state (error.csv)"//nl// &
-    & "  --situations LIST   how solves start (cold):"//nl// &
-    & "    cold              from zero impulses"//nl// &
-    & "    lost:SHARE        from converged impulses, a share of them set to zero"//nl// &
-    & "    turned:DEGREES    from converged impulses, then gravity turns"//nl// &
-    & "    loose:SPEED       from converged impulses, then the grains get random velocities, in g h"//nl// &
-    & "    program           from zero impulses, by the program's own control"//nl// &
-    & "  --iterations LIST   iterations after which a state is looked at (4,8,20,40,80,160)"//nl// &
-    & "  --steps N           steps that the program makes before (0)"//nl// &
-    & "  --every M           look at the state after every M-th of these steps"//nl// &
-    & "  --rest              the exact velocities are zero; otherwise each solve goes on to find them:"//nl// &
-    & "  --tight RESIDUAL    until this residual (1e-10)"//nl// &
-    & "  --limit N           or for so many iterations (20000),"//nl// &
-    & "  --sweeps N          and then for so many sweeps without momentum (20000)"//nl// &
-    & "  --help"//nl// &
-    & "exit status: 0 done; 2 bad input or usage; 4 anything else"
-
   type(communicator_t), target :: comm
-  type(plan_t) :: plan
+  type(options_t) :: options
   type(error_t), allocatable :: error
-  character(len=:), allocatable :: file, table
-  logical :: help
   integer :: status
 
   call start_parallel()
   call comm%init()
   status = status_ok
-  call read_options(error)
-  if (help .and. .not. allocated(error)) then
+  call read_options(options, error)
+  if (options%help .and. .not. allocated(error)) then
     if (comm%rank == 0) write (output_unit, "(a)") usage
   else if (.not. allocated(error)) then
     call make_table(error)
@@ -68,168 +46,21 @@ contains
     character(len=:), allocatable :: text
     type(output_lock_t) :: lock
 
-    call read_input(comm, file, text, error)
-    if (.not. allocated(error)) call parse_config(file, text, plan%config, error)
+    call read_input(comm, options%file, text, error)
+    if (.not. allocated(error)) call parse_config(options%file, text, options%plan%config, error)
     call comm%agree(error)
-    call lock%take_file(comm, table, "gravier_error "//file, error)
-    if (.not. allocated(error)) call measure_case(comm, plan, rows, error)
+    call lock%take_file(comm, options%table, "gravier_error "//options%file, error)
+    if (.not. allocated(error)) call measure_case(comm, options%plan, rows, error)
     call comm%agree(error)
     if (comm%rank == 0 .and. .not. allocated(error)) then
       call print_rows(output_unit, rows)
-      call write_rows(table, plan, rows, comm%size, error)
+      call write_rows(options%table, options%plan, rows, comm%size, error)
       call check_own_files(error)
-      if (.not. allocated(error)) write (output_unit, "(a)") "written: "//table
+      if (.not. allocated(error)) write (output_unit, "(a)") "written: "//options%table
       flush (output_unit)
     end if
     call comm%agree(error)
     call lock%release()
   end subroutine make_table
-
-  !> Read the command line; the same on all ranks.
-  subroutine read_options(error)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: k
-
-    help = .false.
-    file = ""
-    table = "error.csv"
-    plan%iterations = [4, 8, 20, 40, 80, 160]
-    allocate (plan%situations(1))
-    k = 1
-    do while (k <= command_argument_count() .and. .not. allocated(error))
-      select case (argument(k))
-      case ("--help", "-h")
-        help = .true.
-      case ("--rest")
-        plan%at_rest = .true.
-      case ("--out", "--situations", "--iterations", "--steps", "--every", "--tight", "--limit", "--sweeps")
-        call read_value(argument(k), option_value(k), error)
-        k = k + 1
-      case default
-        if (index(argument(k), "-") == 1) then
-          call raise(error, status_input, "unknown option "//argument(k)//"; see gravier_error --help")
-        else if (file /= "") then
-          call raise(error, status_input, "more than one input file: "//file//" and "//argument(k)//"; expected one")
-        end if
-        file = argument(k)
-      end select
-      k = k + 1
-    end do
-    if (file == "" .and. .not. help) call raise(error, status_input, "no input file; see gravier_error --help")
-  end subroutine read_options
-
-  !> Take the value of an option.
-  subroutine read_value(option, word, error)
-    character(len=*), intent(in) :: option, word
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: expected
-
-    expected = ""
-    select case (option)
-    case ("--out")
-      table = word
-      if (word == "") expected = "a path"
-    case ("--situations")
-      call read_situations(word, error)
-    case ("--iterations")
-      call read_iterations(word, expected)
-    case ("--tight")
-      plan%tight = positive_real(word)
-      if (.not. plan%tight > 0.0_dp) expected = "a finite real number > 0"
-    case default
-      if (positive_integer(word) == 0) expected = "an integer >= 1"
-      if (option == "--steps") plan%steps = positive_integer(word)
-      if (option == "--every") plan%every = positive_integer(word)
-      if (option == "--limit") plan%limit = positive_integer(word)
-      if (option == "--sweeps") plan%sweeps = positive_integer(word)
-    end select
-    if (expected /= "") call raise(error, status_input, option//" '"//word//"': expected "//expected)
-  end subroutine read_value
-
-  !> Numbers in ascending order, with commas between.
-  subroutine read_iterations(list, expected)
-    character(len=*), intent(in) :: list
-    character(len=:), allocatable, intent(inout) :: expected
-    integer :: numbers(len(list) + 1), first, last, n
-
-    n = 0
-    first = 1
-    do while (first <= len(list))
-      last = end_of_item(list, first)
-      n = n + 1
-      numbers(n) = positive_integer(list(first:last))
-      first = last + 2
-    end do
-    deallocate (plan%iterations)
-    allocate (plan%iterations(n))
-    plan%iterations(:) = numbers(1:n)
-    if (n > 0) then
-      if (numbers(1) > 0 .and. all(numbers(2:n) > numbers(1:n - 1))) return
-    end if
-    expected = "integers >= 1 in ascending order, with commas between"
-  end subroutine read_iterations
-
-  !> Names, some with a number after a colon, with commas between; 'none' stands for none.
-  subroutine read_situations(list, error)
-    character(len=*), intent(in) :: list
-    type(error_t), allocatable, intent(inout) :: error
-    type(situation_t) :: situations(len(list) + 1)
-    integer :: first, last, n
-
-    n = 0
-    first = 1
-    if (list == "none") first = len(list) + 1
-    do while (first <= len(list))
-      last = end_of_item(list, first)
-      if (list(first:last) == "program") then
-        plan%by_program = .true.
-      else
-        n = n + 1
-        call read_situation(list(first:last), situations(n), error)
-        if (allocated(error)) return
-      end if
-      first = last + 2
-    end do
-    deallocate (plan%situations)
-    allocate (plan%situations(n))
-    plan%situations(:) = situations(1:n)
-  end subroutine read_situations
-
-  subroutine read_situation(item, situation, error)
-    character(len=*), intent(in) :: item
-    type(situation_t), intent(out) :: situation
-    type(error_t), allocatable, intent(inout) :: error
-    logical :: good
-    integer :: colon
-
-    colon = index(item//":", ":")
-    if (colon < len(item)) situation%amount = positive_real(item(colon + 1:))
-    good = situation%amount > 0.0_dp
-    select case (item(1:colon - 1))
-    case ("cold")
-      good = item == "cold"
-      situation%start = start_cold
-    case ("lost")
-      good = good .and. situation%amount <= 1.0_dp
-      situation%start = start_lost
-    case ("turned")
-      situation%start = start_turned
-    case ("loose")
-      situation%start = start_loose
-    case default
-      good = .false.
-    end select
-    if (.not. good) call raise(error, status_input, "--situations '"//item// &
-      & "': expected cold, program, lost:SHARE, turned:DEGREES or loose:SPEED, with a number > 0")
-  end subroutine read_situation
-
-  !> Last character of the item of a list that begins at `first`.
-  pure integer function end_of_item(list, first) result(last)
-    character(len=*), intent(in) :: list
-    integer, intent(in) :: first
-
-    last = index(list(first:), ",") + first - 2
-    if (last < first - 1) last = len(list)
-  end function end_of_item
 
 end program gravier_error

@@ -107,93 +107,108 @@ contains
     copy = simulation%problem%kernels%nv*storage_size(0.0_dp)/8
   end subroutine item_bytes
 
+  !> The arrays of each kind of item.
   subroutine describe(simulation, items)
     type(simulation_t), intent(in) :: simulation
     type(item_t), intent(inout) :: items(5)
     type(held_list_t) :: held
-    integer :: nd, nv, nw, ni
+
+    call simulation%method%held(simulation%problem%kernels%nc, simulation%problem%kernels%nv, held)
+    call describe_contact(simulation, held, items(1))
+    items(2)%name = "near pair"
+    call items(2)%add("candidate", 4, 1)
+    call items(2)%add("antagonist", 4, 1)
+    call items(2)%add("shift", 4, merge(1, 0, simulation%decomposition%ni > 0))
+    call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
+    call items(2)%add("state", 4, simulation%halo%memory%n_states())
+    call describe_body(simulation, held, items(3))
+    items(4)%name = "grain seen, ghosts included"
+    call add_grain(simulation, items(4))
+    call items(4)%add("owner", 4, 2)
+    items(5)%name = "grain owned"
+    call add_grain(simulation, items(5))
+    call items(5)%add("reference", 8, simulation%decomposition%nd)
+  end subroutine describe
+
+  !> What is kept of a contact; `held` is what the method holds.
+  subroutine describe_contact(simulation, held, item)
+    type(simulation_t), intent(in) :: simulation
+    type(held_list_t), intent(in) :: held
+    type(item_t), intent(inout) :: item
 
     associate (kernels => simulation%problem%kernels)
-      nd = kernels%nd
-      nv = kernels%nv
-      nw = kernels%nw
-      ni = simulation%decomposition%ni
-      items(1)%name = "contact"
-      call items(1)%add("pair", 4, 2)
-      call items(1)%add("hot", 8, kernels%nh)
-      call items(1)%add("impulse", 8, kernels%nc)
-      if (simulation%physics%laws%attracts) call items(1)%add("attraction", 8, 1)
-      call items(1)%add("gap", 8, 1)
-      call items(1)%add("source", 4, 1)
+      item%name = "contact"
+      call item%add("pair", 4, 2)
+      call item%add("hot", 8, kernels%nh)
+      call item%add("impulse", 8, kernels%nc)
+      if (simulation%physics%laws%attracts) call item%add("attraction", 8, 1)
+      call item%add("gap", 8, 1)
+      call item%add("source", 4, 1)
       ! a projection of places borrows these
       if (simulation%overlap_allowed < huge(1.0_dp)) then
-        call items(1)%add("law of projections", 8, merge(2, 1, kernels%nf > 1))
-        call items(1)%add("impulse of projections", 8, kernels%nc)
-        call items(1)%add("velocity of projections", 8, kernels%nc)
+        call item%add("law of projections", 8, merge(2, 1, kernels%nf > 1))
+        call item%add("impulse of projections", 8, kernels%nc)
+        call item%add("velocity of projections", 8, kernels%nc)
       end if
-      call simulation%method%held(kernels%nc, nv, held)
-      call add_held(items(1), of_contacts=.true.)
-      items(2)%name = "near pair"
-      call items(2)%add("candidate", 4, 1)
-      call items(2)%add("antagonist", 4, 1)
-      call items(2)%add("shift", 4, merge(1, 0, ni > 0))
-      call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
-      call items(2)%add("state", 4, simulation%halo%memory%n_states())
-      items(3)%name = "body in contact, in each subdomain"
-      call items(3)%add("id", 8, 1)
-      call items(3)%add("owned", 4, 1)
-      call items(3)%add("place", 4, 1)
-      call items(3)%add("multiplicity", 4, 1)
-      call items(3)%add("radius", 8, 1)
-      call items(3)%add("v_free", 8, nv)
-      if (simulation%physics%laws%attracts) call items(3)%add("attraction_load", 8, nv)
-      call items(3)%add("velocity", 8, nv)
-      call items(3)%add("v_global", 8, nv)
-      call items(3)%add("reaction", 8, nv)
-      call add_held(items(3), of_contacts=.false.)
-      call items(3)%add("inverse_mass", 8, nw)
-      call items(3)%add("weight", 8, nw)
-      items(4)%name = "grain seen, ghosts included"
-      call add_grain(items(4))
-      call items(4)%add("owner", 4, 2)
-      items(5)%name = "grain owned"
-      call add_grain(items(5))
-      call items(5)%add("reference", 8, nd)
+      call add_held(item, held, of_contacts=.true.)
     end associate
+  end subroutine describe_contact
 
-  contains
+  !> What is kept of a body in contact; `held` is what the method holds.
+  subroutine describe_body(simulation, held, item)
+    type(simulation_t), intent(in) :: simulation
+    type(held_list_t), intent(in) :: held
+    type(item_t), intent(inout) :: item
 
-    !> What the method holds for each contact, or for each body.
-    subroutine add_held(item, of_contacts)
-      type(item_t), intent(inout) :: item
-      logical, intent(in) :: of_contacts
-      integer :: k
+    associate (kernels => simulation%problem%kernels)
+      item%name = "body in contact, in each subdomain"
+      call item%add("id", 8, 1)
+      call item%add("owned", 4, 1)
+      call item%add("place", 4, 1)
+      call item%add("multiplicity", 4, 1)
+      call item%add("radius", 8, 1)
+      call item%add("v_free", 8, kernels%nv)
+      if (simulation%physics%laws%attracts) call item%add("attraction_load", 8, kernels%nv)
+      call item%add("velocity", 8, kernels%nv)
+      call item%add("v_global", 8, kernels%nv)
+      call item%add("reaction", 8, kernels%nv)
+      call add_held(item, held, of_contacts=.false.)
+      call item%add("inverse_mass", 8, kernels%nw)
+      call item%add("weight", 8, kernels%nw)
+    end associate
+  end subroutine describe_body
 
-      do k = 1, held%n
-        associate (array => held%item(k))
-          if (array%of_contacts .eqv. of_contacts) call item%add(trim(array%name), array%bytes, array%values)
-        end associate
-      end do
-    end subroutine add_held
+  !> What the method holds for each contact, or for each body.
+  subroutine add_held(item, held, of_contacts)
+    type(item_t), intent(inout) :: item
+    type(held_list_t), intent(in) :: held
+    logical, intent(in) :: of_contacts
+    integer :: k
 
-    !> The fields of a grain.
-    subroutine add_grain(item)
-      type(item_t), intent(inout) :: item
-      type(body_layout_t) :: layout
-      character(len=:), allocatable :: name
-      integer :: f, bytes, entries
+    do k = 1, held%n
+      associate (array => held%item(k))
+        if (array%of_contacts .eqv. of_contacts) call item%add(trim(array%name), array%bytes, array%values)
+      end associate
+    end do
+  end subroutine add_held
 
-      layout = simulation%decomposition%layout()
-      f = 0
-      do
-        f = f + 1
-        call layout%describe_field(f, name, bytes, entries)
-        if (len(name) == 0) exit
-        call item%add(name, bytes, entries)
-      end do
-    end subroutine add_grain
+  !> The fields of a grain.
+  subroutine add_grain(simulation, item)
+    type(simulation_t), intent(in) :: simulation
+    type(item_t), intent(inout) :: item
+    type(body_layout_t) :: layout
+    character(len=:), allocatable :: name
+    integer :: f, bytes, entries
 
-  end subroutine describe
+    layout = simulation%decomposition%layout()
+    f = 0
+    do
+      f = f + 1
+      call layout%describe_field(f, name, bytes, entries)
+      if (len(name) == 0) exit
+      call item%add(name, bytes, entries)
+    end do
+  end subroutine add_grain
 
   !> Add an array of so many entries an item; one without entries is not kept at all.
   subroutine item_add(self, name, bytes, entries)

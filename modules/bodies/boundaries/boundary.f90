@@ -2,6 +2,7 @@
 !> are few of them, and every rank knows them all.
 module gravier_boundary
   use gravier_kinds, only: dp, i8
+  use gravier_rotation, only: cross, make_rotation, rotate
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_time_table, only: time_table_t
   use gravier_surface, only: surface_t
@@ -223,15 +224,6 @@ contains
     normal(:) = away(1:size(x))
   end subroutine boundary_locate
 
-  pure function cross(a, b) result(c)
-    real(dp), intent(in) :: a(3), b(3)
-    real(dp) :: c(3)
-
-    c(1) = a(2)*b(3) - a(3)*b(2)
-    c(2) = a(3)*b(1) - a(1)*b(3)
-    c(3) = a(1)*b(2) - a(2)*b(1)
-  end function cross
-
   !> Velocity of the material point at `x` [m/s].
   pure subroutine boundary_velocity_at(self, x, velocity)
     class(boundary_t), intent(in) :: self
@@ -394,48 +386,6 @@ contains
     if (allocated(self%surface)) self%surface%point(1:size(way)) = self%surface%point(1:size(way)) + way
     self%pivot(1:size(way)) = self%pivot(1:size(way)) + way
   end subroutine boundary_shift
-
-  !> v := turn v.
-  pure subroutine rotate(turn, v)
-    real(dp), intent(in) :: turn(3, 3)
-    real(dp), intent(inout) :: v(3)
-    real(dp) :: u(3)
-    integer :: a
-
-    u(:) = v
-    do a = 1, 3
-      v(a) = turn(a, 1)*u(1) + turn(a, 2)*u(2) + turn(a, 3)*u(3)
-    end do
-  end subroutine rotate
-
-  !> Matrix of the rotation by a vector (Rodrigues).
-  pure subroutine make_rotation(vector, turn)
-    !> direction times angle [rad]
-    real(dp), intent(in) :: vector(3)
-    real(dp), intent(out) :: turn(3, 3)
-    real(dp) :: u(3), angle
-    integer :: a, b
-
-    angle = norm2(vector)
-    turn(:, :) = 0.0_dp
-    do a = 1, 3
-      turn(a, a) = 1.0_dp
-    end do
-    if (.not. angle > 0.0_dp) return
-    u(:) = vector/angle
-    do b = 1, 3
-      do a = 1, 3
-        turn(a, b) = (1.0_dp - cos(angle))*u(a)*u(b)
-      end do
-      turn(b, b) = turn(b, b) + cos(angle)
-    end do
-    turn(1, 2) = turn(1, 2) - sin(angle)*u(3)
-    turn(2, 1) = turn(2, 1) + sin(angle)*u(3)
-    turn(1, 3) = turn(1, 3) + sin(angle)*u(2)
-    turn(3, 1) = turn(3, 1) - sin(angle)*u(2)
-    turn(2, 3) = turn(2, 3) - sin(angle)*u(1)
-    turn(3, 2) = turn(3, 2) + sin(angle)*u(1)
-  end subroutine make_rotation
 
   !> Everything of a boundary that time changes, bit for bit.
   pure subroutine boundary_get_state(self, words)

@@ -1,7 +1,6 @@
 !> Bodies files: reading in either format, writing in HDF5.
 module gravier_bodies_file
-  use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, raise, status_input
+    use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: lower
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, check_unique_ids
@@ -37,56 +36,15 @@ contains
     call check_unique_ids(comm, path, bodies, error)
   end subroutine read_bodies
 
-  !> Write a bodies file in HDF5, in the order of the ids whatever rank holds which body. It appears under its name only
-  !> when complete. Failure: status_failure, the same on all ranks; an older file of that name stays. Collective.
-  subroutine write_bodies(comm, path, dimension, id, position, velocity, radius, mass, wall_id, wall_point, wall_normal, error, &
-    & group, origin, period)
+  !> Write a bodies file in HDF5, in the order of the ids whatever rank holds which body: identifiers, positions, velocities, radii,
+  !> groups, materials and walls are allocated, and masses on all ranks or on none. It appears under its name only when complete.
+  !> Failure: status_failure, the same on all ranks; an older file of that name stays. Collective.
+  subroutine write_bodies(comm, path, bodies, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
-    !> 2 or 3
-    integer, intent(in) :: dimension
-    !> (n): of this rank; >= 1
-    integer(i8), intent(in), contiguous :: id(:)
-    !> (dimension, n), m; (3 or 6, n), m/s and rad/s
-    real(dp), intent(in), contiguous :: position(:, :), velocity(:, :)
-    !> (n), m
-    real(dp), intent(in), contiguous :: radius(:)
-    !> (n), kg; absent on all ranks or on none
-    real(dp), intent(in), contiguous, optional :: mass(:)
-    !> (walls): the same on all ranks
-    integer(i8), intent(in), contiguous :: wall_id(:)
-    !> (dimension, walls): a point of each plane, and unit vectors towards the free side
-    real(dp), intent(in), contiguous :: wall_point(:, :), wall_normal(:, :)
+    !> those of this rank; the same walls and box on all ranks
+    type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
-    !> (n): >= 0, the group that a grain is glued to; free grains when absent, on all ranks or on none
-    integer, intent(in), contiguous, optional :: group(:)
-    !> (dimension), m: lower corner and lengths of the periodic box, 0 along an axis that is not periodic; both or none
-    real(dp), intent(in), contiguous, optional :: origin(:), period(:)
-    type(bodies_data_t) :: bodies
-
-    if (allocated(error)) return
-    bodies%dimension = dimension
-    bodies%n = size(id)
-    bodies%id = id
-    bodies%position = position
-    bodies%velocity = velocity
-    bodies%radius = radius
-    if (present(mass)) bodies%mass = mass
-    if (present(group)) then
-      bodies%group = group
-    else
-      allocate (bodies%group(bodies%n), source=0)
-    end if
-    allocate (bodies%material(bodies%n), source=1)
-    bodies%has_box = present(origin) .and. present(period)
-    if (bodies%has_box) then
-      bodies%origin(1:dimension) = origin
-      bodies%period(1:dimension) = period
-    end if
-    bodies%n_walls = size(wall_id)
-    bodies%wall_id = wall_id
-    bodies%wall_point = wall_point
-    bodies%wall_normal = wall_normal
     call write_bodies_hdf5(comm, path, bodies, error)
   end subroutine write_bodies
 

@@ -12,7 +12,7 @@ module gravier_neighbour_search
   use gravier_region, only: region_t
   implicit none
   private
-  public :: neighbour_rule_t, find_neighbours, sweep_order, owner_point, rule_dual, rule_primal
+  public :: neighbour_rule_t, neighbour_search_t, sweep_order, owner_point, rule_dual, rule_primal
 
   !> a pair of grains belongs to the subdomain that holds the midpoint of the centres (paper, section 2.1)
   integer, parameter :: rule_dual = 1
@@ -34,17 +34,36 @@ module gravier_neighbour_search
     procedure :: sweep_edge => rule_sweep_edge
   end type neighbour_rule_t
 
-  !> A grain, or a periodic image of one, where pairs are searched.
+  !> The search for the near pairs that belong to one subdomain: what it knows besides the grains.
+  type :: neighbour_search_t
+    type(neighbour_rule_t) :: rule
+    type(period_t) :: period
+    type(boundary_t), allocatable :: boundaries(:)
+    !> whose pairs are listed
+    integer :: subdomain = 0
+  contains
+    procedure :: find => search_find
+  end type neighbour_search_t
+
+  !> The grains and periodic images of them, where pairs are searched, in grids of cells: one for each class of radii.
   type :: entries_t
     integer :: n = 0
     !> place among the bodies (n)
     integer, allocatable :: body(:)
-    !> periods by which it is shifted (3, n)
+    !> periods by which it is shifted (3, n); of a period alone
     integer, allocatable :: shift(:, :)
     !> with the shift (nd, n) [m]
     real(dp), allocatable :: position(:, :)
-    !> (n)
+    !> class of the radius (n), and whether a class has an entry
     integer, allocatable :: level(:)
+    logical :: used(0:n_levels - 1) = .false.
+    !> corner from which cells are counted (nd), and the edge of the cells of each class [m]
+    real(dp), allocatable :: lower(:)
+    real(dp) :: edge(0:n_levels - 1) = 1.0_dp
+    !> entries by their cells
+    type(cell_hash_t) :: hash
+  contains
+    procedure :: place => entries_place
   end type entries_t
 
   !> offsets of the cells searched from a cell besides itself: half of its neighbours, so that a pair is met once
@@ -129,89 +148,101 @@ contains
     end do
   end function place_of
 
-  !> List the near pairs that belong to a subdomain, in sweep order, with nothing kept.
-  subroutine find_neighbours(bodies, owned, boundaries, period, region, subdomain, rule, memory, list)
+  !> List the near pairs that belong to the subdomain, in sweep order, with nothing kept.
+  subroutine search_find(self, bodies, owned, region, memory, list)
+    class(neighbour_search_t), intent(in) :: self
     !> the grains that the subdomain sees, wrapped into the period
     type(body_set_t), intent(in) :: bodies
     !> (n) subdomain that holds each grain's centre
     integer, intent(in), contiguous :: owned(:)
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(period_t), intent(in) :: period
+    !> which says the subdomain of a point
     class(region_t), intent(in) :: region
-    integer, intent(in) :: subdomain
-    type(neighbour_rule_t), intent(in) :: rule
+    !> what the list keeps of each pair
     type(pair_memory_t), intent(in) :: memory
     type(neighbour_list_t), intent(inout) :: list
     type(entries_t) :: entries
-    type(cell_hash_t) :: hash
-    real(dp) :: lower(bodies%nd), range
-    logical :: periodic
 
-    periodic = period%on()
-    range = rule%range()
-    call list%init(periodic, 4*bodies%n + 16)
+    call list%init(self%period%on(), 4*bodies%n + 16)
     if (bodies%n > 0) then
-      lower(:) = minval(bodies%position, dim=2)
-      call make_entries(bodies, period, rule, entries)
-      call hash_entries(entries, bodies%radius)
-      call search_boundaries()
-      call search_pairs()
+      call make_entries(bodies, self%period, self%rule, entries)
+      call hash_entries(entries, bodies, self%rule)
+      call search_boundaries(self, bodies, owned, list)
+      call search_class(self, bodies, region, entries, list)
+      if (count(entries%used) > 1) call search_larger(self, bodies, region, entries, list)
     end if
-    call sort_list()
+    call sort_list(self, bodies, memory, list)
+  end subroutine search_find
 
-  contains
+  !> Sort entries into the cells of their classes.
+  subroutine hash_entries(entries, bodies, rule)
+    type(entries_t), intent(inout) :: entries
+    type(body_set_t), intent(in) :: bodies
+    type(neighbour_rule_t), intent(in) :: rule
+    integer(i8), allocatable :: keys(:)
+    real(dp) :: lower(bodies%nd)
+    integer :: e, l, place(3)
 
-    subroutine hash_entries(entries, radius)
-      type(entries_t), intent(inout) :: entries
-      real(dp), intent(in), contiguous :: radius(:)
-      integer(i8), allocatable :: keys(:)
-      integer :: e, place(3)
+    lower(:) = minval(entries%position, dim=2)
+    entries%lower = lower
+    do l = 0, n_levels - 1
+      entries%edge(l) = 2.0_dp*rule%largest_radius*0.5_dp**l + rule%range()
+      if (.not. entries%edge(l) > 0.0_dp) entries%edge(l) = 1.0_dp
+    end do
+    allocate (keys(entries%n), entries%level(entries%n))
+    do e = 1, entries%n
+      l = level_of(bodies%radius(entries%body(e)), rule%largest_radius)
+      entries%level(e) = l
+      entries%used(l) = .true.
+      place(:) = entries%place(e, l)
+      keys(e) = cell_key(l, place)
+    end do
+    call entries%hash%init(keys)
+  end subroutine hash_entries
 
-      if (periodic) lower(:) = minval(entries%position(:, 1:entries%n), dim=2)
-      allocate (keys(entries%n), entries%level(entries%n))
-      do e = 1, entries%n
-        entries%level(e) = level_of(radius(entries%body(e)), rule%largest_radius)
-        place(:) = place_of(entries%position(:, e), lower, edge_of(entries%level(e)))
-        keys(e) = cell_key(entries%level(e), place)
+  !> Cell of entry e in the grid of a class.
+  pure function entries_place(self, e, level) result(place)
+    class(entries_t), intent(in) :: self
+    integer, intent(in) :: e, level
+    integer :: place(3)
+    place(:) = place_of(self%position(:, e), self%lower, self%edge(level))
+  end function entries_place
+
+  !> List the grains of the subdomain that are near a boundary.
+  subroutine search_boundaries(self, bodies, owned, list)
+    type(neighbour_search_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in), contiguous :: owned(:)
+    type(neighbour_list_t), intent(inout) :: list
+    integer :: k, b
+    real(dp) :: distance, normal(bodies%nd)
+
+    do k = 1, bodies%n
+      if (owned(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
+      do b = 1, size(self%boundaries)
+        if (.not. self%boundaries(b)%touches()) cycle
+        call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)
+        if (distance - bodies%radius(k) <= self%rule%range()) call list%add(k, -b, no_shift)
       end do
-      call hash%init(keys)
-    end subroutine hash_entries
+    end do
+  end subroutine search_boundaries
 
-    pure real(dp) function edge_of(level)
-      integer, intent(in) :: level
-      edge_of = 2.0_dp*rule%largest_radius*0.5_dp**level + rule%range()
-      if (.not. edge_of > 0.0_dp) edge_of = 1.0_dp
-    end function edge_of
+  !> List the near pairs of entries of one class: those in a cell, and those in cells that touch.
+  subroutine search_class(self, bodies, region, entries, list)
+    type(neighbour_search_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    class(region_t), intent(in) :: region
+    type(entries_t), intent(in) :: entries
+    type(neighbour_list_t), intent(inout) :: list
+    integer :: cell, other, a, b, l, k, place(3), near(3)
 
-    subroutine search_boundaries()
-      integer :: k, b
-      real(dp) :: distance, normal(bodies%nd)
-
-      do k = 1, bodies%n
-        if (owned(k) /= subdomain .or. bodies%glued(k) > 0) cycle
-        do b = 1, size(boundaries)
-          if (.not. boundaries(b)%touches()) cycle
-          call boundaries(b)%locate(bodies%position(:, k), distance, normal)
-          if (distance - bodies%radius(k) <= range) call list%add(k, -b, no_shift)
-        end do
-      end do
-    end subroutine search_boundaries
-
-    subroutine search_pairs()
-      integer :: cell, other, a, b, l, k, x, y, z, place(3), near(3)
-      logical :: used(0:n_levels - 1)
-
-      used(:) = .false.
-      do a = 1, entries%n
-        used(entries%level(a)) = .true.
-      end do
+    associate (hash => entries%hash)
       do cell = 1, hash%n_cells
         a = hash%order(hash%first(cell))
         l = entries%level(a)
-        place(:) = place_of(entries%position(:, a), lower, edge_of(l))
+        place(:) = entries%place(a, l)
         do a = hash%first(cell), hash%first(cell + 1) - 1
           do b = a + 1, hash%first(cell + 1) - 1
-            call test_pair(hash%order(a), hash%order(b))
+            call test_pair(self, bodies, region, entries, hash%order(a), hash%order(b), list)
           end do
         end do
         do k = 1, merge(4, 13, bodies%nd == 2)
@@ -220,105 +251,128 @@ contains
           if (other == 0 .or. other == cell) cycle
           do a = hash%first(cell), hash%first(cell + 1) - 1
             do b = hash%first(other), hash%first(other + 1) - 1
-              call test_pair(hash%order(a), hash%order(b))
+              call test_pair(self, bodies, region, entries, hash%order(a), hash%order(b), list)
             end do
           end do
         end do
       end do
-      if (count(used) == 1) return
-      ! larger grains near each grain: one of a coarser level never lies farther off than one of its cells
-      do a = 1, entries%n
-        do l = 0, entries%level(a) - 1
-          if (.not. used(l)) cycle
-          place(:) = place_of(entries%position(:, a), lower, edge_of(l))
-          do z = merge(-1, 0, bodies%nd == 3), merge(1, 0, bodies%nd == 3)
-            do y = -1, 1
-              do x = -1, 1
-                near(1) = place(1) + x
-                near(2) = place(2) + y
-                near(3) = place(3) + z
-                near(:) = iand(near, last_cell)
-                other = hash%find(cell_key(l, near))
-                if (other == 0) cycle
-                do b = hash%first(other), hash%first(other + 1) - 1
-                  call test_pair(a, hash%order(b))
-                end do
+    end associate
+  end subroutine search_class
+
+  !> List the near pairs of two classes. A grain of a larger class never lies farther off than one of the cells of that class.
+  subroutine search_larger(self, bodies, region, entries, list)
+    type(neighbour_search_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    class(region_t), intent(in) :: region
+    type(entries_t), intent(in) :: entries
+    type(neighbour_list_t), intent(inout) :: list
+    integer :: other, a, b, l, x, y, z, layers, place(3), near(3)
+
+    layers = merge(1, 0, bodies%nd == 3)
+    do a = 1, entries%n
+      do l = 0, entries%level(a) - 1
+        if (.not. entries%used(l)) cycle
+        place(:) = entries%place(a, l)
+        do z = -layers, layers
+          do y = -1, 1
+            do x = -1, 1
+              near(1) = place(1) + x
+              near(2) = place(2) + y
+              near(3) = place(3) + z
+              near(:) = iand(near, last_cell)
+              other = entries%hash%find(cell_key(l, near))
+              if (other == 0) cycle
+              do b = entries%hash%first(other), entries%hash%first(other + 1) - 1
+                call test_pair(self, bodies, region, entries, a, entries%hash%order(b), list)
               end do
             end do
           end do
         end do
       end do
-    end subroutine search_pairs
+    end do
+  end subroutine search_larger
 
-    subroutine test_pair(a, b)
-      integer, intent(in) :: a, b
-      integer :: i, j, shift(3), periods(3)
-      real(dp) :: antagonist(3), point(3), square
-      integer :: d, nd
+  !> List entries a and b where they are near, the subdomain owns their pair, and this is the one of its images that counts.
+  subroutine test_pair(self, bodies, region, entries, a, b, list)
+    type(neighbour_search_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    class(region_t), intent(in) :: region
+    type(entries_t), intent(in) :: entries
+    integer, intent(in) :: a, b
+    type(neighbour_list_t), intent(inout) :: list
+    integer :: i, j, shift(3), periods(3)
+    real(dp) :: antagonist(3), point(3), square
+    logical :: periodic
+    integer :: d, nd
 
-      i = entries%body(a)
-      j = entries%body(b)
-      nd = bodies%nd
-      square = 0.0_dp
-      do d = 1, nd
-        square = square + (entries%position(d, a) - entries%position(d, b))**2
-      end do
-      if (square > (bodies%radius(i) + bodies%radius(j) + range)**2) return
-      if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
-      shift(:) = 0
-      if (periodic) then
-        if (i == j) return
-        shift(:) = entries%shift(:, b) - entries%shift(:, a)
-        periods(:) = entries%shift(:, a)
-        if (bodies%id(j) < bodies%id(i)) then
-          shift(:) = -shift
-          periods(:) = entries%shift(:, b)
-        end if
-      end if
+    i = entries%body(a)
+    j = entries%body(b)
+    nd = bodies%nd
+    square = 0.0_dp
+    do d = 1, nd
+      square = square + (entries%position(d, a) - entries%position(d, b))**2
+    end do
+    if (square > (bodies%radius(i) + bodies%radius(j) + self%rule%range())**2) return
+    if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
+    periodic = self%period%on()
+    shift(:) = 0
+    if (periodic) then
+      if (i == j) return
+      shift(:) = entries%shift(:, b) - entries%shift(:, a)
+      periods(:) = entries%shift(:, a)
       if (bodies%id(j) < bodies%id(i)) then
-        i = entries%body(b)
-        j = entries%body(a)
+        shift(:) = -shift
+        periods(:) = entries%shift(:, b)
       end if
-      antagonist(1:nd) = bodies%position(:, j)
-      if (periodic) antagonist(1:nd) = antagonist(1:nd) + shift(1:nd)*period%length(1:nd)
-      point(1:nd) = owner_point(rule%kind, bodies%position(:, i), antagonist(1:nd))
-      if (periodic) then
-        if (.not. is_where_owned(period, point(1:nd), periods)) return
-      end if
-      if (region%owner(point(1:nd)) /= subdomain) return
-      call list%add(i, j, merge(shift_code(shift), no_shift, periodic))
-    end subroutine test_pair
+    end if
+    if (bodies%id(j) < bodies%id(i)) then
+      i = entries%body(b)
+      j = entries%body(a)
+    end if
+    antagonist(1:nd) = bodies%position(:, j)
+    if (periodic) antagonist(1:nd) = antagonist(1:nd) + shift(1:nd)*self%period%length(1:nd)
+    point(1:nd) = owner_point(self%rule%kind, bodies%position(:, i), antagonist(1:nd))
+    if (periodic) then
+      if (.not. is_where_owned(self%period, point(1:nd), periods)) return
+    end if
+    if (region%owner(point(1:nd)) /= self%subdomain) return
+    call list%add(i, j, merge(shift_code(shift), no_shift, periodic))
+  end subroutine test_pair
 
-    subroutine sort_list()
-      integer(i8), allocatable :: id(:, :)
-      real(dp), allocatable :: point(:, :)
-      integer, allocatable :: order(:)
-      real(dp) :: antagonist(bodies%nd)
-      integer :: p, nd, shift(3)
+  !> Put the pairs in sweep order of their owner points.
+  subroutine sort_list(self, bodies, memory, list)
+    type(neighbour_search_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    type(pair_memory_t), intent(in) :: memory
+    type(neighbour_list_t), intent(inout) :: list
+    integer(i8), allocatable :: id(:, :)
+    real(dp), allocatable :: point(:, :)
+    integer, allocatable :: order(:)
+    real(dp) :: antagonist(bodies%nd), lower(bodies%nd)
+    integer :: p, nd, shift(3)
 
-      nd = bodies%nd
-      allocate (id(2, list%n), point(nd, list%n), order(list%n))
-      do p = 1, list%n
-        id(1, p) = bodies%id(list%candidate(p))
-        if (list%antagonist(p) < 0) then
-          id(2, p) = list%antagonist(p)
-          point(:, p) = bodies%position(:, list%candidate(p))
-        else
-          id(2, p) = bodies%id(list%antagonist(p))
-          antagonist(:) = bodies%position(:, list%antagonist(p))
-          if (periodic) then
-            shift(:) = shift_of_code(list%shift(p))
-            antagonist(:) = antagonist + shift(1:nd)*period%length(1:nd)
-          end if
-          point(:, p) = owner_point(rule%kind, bodies%position(:, list%candidate(p)), antagonist)
+    nd = bodies%nd
+    allocate (id(2, list%n), point(nd, list%n), order(list%n))
+    do p = 1, list%n
+      id(1, p) = bodies%id(list%candidate(p))
+      if (list%antagonist(p) < 0) then
+        id(2, p) = list%antagonist(p)
+        point(:, p) = bodies%position(:, list%candidate(p))
+      else
+        id(2, p) = bodies%id(list%antagonist(p))
+        antagonist(:) = bodies%position(:, list%antagonist(p))
+        if (self%period%on()) then
+          shift(:) = shift_of_code(list%shift(p))
+          antagonist(:) = antagonist + shift(1:nd)*self%period%length(1:nd)
         end if
-      end do
-      if (list%n > 0) lower(:) = minval(point, dim=2)
-      call sweep_order(point, lower, rule%sweep_edge(), id, order)
-      call list%finish(order, memory)
-    end subroutine sort_list
-
-  end subroutine find_neighbours
+        point(:, p) = owner_point(self%rule%kind, bodies%position(:, list%candidate(p)), antagonist)
+      end if
+    end do
+    lower(:) = 0.0_dp
+    if (list%n > 0) lower(:) = minval(point, dim=2)
+    call sweep_order(point, lower, self%rule%sweep_edge(), id, order)
+    call list%finish(order, memory)
+  end subroutine sort_list
 
   !> Class of a radius: the grid whose cells are as large as its pairs need.
   pure integer function level_of(radius, largest) result(level)

@@ -7,7 +7,7 @@ module gravier_halo
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
-  use gravier_neighbour_search, only: find_neighbours, sweep_order
+  use gravier_neighbour_search, only: neighbour_search_t, sweep_order
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
@@ -54,6 +54,7 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     type(body_set_t), allocatable :: ghosts(:)
     integer(i8), allocatable :: records(:, :), received(:, :)
+    type(neighbour_search_t) :: search
     integer :: s
 
     call plan_ghosts(self, decomposition)
@@ -64,10 +65,15 @@ contains
     if (allocated(self%reference)) deallocate (self%reference)
     allocate (self%view(size(decomposition%owned)), self%reference(size(decomposition%owned)))
     call make_views(self, decomposition, ghosts, received)
+    search%rule = decomposition%rule
+    search%period = decomposition%period
+    search%boundaries = decomposition%boundaries
     do s = 1, size(self%view)
       self%reference(s)%position = decomposition%owned(s)%position
-      call find_neighbours(self%view(s)%bodies, self%view(s)%owner, decomposition%boundaries, decomposition%period, &
-        & decomposition%partition, decomposition%subdomain_of(s), decomposition%rule, self%memory, self%view(s)%list)
+      associate (view => self%view(s))
+        search%subdomain = decomposition%subdomain_of(s)
+        call search%find(view%bodies, view%owner, decomposition%partition, self%memory, view%list)
+      end associate
     end do
     self%reference_boundaries = decomposition%boundaries
     self%builds = self%builds + 1

@@ -3,7 +3,8 @@ module gravier_repartition
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_body_store, only: body_set_t
-  use gravier_partition, only: partition_t, choose_boxes, check_subdomains
+  use gravier_box_counts, only: choose_boxes, check_subdomains
+  use gravier_partition, only: partition_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   implicit none

@@ -11,10 +11,12 @@ module gravier_hdf5_datasets
     & h5tget_size_f, hid_t, hsize_t, size_t
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
+  use gravier_text, only: to_text
   use gravier_hdf5_tree, only: h5_tree_t
   implicit none
   private
-  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, chunk_rows, class_of, type_of
+  public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, chunk_rows, class_of, type_of, &
+    & columns_text
 
   !> Rows of this rank in memory.
   type :: rows_t
@@ -279,5 +281,16 @@ contains
     end if
     call h5dclose_f(dataset, stat)
   end function class_of
+
+  !> The shape of a dataset of n_columns, for messages.
+  pure function columns_text(n_columns) result(text)
+    integer, intent(in) :: n_columns
+    character(len=:), allocatable :: text
+    if (n_columns == 0) then
+      text = "a dataset of shape (N)"
+    else
+      text = "a dataset of shape (N, "//to_text(n_columns)//")"
+    end if
+  end function columns_text
 
 end module gravier_hdf5_datasets

@@ -1,54 +1,21 @@
-!> An HDF5 file as a tree of groups: opened and closed, kept readable whatever becomes of the program, and groups that appear when
-!> they are complete.
-!>
-!> HDF5 can neither close nor forget a file whose headers find no room on the disk: on several ranks it waits for ever, and at the
-!> end of the program it dies. So nothing is made in a file before there is room for it: writers call `reserve` with a bound of what
-!> they write up to the next flush, headers included.
+!> An HDF5 file as a tree of groups, which may appear only when they are complete.
 module gravier_hdf5_tree
-  use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, H5P_FILE_CREATE_F, H5_INDEX_NAME_F, &
-    & H5_ITER_INC_F, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, &
-    & h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5ocopy_f, &
-    & h5odecr_refcount_f, h5oincr_refcount_f, h5olink_f, h5pclose_f, h5pcreate_f, h5pset_istore_k_f, &
-    & h5pset_obj_track_times_f, hid_t, hsize_t
-  use gravier_kinds, only: i8
-  use gravier_errors, only: error_t, raise, status_input, status_failure
-  use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, extend_file, remove_file, replace_file
-  use gravier_own_files, only: part_of, give_name, note_own
-  use gravier_hdf5_properties, only: start_library, parallel_access, of_group, ask_for_one_block
+  use hdf5, only: H5_INDEX_NAME_F, H5_ITER_INC_F, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, h5gn_members_f, h5ldelete_f, &
+    & h5lexists_f, h5lget_name_by_idx_f, h5ocopy_f, h5odecr_refcount_f, h5oincr_refcount_f, h5olink_f, h5pclose_f, hid_t, hsize_t
+  use gravier_errors, only: error_t
+  use gravier_hdf5_properties, only: of_group, ask_for_one_block
+  use gravier_hdf5_storage, only: h5_storage_t, bytes_of_link
   implicit none
   private
   public :: h5_tree_t
 
-  !> An open HDF5 file. Paths start at the root: "/steps/12/bodies/id".
-  type :: h5_tree_t
+  !> The groups of an open HDF5 file. Paths start at the root: "/steps/12/bodies/id".
+  type, extends(h5_storage_t) :: h5_tree_t
     private
-    !> the ranks that hold it open
-    type(communicator_t), public :: comm
-    !> its name, and where it is: aside until it has its name
-    character(len=:), allocatable :: name, path
-    integer(hid_t) :: id = -1
-    logical :: writable = .false.
-    !> on rank 0: length of the file when it was flushed last
-    integer(i8) :: flushed = 0
-    !> on rank 0: bytes that were reserved since
-    integer(i8) :: reserved = 0
     !> the group that begin_group started, not yet seen by readers
     integer(hid_t) :: hidden = -1
     character(len=:), allocatable :: hidden_path
   contains
-    procedure :: create => h5_create
-    procedure :: open => h5_open
-    procedure :: reopen => h5_reopen
-    procedure :: show => h5_show
-    procedure :: hide => h5_hide
-    procedure :: leave => h5_leave
-    procedure :: close => h5_close
-    procedure :: discard => h5_discard
-    procedure :: flush => h5_flush
-    procedure :: reserve => h5_reserve
-    procedure :: is_open => h5_is_open
-
     procedure :: make_group => h5_make_group
     procedure :: begin_group => h5_begin_group
     procedure :: commit_group => h5_commit_group
@@ -57,290 +24,15 @@ module gravier_hdf5_tree
     procedure :: take_over => h5_take_over
 
     procedure :: exists => h5_exists
-    procedure :: length => h5_length
     procedure :: member_count => h5_member_count
     procedure :: member => h5_member
 
     !> for the types that extend this one
     procedure :: locate => h5_locate
     procedure :: make_groups_above => h5_make_groups_above
-    procedure :: fail => h5_fail
   end type h5_tree_t
 
-  !> reserved for an empty file, and for the link of a hidden group or other headers
-  integer(i8), parameter :: bytes_of_file = 16384, bytes_of_link = 16384
-  !> groups at the root that find room in its first block
-  integer, parameter :: members_of_root = 8
-
 contains
-
-  !> Create a file, which is written aside: it takes its name, and the place of an older file, when it is shown or closed.
-  subroutine h5_create(self, comm, path, error, chunks)
-    class(h5_tree_t), intent(inout) :: self
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-    !> keep room for so many chunks of each table in one block: to add one more of them is then a single write
-    integer, intent(in), optional :: chunks
-    integer(hid_t) :: access, creation
-    integer :: stat, ignored
-
-    if (allocated(error)) return
-    call prepare(self, comm, path, part_of(path), error)
-    if (comm%rank == 0) then
-      call check_creatable(self%path, error)
-      call reserve_space(self%path, bytes_of_file, error)
-      if (allocated(error)) call remove_file(self%path)
-    end if
-    call comm%agree(error)
-    if (allocated(error)) return
-    ! with headers of version 1.8 the room for chunks is kept in an object of HDF5's own that tells when it was made
-    access = parallel_access(comm, .not. present(chunks))
-    call h5pcreate_f(H5P_FILE_CREATE_F, creation, ignored)
-    call h5pset_obj_track_times_f(creation, .false., ignored)
-    call ask_for_one_block(creation, members_of_root)
-    if (present(chunks)) call h5pset_istore_k_f(creation, (chunks + 1)/2, ignored)
-    call h5fcreate_f(self%path, H5F_ACC_TRUNC_F, self%id, stat, creation_prp=creation, access_prp=access)
-    call h5pclose_f(creation, ignored)
-    call h5pclose_f(access, ignored)
-    if (stat < 0) call raise(error, status_failure, self%path//": cannot create this HDF5 file")
-    self%writable = .true.
-    call comm%agree(error)
-    ! to create the file has cut it, and given back what was reserved
-    call self%reserve(bytes_of_file, error)
-    if (allocated(error)) call self%discard()
-  end subroutine h5_create
-
-  !> Open an existing file for reading.
-  subroutine h5_open(self, comm, path, error)
-    class(h5_tree_t), intent(inout) :: self
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-    call open_existing(self, comm, path, path, .false., error)
-  end subroutine h5_open
-
-  !> Open an existing file for reading and for writing more into it.
-  subroutine h5_reopen(self, comm, path, error, aside)
-    class(h5_tree_t), intent(inout) :: self
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-    !> go on with a file that was left aside
-    logical, intent(in), optional :: aside
-    logical :: named
-
-    named = .true.
-    if (present(aside)) named = .not. aside
-    if (named) then
-      call open_existing(self, comm, path, path, .true., error)
-      if (comm%rank == 0 .and. .not. allocated(error)) call note_own(path)
-    else
-      call open_existing(self, comm, path, part_of(path), .true., error)
-    end if
-  end subroutine h5_reopen
-
-  !> Take its name away from an open file until it is shown or closed. On failure it is closed and keeps its name.
-  subroutine h5_hide(self, error)
-    class(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-    type(communicator_t) :: comm
-    character(len=:), allocatable :: name
-
-    if (self%id < 0) return
-    call close_file(self, error)
-    if (self%comm%rank == 0) call replace_file(self%name, part_of(self%name), error)
-    call self%comm%agree(error)
-    if (allocated(error)) return
-    comm = self%comm
-    name = self%name
-    call self%reopen(comm, name, error, aside=.true.)
-  end subroutine h5_hide
-
-  !> Open the file `name` where it is, at `path`.
-  subroutine open_existing(self, comm, name, path, writable, error)
-    type(h5_tree_t), intent(inout) :: self
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: name, path
-    logical, intent(in) :: writable
-    type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: access
-    integer :: stat, ignored
-
-    if (allocated(error)) return
-    call prepare(self, comm, name, path, error)
-    ! one rank alone looks first: a file that HDF5 cannot make sense of is never opened by all together
-    if (comm%rank == 0) then
-      call check_format(path, error)
-      if (writable) call reserve_space(path, bytes_of_file, error)
-    end if
-    call comm%agree(error)
-    if (allocated(error)) return
-    access = parallel_access(comm, writable)
-    call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable), self%id, stat, access_prp=access)
-    call h5pclose_f(access, ignored)
-    if (stat < 0) call raise(error, status_input, path//": truncated or damaged HDF5 file")
-    if (comm%rank == 0) self%flushed = file_length(path)
-    self%writable = writable
-    call comm%agree(error)
-  end subroutine open_existing
-
-  !> Check that `path` can be read and begins like an HDF5 file.
-  subroutine check_format(path, error)
-    character(len=*), intent(in) :: path
-    type(error_t), allocatable, intent(inout) :: error
-    logical :: is_hdf5
-    integer :: stat
-
-    call check_readable(path, error)
-    if (allocated(error)) return
-    call h5fis_hdf5_f(path, is_hdf5, stat)
-    if (stat < 0 .or. .not. is_hdf5) call raise(error, status_input, path//": not an HDF5 file")
-  end subroutine check_format
-
-  !> Start the library, close what was open and remember where to find the file.
-  subroutine prepare(self, comm, name, path, error)
-    type(h5_tree_t), intent(inout) :: self
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: name, path
-    type(error_t), allocatable, intent(inout) :: error
-
-    call self%close(error)
-    call start_library(error)
-    self%comm = comm
-    self%name = name
-    self%path = path
-    self%flushed = 0
-    self%reserved = 0
-  end subroutine prepare
-
-  !> Give the file its name, with what was written so far; it stays open. On failure it is removed, and an older file stays.
-  subroutine h5_show(self, error)
-    class(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-    type(communicator_t) :: comm
-    character(len=:), allocatable :: name
-
-    if (self%id < 0) return
-    call self%close(error)
-    if (allocated(error)) return
-    comm = self%comm
-    name = self%name
-    call open_existing(self, comm, name, name, .true., error)
-  end subroutine h5_show
-
-  !> Close; a file that is aside takes its name, or is removed where something failed before. Without effect on a file not open. A
-  !> hidden group is lost.
-  subroutine h5_close(self, error)
-    class(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-    logical :: aside
-
-    if (self%id < 0) return
-    aside = self%path /= self%name
-    if (aside) call self%flush(error)
-    if (aside .and. allocated(error)) then
-      call self%discard()
-      return
-    end if
-    call close_file(self, error)
-    if (.not. aside) return
-    if (self%comm%rank == 0) then
-      if (allocated(error)) call remove_file(self%path)
-      call give_name(self%name, error)
-    end if
-    call self%comm%agree(error)
-  end subroutine h5_close
-
-  !> Close, whatever happened before; a file that is aside is removed. Without effect on a file not open.
-  subroutine h5_discard(self)
-    class(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable :: ignored
-
-    if (self%id < 0) return
-    call close_file(self, ignored)
-    if (self%comm%rank == 0 .and. self%path /= self%name) call remove_file(self%path)
-  end subroutine h5_discard
-
-  !> Close a file as it is, aside or not, whatever happened before. Without effect on a file not open.
-  subroutine h5_leave(self)
-    class(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable :: ignored
-
-    if (self%id >= 0) call close_file(self, ignored)
-  end subroutine h5_leave
-
-  subroutine close_file(self, error)
-    type(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: stat
-
-    call self%abandon_group()
-    call h5fclose_f(self%id, stat)
-    self%id = -1
-    if (stat < 0) call raise(error, merge(status_failure, status_input, self%writable), self%path//": cannot close this file")
-    call self%comm%agree(error)
-  end subroutine close_file
-
-  !> Bring everything written so far to the disk: the file stays readable whatever becomes of the program afterwards.
-  subroutine h5_flush(self, error)
-    class(h5_tree_t), intent(inout) :: self
-    type(error_t), allocatable, intent(inout) :: error
-    integer(hsize_t) :: length
-    integer :: stat
-
-    if (allocated(error)) return
-    if (self%comm%rank == 0) then
-      ! a file that the program dies over must not be shorter than its headers say
-      call h5fget_filesize_f(self%id, length, stat)
-      if (stat == 0) call extend_file(self%path, int(length, i8), error)
-      ! HDF5 waits for ever when one rank cannot write its share of the headers: give them their place first
-      call reserve_space(self%path, bytes_of_link, error, start=self%flushed, held=self%flushed + self%reserved)
-    end if
-    call self%comm%agree(error)
-    if (allocated(error)) return
-    call h5fflush_f(self%id, H5F_SCOPE_GLOBAL_F, stat)
-    if (stat < 0) call raise(error, status_failure, self%path//": cannot write to this file: is the disk full?")
-    call self%comm%agree(error)
-    if (self%comm%rank == 0) self%flushed = file_length(self%path)
-    ! HDF5 may have cut what was reserved behind the end
-    self%reserved = 0
-  end subroutine h5_flush
-
-  !> Make sure of `bytes` of disk space for what will be written next, its headers included (allow 64 KiB for those of
-  !> a few groups), besides what was reserved since the last flush. On failure nothing has been written and the file is as
-  !> the last flush left it. Where the file system knows no reservation, the space that is free now is all that can be
-  !> asked for.
-  subroutine h5_reserve(self, bytes, error)
-    class(h5_tree_t), intent(inout) :: self
-    !> on rank 0: of all ranks together
-    integer(i8), intent(in) :: bytes
-    type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: held
-
-    if (allocated(error)) return
-    if (self%comm%rank == 0) then
-      held = self%flushed + self%reserved
-      call reserve_space(self%path, held + bytes - file_length(self%path), error, held=held)
-      if (.not. allocated(error)) self%reserved = self%reserved + bytes
-    end if
-    call self%comm%agree(error)
-  end subroutine h5_reserve
-
-  pure logical function h5_is_open(self) result(is_open)
-    class(h5_tree_t), intent(in) :: self
-    is_open = self%id >= 0
-  end function h5_is_open
-
-  !> Raise an error that names the file and the object in it.
-  subroutine h5_fail(self, path, what, error)
-    class(h5_tree_t), intent(in) :: self
-    character(len=*), intent(in) :: path, what
-    type(error_t), allocatable, intent(inout) :: error
-    call raise(error, merge(status_failure, status_input, self%writable), self%name//": "//path//": "//what)
-  end subroutine h5_fail
-
-  ! ------------------------------------------------------------------------------------------------ groups
 
   !> Make a group, and those above it that are missing.
   subroutine h5_make_group(self, path, error, members)
@@ -403,7 +95,7 @@ contains
     if (self%exists(path)) call self%fail(path, "is in the file already", error)
     if (.not. allocated(error)) then
       creation = of_group()
-      call h5gcreate_anon_f(self%id, self%hidden, stat, gcpl_id=creation)
+      call h5gcreate_anon_f(self%root(), self%hidden, stat, gcpl_id=creation)
       call h5pclose_f(creation, ignored)
       if (stat < 0) then
         self%hidden = -1
@@ -432,7 +124,7 @@ contains
       return
     end if
     call self%make_groups_above(self%hidden_path)
-    call h5olink_f(self%hidden, self%id, self%hidden_path, stat)
+    call h5olink_f(self%hidden, self%root(), self%hidden_path, stat)
     if (stat < 0) call self%fail(self%hidden_path, "cannot make this group", error)
     call h5odecr_refcount_f(self%hidden, ignored)
     call self%comm%agree(error)
@@ -484,7 +176,7 @@ contains
     call self%make_groups_above(target_path)
     call self%locate(target_path, to, target_name)
     call h5ocopy_f(from, name, to, target_name, stat)
-    if (stat < 0) call self%fail(target_path, "cannot copy "//path//" of "//source%path, error)
+    if (stat < 0) call self%fail(target_path, "cannot copy "//path//" of "//source%where_it_is(), error)
     call self%comm%agree(error)
   end subroutine h5_take_over
 
@@ -495,7 +187,7 @@ contains
     integer(hid_t), intent(out) :: place
     character(len=:), allocatable, intent(out) :: name
 
-    place = self%id
+    place = self%root()
     name = path
     if (self%hidden < 0) return
     if (path == self%hidden_path) then
@@ -526,12 +218,6 @@ contains
     end do
     if (len(name) == 1 .and. name /= "/" .and. name /= ".") call h5lexists_f(place, name, exists, stat)
   end function h5_exists
-
-  !> Bytes of the file on the disk. Not collective.
-  integer(i8) function h5_length(self) result(length)
-    class(h5_tree_t), intent(in) :: self
-    length = file_length(self%path)
-  end function h5_length
 
   !> Number of groups and datasets in a group, -1 of anything else. Not collective.
   integer function h5_member_count(self, path) result(n)

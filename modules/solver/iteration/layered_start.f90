@@ -17,7 +17,7 @@ module gravier_layered_start
   use gravier_timers, only: start_timer, stop_timer, phase_sweep
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: add_inverse_mass
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_method, only: momentum_t, work_t
   use gravier_sweep_order, only: group_contacts
   use gravier_supports, only: supports_t, find_supports
@@ -42,6 +42,9 @@ module gravier_layered_start
     real(dp) :: longest = 0.0_dp
     !> contacts by layer, and the first of each layer (layers + 1)
     integer, allocatable :: contact(:), first(:)
+    !> the layer at work, and the shortest way of a body of its halo [mean diameters]
+    integer :: at_work = 0
+    real(dp) :: lowest = 0.0_dp
     !> velocity under the impulses of the layers done (nv, n_columns)
     real(dp), allocatable :: loaded(:, :)
     !> work space: velocity and weight in a layer, impulses it hands on (nv or nw, n_columns)
@@ -55,6 +58,8 @@ module gravier_layered_start
     integer :: n_grouped = 0
     integer, allocatable :: pair(:, :)
     real(dp), allocatable :: hot(:, :, :), impulse(:, :, :), last_impulse(:, :, :), start_impulse(:, :, :)
+  contains
+    procedure :: moves => layers_moves
   end type layers_t
 
 contains
@@ -203,117 +208,144 @@ contains
     integer, intent(in) :: l, s
     type(layers_t), intent(inout) :: this
     integer, allocatable :: found(:), pair(:, :), order(:)
-    integer :: b, c, k, n, last
-    real(dp) :: lowest
+    integer :: k
 
     associate (sub => problem%sub(s))
-      ! what moved in the layer before stands still again
-      do k = 1, size(this%movable)
-        this%weight(:, this%movable(k)) = 0.0_dp
-        this%velocity(:, this%movable(k)) = 0.0_dp
-      end do
-      deallocate (this%movable)
-      last = ubound(this%first, 1)
-      lowest = 0.0_dp
-      if (l < last - 1) lowest = this%longest - thickness*(l + 1) - halo
-      allocate (found(this%first(min(l + 2, last)) - this%first(l)))
-      n = 0
-      do k = this%first(l), this%first(min(l + 2, last)) - 1
-        c = this%contact(k)
-        if (k >= this%first(l + 1)) then
-          if (.not. (moves(sub%pair(1, c)) .or. moves(sub%pair(2, c)))) cycle
-        end if
-        n = n + 1
-        found(n) = c
-      end do
-      call list_movable()
-      if (allocated(this%previous)) deallocate (this%previous)
-      allocate (this%previous(size(this%velocity, 1), size(this%movable)))
-      do k = 1, size(this%movable)
-        this%previous(:, k) = this%velocity(:, this%movable(k))
-      end do
-      allocate (pair(2, n), order(n))
-      do k = 1, n
+      call start_layer(this, l)
+      call find_contacts(sub, this, found)
+      call list_movable(sub, this, found)
+      allocate (pair(2, size(found)), order(size(found)))
+      do k = 1, size(found)
         pair(:, k) = sub%pair(:, found(k))
       end do
       call group_contacts(pair, sub%n_bodies, order, this%n_grouped)
       if (allocated(this%taken)) deallocate (this%taken)
-      allocate (this%taken(n))
-      do k = 1, n
+      allocate (this%taken(size(found)))
+      do k = 1, size(found)
         this%taken(k) = found(order(k))
       end do
-      call pack_contacts()
+      call pack_contacts(sub, this)
+      if (size(found) > 0) call set_operators(problem, size(found), this%pair, this%hot, this%weight)
     end associate
-
-  contains
-
-    !> Whether body `b` moves in this layer.
-    pure logical function moves(b)
-      integer, intent(in) :: b
-      moves = this%layer(b) == l .or. (this%layer(b) == l + 1 .and. l + 1 < last .and. this%way(b) >= lowest)
-    end function moves
-
-    !> The bodies of these contacts that move.
-    subroutine list_movable()
-      integer, allocatable :: list(:)
-      integer :: i, m
-
-      associate (sub => problem%sub(s))
-        allocate (list(2*n))
-        m = 0
-        do i = 1, n
-          do k = 1, 2
-            b = sub%pair(k, found(i))
-            if (b > sub%n_bodies) cycle
-            if (.not. moves(b) .or. any(this%weight(:, b) > 0.0_dp)) cycle
-            m = m + 1
-            list(m) = b
-            this%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
-            this%velocity(:, b) = this%loaded(:, b)
-          end do
-        end do
-        this%movable = list(1:m)
-      end associate
-    end subroutine list_movable
-
-    !> Contacts in sweep order, in blocks; the rest of the last block has no effect.
-    subroutine pack_contacts()
-      integer :: q, g, i
-
-      if (allocated(this%pair)) deallocate (this%pair, this%hot, this%impulse, this%own)
-      associate (sub => problem%sub(s))
-        allocate (this%pair(2, lanes*n_blocks(n)), source=1)
-        allocate (this%hot(lanes, size(sub%hot, 2), n_blocks(n)), this%impulse(lanes, size(sub%impulse, 2), n_blocks(n)), &
-          & source=0.0_dp)
-        allocate (this%own(n))
-        do i = 1, n
-          c = this%taken(i)
-          q = lane_of(i)
-          g = block_of(i)
-          this%pair(:, i) = sub%pair(:, c)
-          this%hot(q, :, g) = sub%hot(lane_of(c), :, block_of(c))
-          this%impulse(q, :, g) = sub%impulse(lane_of(c), :, block_of(c))
-          this%own(i) = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c))) == l
-        end do
-        this%last_impulse = this%impulse
-        this%start_impulse = this%impulse
-        if (n == 0) return
-        call set_operators(this%pair, this%hot, this%weight)
-      end associate
-    end subroutine pack_contacts
-
-    subroutine set_operators(pair, hot, weight)
-      integer, intent(in), contiguous :: pair(:, :)
-      real(dp), intent(inout), contiguous :: hot(:, :, :)
-      real(dp), intent(in), contiguous :: weight(:, :)
-      real(dp) :: whole(3)
-
-      whole(:) = 1.0_dp
-      call problem%kernels%set_operators(pair, hot, weight, whole)
-      hot(lane_of(n) + 1:, :, block_of(n)) = 0.0_dp
-    end subroutine set_operators
-
   end subroutine take_layer
+
+  !> Layer `l` is the one at work: what moved in the one before stands still again.
+  subroutine start_layer(this, l)
+    type(layers_t), intent(inout) :: this
+    integer, intent(in) :: l
+    integer :: k
+
+    do k = 1, size(this%movable)
+      this%weight(:, this%movable(k)) = 0.0_dp
+      this%velocity(:, this%movable(k)) = 0.0_dp
+    end do
+    this%at_work = l
+    this%lowest = 0.0_dp
+    if (l < ubound(this%first, 1) - 1) this%lowest = this%longest - thickness*(l + 1) - halo
+  end subroutine start_layer
+
+  !> Whether body `b` moves in the layer at work: it is of that layer or of its halo.
+  pure logical function layers_moves(self, b) result(moves)
+    class(layers_t), intent(in) :: self
+    integer, intent(in) :: b
+
+    associate (l => self%at_work)
+      moves = self%layer(b) == l .or. &
+        & (self%layer(b) == l + 1 .and. l + 1 < ubound(self%first, 1) .and. self%way(b) >= self%lowest)
+    end associate
+  end function layers_moves
+
+  !> The contacts of the layer at work, and those of the next one where one of the bodies moves.
+  subroutine find_contacts(sub, this, found)
+    type(subproblem_t), intent(in) :: sub
+    type(layers_t), intent(in) :: this
+    integer, allocatable, intent(out) :: found(:)
+    integer, allocatable :: list(:)
+    integer :: c, k, n, next
+
+    associate (l => this%at_work)
+      next = min(l + 2, ubound(this%first, 1))
+      allocate (list(this%first(next) - this%first(l)))
+      n = 0
+      do k = this%first(l), this%first(next) - 1
+        c = this%contact(k)
+        if (k >= this%first(l + 1)) then
+          if (.not. (this%moves(sub%pair(1, c)) .or. this%moves(sub%pair(2, c)))) cycle
+        end if
+        n = n + 1
+        list(n) = c
+      end do
+    end associate
+    found = list(1:n)
+  end subroutine find_contacts
+
+  !> The bodies of these contacts that move, with their weights and velocities.
+  subroutine list_movable(sub, this, found)
+    type(subproblem_t), intent(in) :: sub
+    type(layers_t), intent(inout) :: this
+    integer, intent(in), contiguous :: found(:)
+    integer, allocatable :: list(:)
+    integer :: b, i, k, m
+
+    allocate (list(2*size(found)))
+    m = 0
+    do i = 1, size(found)
+      do k = 1, 2
+        b = sub%pair(k, found(i))
+        if (b > sub%n_bodies) cycle
+        if (.not. this%moves(b) .or. any(this%weight(:, b) > 0.0_dp)) cycle
+        m = m + 1
+        list(m) = b
+        this%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
+        this%velocity(:, b) = this%loaded(:, b)
+      end do
+    end do
+    this%movable = list(1:m)
+    if (allocated(this%previous)) deallocate (this%previous)
+    allocate (this%previous(size(this%velocity, 1), m))
+    do k = 1, m
+      this%previous(:, k) = this%velocity(:, this%movable(k))
+    end do
+  end subroutine list_movable
+
+  !> The contacts taken, in sweep order and in blocks; the rest of the last block has no effect.
+  subroutine pack_contacts(sub, this)
+    type(subproblem_t), intent(in) :: sub
+    type(layers_t), intent(inout) :: this
+    integer :: c, q, g, i, n
+
+    n = size(this%taken)
+    if (allocated(this%pair)) deallocate (this%pair, this%hot, this%impulse, this%own)
+    allocate (this%pair(2, lanes*n_blocks(n)), source=1)
+    allocate (this%hot(lanes, size(sub%hot, 2), n_blocks(n)), this%impulse(lanes, size(sub%impulse, 2), n_blocks(n)), &
+      & source=0.0_dp)
+    allocate (this%own(n))
+    do i = 1, n
+      c = this%taken(i)
+      q = lane_of(i)
+      g = block_of(i)
+      this%pair(:, i) = sub%pair(:, c)
+      this%hot(q, :, g) = sub%hot(lane_of(c), :, block_of(c))
+      this%impulse(q, :, g) = sub%impulse(lane_of(c), :, block_of(c))
+      this%own(i) = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c))) == this%at_work
+    end do
+    this%last_impulse = this%impulse
+    this%start_impulse = this%impulse
+  end subroutine pack_contacts
+
+  !> Local operators of n > 0 contacts with the weights of what moves.
+  subroutine set_operators(problem, n, pair, hot, weight)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: n
+    integer, intent(in), contiguous :: pair(:, :)
+    real(dp), intent(inout), contiguous :: hot(:, :, :)
+    real(dp), intent(in), contiguous :: weight(:, :)
+    real(dp) :: whole(3)
+
+    whole(:) = 1.0_dp
+    call problem%kernels%set_operators(pair, hot, weight, whole)
+    hot(lane_of(n) + 1:, :, block_of(n)) = 0.0_dp
+  end subroutine set_operators
 
   !> Sweeps with momentum over the contacts taken, and the exchange of NSCDD after each. Collective.
   subroutine solve_layer(problem, change, layers, inner)

@@ -109,7 +109,10 @@ contains
     do g = 1, n
       if (mod(g, comm%size) == comm%rank) own = own + 1
     end do
+    bodies%dimension = dimension
     bodies%n = own
+    allocate (bodies%group(own), source=0)
+    allocate (bodies%material(own), source=1)
     allocate (bodies%id(own), bodies%position(dimension, own), bodies%velocity(3*(dimension - 1), own))
     allocate (bodies%radius(own), bodies%mass(own))
     own = 0
@@ -136,23 +139,13 @@ contains
     end do
   end subroutine make_bodies
 
-  subroutine write_made(path, dimension, bodies, error)
-    character(len=*), intent(in) :: path
-    integer, intent(in) :: dimension
-    type(bodies_data_t), intent(in) :: bodies
-    type(error_t), allocatable, intent(inout) :: error
-
-    call write_bodies(comm, path, dimension, bodies%id, bodies%position, bodies%velocity, bodies%radius, bodies%mass, &
-      & bodies%wall_id, bodies%wall_point, bodies%wall_normal, error)
-  end subroutine write_made
-
   subroutine test_hdf5(dimension, n)
     integer, intent(in) :: dimension, n
     type(bodies_data_t) :: bodies
     type(error_t), allocatable :: error
 
     call make_bodies(dimension, n, bodies)
-    call write_made(base//".h5", dimension, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call expect_none(error, "writing")
     call read_bodies(comm, base//".h5", dimension, bodies, error)
     call expect_none(error, "reading")
@@ -221,16 +214,16 @@ contains
     character(len=:), allocatable :: first, second
 
     call make_bodies(3, 50, bodies)
-    call write_made(base//".h5", 3, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call read_bodies(comm, base//".h5", 3, bodies, error)
     first = content(base//".h5")
-    call write_made(base//".again.h5", 3, bodies, error)
+    call write_bodies(comm, base//".again.h5", bodies, error)
     second = content(base//".again.h5")
     call check(first == second .and. len(first) == len(second), "the same file however the bodies are spread")
     call expect_none(error, "writing twice")
   end subroutine test_same_file
 
-  !> Glued grains keep their groups; a file without any is the one of no argument, and is read with zeros.
+  !> Glued grains keep their groups; a file without any has no dataset of them, and is read with zeros.
   subroutine test_groups()
     type(bodies_data_t) :: bodies
     type(error_t), allocatable :: error
@@ -238,15 +231,15 @@ contains
     character(len=:), allocatable :: plain, free
 
     call make_bodies(2, 30, bodies)
-    call write_made(base//".h5", 2, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     plain = content(base//".h5")
     call file%open(comm, base//".h5", error)
     call check(.not. file%exists("/bodies/group"), "no dataset where no grain is glued")
     call file%close(error)
-    allocate (bodies%group(bodies%n), source=0)
-    call write_with(bodies, error)
+    call read_bodies(comm, base//".h5", 2, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     free = content(base//".h5")
-    call check(plain == free .and. len(plain) == len(free), "no grain glued: the file of no groups")
+    call check(plain == free .and. len(plain) == len(free), "no grain glued: the same file, read and written again")
     call read_bodies(comm, base//".h5", 2, bodies, error)
     call expect_none(error, "reading no groups")
     call check_equal(size(bodies%group), bodies%n, "size of no groups")
@@ -255,14 +248,14 @@ contains
     ! one glued grain, on one rank, and many
     call make_bodies(2, 30, bodies)
     bodies%group = merge(7, 0, bodies%id == 24)
-    call write_with(bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call read_bodies(comm, base//".h5", 2, bodies, error)
     call expect_none(error, "reading one group")
     call check(all(bodies%group == merge(7, 0, bodies%id == 24)), "one glued grain")
     call make_bodies(2, 30, bodies)
     bodies%group = int(mod(bodies%id, 9_i8))
     where (bodies%id == 12) bodies%group = huge(1)
-    call write_with(bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call read_bodies(comm, base//".h5", 2, bodies, error)
     call expect_none(error, "reading many groups")
     call check(all(bodies%group == merge(huge(1), int(mod(bodies%id, 9_i8)), bodies%id == 12)), "many glued grains")
@@ -270,20 +263,12 @@ contains
 
     call make_bodies(2, 30, bodies)
     bodies%group = merge(-1, 0, bodies%id == 40)
-    call write_with(bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call expect(error, status_failure, "/bodies/group: id 40: -1, but a group from 0 to 2147483647 was expected", &
       & "writing a negative group")
     call refuse_groups(-1_i8)
     call refuse_groups(2147483648_i8)
   end subroutine test_groups
-
-  subroutine write_with(bodies, error)
-    type(bodies_data_t), intent(in) :: bodies
-    type(error_t), allocatable, intent(inout) :: error
-
-    call write_bodies(comm, base//".h5", 2, bodies%id, bodies%position, bodies%velocity, bodies%radius, bodies%mass, &
-      & bodies%wall_id, bodies%wall_point, bodies%wall_normal, error, group=bodies%group)
-  end subroutine write_with
 
   !> A file with this group of the last body.
   subroutine refuse_groups(group)
@@ -347,7 +332,7 @@ contains
     type(error_t), allocatable :: error
 
     call make_bodies(3, 9, bodies)
-    call write_made(base//".h5", 3, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call read_bodies(comm, base//".h5", 3, bodies, error)
     call check(.not. bodies%has_box, "no box")
     call check_write_box([0.1_dp, -0.2_dp, 0.3_dp], [1.5_dp, 0.0_dp, 1.0_dp/3], error)
@@ -377,8 +362,10 @@ contains
     type(bodies_data_t) :: bodies
 
     call make_bodies(size(origin), 9, bodies)
-    call write_bodies(comm, base//".h5", size(origin), bodies%id, bodies%position, bodies%velocity, bodies%radius, bodies%mass, &
-      & bodies%wall_id, bodies%wall_point, bodies%wall_normal, error, origin=origin, period=period)
+    bodies%has_box = .true.
+    bodies%origin(1:size(origin)) = origin
+    bodies%period(1:size(period)) = period
+    call write_bodies(comm, base//".h5", bodies, error)
   end subroutine check_write_box
 
   !> A box of n numbers, all of one value.
@@ -718,7 +705,7 @@ contains
     call expect(error, status_input, "/walls/normal: id 1000: zero, but a normal that is not zero was expected", "a zero normal")
     call make_bodies(2, 8, bodies)
     bodies%wall_id(2) = 14
-    call write_made(base//".h5", 2, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call expect_none(error, "a wall with the id of a body")
     call read_bodies(comm, base//".h5", 2, bodies, error)
     call expect(error, status_input, "id 14 appears twice, but ids must be unique among bodies and walls", "a wall like a body")
@@ -732,17 +719,17 @@ contains
     logical :: exists
 
     call make_bodies(2, 8, bodies)
-    call write_made(base//".h5", 2, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call expect_none(error, "a good file")
     before = content(base//".h5")
     if (comm%rank == comm%size - 1) bodies%position(1, 1) = ieee_value(1.0_dp, ieee_quiet_nan)
-    call write_made(base//".h5", 2, bodies, error)
+    call write_bodies(comm, base//".h5", bodies, error)
     call expect(error, status_failure, "/bodies/position: id ", "writing NaN")
     call check(content(base//".h5") == before, "the older file is as it was")
     inquire (file=base//".h5.part", exist=exists)
     call check(.not. exists, "no unfinished file is left")
     call make_bodies(2, 8, bodies)
-    call write_made(base//".h5/none.h5", 2, bodies, error)
+    call write_bodies(comm, base//".h5/none.h5", bodies, error)
     call expect(error, status_failure, "cannot create this file: Not a directory", "no such directory")
   end subroutine test_write_refused
 

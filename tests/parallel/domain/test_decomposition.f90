@@ -7,7 +7,7 @@ program test_decomposition
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_set_t
   use gravier_periodic, only: period_t
-  use gravier_partition, only: choose_boxes
+  use gravier_box_counts, only: choose_boxes
   use gravier_decomposition, only: decomposition_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none

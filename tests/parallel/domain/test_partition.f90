@@ -8,7 +8,8 @@ program test_partition
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_sparse_exchange, only: sparse_exchange
-  use gravier_partition, only: partition_t, choose_boxes, check_subdomains
+  use gravier_box_counts, only: choose_boxes, check_subdomains
+  use gravier_partition, only: partition_t
   use gravier_cell_levels, only: share_out
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none

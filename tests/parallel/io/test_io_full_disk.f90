@@ -10,7 +10,8 @@ program test_io_full_disk
   use gravier_hdf5_file, only: h5_file_t
   use gravier_results_file, only: results_file_t
   use gravier_test_results_rows, only: body_rows_t, write_rows
-  use gravier_bodies_file, only: bodies_data_t, read_bodies, write_bodies
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls
+  use gravier_bodies_file, only: read_bodies, write_bodies
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_check, only: check, check_equal, finish_checks
@@ -307,12 +308,17 @@ contains
     integer, intent(in) :: n
     type(error_t), allocatable, intent(inout) :: error
     type(body_rows_t) :: bodies
-    integer(i8) :: no_id(0)
-    real(dp) :: no_point(3, 0)
+    type(bodies_data_t) :: data
 
     call make_bodies(n, bodies)
-    call write_bodies(comm, disk//"/bodies.h5", 3, bodies%id, bodies%position, bodies%velocity, bodies%radius, wall_id=no_id, &
-      & wall_point=no_point, wall_normal=no_point, error=error)
+    call allocate_bodies(data, 3, size(bodies%id), .false., "a test", error)
+    call allocate_walls(data, 3, 0, "a test", error)
+    if (allocated(error)) return
+    data%id(:) = bodies%id
+    data%position(:, :) = bodies%position
+    data%velocity(:, :) = bodies%velocity
+    data%radius(:) = bodies%radius
+    call write_bodies(comm, disk//"/bodies.h5", data, error)
   end subroutine write_some
 
   !> The older checkpoint stays, whether it is the table or the commit that fails.

@@ -44,7 +44,8 @@ program test_neighbour_search
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
-  use gravier_neighbour_search, only: neighbour_rule_t, find_neighbours, sweep_order, owner_point, rule_dual, rule_primal
+  use gravier_neighbour_search, only: neighbour_rule_t, neighbour_search_t, sweep_order, owner_point, rule_dual, &
+    & rule_primal
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape
   use test_search_region, only: sites_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -200,7 +201,7 @@ contains
     right = .true.
     ordered = .true.
     do s = 1, size(region%site, 2)
-      call find_neighbours(bodies, owned, boundaries, cloud%period, region, s, rule, pair_memory_t(3), list)
+      call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies, owned, region, pair_memory_t(3), list)
       right = right .and. size(list%candidate) == list%n .and. size(list%impulse, 1) == 3 .and. size(list%impulse, 2) == list%n
       right = right .and. size(list%shift) == merge(list%n, 0, cloud%period%on()) .and. all(abs(list%impulse) <= 0.0_dp)
       do p = 1, list%n
@@ -340,7 +341,7 @@ contains
       do k = 1, 2
         call shuffled_bodies(cloud, merge(53, 67, k == 1), bodies(k))
         call find_homes(bodies(k), region, owned)
-        call find_neighbours(bodies(k), owned, boundaries, cloud%period, region, s, rule, pair_memory_t(1), list(k))
+        call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies(k), owned, region, pair_memory_t(1), list(k))
       end do
       same = same .and. list(1)%n == list(2)%n
       if (.not. same) exit
@@ -442,7 +443,7 @@ contains
     rule%mean_radius = 1.0_dp
     call make_sites(bodies%nd, 1, whole)
     owned(:) = 1
-    call find_neighbours(bodies, owned, boundaries, period, whole, 1, rule, pair_memory_t(1), list)
+    call find_pairs(neighbour_search_t(rule, period, boundaries, 1), bodies, owned, whole, pair_memory_t(1), list)
   end subroutine list_units
 
   !> A gap equal to alert distance and skin is listed, a larger one is not; all numbers are exact in binary.
@@ -563,7 +564,7 @@ contains
     call unit_bodies(reshape([1.0_dp, 2.0_dp, 1.0_dp, 2.0_dp], [2, 2]), bodies)
     bodies%radius(:) = 0.0_dp
     call make_sites(2, 1, whole)
-    call find_neighbours(bodies, owned, ground, period, whole, 1, point_like, pair_memory_t(1), list)
+    call find_pairs(neighbour_search_t(point_like, period, ground, 1), bodies, owned, whole, pair_memory_t(1), list)
     call check_equal(list%n, 1, "points that coincide")
   end subroutine test_few_bodies
 
@@ -581,5 +582,16 @@ contains
     call sweep_order(points, lower, 1.0_dp, id, order)
     call check(all(order == expected), "sweep order")
   end subroutine test_sweep_order
+
+  !> One search, as of a subdomain.
+  subroutine find_pairs(search, bodies, owned, region, memory, list)
+    type(neighbour_search_t), intent(in) :: search
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in), contiguous :: owned(:)
+    type(sites_t), intent(in) :: region
+    type(pair_memory_t), intent(in) :: memory
+    type(neighbour_list_t), intent(inout) :: list
+    call search%find(bodies, owned, region, memory, list)
+  end subroutine find_pairs
 
 end program test_neighbour_search
