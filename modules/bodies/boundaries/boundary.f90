@@ -5,7 +5,7 @@ module gravier_boundary
   use gravier_rotation, only: cross, make_rotation, rotate
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_time_table, only: time_table_t
-  use gravier_surface, only: surface_t, surface_features_t
+  use gravier_surface, only: surface_t
   use gravier_surface_registry, only: glued_grains
   implicit none
   private
@@ -85,12 +85,10 @@ contains
   pure function boundary_shape_name(self) result(name)
     class(boundary_t), intent(in) :: self
     character(len=:), allocatable :: name
-    type(surface_features_t) :: features
 
     name = glued_grains
     if (.not. allocated(self%surface)) return
-    features = self%surface%features()
-    name = trim(features%kind)
+    name = trim(self%surface%is%kind)
   end function boundary_shape_name
 
   !> Names of the columns of a table of drives, with a blank between two.
@@ -104,34 +102,25 @@ contains
   !> Whether grains can have a contact with its surface.
   pure logical function boundary_touches(self)
     class(boundary_t), intent(in) :: self
-    type(surface_features_t) :: features
 
     boundary_touches = self%present .and. allocated(self%surface)
-    if (.not. boundary_touches) return
-    features = self%surface%features()
-    boundary_touches = features%touches
+    if (boundary_touches) boundary_touches = self%surface%is%touches
   end function boundary_touches
 
   !> Whether grains leave the scene behind it, while it is there or not.
   pure logical function boundary_lets_out(self)
     class(boundary_t), intent(in) :: self
-    type(surface_features_t) :: features
 
     boundary_lets_out = allocated(self%surface)
-    if (.not. boundary_lets_out) return
-    features = self%surface%features()
-    boundary_lets_out = features%lets_out
+    if (boundary_lets_out) boundary_lets_out = self%surface%is%lets_out
   end function boundary_lets_out
 
   !> Whether it is a plane that grains can touch, while it is there or not.
   pure logical function boundary_is_plane(self)
     class(boundary_t), intent(in) :: self
-    type(surface_features_t) :: features
 
     boundary_is_plane = allocated(self%surface)
-    if (.not. boundary_is_plane) return
-    features = self%surface%features()
-    boundary_is_plane = features%endless .and. features%touches
+    if (boundary_is_plane) boundary_is_plane = self%surface%is%endless .and. self%surface%is%touches
   end function boundary_is_plane
 
   !> Whether it is a group of grains that are glued to each other.
@@ -202,7 +191,6 @@ contains
     !> (nd) [m]
     real(dp), intent(in) :: x(:)
     real(dp), intent(out) :: image(3)
-    type(surface_features_t) :: features
     real(dp) :: middle(3)
     integer :: d
 
@@ -211,8 +199,7 @@ contains
     if (.not. any(self%period > 0.0_dp)) return
     middle(:) = self%pivot
     if (allocated(self%surface)) then
-      features = self%surface%features()
-      if (features%endless) return
+      if (self%surface%is%endless) return
       call self%surface%find_middle(middle)
     end if
     do d = 1, size(x)

@@ -43,6 +43,8 @@ module gravier_surface
     real(dp) :: edge(3, 2) = 0.0_dp
     !> 0 where the shape has none [m]
     real(dp) :: radius = 0.0_dp
+    !> what `features` says, at hand where it is asked for each grain; set by the registry, which makes surfaces
+    type(surface_features_t) :: is
   contains
     procedure(surface_features), deferred, nopass :: features
     procedure(surface_keys), deferred, nopass :: keys
