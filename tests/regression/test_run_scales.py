@@ -71,7 +71,9 @@ class Scales(RunTestCase):
                      2 * RADIUS, G * 1e-3, G * 1e-6 / (2 * RADIUS), math.sqrt(2 * G * RADIUS))
         self.figures(text, rf"error of a solve is compared with U = {NUMBER} m/s \(load of a step\)", G * 1e-3)
         self.assertEqual(self.warnings(text), [])
-        self.assertEqual(text, self.check_case(LATTICE))
+        # what the libraries of a process take differs from time to time
+        memory = r"about \d+ MiB at most on a rank"
+        self.assertEqual(re.sub(memory, "", text), re.sub(memory, "", self.check_case(LATTICE)))
 
     def test_shear(self):
         text = self.check_case(SHEAR)
