@@ -25,7 +25,7 @@ except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from one_line import OneLineParser  # noqa: E402
+from one_line import OneLineParser, plain  # noqa: E402
 from whole_file import Locked, give_names, hdf5_file, output_lock  # noqa: E402
 
 LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
@@ -728,16 +728,16 @@ def main():
         with output_lock(options.out + ".nml", "gravier_import"):
             made = write_files(case, options.out, options, contacts)
     except (Refused, Locked) as refused:
-        print(f"gravier_import: error: {refused}", file=sys.stderr)
+        print(f"gravier_import: error: {plain(refused)}", file=sys.stderr)
         return 2
     except (ValueError, IndexError) as problem:
-        print(f"gravier_import: error: {box}: {problem}: expected the files of a DATBOX as LMGC90 writes them", file=sys.stderr)
+        print(f"gravier_import: error: {box}: {plain(problem)}: expected the files of a DATBOX as LMGC90 writes them", file=sys.stderr)
         return 2
     except OSError as problem:
         print(f"gravier_import: error: {problem.filename or options.out}: {' '.join(str(problem.strerror or problem).split())}", file=sys.stderr)
         return 4
     for remark in dict.fromkeys(case.remarks):
-        print(f"gravier_import: note: {remark}", file=sys.stderr)
+        print(f"gravier_import: note: {plain(remark)}", file=sys.stderr)
     print(f"{len(case.free)} grains, {len(case.boundaries)} boundaries" + (f", {len(contacts)} contacts" if contacts is not None else "")
           + f": {', '.join(made)}")
     return 0

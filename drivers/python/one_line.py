@@ -1,5 +1,11 @@
 """Command lines whose errors are one line, as those of the programs."""
 import argparse
+import unicodedata
+
+
+def plain(text):
+    """A text on one line whose characters steer no terminal: each control character is a question mark."""
+    return "".join("?" if unicodedata.category(letter) == "Cc" else letter for letter in str(text).replace("\n", " "))
 
 
 class OneLineParser(argparse.ArgumentParser):

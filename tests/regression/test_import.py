@@ -471,6 +471,8 @@ class Import(RunTestCase):
             ({"drives": ""}, ("body 2 (JONCx) turns freely", "vlocy 3")),
             ({"drives": still(2, 7)}, ("DRV_DOF.DAT: line 3", "body RBDY2 7")),
             ({"drives": still(2, 2).replace("vlocy      1", "gravy      1")}, ("gravy", "vlocy or force")),
+            # no word of a file steers the terminal
+            ({"drives": still(2, 2).replace("vlocy      1", "vl\x1bcy      1")}, ("vl?cy", "vlocy or force")),
             ({"bulk": "$behav  lawty\n stone  RIGID      Umas= 1.\n"}, ("no gravity", "$gravy")),
             ({"contacts": "$icdan  DKDKx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      9  DISKx      1\n"},
              ("Vloc_Rloc.INI: line 3", "bodies 1 and 9")),
