@@ -2,6 +2,7 @@
 module gravier_flat_piece
   use gravier_kinds, only: dp
   use gravier_magnitude, only: is_size
+  use gravier_rotation, only: cross
   use gravier_declared_keys, only: declared_key_t
   use gravier_surface, only: surface_t, surface_features_t, point_key, is_vector
   implicit none
@@ -132,16 +133,15 @@ contains
     real(dp), intent(out) :: distance
     !> the vector in, the direction out
     real(dp), intent(inout) :: normal(3)
+    real(dp) :: across(3)
 
     distance = norm2(normal)
     ! less is rounding, and has no direction
     if (distance > 8.0_dp*epsilon(1.0_dp)*norm2(from)) then
       normal(:) = normal/distance
     else
-      normal(1) = a(2)*b(3) - a(3)*b(2)
-      normal(2) = a(3)*b(1) - a(1)*b(3)
-      normal(3) = a(1)*b(2) - a(2)*b(1)
-      normal(:) = normal/norm2(normal)
+      across(:) = cross(a, b)
+      normal(:) = across/norm2(across)
     end if
   end subroutine part
 
