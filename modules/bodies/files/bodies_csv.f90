@@ -10,7 +10,7 @@ module gravier_bodies_csv
   use gravier_shape_library, only: shape_library_t
   use gravier_shape_lookup, only: find_shape, shape_names
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, make_unit
-  use gravier_body_turn, only: settle_turn, settle_radius
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
   implicit none
   private
   public :: read_bodies_csv
@@ -275,6 +275,7 @@ contains
         if (allocated(bodies%shape)) bodies%shape(i) = what
         call read_grain(table, layout, i, bodies, error)
         if (shapes%n > 0) call read_turn(table, layout, bodies%orientation(:, i), error)
+        if (what > 0) call take_principal_axes(shapes%shape(what)%turn, bodies%orientation(:, i))
         call read_size(table, layout, shapes, what, bodies%radius(i), error)
       end if
     end do
