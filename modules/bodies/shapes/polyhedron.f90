@@ -1,0 +1,291 @@
+!> Bodies in space other than spheres: rounded convex polyhedra, capsules, and rigid unions of such pieces.
+!>
+!> Their mass, centre and inertia are those of the polyhedron that is wanted, with sharp edges.
+module gravier_polyhedron
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_convex_hull, only: find_hull
+  use gravier_closed_surface, only: merge_points, check_closed_convex
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_mass_properties, only: mass_t, mass_of_polyhedron, mass_of_capsule, mass_of_sum, find_principal_axes
+  use gravier_rounded_core, only: find_core
+  use gravier_shape_library, only: body_shape_t
+  use gravier_sharp_polyhedron, only: sharp_polyhedron_t
+  use gravier_spatial, only: extent_of, turn_back
+  use gravier_union_grid, only: mass_on_grid
+  implicit none
+  private
+  public :: make_polyhedron, make_polyhedron_of_faces, make_box, make_capsule, make_union, make_overlapping_union
+  public :: make_piece, make_piece_of_faces, make_capsule_piece, make_shape
+
+  !> features of a piece (vertices, sides of faces, faces) that a contact can name
+  integer, parameter :: most_features = 32768
+  !> distance from a plane, in parts of the extent, up to which points lie in it; files of single precision are off by less
+  real(dp), parameter :: flat = 1.0e-6_dp
+
+contains
+
+  !> A body that is the convex hull of points, with round edges. Failures (status_input): fewer than 4 points, all in one plane, a
+  !> rounding that is 0 or as large as the distance from the centre of mass to a face, too many corners.
+  subroutine make_polyhedron(name, points, rounding, shape, error)
+    !> for messages, and the name of the shape
+    character(len=*), intent(in) :: name
+    !> (3, n)
+    real(dp), intent(in), contiguous :: points(:, :)
+    !> in the unit of the points
+    real(dp), intent(in) :: rounding
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+    type(convex_piece_t) :: piece(1)
+    type(mass_t) :: mass
+
+    call make_piece(name, points, rounding, piece(1), mass, error)
+    call make_shape(name, piece, mass, shape, error)
+  end subroutine make_polyhedron
+
+  !> A body with the faces of a closed surface. Failures (status_input) beside those above: the surface is not closed, has no volume,
+  !> is inside out or not convex, or has a face without area.
+  subroutine make_polyhedron_of_faces(name, points, first, corner, rounding, shape, error)
+    character(len=*), intent(in) :: name
+    !> (3, n); points at one place become one
+    real(dp), intent(in) :: points(:, :)
+    !> face f has the corners corner(first(f):first(f + 1) - 1), anticlockwise seen from outside
+    integer, intent(in) :: first(:), corner(:)
+    real(dp), intent(in) :: rounding
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+    type(convex_piece_t) :: piece(1)
+    type(mass_t) :: mass
+
+    call make_piece_of_faces(name, points, first, corner, rounding, piece(1), mass, error)
+    call make_shape(name, piece, mass, shape, error)
+  end subroutine make_polyhedron_of_faces
+
+  !> A box with the axes of coordinates.
+  subroutine make_box(name, sides, rounding, shape, error)
+    character(len=*), intent(in) :: name
+    !> lengths along the axes, and the rounding in their unit
+    real(dp), intent(in) :: sides(3), rounding
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: points(3, 8)
+    integer :: k, d
+
+    if (allocated(error)) return
+    if (.not. all(sides > 0.0_dp)) then
+      call raise(error, status_input, name//": a side of "//to_text(minval(sides))//", but one above 0 was expected")
+      return
+    end if
+    do k = 1, 8
+      do d = 1, 3
+        points(d, k) = sides(d)*(ibits(k - 1, d - 1, 1) - 0.5_dp)
+      end do
+    end do
+    call make_polyhedron(name, points, rounding, shape, error)
+  end subroutine make_box
+
+  !> A capsule: a cylinder with half-balls at its ends, along the third axis; a sphere where the length is 0.
+  subroutine make_capsule(name, length, radius, shape, error)
+    character(len=*), intent(in) :: name
+    !> of the cylinder, between the centres of the half-balls
+    real(dp), intent(in) :: length
+    real(dp), intent(in) :: radius
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+    type(convex_piece_t) :: piece(1)
+    type(mass_t) :: mass
+    real(dp) :: ends(3, 2)
+
+    ends(:, :) = 0.0_dp
+    ends(3, 1) = -0.5_dp*length
+    ends(3, 2) = 0.5_dp*length
+    call make_capsule_piece(name, ends, radius, piece(1), mass, error)
+    call make_shape(name, piece, mass, shape, error)
+  end subroutine make_capsule
+
+  !> A body of several pieces that touch but do not overlap: its mass, centre and inertia are the sums of theirs.
+  subroutine make_union(name, pieces, masses, shape, error)
+    character(len=*), intent(in) :: name
+    !> in common axes, as make_piece and its like give them
+    type(convex_piece_t), intent(in) :: pieces(:)
+    type(mass_t), intent(in) :: masses(:)
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+
+    call make_shape(name, pieces, mass_of_sum(masses), shape, error)
+  end subroutine make_union
+
+  !> A body of several pieces that may overlap, as spheres of a cluster do: its mass, centre and inertia are integrals along parallel
+  !> lines through the pieces, which gravier_union_grid describes with their error.
+  subroutine make_overlapping_union(name, pieces, lines, shape, error)
+    character(len=*), intent(in) :: name
+    type(convex_piece_t), intent(in) :: pieces(:)
+    !> along the longer side of the grid of lines, at least 10
+    integer, intent(in) :: lines
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error)) return
+    if (lines < 10) call raise(error, status_input, name//": "//to_text(lines)//" lines of a grid, but 10 or more were expected")
+    if (allocated(error)) return
+    call make_shape(name, pieces, mass_on_grid(pieces, lines), shape, error)
+  end subroutine make_overlapping_union
+
+  !> The rounded hull of points as a piece, in their unit and axes, and its mass. Failures as of make_polyhedron.
+  subroutine make_piece(name, points, rounding, piece, mass, error)
+    character(len=*), intent(in) :: name
+    real(dp), intent(in), contiguous :: points(:, :)
+    real(dp), intent(in) :: rounding
+    type(convex_piece_t), intent(out) :: piece
+    type(mass_t), intent(out) :: mass
+    type(error_t), allocatable, intent(inout) :: error
+    type(sharp_polyhedron_t) :: sharp
+    real(dp) :: moment(3), axes(3, 3)
+    character(len=:), allocatable :: message
+
+    if (allocated(error)) return
+    call find_hull(points, flat*extent_of(points), sharp, message)
+    if (len(message) == 0) then
+      mass = mass_of_polyhedron(sharp)
+      call find_principal_axes(mass%inertia, moment, axes)
+      call find_core(sharp, mass%centre, axes, rounding, piece, message)
+    end if
+    if (len(message) == 0) call check_features(piece, message)
+    if (len(message) > 0) call raise(error, status_input, name//": "//message)
+  end subroutine make_piece
+
+  !> The same of a closed surface. Failures as of make_polyhedron_of_faces.
+  subroutine make_piece_of_faces(name, points, first, corner, rounding, piece, mass, error)
+    character(len=*), intent(in) :: name
+    real(dp), intent(in) :: points(:, :)
+    integer, intent(in) :: first(:), corner(:)
+    real(dp), intent(in) :: rounding
+    type(convex_piece_t), intent(out) :: piece
+    type(mass_t), intent(out) :: mass
+    type(error_t), allocatable, intent(inout) :: error
+    type(sharp_polyhedron_t) :: surface
+    character(len=:), allocatable :: message
+    integer :: same(size(points, 2)), k
+    logical :: used(size(points, 2))
+
+    if (allocated(error)) return
+    if (size(corner) == 0) then
+      call raise(error, status_input, name//": no faces")
+      return
+    else
+      if (minval(corner) < 1 .or. maxval(corner) > size(points, 2)) then
+        call raise(error, status_input, name//": a face names a corner that there is not")
+        return
+      end if
+    end if
+    call merge_points(points, 0.1_dp*flat*extent_of(points), same)
+    allocate (surface%vertex(3, size(points, 2)), surface%face_vertex(size(corner)))
+    surface%vertex(:, :) = points
+    surface%face_first = first
+    used(:) = .false.
+    do k = 1, size(corner)
+      surface%face_vertex(k) = same(corner(k))
+      used(same(corner(k))) = .true.
+    end do
+    ! points that no face names do not count
+    do k = 1, size(same)
+      if (.not. used(k)) surface%vertex(:, k) = points(:, surface%face_vertex(1))
+    end do
+    call check_closed_convex(surface, flat*extent_of(points), message)
+    if (len(message) > 0) then
+      call raise(error, status_input, name//": "//message)
+      return
+    end if
+    call make_piece(name, surface%vertex, rounding, piece, mass, error)
+  end subroutine make_piece_of_faces
+
+  !> A capsule between two points, or a sphere where they are one. Failures: a radius that is not above 0.
+  subroutine make_capsule_piece(name, ends, radius, piece, mass, error)
+    character(len=*), intent(in) :: name
+    !> (3, 2)
+    real(dp), intent(in) :: ends(:, :)
+    real(dp), intent(in) :: radius
+    type(convex_piece_t), intent(out) :: piece
+    type(mass_t), intent(out) :: mass
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    if (allocated(error)) return
+    if (.not. radius > 0.0_dp) then
+      call raise(error, status_input, name//": a radius of "//to_text(radius)//", but one above 0 was expected")
+      return
+    end if
+    n = 2
+    if (norm2(ends(:, 2) - ends(:, 1)) <= flat*radius) n = 1
+    piece%rounding = radius
+    piece%vertex = ends(:, 1:n)
+    piece%corner = piece%vertex
+    allocate (piece%face_first(1), piece%face_vertex(0), piece%face_normal(3, 0), piece%neighbour_first(n + 1))
+    piece%face_first(1) = 1
+    piece%neighbour_first(1) = 1
+    if (n == 1) then
+      allocate (piece%neighbour(0))
+    else
+      piece%neighbour = [2, 1]
+      piece%neighbour_first(2) = 2
+    end if
+    piece%neighbour_first(n + 1) = n
+    if (n == 2) piece%neighbour_first(3) = 3
+    mass = mass_of_capsule(ends, radius)
+  end subroutine make_capsule_piece
+
+  !> A shape of pieces: turned into principal axes about the centre of mass, and scaled to the radius 1.
+  subroutine make_shape(name, pieces, mass, shape, error)
+    character(len=*), intent(in) :: name
+    type(convex_piece_t), intent(in) :: pieces(:)
+    !> of the whole body
+    type(mass_t), intent(in) :: mass
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), parameter :: no_way(3) = 0.0_dp
+    real(dp) :: moment(3), axes(3, 3)
+    integer :: k, v
+
+    if (allocated(error)) return
+    if (.not. mass%volume > 0.0_dp) then
+      call raise(error, status_input, name//": a body without volume")
+      return
+    end if
+    call find_principal_axes(mass%inertia, moment, axes)
+    shape%name = name
+    shape%piece = pieces
+    shape%size = 0.0_dp
+    do k = 1, size(pieces)
+      associate (piece => shape%piece(k))
+        do v = 1, size(piece%vertex, 2)
+          call turn_back(axes, mass%centre, piece%vertex(:, v))
+          call turn_back(axes, mass%centre, piece%corner(:, v))
+          shape%size = max(shape%size, norm2(piece%corner(:, v)), norm2(piece%vertex(:, v)) + piece%rounding)
+        end do
+        do v = 1, size(piece%face_normal, 2)
+          call turn_back(axes, no_way, piece%face_normal(:, v))
+        end do
+      end associate
+    end do
+    do k = 1, size(pieces)
+      shape%piece(k)%rounding = shape%piece(k)%rounding/shape%size
+      shape%piece(k)%vertex(:, :) = shape%piece(k)%vertex/shape%size
+      shape%piece(k)%corner(:, :) = shape%piece(k)%corner/shape%size
+    end do
+    shape%volume = mass%volume/shape%size**3
+    shape%inertia(:) = moment/mass%volume/shape%size**2
+  end subroutine make_shape
+
+  !> Refuse a piece with more features than a contact can name.
+  pure subroutine check_features(piece, message)
+    type(convex_piece_t), intent(in) :: piece
+    character(len=:), allocatable, intent(inout) :: message
+    integer :: n
+
+    n = size(piece%vertex, 2) + size(piece%neighbour) + size(piece%face_first) - 1
+    if (n > most_features) message = "corners, faces and their sides are "//to_text(n)//", but at most "//to_text(most_features)// &
+      & " were expected"
+  end subroutine check_features
+
+end module gravier_polyhedron

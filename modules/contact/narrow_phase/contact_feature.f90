@@ -1,0 +1,239 @@
+!> What two pieces touch each other with: the face, edge or vertex of each that lies across a common normal.
+module gravier_contact_feature
+  use gravier_kinds, only: dp
+  use gravier_convex_piece, only: convex_piece_t
+  implicit none
+  private
+  public :: placement_t, feature_t, frame_t
+  public :: find_feature, lay_out_feature, edge_number, face_number, place_vertex, turn_back
+
+  !> Where a piece is: its lengths times a radius, its axes as columns, its centre [m].
+  type :: placement_t
+    real(dp) :: radius, rotation(3, 3), centre(3)
+  end type placement_t
+
+  !> A part of a piece: a vertex, an edge or a face.
+  type :: feature_t
+    !> number of the face, or 0
+    integer :: face = 0
+    !> the vertex that is farthest, and the other end of an edge, or 0
+    integer :: vertex = 0, other = 0
+    !> corners
+    integer :: n = 1
+  end type feature_t
+
+  !> Axes across a common normal, and where their origin is.
+  type :: frame_t
+    real(dp) :: origin(3), normal(3), first(3), second(3)
+  end type frame_t
+
+  !> a face or edge within this angle of the plane of contact is one that the other piece touches as a whole: its sine and cosine
+  real(dp), parameter :: most_sine = 0.2_dp
+  real(dp), parameter :: least_cosine = sqrt(1.0_dp - most_sine**2)
+  !> angle at which a side has no share of its sharp corners any more [rad]
+  real(dp), parameter :: blend_angle = 0.02_dp
+
+contains
+
+  !> The feature that lies across a direction and has the given vertices: the face most along the direction, else the edge most across
+  !> it, each within an angle, else a vertex. Ties go to the lowest number.
+  pure subroutine find_feature(piece, along, known, feature)
+    type(convex_piece_t), intent(in) :: piece
+    !> unit vector out of the piece, in its axes
+    real(dp), intent(in) :: along(3)
+    !> vertices nearest to the other piece; numbers may come twice
+    integer, intent(in) :: known(:)
+    type(feature_t), intent(out) :: feature
+    real(dp) :: greatest, found
+    integer :: f
+
+    feature%vertex = known(1)
+    greatest = least_cosine
+    do f = 1, size(piece%face_normal, 2)
+      found = along(1)*piece%face_normal(1, f) + along(2)*piece%face_normal(2, f) + along(3)*piece%face_normal(3, f)
+      if (found <= greatest) cycle
+      if (.not. has_all(piece, f, known)) cycle
+      greatest = found
+      feature%face = f
+    end do
+    if (feature%face > 0) then
+      feature%n = piece%face_first(feature%face + 1) - piece%face_first(feature%face)
+      return
+    end if
+    call find_edge(piece, along, known, feature)
+  end subroutine find_feature
+
+  !> The edge most across a direction, of those that have the given vertices.
+  pure subroutine find_edge(piece, along, known, feature)
+    type(convex_piece_t), intent(in) :: piece
+    real(dp), intent(in) :: along(3)
+    integer, intent(in) :: known(:)
+    type(feature_t), intent(inout) :: feature
+    real(dp) :: least, found, side(3)
+    integer :: e, k
+
+    least = most_sine
+    do e = piece%neighbour_first(feature%vertex), piece%neighbour_first(feature%vertex + 1) - 1
+      k = piece%neighbour(e)
+      if (any(known /= feature%vertex .and. known /= k)) cycle
+      side(:) = piece%vertex(:, k) - piece%vertex(:, feature%vertex)
+      found = sine_of(side, along)
+      if (found >= least) cycle
+      least = found
+      feature%other = k
+      feature%n = 2
+    end do
+  end subroutine find_edge
+
+  !> Whether a face has all of some vertices.
+  pure logical function has_all(piece, f, known)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: f, known(:)
+    integer :: k, i
+    logical :: found
+
+    has_all = .false.
+    do i = 1, size(known)
+      found = .false.
+      do k = piece%face_first(f), piece%face_first(f + 1) - 1
+        found = found .or. piece%face_vertex(k) == known(i)
+      end do
+      if (.not. found) return
+    end do
+    has_all = .true.
+  end function has_all
+
+  !> Sine of the angle between a side and the plane across a unit vector; 0 for a side without length.
+  pure real(dp) function sine_of(side, along)
+    real(dp), intent(in) :: side(3), along(3)
+    real(dp) :: length
+
+    length = sqrt(dot_product(side, side))
+    sine_of = 0.0_dp
+    if (length > 0.0_dp) sine_of = abs(dot_product(side, along))/length
+  end function sine_of
+
+  !> Corners of a face or an edge in the axes of a frame, blended: between those of the core and the sharp ones, the nearer to these the
+  !> more a side lies in the plane of contact.
+  pure subroutine lay_out_feature(piece, at, feature, frame, vertex, place)
+    type(convex_piece_t), intent(in) :: piece
+    type(placement_t), intent(in) :: at
+    type(feature_t), intent(in) :: feature
+    type(frame_t), intent(in) :: frame
+    !> numbers of the corners' vertices (n)
+    integer, intent(out) :: vertex(:)
+    !> along both axes of the frame and its normal (3, n) [m]
+    real(dp), intent(out) :: place(:, :)
+    real(dp) :: along(3), x(3), side(3, feature%n), share(feature%n)
+    integer :: k, m
+
+    m = feature%n
+    if (feature%face > 0) then
+      vertex(1:m) = piece%face_vertex(piece%face_first(feature%face):piece%face_first(feature%face + 1) - 1)
+    else
+      vertex(1) = min(feature%vertex, feature%other)
+      vertex(2) = max(feature%vertex, feature%other)
+    end if
+    call turn_back(at, frame%normal, along)
+    do k = 1, m
+      side(:, k) = piece%vertex(:, vertex(mod(k, m) + 1)) - piece%vertex(:, vertex(k))
+      share(k) = max(0.0_dp, 1.0_dp - sine_of(side(:, k), along)/blend_angle)
+    end do
+    do k = 1, m
+      x(:) = piece%vertex(:, vertex(k))
+      call blend(piece, feature, vertex(k), side(:, mod(k + m - 2, m) + 1), side(:, k), &
+        & share(mod(k + m - 2, m) + 1), share(k), x)
+      call place_point(at, x, along)
+      x(:) = along - frame%origin
+      place(1, k) = dot_product(x, frame%first)
+      place(2, k) = dot_product(x, frame%second)
+      place(3, k) = dot_product(x, frame%normal)
+    end do
+  end subroutine lay_out_feature
+
+  !> Move a corner towards its sharp place: within the face where both of its sides lie in the plane of contact, along a side where
+  !> only that one does.
+  pure subroutine blend(piece, feature, v, before, behind, share_before, share_behind, x)
+    type(convex_piece_t), intent(in) :: piece
+    type(feature_t), intent(in) :: feature
+    integer, intent(in) :: v
+    !> sides of the face at the corner, and their shares
+    real(dp), intent(in) :: before(3), behind(3), share_before, share_behind
+    real(dp), intent(inout) :: x(3)
+    real(dp) :: way(3), squared
+
+    if (.not. (share_before > 0.0_dp .or. share_behind > 0.0_dp)) return
+    way(:) = piece%corner(:, v) - piece%vertex(:, v)
+    if (feature%face > 0) then
+      associate (normal => piece%face_normal(:, feature%face))
+        way(:) = way - dot_product(way, normal)*normal
+      end associate
+      x(:) = x + share_before*share_behind*way
+      squared = dot_product(before, before)
+      if (squared > 0.0_dp) x(:) = x + share_before*(1.0_dp - share_behind)*dot_product(way, before)/squared*before
+      squared = dot_product(behind, behind)
+      if (squared > 0.0_dp) x(:) = x + (1.0_dp - share_before)*share_behind*dot_product(way, behind)/squared*behind
+    else
+      squared = dot_product(behind, behind)
+      if (squared > 0.0_dp) x(:) = x + share_behind*dot_product(way, behind)/squared*behind
+    end if
+  end subroutine blend
+
+  !> Number of an edge among the features of a piece: behind those of the vertices, by its place in the list of neighbours of its
+  !> lower end; of the lower end where there is no such edge.
+  pure integer function edge_number(piece, v, w)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: v, w
+    integer :: k
+
+    edge_number = min(v, w) - 1
+    do k = piece%neighbour_first(min(v, w)), piece%neighbour_first(min(v, w) + 1) - 1
+      if (piece%neighbour(k) /= max(v, w)) cycle
+      edge_number = size(piece%vertex, 2) + k - 1
+      return
+    end do
+  end function edge_number
+
+  !> Number of a face among the features of a piece, behind those of the edges.
+  pure integer function face_number(piece, f)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: f
+    face_number = size(piece%vertex, 2) + size(piece%neighbour) + f - 1
+  end function face_number
+
+  !> Where a vertex is [m].
+  pure subroutine place_vertex(piece, at, v, x)
+    type(convex_piece_t), intent(in) :: piece
+    type(placement_t), intent(in) :: at
+    integer, intent(in) :: v
+    real(dp), intent(out) :: x(3)
+    call place_point(at, piece%vertex(:, v), x)
+  end subroutine place_vertex
+
+  !> Where a point of a piece is [m].
+  pure subroutine place_point(at, point, x)
+    type(placement_t), intent(in) :: at
+    real(dp), intent(in) :: point(3)
+    real(dp), intent(out) :: x(3)
+    real(dp) :: u(3)
+    integer :: k
+
+    u(:) = at%radius*point
+    do k = 1, 3
+      x(k) = at%centre(k) + (at%rotation(k, 1)*u(1) + at%rotation(k, 2)*u(2) + at%rotation(k, 3)*u(3))
+    end do
+  end subroutine place_point
+
+  !> A direction in the axes of a piece.
+  pure subroutine turn_back(at, v, u)
+    type(placement_t), intent(in) :: at
+    real(dp), intent(in) :: v(3)
+    real(dp), intent(out) :: u(3)
+    integer :: k
+
+    do k = 1, 3
+      u(k) = at%rotation(1, k)*v(1) + at%rotation(2, k)*v(2) + at%rotation(3, k)*v(3)
+    end do
+  end subroutine turn_back
+
+end module gravier_contact_feature

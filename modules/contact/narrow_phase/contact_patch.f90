@@ -1,0 +1,200 @@
+!> Points of a contact before they become a manifold: collected, thinned out to as many as wanted, and put into order.
+module gravier_contact_patch
+  use gravier_kinds, only: dp
+  use gravier_contact_feature, only: frame_t
+  use gravier_manifold, only: manifold_t, most_points
+  implicit none
+  private
+  public :: patch_point_t, add_point, fill_manifold
+
+  !> A point of a patch.
+  type :: patch_point_t
+    !> along the axes of the frame and its normal [m]
+    real(dp) :: place(3)
+    real(dp) :: gap
+    integer :: key
+  end type patch_point_t
+
+  !> lengths and gaps that differ by less than this part of the size of the pair are equal, so that rounding does not decide
+  real(dp), parameter :: equal = 1.0e-5_dp
+
+contains
+
+  !> Add a point, unless its gap is too large. Of two points at one place, or of one key, that of the lower key stays, with the
+  !> smaller gap.
+  pure subroutine add_point(new, alert, size_of_pair, n, point)
+    type(patch_point_t), intent(in) :: new
+    !> [m]
+    real(dp), intent(in) :: alert, size_of_pair
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    integer :: k
+
+    if (.not. new%gap < alert) return
+    do k = 1, n
+      if (new%key /= point(k)%key) then
+        if (abs(new%place(1) - point(k)%place(1)) > equal*size_of_pair) cycle
+        if (abs(new%place(2) - point(k)%place(2)) > equal*size_of_pair) cycle
+      end if
+      if (new%gap < point(k)%gap) then
+        point(k)%place(:) = new%place
+        point(k)%gap = new%gap
+      end if
+      point(k)%key = min(point(k)%key, new%key)
+      return
+    end do
+    if (n == size(point)) return
+    n = n + 1
+    point(n) = new
+  end subroutine add_point
+
+  !> The manifold of the points: at most `most` of them, in ascending order of their keys.
+  pure subroutine fill_manifold(frame, size_of_pair, most, n, point, manifold)
+    type(frame_t), intent(in) :: frame
+    real(dp), intent(in) :: size_of_pair
+    integer, intent(in) :: most
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    type(manifold_t), intent(inout) :: manifold
+    integer :: k
+
+    call sort_points(n, point)
+    if (n > min(most, most_points)) then
+      if (most <= 4) then
+        call keep_four(most, size_of_pair, n, point)
+      else
+        do while (n > min(most, most_points))
+          call drop_one(size_of_pair, n, point)
+        end do
+      end if
+    end if
+    manifold%n = n
+    do k = 1, n
+      manifold%point(:, k) = frame%origin + point(k)%place(1)*frame%first + point(k)%place(2)*frame%second + &
+        & point(k)%place(3)*frame%normal
+      manifold%gap(k) = point(k)%gap
+      manifold%key(k) = point(k)%key
+    end do
+  end subroutine fill_manifold
+
+  !> Ascending keys.
+  pure subroutine sort_points(n, point)
+    integer, intent(in) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    type(patch_point_t) :: moved
+    integer :: j, k
+
+    do k = 2, n
+      moved = point(k)
+      j = k
+      do while (j > 1)
+        if (point(j - 1)%key <= moved%key) exit
+        point(j) = point(j - 1)
+        j = j - 1
+      end do
+      point(j) = moved
+    end do
+  end subroutine sort_points
+
+  !> Of more points keep the deepest, the one farthest from it, the one farthest from the line of both, and the one farthest from the
+  !> line on its other side. Differences that rounding could make do not count: ties go to the lowest key.
+  pure subroutine keep_four(most, size_of_pair, n, point)
+    integer, intent(in) :: most
+    real(dp), intent(in) :: size_of_pair
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    real(dp) :: value(n), size_of(n), way(2), base(2), room
+    integer :: chosen(4), k, m
+    logical :: kept(n)
+
+    room = equal*size_of_pair
+    do k = 1, n
+      value(k) = -point(k)%gap
+    end do
+    chosen(1) = first_greatest(value, room)
+    base(:) = point(chosen(1))%place(1:2)
+    do k = 1, n
+      value(k) = norm2(point(k)%place(1:2) - base)
+    end do
+    chosen(2) = first_greatest(value, room)
+    way(:) = point(chosen(2))%place(1:2) - base
+    way(:) = way/max(norm2(way), tiny(room))
+    do k = 1, n
+      value(k) = way(1)*(point(k)%place(2) - base(2)) - way(2)*(point(k)%place(1) - base(1))
+    end do
+    size_of(:) = abs(value)
+    chosen(3) = first_greatest(size_of, room)
+    value(:) = -sign(1.0_dp, value(chosen(3)))*value
+    chosen(4) = first_greatest(value, room)
+    ! nothing lies on the other side: the point that is farthest from the three
+    if (value(chosen(4)) <= room) chosen(4) = farthest_of(chosen(1:3), n, point, room)
+    kept(:) = .false.
+    do k = 1, min(most, 4)
+      kept(chosen(k)) = .true.
+    end do
+    m = 0
+    do k = 1, n
+      if (.not. kept(k)) cycle
+      m = m + 1
+      point(m) = point(k)
+    end do
+    n = m
+  end subroutine keep_four
+
+  !> The first of those values that are greatest but for a difference that does not count.
+  pure integer function first_greatest(value, room) result(place)
+    real(dp), intent(in) :: value(:), room
+    real(dp) :: greatest
+
+    greatest = maxval(value)
+    do place = 1, size(value)
+      if (value(place) >= greatest - room) return
+    end do
+    place = 1
+  end function first_greatest
+
+  !> The point whose nearest chosen one is farthest.
+  pure integer function farthest_of(chosen, n, point, room) result(place)
+    integer, intent(in) :: chosen(:), n
+    type(patch_point_t), intent(in) :: point(:)
+    real(dp), intent(in) :: room
+    real(dp) :: value(n), way(2)
+    integer :: k, j
+
+    do k = 1, n
+      value(k) = huge(1.0_dp)
+      do j = 1, size(chosen)
+        way(:) = point(k)%place(1:2) - point(chosen(j))%place(1:2)
+        value(k) = min(value(k), norm2(way))
+      end do
+    end do
+    place = first_greatest(value, room)
+  end function farthest_of
+
+  !> Leave out the point that is nearest to another one, but never the deepest; of the two the one with the higher key.
+  pure subroutine drop_one(size_of_pair, n, point)
+    real(dp), intent(in) :: size_of_pair
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    real(dp) :: depth(n), nearest, way(2)
+    integer :: k, j, deepest, out
+
+    do k = 1, n
+      depth(k) = -point(k)%gap
+    end do
+    deepest = first_greatest(depth, equal*size_of_pair)
+    nearest = huge(1.0_dp)
+    out = n
+    do k = 2, n
+      do j = 1, k - 1
+        way(:) = point(k)%place(1:2) - point(j)%place(1:2)
+        if (norm2(way) >= nearest - equal*size_of_pair) cycle
+        nearest = norm2(way)
+        out = merge(j, k, k == deepest)
+      end do
+    end do
+    point(out:n - 1) = point(out + 1:n)
+    n = n - 1
+  end subroutine drop_one
+
+end module gravier_contact_patch

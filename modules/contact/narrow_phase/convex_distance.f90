@@ -1,0 +1,272 @@
+!> The distance of two convex cores in space, exact up to rounding (GJK: Gilbert, Johnson and Keerthi 1988).
+!>
+!> The point nearest to the origin in the set of all differences of a point of one core and one of the other is found by simplices of
+!> up to four such differences, with signed volumes (Montanari, Petrinic and Barbieri, ACM Trans. Graph. 36 (2017) 30). Nothing is
+!> kept between calls, so that the same two places give the same bits; vertices that are equally far in a direction give way to the
+!> lowest of them.
+module gravier_convex_distance
+  use gravier_kinds, only: dp
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_nearest_simplex, only: find_nearest
+  implicit none
+  private
+  public :: placed_pair_t, core_distance_t
+  public :: find_core_distance, find_support, support_a, support_b, place_a, place_b
+
+  !> Two pieces, where they are.
+  type :: placed_pair_t
+    !> radii of the two bodies [m]
+    real(dp) :: radius_a = 1.0_dp, radius_b = 1.0_dp
+    !> axes of b, one a column, and its centre, in the axes of a and from the centre of a [m]
+    real(dp) :: rotation(3, 3) = 0.0_dp, way(3) = 0.0_dp
+  end type placed_pair_t
+
+  !> How far two cores are from each other.
+  type :: core_distance_t
+    !> they are farther than what was asked about: nothing else is known
+    logical :: beyond = .false.
+    !> they overlap, or are closer than rounding lets tell: the rest is not known
+    logical :: overlap = .false.
+    !> [m]
+    real(dp) :: distance = 0.0_dp
+    !> unit vector from the nearest point of b to that of a
+    real(dp) :: normal(3) = 0.0_dp
+    !> the nearest points, in the axes of a from its centre [m]
+    real(dp) :: point_a(3) = 0.0_dp, point_b(3) = 0.0_dp
+    !> vertices whose hulls the nearest points are in: how many pairs, their numbers and shares, which sum to 1
+    integer :: n = 0
+    integer :: vertex_a(4) = 0, vertex_b(4) = 0
+    real(dp) :: share(4) = 0.0_dp
+    !> differences looked at
+    integer :: steps = 0
+  end type core_distance_t
+
+  !> more steps than a search takes; it ends with the best of them
+  integer, parameter :: most_steps = 200
+  !> from this number of vertices on, the farthest is searched along edges
+  integer, parameter :: many_vertices = 48
+  !> below this distance, in parts of the size of the differences, cores count as overlapping
+  real(dp), parameter :: touching = 1.0e-11_dp
+
+contains
+
+  !> The distance of the cores of two pieces.
+  pure subroutine find_core_distance(a, b, pair, beyond, found)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    !> distance above which the search may end early [m]
+    real(dp), intent(in) :: beyond
+    type(core_distance_t), intent(out) :: found
+    real(dp) :: w(3, 4), x(3, 4), v(3), share(4), squared, along, size_squared
+    integer :: i, j, n
+
+    v(:) = -pair%way
+    if (.not. dot_product(v, v) > 0.0_dp) v(3) = 1.0_dp
+    n = 0
+    i = 1
+    j = 1
+    size_squared = 0.0_dp
+    squared = huge(1.0_dp)
+    do while (found%steps < most_steps)
+      found%steps = found%steps + 1
+      call support_a(a, v, i)
+      call support_b(b, pair, v, j)
+      if (is_known(found, n, i, j)) exit
+      n = n + 1
+      found%vertex_a(n) = i
+      found%vertex_b(n) = j
+      x(:, n) = place_a(a, pair, i)
+      w(:, n) = x(:, n) - place_b(b, pair, j)
+      size_squared = max(size_squared, dot_product(w(:, n), w(:, n)))
+      along = dot_product(v, w(:, n))
+      ! the difference that is farthest along -v bounds the distance from below
+      if (along > 0.0_dp .and. along*along > beyond*beyond*dot_product(v, v)) then
+        found%beyond = .true.
+        return
+      end if
+      ! no step is better than the last by more than rounding
+      if (n > 1 .and. squared - along <= 4*epsilon(1.0_dp)*sqrt(squared*size_squared)) then
+        n = n - 1
+        exit
+      end if
+      call find_nearest(w, n, share, v)
+      call drop_idle(found, n, share, w, x)
+      squared = dot_product(v, v)
+      if (n == 4 .or. squared <= touching**2*size_squared) exit
+    end do
+    found%n = n
+    if (n == 4 .or. squared <= touching**2*size_squared) then
+      found%overlap = .true.
+      return
+    end if
+    call finish(w(:, 1:n), x(:, 1:n), found)
+  end subroutine find_core_distance
+
+  !> Whether the difference of two vertices is in the simplex.
+  pure logical function is_known(found, n, i, j)
+    type(core_distance_t), intent(in) :: found
+    integer, intent(in) :: n, i, j
+    integer :: k
+
+    is_known = .false.
+    do k = 1, n
+      is_known = is_known .or. (found%vertex_a(k) == i .and. found%vertex_b(k) == j)
+    end do
+  end function is_known
+
+  !> Leave the vertices without a share out of the simplex.
+  pure subroutine drop_idle(found, n, share, w, x)
+    type(core_distance_t), intent(inout) :: found
+    integer, intent(inout) :: n
+    real(dp), intent(in) :: share(4)
+    real(dp), intent(inout) :: w(3, 4), x(3, 4)
+    integer :: k, m
+
+    m = 0
+    do k = 1, n
+      if (.not. share(k) > 0.0_dp) cycle
+      m = m + 1
+      found%share(m) = share(k)
+      if (m == k) cycle
+      found%vertex_a(m) = found%vertex_a(k)
+      found%vertex_b(m) = found%vertex_b(k)
+      w(:, m) = w(:, k)
+      x(:, m) = x(:, k)
+    end do
+    n = m
+  end subroutine drop_idle
+
+  !> Nearest points, distance and normal from the vertices that take part. The shares are bettered by one step of Newton's method,
+  !> which makes the way between the points normal to both features up to rounding.
+  pure subroutine finish(w, x, found)
+    !> differences and vertices of a (3, n)
+    real(dp), intent(in) :: w(:, :), x(:, :)
+    type(core_distance_t), intent(inout) :: found
+    real(dp) :: v(3), u(3), t(3), d(2), g(3), det
+    integer :: k
+
+    v(:) = w(:, 1)
+    do k = 2, found%n
+      v(:) = v + found%share(k)*(w(:, k) - w(:, 1))
+    end do
+    if (found%n == 2) then
+      u(:) = w(:, 2) - w(:, 1)
+      g(1) = dot_product(u, u)
+      if (g(1) > 0.0_dp) then
+        d(1) = -dot_product(u, v)/g(1)
+        v(:) = v + d(1)*u
+        found%share(2) = found%share(2) + d(1)
+        found%share(1) = 1.0_dp - found%share(2)
+      end if
+    else if (found%n == 3) then
+      u(:) = w(:, 2) - w(:, 1)
+      t(:) = w(:, 3) - w(:, 1)
+      g(1) = dot_product(u, u)
+      g(2) = dot_product(u, t)
+      g(3) = dot_product(t, t)
+      det = g(1)*g(3) - g(2)*g(2)
+      if (det > epsilon(1.0_dp)*g(1)*g(3)) then
+        d(1) = -(g(3)*dot_product(u, v) - g(2)*dot_product(t, v))/det
+        d(2) = -(g(1)*dot_product(t, v) - g(2)*dot_product(u, v))/det
+        v(:) = v + d(1)*u + d(2)*t
+        found%share(2:3) = found%share(2:3) + d
+        found%share(1) = 1.0_dp - found%share(2) - found%share(3)
+      end if
+    end if
+    found%point_a(:) = x(:, 1)
+    do k = 2, found%n
+      found%point_a(:) = found%point_a + found%share(k)*(x(:, k) - x(:, 1))
+    end do
+    found%point_b(:) = found%point_a - v
+    found%distance = sqrt(dot_product(v, v))
+    found%normal(:) = v/found%distance
+  end subroutine finish
+
+  !> The vertex of a that is farthest along -v.
+  pure subroutine support_a(a, v, i)
+    type(convex_piece_t), intent(in) :: a
+    real(dp), intent(in) :: v(3)
+    !> where a search along edges begins
+    integer, intent(inout) :: i
+    real(dp) :: along(3)
+
+    along(:) = -v
+    call find_support(a, along, i)
+  end subroutine support_a
+
+  !> The vertex of b that is farthest along v.
+  pure subroutine support_b(b, pair, v, j)
+    type(convex_piece_t), intent(in) :: b
+    type(placed_pair_t), intent(in) :: pair
+    real(dp), intent(in) :: v(3)
+    integer, intent(inout) :: j
+    real(dp) :: along(3)
+    integer :: k
+
+    do k = 1, 3
+      along(k) = pair%rotation(1, k)*v(1) + pair%rotation(2, k)*v(2) + pair%rotation(3, k)*v(3)
+    end do
+    call find_support(b, along, j)
+  end subroutine support_b
+
+  !> The vertex that is farthest along a direction. Among few vertices it is the lowest of those equally far; among many it is where
+  !> a walk along edges that go farther ends.
+  pure subroutine find_support(piece, along, best)
+    type(convex_piece_t), intent(in) :: piece
+    real(dp), intent(in) :: along(3)
+    integer, intent(inout) :: best
+    real(dp) :: farthest, reach
+    integer :: k, from
+
+    if (size(piece%vertex, 2) < many_vertices) then
+      best = 1
+      farthest = along(1)*piece%vertex(1, 1) + along(2)*piece%vertex(2, 1) + along(3)*piece%vertex(3, 1)
+      do k = 2, size(piece%vertex, 2)
+        reach = along(1)*piece%vertex(1, k) + along(2)*piece%vertex(2, k) + along(3)*piece%vertex(3, k)
+        if (reach > farthest) then
+          farthest = reach
+          best = k
+        end if
+      end do
+      return
+    end if
+    farthest = along(1)*piece%vertex(1, best) + along(2)*piece%vertex(2, best) + along(3)*piece%vertex(3, best)
+    do
+      from = best
+      do k = piece%neighbour_first(from), piece%neighbour_first(from + 1) - 1
+        associate (x => piece%vertex(:, piece%neighbour(k)))
+          reach = along(1)*x(1) + along(2)*x(2) + along(3)*x(3)
+        end associate
+        if (reach > farthest) then
+          farthest = reach
+          best = piece%neighbour(k)
+        end if
+      end do
+      if (best == from) return
+    end do
+  end subroutine find_support
+
+  !> Vertex i of a in the axes of a [m].
+  pure function place_a(a, pair, i) result(x)
+    type(convex_piece_t), intent(in) :: a
+    type(placed_pair_t), intent(in) :: pair
+    integer, intent(in) :: i
+    real(dp) :: x(3)
+    x(:) = pair%radius_a*a%vertex(:, i)
+  end function place_a
+
+  !> Vertex j of b in the axes of a, from the centre of a [m].
+  pure function place_b(b, pair, j) result(x)
+    type(convex_piece_t), intent(in) :: b
+    type(placed_pair_t), intent(in) :: pair
+    integer, intent(in) :: j
+    real(dp) :: x(3), u(3)
+    integer :: k
+
+    u(:) = pair%radius_b*b%vertex(:, j)
+    do k = 1, 3
+      x(k) = pair%way(k) + (pair%rotation(k, 1)*u(1) + pair%rotation(k, 2)*u(2) + pair%rotation(k, 3)*u(3))
+    end do
+  end function place_b
+
+end module gravier_convex_distance

@@ -1,0 +1,80 @@
+!> The common part of two convex polygons in a plane (Sutherland and Hodgman 1974).
+module gravier_polygon_clip
+  use gravier_kinds, only: dp
+  implicit none
+  private
+  public :: clip_polygon, room_for_clip
+
+contains
+
+  !> Corners that the common part of polygons of n and m corners can have, and some more for polygons that rounding bends.
+  pure integer function room_for_clip(n, m)
+    integer, intent(in) :: n, m
+    room_for_clip = 2*(n + m)
+  end function room_for_clip
+
+  !> Clip a polygon, or a segment as a polygon of two corners, against a convex one.
+  pure subroutine clip_polygon(subject, clip, sense, n, place, label)
+    !> corners in turn, first and second coordinate in the first two rows (3, corners)
+    real(dp), intent(in) :: subject(:, :), clip(:, :)
+    !> 1.0 where the corners of `clip` are anticlockwise, -1.0 where they are clockwise
+    real(dp), intent(in) :: sense
+    !> corners of the common part
+    integer, intent(out) :: n
+    !> (2, room)
+    real(dp), intent(out) :: place(:, :)
+    !> whose side leads from a corner to the next: k that of the subject from its corner k on, -k that of `clip` (room)
+    integer, intent(out) :: label(:)
+    real(dp) :: way(2), height(size(label)), old(2, size(label)), part
+    integer :: old_label(size(label)), s, k, next, m
+
+    n = size(subject, 2)
+    do k = 1, n
+      place(:, k) = subject(1:2, k)
+      label(k) = k
+    end do
+    do s = 1, size(clip, 2)
+      next = mod(s, size(clip, 2)) + 1
+      way(1) = sense*(clip(1, next) - clip(1, s))
+      way(2) = sense*(clip(2, next) - clip(2, s))
+      m = 0
+      do k = 1, n
+        height(k) = way(1)*(place(2, k) - clip(2, s)) - way(2)*(place(1, k) - clip(1, s))
+        if (height(k) >= 0.0_dp) m = m + 1
+      end do
+      if (m == n) cycle
+      if (m == 0) then
+        n = 0
+        return
+      end if
+      old(:, 1:n) = place(:, 1:n)
+      old_label(1:n) = label(1:n)
+      m = 0
+      do k = 1, n
+        next = merge(1, k + 1, k == n)
+        if (height(k) >= 0.0_dp) call put(old(:, k), old_label(k), m, place, label)
+        if ((height(k) >= 0.0_dp) .eqv. (height(next) >= 0.0_dp)) cycle
+        part = height(k)/(height(k) - height(next))
+        way(:) = old(:, k) + part*(old(:, next) - old(:, k))
+        call put(way, merge(-s, old_label(k), height(k) >= 0.0_dp), m, place, label)
+      end do
+      n = m
+    end do
+
+  end subroutine clip_polygon
+
+  !> Add a corner where there is room.
+  pure subroutine put(corner, name, m, place, label)
+    real(dp), intent(in) :: corner(2)
+    integer, intent(in) :: name
+    integer, intent(inout) :: m
+    real(dp), intent(inout) :: place(:, :)
+    integer, intent(inout) :: label(:)
+
+    if (m == size(label)) return
+    m = m + 1
+    place(:, m) = corner
+    label(m) = name
+  end subroutine put
+
+end module gravier_polygon_clip

@@ -1,0 +1,243 @@
+!> Contacts of two rounded convex pieces in space, and of a piece and a half-space.
+!>
+!> The normal is the direction of the shortest way between the cores, which is continuous in their places. Where both pieces lie along
+!> the plane of contact with a face or an edge, the contact is a patch: the common part of both, seen along the normal. Neither face is
+!> the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
+module gravier_polyhedron_pair
+  use gravier_kinds, only: dp
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, find_support
+  use gravier_core_overlap, only: find_least_separation
+  use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, lay_out_feature, edge_number, face_number, &
+    & place_vertex, turn_back
+  use gravier_contact_patch, only: patch_point_t, add_point, fill_manifold
+  use gravier_edge_patch, only: add_edge_points
+  use gravier_face_patch, only: add_face_points
+  use gravier_manifold, only: manifold_t, feature_base
+  implicit none
+  private
+  public :: find_polyhedron_manifold, find_halfspace_manifold
+
+  real(dp), parameter :: unturned(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
+  real(dp), parameter :: origin(3) = 0.0_dp
+  !> the exact point is kept beside a patch where it is deeper by this part of both roundings: blended corners make less of a
+  !> difference
+  real(dp), parameter :: deeper = 0.02_dp
+
+contains
+
+  !> The contacts of two pieces, in the axes of the first.
+  pure subroutine find_polyhedron_manifold(a, b, radius_a, radius_b, rotation, way, alert, most, manifold)
+    type(convex_piece_t), intent(in) :: a, b
+    !> what the lengths of the pieces are multiplied by [m]
+    real(dp), intent(in) :: radius_a, radius_b
+    !> axes of b, one a column, and its centre seen from that of a, in the axes of a [m]
+    real(dp), intent(in) :: rotation(3, 3), way(3)
+    !> points whose gap is this or more are no contacts [m]
+    real(dp), intent(in) :: alert
+    !> points wanted at most: 4, or up to most_points
+    integer, intent(in) :: most
+    !> from the centre of a, in its axes; what it held is lost
+    type(manifold_t), intent(inout) :: manifold
+    type(placed_pair_t) :: pair
+    type(core_distance_t) :: found
+    real(dp) :: reach
+
+    manifold%n = 0
+    manifold%cores_overlap = .false.
+    if (dot_product(way, way) >= (radius_a + radius_b + max(alert, 0.0_dp))**2) return
+    reach = radius_a*a%rounding + radius_b*b%rounding
+    pair%radius_a = radius_a
+    pair%radius_b = radius_b
+    pair%rotation(:, :) = rotation
+    pair%way(:) = way
+    call find_core_distance(a, b, pair, max(0.0_dp, reach + alert), found)
+    if (found%beyond) return
+    if (found%overlap) call find_least_separation(a, b, pair, found)
+    if (.not. found%distance - reach < alert) return
+    manifold%cores_overlap = found%overlap
+    manifold%normal(:) = found%normal
+    call find_patch(a, b, pair, found, alert, most, manifold)
+  end subroutine find_polyhedron_manifold
+
+  !> The points of a manifold from the features that the nearest points are in.
+  pure subroutine find_patch(a, b, pair, found, alert, most, manifold)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    type(core_distance_t), intent(in) :: found
+    real(dp), intent(in) :: alert
+    integer, intent(in) :: most
+    type(manifold_t), intent(inout) :: manifold
+    type(placement_t) :: at_a, at_b
+    type(feature_t) :: feature_a, feature_b
+    type(frame_t) :: frame
+    type(patch_point_t) :: point(2*(largest_face(a) + largest_face(b)) + 1), exact
+    real(dp) :: along(3), rounding(2)
+    integer :: n
+
+    at_a = placement_t(pair%radius_a, unturned, origin)
+    at_b = placement_t(pair%radius_b, pair%rotation, pair%way)
+    rounding(1) = pair%radius_a*a%rounding
+    rounding(2) = pair%radius_b*b%rounding
+    along(:) = -found%normal
+    call find_feature(a, along, found%vertex_a(1:found%n), feature_a)
+    call turn_back(at_b, found%normal, along)
+    call find_feature(b, along, found%vertex_b(1:found%n), feature_b)
+    call make_frame(found, frame)
+    n = 0
+    associate (scale => min(pair%radius_a, pair%radius_b))
+      if (feature_a%n > 1 .and. feature_b%n > 1) then
+        if (feature_a%n == 2 .and. feature_b%n == 2) then
+          call add_edge_points(a, b, at_a, at_b, feature_a, feature_b, frame, alert, n, point)
+        else
+          call add_face_points(a, b, at_a, at_b, feature_a, feature_b, frame, alert, n, point)
+        end if
+      end if
+      exact%gap = found%distance - rounding(1) - rounding(2)
+      if (needs_exact(exact%gap, sum(rounding), n, point)) then
+        exact%place(1:2) = 0.0_dp
+        exact%place(3) = 0.5_dp*(rounding(2) - rounding(1))
+        exact%key = number_of(a, feature_a)*feature_base + number_of(b, feature_b)
+        call add_point(exact, alert, scale, n, point)
+      end if
+      call fill_manifold(frame, scale, most, n, point, manifold)
+    end associate
+  end subroutine find_patch
+
+  !> Whether the nearest points are deeper than what a patch has.
+  pure logical function needs_exact(gap, reach, n, point)
+    real(dp), intent(in) :: gap, reach
+    integer, intent(in) :: n
+    type(patch_point_t), intent(in) :: point(:)
+    integer :: k
+
+    needs_exact = .true.
+    do k = 1, n
+      needs_exact = needs_exact .and. gap < point(k)%gap - deeper*reach
+    end do
+  end function needs_exact
+
+  !> Corners of the largest face of a piece, at least 2.
+  pure integer function largest_face(piece)
+    type(convex_piece_t), intent(in) :: piece
+    integer :: f
+
+    largest_face = 2
+    do f = 1, size(piece%face_first) - 1
+      largest_face = max(largest_face, piece%face_first(f + 1) - piece%face_first(f))
+    end do
+  end function largest_face
+
+  !> Number of a feature among those of a piece.
+  pure integer function number_of(piece, feature)
+    type(convex_piece_t), intent(in) :: piece
+    type(feature_t), intent(in) :: feature
+
+    number_of = feature%vertex - 1
+    if (feature%other > 0) number_of = edge_number(piece, feature%vertex, feature%other)
+    if (feature%face > 0) number_of = face_number(piece, feature%face)
+  end function number_of
+
+  !> A frame with the normal of the nearest points, from half-way between them.
+  pure subroutine make_frame(found, frame)
+    type(core_distance_t), intent(in) :: found
+    type(frame_t), intent(out) :: frame
+
+    frame%origin(:) = 0.5_dp*(found%point_a + found%point_b)
+    frame%normal(:) = found%normal
+    call find_tangents(frame)
+  end subroutine make_frame
+
+  !> Two axes across the normal of a frame, right-handed with it (Duff et al., J. Comput. Graph. Tech. 6 (2017) 1).
+  pure subroutine find_tangents(frame)
+    type(frame_t), intent(inout) :: frame
+    real(dp) :: s, p, q
+
+    associate (n => frame%normal)
+      s = sign(1.0_dp, n(3))
+      p = -1.0_dp/(s + n(3))
+      q = n(1)*n(2)*p
+      frame%first(1) = 1.0_dp + s*n(1)*n(1)*p
+      frame%first(2) = s*q
+      frame%first(3) = -s*n(1)
+      frame%second(1) = q
+      frame%second(2) = s + n(2)*n(2)*p
+      frame%second(3) = -n(2)
+    end associate
+  end subroutine find_tangents
+
+  !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the plane,
+  !> and all other vertices that are near enough. Keys are those of the piece's vertices.
+  pure subroutine find_halfspace_manifold(a, radius, normal, distance, alert, most, manifold)
+    type(convex_piece_t), intent(in) :: a
+    !> what the lengths of the piece are multiplied by [m]
+    real(dp), intent(in) :: radius
+    !> of the plane, out of the half-space, in the axes of the piece
+    real(dp), intent(in) :: normal(3)
+    !> of the piece's centre from the plane [m]
+    real(dp), intent(in) :: distance
+    real(dp), intent(in) :: alert
+    integer, intent(in) :: most
+    !> from the centre of the piece, in its axes; what it held is lost
+    type(manifold_t), intent(inout) :: manifold
+    type(placement_t) :: at
+    type(feature_t) :: feature
+    type(frame_t) :: frame
+    type(patch_point_t) :: point(largest_face(a) + size(a%vertex, 2))
+    integer :: vertex(largest_face(a)), n, k, lowest(1)
+    real(dp) :: place(3, largest_face(a)), along(3), x(3), corner(3)
+
+    manifold%n = 0
+    manifold%cores_overlap = .false.
+    if (.not. distance - radius < alert) return
+    manifold%normal(:) = normal
+    at = placement_t(radius, unturned, origin)
+    frame%origin(:) = 0.0_dp
+    frame%normal(:) = normal
+    call find_tangents(frame)
+    along(:) = -normal
+    lowest(1) = 1
+    call find_support(a, along, lowest(1))
+    call find_feature(a, along, lowest, feature)
+    if (feature%n > 1) then
+      call lay_out_feature(a, at, feature, frame, vertex, place)
+    else
+      vertex(1) = lowest(1)
+    end if
+    n = 0
+    do k = 1, size(a%vertex, 2)
+      if (feature%n > 1 .and. any(vertex(1:feature%n) == k)) cycle
+      call place_vertex(a, at, k, x)
+      corner(1) = dot_product(x, frame%first)
+      corner(2) = dot_product(x, frame%second)
+      corner(3) = dot_product(x, normal)
+      call add_point(point_of(k, corner), alert, radius, n, point)
+    end do
+    if (feature%n > 1) then
+      do k = 1, feature%n
+        call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
+      end do
+    end if
+    call fill_manifold(frame, radius, most, n, point, manifold)
+    do k = 1, manifold%n
+      manifold%cores_overlap = manifold%cores_overlap .or. manifold%gap(k) < -radius*a%rounding
+    end do
+
+  contains
+
+    !> A corner of the piece.
+    pure function point_of(v, corner) result(new)
+      integer, intent(in) :: v
+      !> in the frame
+      real(dp), intent(in) :: corner(3)
+      type(patch_point_t) :: new
+
+      new%gap = corner(3) + distance - radius*a%rounding
+      new%place(1:2) = corner(1:2)
+      new%place(3) = -distance + 0.5_dp*new%gap
+      new%key = (v - 1)*feature_base
+    end function point_of
+
+  end subroutine find_halfspace_manifold
+
+end module gravier_polyhedron_pair
