@@ -48,6 +48,7 @@ program test_step_parts
   call check_sliding(0.0_dp)
   call check_sliding(0.5_dp)
   call check_loads()
+  call check_period()
   call check_turning_glued(1)
   call check_turning_glued(2)
   call check_structure()
@@ -379,6 +380,30 @@ contains
     call check_columns(sim)
     call sim%free()
   end subroutine check_loads
+
+  !> A grain leaves a periodic scene at 2 m/s and comes back on the other side, with a load along its way: its potential is that of
+  !> the way that it has made.
+  subroutine check_period()
+    type(energy_balance_t) :: energy
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp), parameter :: m = 2.0_dp, a = 0.5_dp, t = 5*h, start = 3.95_dp
+    integer :: k
+
+    call add_grain(1, m, 0, start, 3.0_dp, 2.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, m, 0, 1.0_dp, 0.0_dp, -1.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0.5, 0, period = 4, 0, overlap_projection = F /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    do k = 1, 5
+      call advance(sim, figures)
+    end do
+    energy = energy_of(sim)
+    call check_close(grain(sim, 1, 1, .true.), start + 2.0_dp*t + 0.5_dp*a*t**2 - 4.0_dp, solved, "it is back in the period")
+    call check_close(energy%potential, -m*a*(start + 1.0_dp + t + a*t**2), solved, "potential of the way made")
+    call check_close(energy%translation + energy%potential, 0.5_dp*m*5.0_dp - m*a*(start + 1.0_dp), solved, &
+      & "what the potential loses is motion")
+    call sim%free()
+  end subroutine check_period
 
   !> A balance goes on from its state, bit for bit.
   subroutine check_state(energy)
