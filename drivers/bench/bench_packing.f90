@@ -120,7 +120,7 @@ contains
     call comm%agree(error)
     if (.not. allocated(error)) call simulation%make(comm, config, made, error)
     if (allocated(error)) return
-    call grains%init(packing%nd, made%nv, 0, made%n)
+    call grains%init(made, made%n)
     grains%id(:) = made%id
     grains%radius(:) = made%radius
     grains%mass(:) = made%mass

@@ -164,7 +164,7 @@ contains
       if (allocated(error)) return
       n = 0
       do s = 1, size(decomposition%owned)
-        call decomposition%owned(s)%init(nd, decomposition%nv, decomposition%ni, narrow(counts(s)))
+        call decomposition%owned(s)%init(decomposition%layout(), narrow(counts(s)))
         do k = 1, decomposition%owned(s)%n
           call decomposition%owned(s)%set_record(k, records(1:n_words, n + k))
         end do
@@ -202,7 +202,8 @@ contains
 
     layout = simulation%decomposition%layout()
     do k = 1, size(records, 2)
-      field = layout%invalid_field(records(:, k), size(simulation%decomposition%boundaries), size(simulation%config%materials))
+      field = layout%invalid_field(records(:, k), size(simulation%decomposition%boundaries), size(simulation%config%materials), &
+        & simulation%decomposition%shapes%n)
       if (len(field) > 0) call raise(error, status_input, path//": table grains: grain "//to_text(records(1, k))// &
         & " has a value of "//field//" that no grain has: the file is damaged")
       call check_reals(path//": table grains: grain "//to_text(records(1, k)), records(layout%record_words() + 1:, k), error)

@@ -94,7 +94,7 @@ contains
     call choose_scheme(config, self%method)
     self%decomposition%boundaries = scene%boundaries
     ! one subdomain until it is known that the scene has room for so many
-    call self%decomposition%init(comm, 1, scene%grains%nd, scene%grains%nv, scene%period)
+    call self%decomposition%init(comm, 1, scene%grains, scene%period)
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
@@ -135,8 +135,7 @@ contains
     class(simulation_t), intent(inout) :: self
 
     associate (decomposition => self%decomposition)
-      call decomposition%init(self%comm, self%config%decomposition%subdomains, decomposition%nd, decomposition%nv, &
-        & decomposition%period)
+      call decomposition%init(self%comm, self%config%decomposition%subdomains, decomposition%layout(), decomposition%period)
     end associate
   end subroutine simulation_make_subdomains
 

@@ -8,7 +8,7 @@ module gravier_scene
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
   use gravier_periodic, only: period_t
-  use gravier_body_store, only: body_set_t
+  use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_boundary, only: boundary_t
   use gravier_effects, only: effects_t
@@ -316,7 +316,7 @@ contains
     nd = config%scene%dimension
     call deduce_effects(comm, config%scene, data, scene)
     nv = merge(3*nd - 3, nd, scene%effects%rotation)
-    call scene%grains%init(nd, nv, merge(nd, 0, scene%period%on()), data%n)
+    call scene%grains%init(body_layout_t(nd, nv, merge(nd, 0, scene%period%on())), data%n)
     scene%grains%glued(:) = 0
     scene%grains%image(:, :) = 0
     do k = 1, data%n

@@ -5,7 +5,7 @@ module gravier_test_scenes
   use gravier_random_hash, only: hash_uniform
   use gravier_periodic, only: period_t
   use gravier_communicator, only: communicator_t
-  use gravier_body_store, only: body_set_t
+  use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_surface, only: surface_t
   use gravier_surface_registry, only: make_surface
@@ -98,7 +98,7 @@ contains
     type(body_set_t), intent(inout) :: bodies
     integer :: g, d, n
 
-    call bodies%init(self%nd, nv, merge(self%nd, 0, self%period%on()), max(0, (self%n - first + step)/step))
+    call bodies%init(body_layout_t(self%nd, nv, merge(self%nd, 0, self%period%on())), max(0, (self%n - first + step)/step))
     bodies%glued(:) = 0
     bodies%image(:, :) = 0
     n = 0
@@ -207,7 +207,7 @@ contains
 
     bringing = max(1, comm%size - 1)
     call cloud%bodies(nv, merge(comm%rank + 1, cloud%n + 1, comm%rank < bringing), bringing, newcomers(1))
-    call decomposition%init(comm, n_subdomains, cloud%nd, nv, cloud%period)
+    call decomposition%init(comm, n_subdomains, newcomers(1), cloud%period)
     call decomposition%bounding_box(newcomers, lower, upper)
     decomposition%partition%period(:) = cloud%period%length
     if (by_cells) then

@@ -7,6 +7,7 @@ module gravier_decomposition
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, place_word
+  use gravier_shape_library, only: shape_library_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_partition, only: partition_t
@@ -21,12 +22,14 @@ module gravier_decomposition
     type(period_t) :: period
     type(neighbour_rule_t) :: rule
     integer :: n_subdomains = 1
-    !> space dimension, degrees of freedom of a grain, entries of an image
-    integer :: nd = 2, nv = 3, ni = 0
+    !> space dimension, degrees of freedom of a body, entries of an image and of an orientation
+    integer :: nd = 2, nv = 3, ni = 0, no = 0
     !> first subdomain of this rank; owned(s) belongs to subdomain first + s - 1
     integer :: first = 1
     type(body_set_t), allocatable :: owned(:)
     type(boundary_t), allocatable :: boundaries(:)
+    !> the shapes of the bodies, the same on every rank
+    type(shape_library_t) :: shapes
   contains
     procedure :: init => decomposition_init
     procedure :: migrate => decomposition_migrate
@@ -41,18 +44,21 @@ module gravier_decomposition
 contains
 
   !> Make room for `n_subdomains`, without grains.
-  subroutine decomposition_init(self, comm, n_subdomains, nd, nv, period)
+  subroutine decomposition_init(self, comm, n_subdomains, layout, period)
     class(decomposition_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
-    integer, intent(in) :: n_subdomains, nd, nv
+    integer, intent(in) :: n_subdomains
+    !> of the bodies, with an image where the scene is periodic
+    class(body_layout_t), intent(in) :: layout
     type(period_t), intent(in) :: period
     integer :: s, last
 
     self%comm => comm
     self%n_subdomains = n_subdomains
-    self%nd = nd
-    self%nv = nv
-    self%ni = merge(nd, 0, period%on())
+    self%nd = layout%nd
+    self%nv = layout%nv
+    self%ni = layout%ni
+    self%no = layout%no
     self%period = period
     if (.not. allocated(self%boundaries)) allocate (self%boundaries(0))
     self%first = comm%first_subdomain(comm%rank, n_subdomains)
@@ -60,7 +66,7 @@ contains
     if (allocated(self%owned)) deallocate (self%owned)
     allocate (self%owned(last - self%first + 1))
     do s = 1, size(self%owned)
-      call self%owned(s)%init(nd, nv, self%ni, 0)
+      call self%owned(s)%init(layout, 0)
     end do
   end subroutine decomposition_init
 
@@ -75,7 +81,7 @@ contains
   pure type(body_layout_t) function decomposition_layout(self) result(layout)
     class(decomposition_t), intent(in) :: self
 
-    layout = body_layout_t(self%nd, self%nv, self%ni)
+    layout = body_layout_t(self%nd, self%nv, self%ni, self%no)
   end function decomposition_layout
 
   !> Subdomain of this rank and place among its owned bodies of a grain.
@@ -251,7 +257,7 @@ contains
     logical, allocatable :: stays(:)
     integer :: s, k
 
-    call leaving%init(self%nd, self%nv, self%ni, 0)
+    call leaving%init(self%layout(), 0)
     do s = 1, size(self%owned)
       allocate (stays(self%owned(s)%n))
       do k = 1, self%owned(s)%n
@@ -305,7 +311,7 @@ contains
       counts(s) = counts(s) + 1
     end do
     do s = 1, size(sets)
-      call sets(s)%init(self%nd, self%nv, self%ni, counts(s))
+      call sets(s)%init(self%layout(), counts(s))
     end do
     counts(:) = 0
     do k = 1, size(received, 2)

@@ -8,7 +8,7 @@ module gravier_enriched_matrix
   use gravier_sparse_rows, only: entries_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
-  use gravier_body_mass, only: diagonal_mass
+  use gravier_body_mass, only: mass_column
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_method, only: method_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
@@ -217,8 +217,8 @@ contains
     real(dp), intent(in), contiguous :: block(:, :, :)
     logical, intent(in) :: general
     type(entries_t), intent(out) :: entries
-    real(dp) :: jacobian(kernels%nc, kernels%nv, 2), mass
-    integer :: b, c, d, n, nv, side, on_wall, of_pair
+    real(dp) :: jacobian(kernels%nc, kernels%nv, 2), mass(kernels%nv)
+    integer :: b, c, d, k, n, nv, coupled, side, on_wall, of_pair
 
     nv = kernels%nv
     ! on what moves as prescribed: the antagonist, or a candidate glued to it
@@ -227,13 +227,20 @@ contains
       if (any(sub%pair(:, c) > sub%n_bodies)) on_wall = on_wall + 1
     end do
     of_pair = merge(2*nv*nv, nv*(nv + 1), general)
-    n = sub%n_bodies*nv + on_wall*(of_pair/2) + (sub%n_contacts - on_wall)*(of_pair + merge(2, 1, general)*nv*nv)
+    ! components of a velocity that a mass matrix couples to others: the last ones, where it is not diagonal
+    coupled = merge(3, 0, kernels%nw == 9)
+    n = sub%n_bodies*(nv + coupled*(coupled - 1)/merge(1, 2, general)) + on_wall*(of_pair/2) &
+      & + (sub%n_contacts - on_wall)*(of_pair + merge(2, 1, general)*nv*nv)
     call entries%init(n)
     do b = 1, sub%n_bodies
       do d = 1, nv
-        mass = diagonal_mass(sub%inverse_mass(:, b), sub%weight(:, b), d)
-        if (.not. sub%moves(d, b)) mass = 1.0_dp
-        call entries%add((b - 1)*nv + d, (b - 1)*nv + d, mass)
+        call mass_column(sub%inverse_mass(:, b), sub%weight(:, b), d, mass)
+        if (.not. sub%moves(d, b)) mass(d) = 1.0_dp
+        call entries%add((b - 1)*nv + d, (b - 1)*nv + d, mass(d))
+        if (d <= nv - coupled) cycle
+        do k = merge(nv - coupled + 1, d + 1, general), nv
+          if (k /= d) call entries%add((b - 1)*nv + k, (b - 1)*nv + d, mass(k))
+        end do
       end do
     end do
     do c = 1, sub%n_contacts

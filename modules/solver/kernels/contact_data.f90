@@ -7,9 +7,9 @@ module gravier_contact_data
   private
   public :: lanes, n_blocks, block_of, lane_of, contact_rows_t
   public :: rows_2d_frictionless, rows_2d_friction, rows_2d_friction_shift, rows_2d_friction_rolling
-  public :: rows_2d_friction_shift_rolling
+  public :: rows_2d_friction_shift_rolling, rows_2d_shaped, rows_2d_shaped_shift
   public :: rows_3d_frictionless, rows_3d_friction, rows_3d_friction_shift, rows_3d_friction_rolling
-  public :: rows_3d_friction_shift_rolling
+  public :: rows_3d_friction_shift_rolling, rows_3d_shaped, rows_3d_shaped_shift
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
@@ -27,7 +27,7 @@ module gravier_contact_data
     integer :: per_wnn = 0
     !> relaxation factor over W_tt [kg]
     integer :: per_wtt = 0
-    !> distance from the centre of the candidate, and of the antagonist, to the contact; 0 of boundaries [m]
+    !> distance along the normal from the centre of the candidate, and of the antagonist, to the contact; 0 of boundaries [m]
     integer :: lever_i = 0, lever_j = 0
     !> coefficient of friction
     integer :: friction = 0
@@ -39,6 +39,11 @@ module gravier_contact_data
     integer :: per_wrr = 0
     !> coefficients of rolling and, of spheres, pivoting resistance
     integer :: rolling_friction = 0, pivoting_friction = 0
+    !> of bodies with shapes: what couples the normal to the tangential directions, W_nt and, in space, W_ns [1/kg]
+    integer :: w_nt = 0, w_ns = 0
+    !> of bodies with shapes: in the plane, c x n of the arm c from the centre of the candidate, and of the antagonist, to the contact;
+    !> in space, the first of the three components of either arm in global axes; 0 of boundaries [m]
+    integer :: arm_i = 0, arm_j = 0
   end type contact_rows_t
 
   type(contact_rows_t), parameter :: rows_2d_frictionless = contact_rows_t(total=4, nx=1, ny=2, shift=3, per_wnn=4)
@@ -52,6 +57,12 @@ module gravier_contact_data
   type(contact_rows_t), parameter :: rows_2d_friction_shift_rolling = &
     & contact_rows_t(total=12, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, shift_t=9, &
     &                rolling_radius=10, per_wrr=11, rolling_friction=12)
+  type(contact_rows_t), parameter :: rows_2d_shaped = &
+    & contact_rows_t(total=11, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, &
+    &                w_nt=9, arm_i=10, arm_j=11)
+  type(contact_rows_t), parameter :: rows_2d_shaped_shift = &
+    & contact_rows_t(total=12, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, shift_t=9, &
+    &                w_nt=10, arm_i=11, arm_j=12)
 
   type(contact_rows_t), parameter :: rows_3d_frictionless = contact_rows_t(total=5, nx=1, ny=2, nz=3, shift=4, per_wnn=5)
   type(contact_rows_t), parameter :: rows_3d_friction = &
@@ -65,6 +76,11 @@ module gravier_contact_data
   type(contact_rows_t), parameter :: rows_3d_friction_shift_rolling = &
     & contact_rows_t(total=15, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, lever_i=7, lever_j=8, friction=9, &
     &                shift_t=10, shift_s=11, rolling_radius=12, per_wrr=13, rolling_friction=14, pivoting_friction=15)
+  type(contact_rows_t), parameter :: rows_3d_shaped = &
+    & contact_rows_t(total=15, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, friction=7, w_nt=8, w_ns=9, arm_i=10, arm_j=13)
+  type(contact_rows_t), parameter :: rows_3d_shaped_shift = &
+    & contact_rows_t(total=17, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, friction=7, shift_t=8, shift_s=9, &
+    &                w_nt=10, w_ns=11, arm_i=12, arm_j=15)
 
 contains
 

@@ -9,8 +9,9 @@
 !> The first n_grouped contacts make whole blocks in which no two contacts share a moving body (gravier_sweep_order): these
 !> are relaxed `lanes` at a time. A body is a column of
 !>   velocity      (nv) translation, then spin
-!>   weight        inverse mass of each component of the translation, then, where bodies turn, inverse inertia (nw); zero
-!>                 for what cannot move. Grains have the same mass along all axes, boundaries need not.
+!>   weight        inverse mass of each component of the translation, then, where bodies turn, inverse inertia (nw): one entry, or
+!>                 in space with shapes the entries xx, yy, zz, xy, xz and yz of a symmetric matrix; zero for what cannot move.
+!>                 Grains have the same mass along all axes, boundaries need not.
 !> The normal points from the antagonist to the candidate; v = H^T V and R = H r (paper, section 1).
 !>
 !> Local operators are taken diagonal, which they are between bodies of equal components. With a body whose components
@@ -18,11 +19,14 @@
 !> lowers the energy of the contact whatever the entries off the diagonal, and its fixed points are the same. What couples
 !> sliding and rolling, W_tr, is not zero but between grains of equal inverse inertia times radius: the rolling law is solved
 !> after the tangential one, with the spins that this one leaves (Acary & Bourrier 2021 state the law as a cone complementarity).
+!> A normal impulse turns bodies with shapes, so that W_nt is not zero between them: the tangential law is solved with the velocity
+!> that the normal impulse leaves, W_nt and W_ns being part of the contact data.
 module gravier_contact_kernels
   use gravier_effects, only: effects_t
   use gravier_contact_data, only: contact_rows_t, lanes, n_blocks, block_of, lane_of, rows_2d_frictionless, rows_2d_friction, &
     & rows_2d_friction_shift, rows_2d_friction_rolling, rows_2d_friction_shift_rolling, rows_3d_frictionless, rows_3d_friction, &
-    & rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling
+    & rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling, &
+    & rows_2d_shaped, rows_2d_shaped_shift, rows_3d_shaped, rows_3d_shaped_shift
   use gravier_kernel_table, only: kernel_table_t
   use gravier_sweeps_2d, only: choose_sweeps_2d
   use gravier_sweeps_3d, only: choose_sweeps_3d
@@ -51,26 +55,29 @@ contains
     class(kernels_t), intent(inout) :: self
     !> 2 or 3
     integer, intent(in) :: dimension
-    !> without friction no contact turns a grain, spins are none of its unknowns, and the other two effects have no meaning
+    !> without friction no contact turns a disk or a sphere, spins are none of its unknowns, and tangential restitution and rolling
+    !> have no meaning; where bodies have shapes, spins are unknowns, and rolling has none
     type(effects_t), intent(in) :: effects
-    logical :: shifted, rolling
+    logical :: friction, shifted, rolling
 
+    friction = effects%friction .or. effects%shapes
     shifted = effects%friction .and. effects%tangential_restitution
-    rolling = effects%friction .and. effects%rolling
+    rolling = effects%friction .and. effects%rolling .and. .not. effects%shapes
     if (dimension == 2) then
-      self%row = rows_of_disks(effects%friction, shifted, rolling)
-      call choose_sweeps_2d(self, effects%friction, shifted, rolling)
-      call choose_loops_2d(self, effects%friction, shifted, rolling)
+      self%row = rows_of_disks(friction, shifted, rolling, effects%shapes)
+      call choose_sweeps_2d(self, friction, shifted, rolling, effects%shapes)
+      call choose_loops_2d(self, friction, shifted, rolling, effects%shapes)
     else
-      self%row = rows_of_spheres(effects%friction, shifted, rolling)
-      call choose_sweeps_3d(self, effects%friction, shifted, rolling)
-      call choose_loops_3d(self, effects%friction, shifted, rolling)
+      self%row = rows_of_spheres(friction, shifted, rolling, effects%shapes)
+      call choose_sweeps_3d(self, friction, shifted, rolling, effects%shapes)
+      call choose_loops_3d(self, friction, shifted, rolling, effects%shapes)
     end if
     self%nd = dimension
-    self%nf = merge(dimension, 1, effects%friction)
+    self%nf = merge(dimension, 1, friction)
     self%nv = dimension
-    if (effects%friction) self%nv = 3*dimension - 3
-    self%nw = dimension + merge(1, 0, effects%friction)
+    if (friction) self%nv = 3*dimension - 3
+    self%nw = dimension + merge(1, 0, friction)
+    if (dimension == 3 .and. effects%shapes) self%nw = 9
     self%nc = self%nf
     if (rolling) self%nc = self%nc + 2*dimension - 3
     self%nh = self%row%total
@@ -79,24 +86,28 @@ contains
     self%rolling_row = max(self%row%rolling_radius - 1, 0)
   end subroutine kernels_choose
 
-  pure type(contact_rows_t) function rows_of_disks(friction, shifted, rolling) result(row)
-    logical, intent(in) :: friction, shifted, rolling
+  pure type(contact_rows_t) function rows_of_disks(friction, shifted, rolling, shaped) result(row)
+    logical, intent(in) :: friction, shifted, rolling, shaped
 
     row = rows_2d_frictionless
     if (friction) row = rows_2d_friction
     if (shifted) row = rows_2d_friction_shift
     if (rolling) row = rows_2d_friction_rolling
     if (shifted .and. rolling) row = rows_2d_friction_shift_rolling
+    if (shaped) row = rows_2d_shaped
+    if (shaped .and. shifted) row = rows_2d_shaped_shift
   end function rows_of_disks
 
-  pure type(contact_rows_t) function rows_of_spheres(friction, shifted, rolling) result(row)
-    logical, intent(in) :: friction, shifted, rolling
+  pure type(contact_rows_t) function rows_of_spheres(friction, shifted, rolling, shaped) result(row)
+    logical, intent(in) :: friction, shifted, rolling, shaped
 
     row = rows_3d_frictionless
     if (friction) row = rows_3d_friction
     if (shifted) row = rows_3d_friction_shift
     if (rolling) row = rows_3d_friction_rolling
     if (shifted .and. rolling) row = rows_3d_friction_shift_rolling
+    if (shaped) row = rows_3d_shaped
+    if (shaped .and. shifted) row = rows_3d_shaped_shift
   end function rows_of_spheres
 
 end module gravier_contact_kernels

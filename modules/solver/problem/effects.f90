@@ -4,13 +4,13 @@ module gravier_effects
   private
   public :: effects_t, n_effects, effect_name_length
 
-  integer, parameter :: n_effects = 14, effect_name_length = 24
+  integer, parameter :: n_effects = 15, effect_name_length = 24
 
   !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
   type :: effects_t
     !> some contact has mu > 0; some frictional contact sends its tangential velocity back; some moment resists rolling, or pivoting
-    !> (of spheres): these three choose the kernels
-    logical :: friction = .false., tangential_restitution = .false., rolling = .false.
+    !> (of spheres); some body is neither a disk nor a sphere: these four choose the kernels
+    logical :: friction = .false., tangential_restitution = .false., rolling = .false., shapes = .false.
     !> what else contacts do: pivoting (in the kernels of rolling), normal restitution, cohesion
     logical :: pivoting = .false., restitution = .false., cohesion = .false.
     !> some grain turns; some axis is periodic; some boundary moves as prescribed, or is moved by forces; some grain is glued
@@ -51,12 +51,14 @@ contains
     on(10) = self%forces
     names(11) = "glued grains"
     on(11) = self%glued
-    names(12) = "gravity"
-    on(12) = self%gravity
-    names(13) = "body force"
-    on(13) = self%body_force
-    names(14) = "removal"
-    on(14) = self%removal
+    names(12) = "shapes"
+    on(12) = self%shapes
+    names(13) = "gravity"
+    on(13) = self%gravity
+    names(14) = "body force"
+    on(14) = self%body_force
+    names(15) = "removal"
+    on(15) = self%removal
   end subroutine effects_list
 
 end module gravier_effects

@@ -2,7 +2,7 @@
 module gravier_contact_structure
   use gravier_kinds, only: dp, i4, i8
   use gravier_contact_law, only: unused
-  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t
@@ -112,7 +112,7 @@ contains
     counts(:) = 0
     largest = 0.0_dp
     do s = 1, size(problem%sub)
-      call count_contacts(problem%sub(s), nd, problem%kernels%nf, counts, parts(:, s))
+      call count_contacts(problem%sub(s), problem%kernels, counts, parts(:, s))
       do c = 1, problem%sub(s)%n_contacts
         largest = max(largest, problem%sub(s)%normal_impulse(c))
       end do
@@ -145,16 +145,16 @@ contains
   end function ratio
 
   !> Counts and sums (fabric, normal impulse, overlap) over the contacts of a subdomain.
-  pure subroutine count_contacts(sub, nd, nf, counts, part)
+  pure subroutine count_contacts(sub, kernels, counts, part)
     type(subproblem_t), intent(in) :: sub
-    !> space dimension, components of a force
-    integer, intent(in) :: nd, nf
+    type(kernels_t), intent(in) :: kernels
     integer(i8), intent(inout) :: counts(n_counts)
     !> (nd**2 + 2)
     real(dp), intent(inout) :: part(:)
     real(dp) :: bound, held
-    integer :: c, d, q, g
+    integer :: c, d, q, g, nd
 
+    nd = kernels%nd
     do c = 1, sub%n_contacts
       if (sub%gap(c) < 0.0_dp) then
         counts(overlapping) = counts(overlapping) + 1
@@ -167,11 +167,11 @@ contains
       if (.not. held > 0.0_dp) cycle
       counts(carrying) = counts(carrying) + 1
       part(nd**2 + 1) = part(nd**2 + 1) + abs(sub%normal_impulse(c))
-      if (nf > 1) then
-        bound = sub%hot(q, nd + 6, g)*held
+      if (kernels%nf > 1) then
+        bound = sub%hot(q, kernels%row%friction, g)*held
         if (bound > 0.0_dp) then
           counts(with_friction) = counts(with_friction) + 1
-          if (norm2(sub%impulse(q, 2:nf, g)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
+          if (norm2(sub%impulse(q, 2:kernels%nf, g)) >= bound*(1.0_dp - unused)) counts(sliding) = counts(sliding) + 1
         end if
       end if
       if (any(sub%pair(:, c) > sub%n_grains)) cycle

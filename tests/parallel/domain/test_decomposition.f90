@@ -5,7 +5,7 @@ program test_decomposition
   use gravier_errors, only: error_t
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_body_store, only: body_set_t
+  use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_periodic, only: period_t
   use gravier_box_counts, only: choose_boxes
   use gravier_decomposition, only: decomposition_t
@@ -84,7 +84,7 @@ contains
     integer, allocatable :: weights(:)
     integer :: boxes(3), g, n
 
-    call decomposition%init(comm, n_subdomains, nd, nd, period)
+    call decomposition%init(comm, n_subdomains, body_layout_t(nd, nd, merge(nd, 0, period%on())), period)
     ! the last rank brings nobody, unless it is alone
     n = 0
     do g = 1, n_grains
@@ -127,7 +127,7 @@ contains
     integer :: s, homes
     integer(i8) :: total
 
-    call decomposition%init(comm, 7, 3, 6, none)
+    call decomposition%init(comm, 7, body_layout_t(3, 6, 0), none)
     homes = size(decomposition%owned)
     total = comm%total(int(homes, i8))
     call check_equal(total, 7_i8, "one owned for each subdomain")
@@ -138,7 +138,7 @@ contains
       call check_equal(decomposition%subdomain_of(s), decomposition%first + s - 1, "number of a subdomain")
     end do
     call choose_period(2, cell)
-    call decomposition%init(comm, 7, 3, 6, cell)
+    call decomposition%init(comm, 7, body_layout_t(3, 6, 3), cell)
     call check_equal(decomposition%ni, 3, "grains of a periodic scene have images")
   end subroutine test_init
 
@@ -149,14 +149,14 @@ contains
     real(dp) :: lower(2), upper(2)
     integer :: r
 
-    call decomposition%init(comm, 1, 2, 2, none)
-    call bodies(1)%init(2, 2, 0, 0)
-    call bodies(2)%init(2, 2, 0, 0)
+    call decomposition%init(comm, 1, body_layout_t(2, 2, 0), none)
+    call bodies(1)%init(body_layout_t(2, 2, 0), 0)
+    call bodies(2)%init(body_layout_t(2, 2, 0), 0)
     call decomposition%bounding_box(bodies, lower, upper)
     call check_close(maxval(abs(lower)), 0.0_dp, 0.0_dp, "nobody: lower corner")
     call check_close(maxval(abs(upper - 1.0_dp)), 0.0_dp, 0.0_dp, "nobody: upper corner")
     do r = 0, comm%size - 1
-      call bodies(2)%init(2, 2, 0, merge(2, 0, comm%rank == r))
+      call bodies(2)%init(body_layout_t(2, 2, 0), merge(2, 0, comm%rank == r))
       if (comm%rank == r) then
         bodies(2)%position(:, 1) = [-5.0_dp, 2.0_dp]
         bodies(2)%position(:, 2) = [-4.5_dp, 3.0_dp]
@@ -170,7 +170,7 @@ contains
       call check_close(upper(2), 4.0_dp, 0.0_dp, "upper end")
     end do
     call choose_period(2, cell)
-    call decomposition%init(comm, 1, 2, 2, cell)
+    call decomposition%init(comm, 1, body_layout_t(2, 2, 2), cell)
     call decomposition%bounding_box(bodies, lower, upper)
     call check_close(lower(1), -5.5_dp, 0.0_dp, "left end beside a period")
     call check_close(lower(2), -0.25_dp, 0.0_dp, "lower end of a period")

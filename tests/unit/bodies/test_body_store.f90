@@ -3,7 +3,7 @@ program test_body_store
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_body_store, only: body_set_t, append_bodies, collect_fields, place_word, body_record
+  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, collect_fields, place_word, body_record
   use gravier_field_list, only: field_list_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -33,7 +33,7 @@ contains
     integer, intent(in) :: sizes(3), n, first
     integer :: b, d
 
-    call bodies%init(sizes(1), sizes(2), sizes(3), n)
+    call bodies%init(body_layout_t(sizes(1), sizes(2), sizes(3)), n)
     do b = 1, n
       bodies%id(b) = first + b - 1
       bodies%radius(b) = number(bodies%id(b), 1)
@@ -279,7 +279,7 @@ contains
     character(len=:), allocatable :: name, names
     integer :: f, bytes, entries, words
 
-    call bodies%init(sizes(1), sizes(2), sizes(3), 2)
+    call bodies%init(body_layout_t(sizes(1), sizes(2), sizes(3)), 2)
     call check(all(bodies%material == 1), "the material of a new body")
     names = ""
     words = 0
@@ -306,7 +306,7 @@ contains
     real(dp) :: infinite
 
     infinite = transfer(9218868437227405312_i8, 0.0_dp)
-    call bodies%init(sizes(1), sizes(2), sizes(3), 1)
+    call bodies%init(body_layout_t(sizes(1), sizes(2), sizes(3)), 1)
     bodies%id = 7
     bodies%radius = 0.5_dp
     bodies%mass = 2.0_dp
@@ -351,7 +351,7 @@ contains
     integer(i8) :: record(bodies%record_words())
 
     call bodies%get_record(1, record)
-    call check(bodies%invalid_field(record, n_boundaries=3, n_materials=2) == field, name)
+    call check(bodies%invalid_field(record, n_boundaries=3, n_materials=2, n_shapes=4) == field, name)
   end subroutine expect_invalid
 
 end program test_body_store

@@ -41,7 +41,7 @@ program test_neighbour_search
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
-  use gravier_body_store, only: body_set_t
+  use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_search, only: neighbour_rule_t, neighbour_search_t, sweep_order, owner_point, rule_dual, &
@@ -416,7 +416,7 @@ contains
     type(body_set_t), intent(inout) :: bodies
     integer :: k
 
-    call bodies%init(size(x, 1), size(x, 1), 0, size(x, 2))
+    call bodies%init(body_layout_t(size(x, 1), size(x, 1), 0), size(x, 2))
     do k = 1, bodies%n
       bodies%id(k) = 10 - k
       bodies%position(:, k) = x(:, k)
