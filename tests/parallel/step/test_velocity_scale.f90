@@ -8,7 +8,7 @@ program test_velocity_scale
   use gravier_random_hash, only: hash_uniform
   use gravier_motion, only: grain_mass
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_body_store, only: body_set_t
+  use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_test_scenes, only: plane, change_shape
   use gravier_velocity_scale, only: velocity_scale_t
@@ -129,7 +129,7 @@ contains
     boundaries(4)%table%has(6) = .true.
     boundaries(5) = boundaries(2)
     boundaries(5)%given_spin(:) = 0.0_dp
-    call grains%init(3, 6, 0, 2)
+    call grains%init(body_layout_t(3, 6, 0), 2)
     grains%mass(:) = 1.0_dp
     grains%radius(1) = 0.5_dp
     grains%radius(2) = 0.25_dp
