@@ -1,10 +1,11 @@
 !> The contact problem of a step as it is written: M V = H r + f gives the velocities that the step has led to, in the order of the
 !> identifiers, and u = H^T V + w and r obey the law of each contact, whatever is shared, prescribed or frictionless.
 program test_problem_dump
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_sparse_rows, only: sparse_rows_t
+  use gravier_hdf5_file, only: h5_file_t
   use gravier_fclib_file, only: fclib_local_t, fclib_global_t, read_fclib
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -186,7 +187,109 @@ contains
     call check(pushing > 1, "some contacts push")
     if (friction > 0.0_dp .and. nd == 2) call check(at_rest > 0, "some contacts stick")
     call check_equal(count(abs(problem%r(1, :)) > 0.0_dp), count_impulses(simulation), "the impulses are those of the step")
+    call check_frames(simulation, problem)
+    call check_solution(v, u)
+    call check_order()
   end subroutine check_law
+
+  !> The entries of H that act on the translation of a grain are a frame: unit vectors at right angles. Where a contact has two
+  !> grains, that of one is opposite to that of the other. In the plane t is n turned to the left.
+  subroutine check_frames(simulation, problem)
+    type(simulation_t), intent(in) :: simulation
+    type(fclib_global_t), intent(in) :: problem
+    real(dp) :: frame(problem%dimension, problem%dimension), other(problem%dimension, problem%dimension), sides(2)
+    integer :: nd, nv, c, b, i, n
+
+    nd = problem%dimension
+    nv = simulation%problem%kernels%nv
+    do c = 1, size(problem%mu)
+      n = 0
+      other(:, :) = 0.0_dp
+      do b = 1, int(simulation%n_grains)
+        call take_frame(problem%h, (b - 1)*nv, (c - 1)*nd, frame)
+        if (.not. any(abs(frame) > 0.0_dp)) cycle
+        n = n + 1
+        do i = 1, nd
+          call check_close(norm2(frame(:, i)), 1.0_dp, solved, "a vector of a frame")
+          call check_close(dot_product(frame(:, i), frame(:, 1 + mod(i, nd))), 0.0_dp, solved, "vectors of a frame")
+        end do
+        if (nd == 2) then
+          sides(1) = frame(1, 1)*frame(2, 2)
+          sides(2) = frame(2, 1)*frame(1, 2)
+          call check_close(sides(1) - sides(2), 1.0_dp, solved, "t is n turned to the left")
+        end if
+        other(:, :) = other + frame
+      end do
+      call check(n > 0, "a contact acts on a grain")
+      if (n == 2) call check_close(maxval(abs(other)), 0.0_dp, solved, "action and reaction")
+    end do
+  end subroutine check_frames
+
+  !> A block of H.
+  pure subroutine take_frame(h, row, column, frame)
+    type(sparse_rows_t), intent(in) :: h
+    !> before its first row and column
+    integer, intent(in) :: row, column
+    real(dp), intent(out) :: frame(:, :)
+    integer :: i, k
+
+    frame(:, :) = 0.0_dp
+    do i = 1, size(frame, 1)
+      do k = h%start(row + i), h%start(row + i + 1) - 1
+        associate (d => h%column(k) - column)
+          if (d >= 1 .and. d <= size(frame, 2)) frame(i, d) = h%value(k)
+        end associate
+      end do
+    end do
+  end subroutine take_frame
+
+  !> The velocities of the solution in the file are those of its equations.
+  subroutine check_solution(v, u)
+    real(dp), intent(in) :: v(:), u(:, :)
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    real(dp), allocatable :: bodies(:), contacts(:)
+    integer :: c, d
+
+    allocate (bodies(size(v)), contacts(size(u)), source=-huge(1.0_dp))
+    call file%open(comm, "problem.hdf5", error)
+    call file%read_rows("/solution/v", 0_i8, bodies, error)
+    call file%read_rows("/solution/u", 0_i8, contacts, error)
+    call check(.not. allocated(error), "velocities in the file")
+    call file%leave()
+    call check_close(maxval(abs(bodies - v)), 0.0_dp, solved, "velocities of the bodies in the file")
+    do c = 1, size(u, 2)
+      do d = 1, size(u, 1)
+        call check_close(contacts((c - 1)*size(u, 1) + d), u(d, c), solved, "velocities of the contacts in the file")
+      end do
+    end do
+  end subroutine check_solution
+
+  !> The entries of a column of H stand in the order of their rows.
+  subroutine check_order()
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    integer(i8), allocatable :: start(:), row(:)
+    integer(i8) :: n
+    integer :: c, k
+    logical :: ordered
+
+    call file%open(comm, "problem.hdf5", error)
+    call file%row_count("/fclib_global/H/p", n, error)
+    allocate (start(n), source=0_i8)
+    call file%read_rows("/fclib_global/H/p", 0_i8, start, error)
+    allocate (row(start(n)), source=0_i8)
+    call file%read_rows("/fclib_global/H/i", 0_i8, row, error)
+    call check(.not. allocated(error), "rows of H in the file")
+    call file%leave()
+    ordered = .true.
+    do c = 1, size(start) - 1
+      do k = int(start(c)) + 2, int(start(c + 1))
+        ordered = ordered .and. row(k - 1) < row(k)
+      end do
+    end do
+    call check(ordered, "rows of a column in their order")
+  end subroutine check_order
 
   !> The diagonal entry of a row of M, which is its only one.
   real(dp) function mass_of(m, i) result(mass)
