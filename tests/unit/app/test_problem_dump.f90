@@ -31,6 +31,7 @@ program test_problem_dump
   call test_pile("friction = 0", "velocity = 0.25, 0.1", "", 0.0_dp)
   call test_pile("friction = 0.5", "velocity = 0.25, 0, free = F, T, mass = 16, force = 0, 80", "", 0.5_dp)
   call test_pile("friction = 0.5", "velocity = 0.25, 0.1", "&decomposition grid = 2, 1 /", 0.5_dp)
+  call test_glued()
   call test_spheres("friction = 0.5", 0.5_dp)
   call test_spheres("friction = 0", 0.0_dp)
   call finish_checks()
@@ -97,6 +98,31 @@ contains
     if (b == 5) call check_equal(problem%h%start(4*nv + 2) - problem%h%start(4*nv + 1), 0, "and no contact acts on it")
     call simulation%free()
   end subroutine test_pile
+
+  !> Disk 2 is glued to a group that forces move: it is the candidate of its contact with disk 4, and its body stands behind that
+  !> of the disk.
+  subroutine test_glued()
+    type(simulation_t) :: simulation
+    type(fclib_global_t), allocatable :: problem
+    real(dp), allocatable :: v(:)
+    character(len=42) :: rows(4)
+    integer :: k
+
+    do k = 1, 4
+      rows(k) = trim(pile(k))//merge(",1", ",0", k == 4)
+    end do
+    call make(disks//",group", rows, "gravity = 0, -10, friction = 0.5 /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, velocity = 0, 0.1 /"//newline// &
+      & "&boundary shape = 'grains', group = 1, free = T, T, mass = 5, force = -300, -50 /", simulation, problem)
+    call check_law(simulation, problem, 0.5_dp, v)
+    call check_equal(size(v), 4*3, "unknowns of three disks and a group")
+    call check_velocity(simulation, 4, v(1:3))
+    call check_velocity(simulation, 17, v(4:6))
+    call check_velocity(simulation, 30, v(7:9))
+    call check_close(v(10), simulation%decomposition%boundaries(2)%velocity(1), solved, "velocity of the group along x")
+    call check_close(v(11), simulation%decomposition%boundaries(2)%velocity(2), solved, "velocity of the group along y")
+    call simulation%free()
+  end subroutine test_glued
 
   !> Spheres on a floor and on each other.
   subroutine test_spheres(keys, friction)
