@@ -7,7 +7,7 @@ module gravier_shapes_file
   use gravier_communicator, only: communicator_t
   use gravier_whole_file, only: read_whole_file
   use gravier_shape_library, only: body_shape_t, shape_library_t
-  use gravier_shape_lookup, only: find_shape, is_reserved_name
+  use gravier_shape_names, only: is_reserved_name
   use gravier_convex_piece, only: convex_piece_t
   use gravier_mass_properties, only: mass_t, mass_of_sum, find_principal_axes
   use gravier_polyhedron, only: make_piece, make_capsule_piece, make_shape
@@ -49,16 +49,11 @@ contains
     type(shape_library_t), intent(out) :: library
     type(error_t), allocatable, intent(inout) :: error
     type(statement_t), allocatable :: statements(:)
-    integer :: first, last, n, k
+    integer :: first, last
 
     if (allocated(error)) return
     call split_statements(path, text, dimension, statements, error)
     if (allocated(error)) return
-    n = 0
-    do k = 1, size(statements)
-      if (statements(k)%word == "shape") n = n + 1
-    end do
-    allocate (library%shape(n))
     first = 1
     do while (first <= size(statements) .and. .not. allocated(error))
       last = first
@@ -93,7 +88,7 @@ contains
       else if (is_reserved_name(name)) then
         call refuse(path, statement, "shape "//name//": expected another name: grain, disk, sphere and plane stand for "// &
           & "themselves in bodies files", error)
-      else if (find_shape(library, name) > 0) then
+      else if (library%find(name) > 0) then
         call refuse(path, statement, "shape "//name//": expected a name that no shape above has", error)
       end if
     end associate
@@ -142,8 +137,7 @@ contains
     if (allocated(error)) return
     if (.not. is_size(shape%size)) call refuse(path, statements(1), "shape "//shape%name//": a size of "//to_text(shape%size)// &
       & ": expected "//size_text, error)
-    library%n = library%n + 1
-    library%shape(library%n) = shape
+    if (.not. allocated(error)) call library%add(shape)
 
   contains
 
