@@ -45,16 +45,11 @@ contains
     type(shape_library_t), intent(out) :: library
     type(error_t), allocatable, intent(inout) :: error
     type(statement_t), allocatable :: statements(:)
-    integer :: first, last, n, k
+    integer :: first, last
 
     if (allocated(error)) return
     call split_statements(path, text, dimension, statements, error)
     if (allocated(error)) return
-    n = 0
-    do k = 1, size(statements)
-      if (statements(k)%word == "shape") n = n + 1
-    end do
-    allocate (library%shape(n))
     first = 1
     do while (first <= size(statements) .and. .not. allocated(error))
       last = first
@@ -143,8 +138,7 @@ contains
     if (allocated(error)) return
     if (.not. is_size(shape%size)) call refuse(path, statements(1), "shape "//shape%name//": a size of "//to_text(shape%size)// &
       & ": expected "//size_text, error)
-    library%n = library%n + 1
-    library%shape(library%n) = shape
+    call library%add(shape)
   end subroutine add_shape
 
   !> Least extent of the polygons among some pieces, each along its longer axis; any number where there are none.
