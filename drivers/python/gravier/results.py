@@ -174,7 +174,7 @@ class Run:
         rows = self._split(self._group(step, "boundaries"))
         with self._open() as file:
             for key in ("name", "shape"):
-                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])])
+                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
         return rows
 
     def contacts(self, step=None):
