@@ -4,7 +4,7 @@ module gravier_checkpoint_scene
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_checkpoint_file, only: checkpoint_file_t
-  use gravier_shape_lookup, only: library_digest
+  use gravier_shape_names, only: library_digest
   use gravier_time_table, only: time_table_t
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t

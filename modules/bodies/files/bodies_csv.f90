@@ -8,9 +8,9 @@ module gravier_bodies_csv
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_lookup, only: find_shape, shape_names
+  use gravier_shape_names, only: shape_names
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, make_unit
-  use gravier_body_turn, only: settle_turn, settle_radius
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
   implicit none
   private
   public :: read_bodies_csv
@@ -229,7 +229,7 @@ contains
 
     what = is_grain
     if (table%is_empty(layout%shape)) return
-    what = find_shape(shapes, table%get_text(layout%shape))
+    what = shapes%find(table%get_text(layout%shape))
     if (what > 0) return
     select case (lower(table%get_text(layout%shape)))
     case ("plane")
@@ -275,6 +275,7 @@ contains
         if (allocated(bodies%shape)) bodies%shape(i) = what
         call read_grain(table, layout, i, bodies, error)
         if (shapes%n > 0) call read_turn(table, layout, bodies%orientation(:, i), error)
+        if (what > 0) call take_principal_axes(shapes%shape(what)%turn, bodies%orientation(:, i))
         call read_size(table, layout, shapes, what, bodies%radius(i), error)
       end if
     end do

@@ -1,5 +1,6 @@
 !> Shapes of bodies in HDF5: /bodies/{shape, scale, orientation}. `shape` holds numbers, k for the k-th of the names that its
-!> attribute `names` lists with commas between, and 0 for a disk or a sphere.
+!> attribute `names` lists with commas between, and 0 for a disk or a sphere. In 3D `orientation` is that of the axes in which the
+!> shapes are written or, where its attribute `axes` is 'principal', that of their principal axes.
 module gravier_bodies_shapes
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
@@ -8,10 +9,10 @@ module gravier_bodies_shapes
   use gravier_communicator, only: communicator_t
   use gravier_hdf5_file, only: h5_file_t
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_lookup, only: find_shape, shape_names
+  use gravier_shape_names, only: shape_names
   use gravier_bodies_data, only: bodies_data_t
   use gravier_bodies_checks, only: check_numbers, quantity, extent
-  use gravier_body_turn, only: settle_turn, settle_radius
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
   implicit none
   private
   public :: read_body_shapes, write_body_shapes
@@ -41,7 +42,7 @@ contains
       call take_numbers(path, listed, number, bodies, error)
       call comm%agree(error)
     end if
-    if (file%exists("/bodies/orientation")) call read_turns(comm, file, path, first, bodies, error)
+    call read_turns(comm, file, path, first, shapes, bodies, error)
     allocate (scale(bodies%n), source=1.0_dp)
     if (file%exists("/bodies/scale")) then
       call file%read_rows("/bodies/scale", first, scale, error)
@@ -73,7 +74,7 @@ contains
     n = 0
     do while (at <= len_trim(names) .and. n < size(number))
       length = index(names(at:)//",", ",") - 1
-      k = find_shape(shapes, trim(adjustl(names(at:at + length - 1))))
+      k = shapes%find(trim(adjustl(names(at:at + length - 1))))
       if (k == 0) then
         call raise(error, status_input, path//": /bodies/shape: attribute names: "//trim(adjustl(names(at:at + length - 1)))// &
           & ": expected one of the shapes of the scene, "//shape_names(shapes, ", "))
@@ -107,17 +108,44 @@ contains
     end do
   end subroutine take_numbers
 
-  !> Angles, as a vector or as one column, or quaternions.
-  subroutine read_turns(comm, file, path, first, bodies, error)
+  !> Angles, as a vector or as one column, or quaternions; 0 and 1 where the file has none.
+  subroutine read_turns(comm, file, path, first, shapes, bodies, error)
     type(communicator_t), intent(in) :: comm
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: path
     integer(i8), intent(in) :: first
+    type(shape_library_t), intent(in) :: shapes
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: possible, principal
+    integer :: i
+
+    principal = .false.
+    if (file%exists("/bodies/orientation")) then
+      call read_orientation(file, first, bodies, error)
+      call check_numbers(comm, path//": /bodies/orientation", size(bodies%orientation, 1), bodies%id, bodies%orientation, &
+        & quantity, error)
+      call find_axes(file, path, principal, error)
+    end if
+    if (.not. allocated(error)) then
+      do i = 1, bodies%n
+        call settle_turn(bodies%orientation(:, i), possible)
+        if (.not. possible) exit
+        if (bodies%shape(i) == 0 .or. principal) cycle
+        call take_principal_axes(shapes%shape(bodies%shape(i))%turn, bodies%orientation(:, i))
+      end do
+      if (i <= bodies%n) call raise(error, status_input, path//": /bodies/orientation: id "//to_text(bodies%id(i))// &
+        & ": zero, but a quaternion that is not zero was expected")
+    end if
+    call comm%agree(error)
+  end subroutine read_turns
+
+  subroutine read_orientation(file, first, bodies, error)
+    type(h5_file_t), intent(in) :: file
+    integer(i8), intent(in) :: first
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     real(dp), allocatable :: angle(:)
-    logical :: possible
-    integer :: i
 
     if (file%columns("/bodies/orientation") == 0 .and. bodies%dimension == 2) then
       allocate (angle(bodies%n), source=0.0_dp)
@@ -126,19 +154,25 @@ contains
     else
       call file%read_rows("/bodies/orientation", first, bodies%orientation, error)
     end if
-    call check_numbers(comm, path//": /bodies/orientation", size(bodies%orientation, 1), bodies%id, bodies%orientation, quantity, &
-      & error)
-    if (.not. allocated(error)) then
-      do i = 1, bodies%n
-        call settle_turn(bodies%orientation(:, i), possible)
-        if (possible) cycle
-        call raise(error, status_input, path//": /bodies/orientation: id "//to_text(bodies%id(i))// &
-          & ": zero, but a quaternion that is not zero was expected")
-        exit
-      end do
-    end if
-    call comm%agree(error)
-  end subroutine read_turns
+  end subroutine read_orientation
+
+  !> Whether orientations are those of principal axes.
+  subroutine find_axes(file, path, principal, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    logical, intent(out) :: principal
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: axes
+
+    principal = .false.
+    if (allocated(error)) return
+    if (.not. file%has_attribute("/bodies/orientation", "axes")) return
+    call file%read_attribute("/bodies/orientation", "axes", axes, error)
+    if (allocated(error)) return
+    principal = axes == "principal"
+    if (.not. (principal .or. axes == "written")) call raise(error, status_input, path// &
+      & ": /bodies/orientation: attribute axes: "//axes//", but principal or written was expected")
+  end subroutine find_axes
 
   !> Radii of bodies with shapes, from what the file says of them.
   subroutine settle_radii(path, scaled, scale, shapes, bodies, error)
@@ -189,6 +223,7 @@ contains
       call file%write_attribute("/bodies/orientation", "unit", "rad", error)
     else
       call file%write_rows("/bodies/orientation", bodies%orientation, error)
+      call file%write_attribute("/bodies/orientation", "axes", "principal", error)
     end if
   end subroutine write_body_shapes
 

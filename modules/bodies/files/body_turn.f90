@@ -1,10 +1,11 @@
 !> Size and orientation of bodies with shapes, as files say them in several ways.
 module gravier_body_turn
   use gravier_kinds, only: dp
+  use gravier_quaternion, only: multiply_quaternions
   use gravier_bodies_data, only: make_unit
   implicit none
   private
-  public :: settle_turn, settle_radius
+  public :: settle_turn, settle_radius, take_principal_axes
 
   !> what a quaternion may differ from length 1 and be left as it is: rounding of a time stepper, which a file gives back to the bit
   real(dp), parameter :: unit_enough = 1.0e-12_dp
@@ -24,6 +25,20 @@ contains
     if (size(turn) == 1) return
     if (abs(norm2(turn) - 1.0_dp) > unit_enough) call make_unit(turn, possible)
   end subroutine settle_turn
+
+  !> From the turn of the axes in which a shape is written to that of its principal axes. A shape that is written in its principal
+  !> axes leaves the turn as it is, to the bit.
+  pure subroutine take_principal_axes(shape_turn, turn)
+    !> of the principal axes in the others
+    real(dp), intent(in) :: shape_turn(4)
+    !> (1) in 2D, (4) in 3D
+    real(dp), intent(inout), contiguous :: turn(:)
+    real(dp) :: given(4)
+
+    if (size(turn) == 1 .or. .not. maxval(abs(shape_turn(2:4))) > 0.0_dp) return
+    given(:) = turn
+    call multiply_quaternions(given, shape_turn, turn)
+  end subroutine take_principal_axes
 
   !> The radius of a body with a shape: what is given, else scale times the size of the shape.
   pure subroutine settle_radius(size_of_shape, scale, scale_given, radius, agrees)

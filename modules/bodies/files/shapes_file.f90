@@ -7,7 +7,11 @@ module gravier_shapes_file
   use gravier_communicator, only: communicator_t
   use gravier_whole_file, only: read_whole_file
   use gravier_shape_library, only: body_shape_t, shape_library_t
-  use gravier_shape_lookup, only: find_shape, is_reserved_name
+  use gravier_shape_names, only: is_reserved_name
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_mass_properties, only: mass_t, mass_of_sum, find_principal_axes
+  use gravier_polyhedron, only: make_piece, make_capsule_piece, make_shape
+  use gravier_quaternion, only: find_quaternion
   use gravier_polygon, only: flat_piece_t, polygon_piece, round_piece, make_flat_shape
   use gravier_shapes_text, only: statement_t, split_statements
   implicit none
@@ -84,7 +88,7 @@ contains
       else if (is_reserved_name(name)) then
         call refuse(path, statement, "shape "//name//": expected another name: grain, disk, sphere and plane stand for "// &
           & "themselves in bodies files", error)
-      else if (find_shape(library, name) > 0) then
+      else if (library%find(name) > 0) then
         call refuse(path, statement, "shape "//name//": expected a name that no shape above has", error)
       end if
     end associate
@@ -124,35 +128,54 @@ contains
     if (allocated(error)) return
     first = 2
     if (statements(2)%word == "rounding") first = 3
-    if (dimension == 3) then
-      call refuse(path, statements(1), "shape "//statements(1)%text//": expected a scene in the plane", error)
-      return
-    end if
     if (first == 3) then
-      call make_flat(path, statements(1)%text, statements(first:), statements(2)%number(1), shape, error)
+      call make(statements(2)%number(1))
     else
-      call make_flat(path, statements(1)%text, statements(first:), trial_rounding*least_extent(statements(first:)), shape, error)
-      if (.not. allocated(error)) &
-        & call make_flat(path, statements(1)%text, statements(first:), usual_rounding*shape%size, shape, error)
+      call make(trial_rounding*least_extent(statements(first:), dimension))
+      if (.not. allocated(error)) call make(usual_rounding*shape%size)
     end if
     if (allocated(error)) return
     if (.not. is_size(shape%size)) call refuse(path, statements(1), "shape "//shape%name//": a size of "//to_text(shape%size)// &
       & ": expected "//size_text, error)
-    call library%add(shape)
+    if (.not. allocated(error)) call library%add(shape)
+
+  contains
+
+    subroutine make(rounding)
+      !> in the unit of the file
+      real(dp), intent(in) :: rounding
+
+      if (dimension == 2) then
+        call make_flat(path, statements(1)%text, statements(first:), rounding, shape, error)
+      else
+        call make_solid(path, statements(1)%text, statements(first:), rounding, shape, error)
+      end if
+    end subroutine make
+
   end subroutine add_shape
 
-  !> Least extent of the polygons among some pieces, each along its longer axis; any number where there are none.
-  pure real(dp) function least_extent(pieces) result(extent)
+  !> Least extent of the pieces with corners, each along its longest axis; any number where there are none.
+  pure real(dp) function least_extent(pieces, dimension) result(extent)
     type(statement_t), intent(in) :: pieces(:)
-    integer :: k, n
+    integer, intent(in) :: dimension
+    real(dp) :: longest
+    integer :: k, d, n
 
     extent = huge(1.0_dp)
     do k = 1, size(pieces)
-      if (pieces(k)%word /= "polygon") cycle
+      longest = 0.0_dp
       n = size(pieces(k)%number)
-      associate (x => pieces(k)%number(1:n:2), y => pieces(k)%number(2:n:2))
-        extent = min(extent, max(maxval(x) - minval(x), maxval(y) - minval(y)))
-      end associate
+      select case (pieces(k)%word)
+      case ("polygon", "hull")
+        do d = 1, min(dimension, n)
+          longest = max(longest, maxval(pieces(k)%number(d:n:dimension)) - minval(pieces(k)%number(d:n:dimension)))
+        end do
+      case ("box")
+        longest = maxval(pieces(k)%number(1:min(3, n)))
+      case default
+        cycle
+      end select
+      extent = min(extent, longest)
     end do
     if (extent >= huge(1.0_dp)) extent = 1.0_dp
   end function least_extent
@@ -197,6 +220,100 @@ contains
     end do
     call make_flat_shape(name, made, shape)
   end subroutine make_flat
+
+  !> Make a shape of space.
+  subroutine make_solid(path, name, pieces, rounding, shape, error)
+    character(len=*), intent(in) :: path, name
+    type(statement_t), intent(in) :: pieces(:)
+    !> of pieces with corners, in the unit of the file
+    real(dp), intent(in) :: rounding
+    type(body_shape_t), intent(out) :: shape
+    type(error_t), allocatable, intent(inout) :: error
+    type(convex_piece_t) :: made(size(pieces))
+    type(mass_t) :: mass(size(pieces)), whole
+    real(dp) :: moment(3), axes(3, 3)
+    integer :: k
+
+    do k = 1, size(pieces)
+      call make_solid_piece(path, name, pieces(k), rounding, made(k), mass(k), error)
+      if (allocated(error)) return
+    end do
+    whole = mass_of_sum(mass)
+    call make_shape(name, made, whole, shape, error)
+    call find_principal_axes(whole%inertia, moment, axes)
+    call find_quaternion(axes, shape%turn)
+  end subroutine make_solid
+
+  subroutine make_solid_piece(path, name, statement, rounding, piece, mass, error)
+    character(len=*), intent(in) :: path, name
+    type(statement_t), intent(in) :: statement
+    real(dp), intent(in) :: rounding
+    type(convex_piece_t), intent(out) :: piece
+    type(mass_t), intent(out) :: mass
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: what
+    real(dp), allocatable :: point(:, :)
+    integer :: n
+
+    n = size(statement%number)
+    what = path//": line "//to_text(statement%line)//": shape "//name
+    select case (statement%word)
+    case ("hull")
+      call check_count(path, statement, mod(n, 3) == 0 .and. n >= 12, "x, y and z of four corners or more", error)
+      if (allocated(error)) return
+      call take_points(statement%number, point)
+      call make_piece(what, point, rounding, piece, mass, error)
+    case ("box")
+      call check_count(path, statement, n == 3 .or. n == 6, "three lengths, and perhaps x, y and z of the centre", error)
+      if (allocated(error)) return
+      if (.not. all(is_size(statement%number(1:3)))) call refuse(path, statement, "box with a length of "// &
+        & to_text(minval(statement%number(1:3)))//": expected "//size_text, error)
+      call take_box(statement%number, point)
+      call make_piece(what, point, rounding, piece, mass, error)
+    case default
+      if (statement%word == "sphere") then
+        call check_count(path, statement, n == 4, "x, y, z and a radius", error)
+      else
+        call check_count(path, statement, n == 7, "x, y and z of both ends and a radius", error)
+      end if
+      call check_radius(path, statement, error)
+      if (allocated(error)) return
+      allocate (point(3, 2))
+      point(:, 1) = statement%number(1:3)
+      point(:, 2) = statement%number(n - 3:n - 1)
+      call make_capsule_piece(what, point, statement%number(n), piece, mass, error)
+      if (statement%word == "capsule" .and. size(piece%vertex, 2) == 1 .and. .not. allocated(error)) &
+        & call refuse(path, statement, "shape "//name//": a capsule of length 0: expected two ends", error)
+    end select
+  end subroutine make_solid_piece
+
+  !> Points of their coordinates one after the other.
+  pure subroutine take_points(number, point)
+    real(dp), intent(in) :: number(:)
+    real(dp), allocatable, intent(out) :: point(:, :)
+    integer :: k
+
+    allocate (point(3, size(number)/3))
+    do k = 1, size(point, 2)
+      point(:, k) = number(3*k - 2:3*k)
+    end do
+  end subroutine take_points
+
+  !> Corners of a box of three lengths, about the origin or about a point.
+  pure subroutine take_box(number, point)
+    !> (3 or 6)
+    real(dp), intent(in) :: number(:)
+    real(dp), allocatable, intent(out) :: point(:, :)
+    integer :: k, d
+
+    allocate (point(3, 8))
+    do k = 1, 8
+      do d = 1, 3
+        point(d, k) = number(d)*(ibits(k - 1, d - 1, 1) - 0.5_dp)
+        if (size(number) == 6) point(d, k) = point(d, k) + number(d + 3)
+      end do
+    end do
+  end subroutine take_box
 
   subroutine check_count(path, statement, right, expected, error)
     character(len=*), intent(in) :: path

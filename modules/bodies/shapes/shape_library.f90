@@ -25,6 +25,8 @@ module gravier_shape_library
     real(dp) :: inertia(3) = 0.0_dp
     !> radius of that ball in the length unit of the file that the shape comes from
     real(dp) :: size = 1.0_dp
+    !> in 3D, the unit quaternion that turns these axes to where they lie in those of the file; its real part comes first
+    real(dp) :: turn(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp]
   end type body_shape_t
 
   !> In how many points bodies may touch.

@@ -4,7 +4,7 @@ program test_shapes_file
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_lookup, only: find_shape, shape_names, library_digest
+  use gravier_shape_names, only: shape_names, library_digest
   use gravier_shapes_file, only: parse_shapes
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -21,6 +21,9 @@ program test_shapes_file
   call test_statements_refused()
   call test_names_refused()
   call test_planar_refused()
+  call test_space()
+  call test_principal_axes()
+  call test_space_refused()
   call finish_checks()
   call MPI_Finalize()
 
@@ -38,8 +41,8 @@ contains
     if (allocated(error)) return
     call check_equal(library%n, 4, "number of shapes")
     call check_equal(shape_names(library, " "), "brick two coin pill", "names")
-    call check_equal(find_shape(library, "coin"), 3, "a shape by its name")
-    call check_equal(find_shape(library, "coi"), 0, "no shape of that name")
+    call check_equal(library%find("coin"), 3, "a shape by its name")
+    call check_equal(library%find("coi"), 0, "no shape of that name")
     associate (brick => library%shape(1), two => library%shape(2), coin => library%shape(3), pill => library%shape(4))
       call check_close(brick%size, sqrt(5.0_dp), rounding_error, "size of a rectangle")
       call check_close(brick%volume*brick%size**2, 8.0_dp, 10*rounding_error, "area of a rectangle")
@@ -154,6 +157,98 @@ contains
     call refuse("shape a"//lf//"rounding 0.6"//lf//"polygon 0 0 1 0 1 1 0 1", 2, "line 3: shape a: a rounding of")
     call refuse("shape a"//lf//"disk 0 0 1000"//lf//"polygon 0 0 1 0 1 1 0 1", 2, "line 3: shape a: a rounding of")
   end subroutine test_planar_refused
+
+  !> A box, a tetrahedron, a capsule, a sphere and a cluster: sizes, volumes and moments that are known.
+  subroutine test_space()
+    type(shape_library_t) :: library
+    type(error_t), allocatable :: error
+
+    call parse_shapes(path, "shape box"//lf//"rounding 0.01"//lf//"box 4 2 4"//lf//"shape tetra"//lf//"hull 1 1 1  1 -1 -1"//lf// &
+      & "  -1 1 -1"//lf//"  -1 -1 1"//lf//"shape pill"//lf//"capsule 0 0 -1 0 0 1 0.5"//lf//"shape ball"//lf//"sphere 1 2 3 0.5"// &
+      & lf//"shape pair"//lf//"box 1 1 1 0.5 0 0"//lf//"box 1 1 1 -0.5 0 0", 3, library, error)
+    call check(.not. allocated(error), "a good file in space")
+    if (allocated(error)) call check(.false., error%message)
+    if (allocated(error)) return
+    associate (box => library%shape(1), tetra => library%shape(2), pill => library%shape(3), ball => library%shape(4), &
+      & pair => library%shape(5))
+      call check_close(box%size, 3.0_dp, rounding_error, "size of a box")
+      call check_close(box%volume*box%size**3, 32.0_dp, 100*rounding_error, "volume of a box")
+      call check_close(box%inertia(2)*box%size**2, (4.0_dp**2 + 4.0_dp**2)/12, 100*rounding_error, "largest inertia of a box")
+      call check_close(box%piece(1)%rounding*box%size, 0.01_dp, rounding_error, "a rounding that is said")
+      call check_close(tetra%size, sqrt(3.0_dp), 10*rounding_error, "size of a tetrahedron")
+      call check_close(tetra%volume*tetra%size**3, 8.0_dp/3.0_dp, 100*rounding_error, "volume of a tetrahedron")
+      call check_close(tetra%piece(1)%rounding, 1.0e-3_dp, rounding_error, "the usual rounding")
+      call check_close(pill%size, 1.5_dp, rounding_error, "size of a capsule")
+      call check_close(pill%volume*pill%size**3, pi*0.25_dp*2 + pi/6, 100*rounding_error, "volume of a capsule")
+      call check_close(ball%volume, 4.0_dp/3.0_dp*pi, 100*rounding_error, "volume of a sphere of radius 1")
+      call check_equal(size(pair%piece), 2, "pieces of a cluster of boxes")
+      call check_close(pair%size, sqrt(1.5_dp), 10*rounding_error, "size of a cluster")
+      call check_close(pair%inertia(3)*pair%size**2, 5.0_dp/12, 100*rounding_error, "inertia of a cluster across its axis")
+      call check_close(pair%inertia(1)*pair%size**2, 1.0_dp/6, 100*rounding_error, "inertia of a cluster about its axis")
+    end associate
+  end subroutine test_space
+
+  !> A box that is written askew has the shape of one that is not, and the quaternion that turns it to where it was written.
+  subroutine test_principal_axes()
+    real(dp), parameter :: angle = 0.3_dp
+    character(len=24) :: number
+    character(len=:), allocatable :: text
+    type(shape_library_t) :: straight, askew
+    type(error_t), allocatable :: error
+    real(dp) :: corner(3), across
+    integer :: k, d, v
+
+    text = "shape b"//lf//"hull"
+    do k = 0, 7
+      do d = 1, 3
+        corner(d) = (4 - d)*(2*ibits(k, d - 1, 1) - 1)
+      end do
+      across = cos(angle)*corner(1) - sin(angle)*corner(2)
+      corner(2) = sin(angle)*corner(1) + cos(angle)*corner(2)
+      corner(1) = across
+      do d = 1, 3
+        write (number, "(es24.16)") corner(d)
+        text = text//" "//number
+      end do
+    end do
+    call parse_shapes(path, text, 3, askew, error)
+    call parse_shapes(path, "shape b"//lf//"box 6 4 2", 3, straight, error)
+    call check(.not. allocated(error), "a box askew")
+    if (allocated(error)) return
+    associate (one => straight%shape(1), other => askew%shape(1))
+      do d = 1, 3
+        call check_close(other%inertia(d), one%inertia(d), 10*rounding_error, "a principal moment")
+      end do
+      call check_close(other%turn(1), cos(angle/2), 10*rounding_error, "real part of the turn")
+      call check_close(other%turn(4), sin(angle/2), 10*rounding_error, "turn about the third axis")
+      call check(all(abs(other%turn(2:3)) <= 10*rounding_error), "no turn about the others")
+      call check(all(abs(one%turn(2:4)) <= 0.0_dp), "no turn of what is written in principal axes")
+      do v = 1, size(other%piece(1)%corner, 2)
+        do d = 1, 3
+          call check_close(abs(other%piece(1)%corner(d, v)), (4 - d)/sqrt(14.0_dp), 10*rounding_error, "a corner in principal axes")
+        end do
+      end do
+    end associate
+  end subroutine test_principal_axes
+
+  subroutine test_space_refused()
+    call refuse("shape a"//lf//"polygon 0 0 1 0 0 1", 3, &
+      & 'line 2: "polygon": expected shape, rounding, hull, box, sphere or capsule')
+    call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0", 3, &
+      & "line 2: hull with 9 numbers: expected x, y and z of four corners or more")
+    call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 1", 3, "line 2: hull with 10 numbers: expected x, y and z of four corners")
+    call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 1 1 0", 3, "line 2: shape a: ")
+    call refuse("shape a"//lf//"box 1 1", 3, &
+      & "line 2: box with 2 numbers: expected three lengths, and perhaps x, y and z of the centre")
+    call refuse("shape a"//lf//"box 1 0 1", 3, "line 2: box with a length of 0.00000000E+000: expected a number from 1e-30 to 1e30")
+    call refuse("shape a"//lf//"sphere 0 0 1", 3, "line 2: sphere with 3 numbers: expected x, y, z and a radius")
+    call refuse("shape a"//lf//"sphere 0 0 0 0", 3, "line 2: sphere with a radius of 0.00000000E+000: expected a number")
+    call refuse("shape a"//lf//"capsule 0 0 0 1 0 0", 3, &
+      & "line 2: capsule with 6 numbers: expected x, y and z of both ends and a radius")
+    call refuse("shape a"//lf//"capsule 0 0 0 0 0 0 1", 3, "line 2: shape a: a capsule of length 0: expected two ends")
+    call refuse("shape a"//lf//"rounding 0.6"//lf//"box 1 1 1", 3, "line 3: shape a: the rounding of ")
+    call refuse("shape a"//lf//"sphere 0 0 0 1000"//lf//"box 1 1 1", 3, "line 3: shape a: the rounding of ")
+  end subroutine test_space_refused
 
   subroutine refuse(text, dimension, part)
     character(len=*), intent(in) :: text

@@ -1,5 +1,5 @@
-!> Shapes of a library by name, and what tells two libraries from each other.
-module gravier_shape_lookup
+!> Names of shapes, and what tells two libraries from each other.
+module gravier_shape_names
   use gravier_kinds, only: i8
   use gravier_text, only: lower
   use gravier_random_hash, only: hash_words
@@ -7,23 +7,12 @@ module gravier_shape_lookup
   use gravier_shape_library, only: body_shape_t, shape_library_t
   implicit none
   private
-  public :: find_shape, shape_names, is_reserved_name, library_digest
+  public :: shape_names, is_reserved_name, library_digest
 
   !> names that files of bodies have for what is not in a library
   character(len=*), parameter :: reserved(4) = [character(len=6) :: "grain", "disk", "sphere", "plane"]
 
 contains
-
-  !> Number of the shape with that name, 0 where there is none.
-  pure integer function find_shape(library, name) result(number)
-    type(shape_library_t), intent(in) :: library
-    character(len=*), intent(in) :: name
-
-    do number = 1, library%n
-      if (len(library%shape(number)%name) == len(name) .and. library%shape(number)%name == name) return
-    end do
-    number = 0
-  end function find_shape
 
   !> All names in the order of their numbers, with `between` between two.
   pure function shape_names(library, between) result(text)
@@ -95,4 +84,4 @@ contains
     digest = hash_words(words)
   end function piece_digest
 
-end module gravier_shape_lookup
+end module gravier_shape_names
