@@ -30,8 +30,8 @@ contains
     real(dp) :: x(3, 2), y(3, 2), along(2), s(2), t(2), ends(2), room, sense
     integer :: v(2), w(2), k, p, q, key
 
-    call lay_out_feature(a, at_a, feature_a, frame, v, x)
-    call lay_out_feature(b, at_b, feature_b, frame, w, y)
+    call lay_out_feature(a, at_a, feature_a, frame, k, v, x)
+    call lay_out_feature(b, at_b, feature_b, frame, k, w, y)
     call find_common_line(x, y, along)
     if (.not. dot_product(along, along) > 0.0_dp) return
     do k = 1, 2
