@@ -43,6 +43,10 @@ contains
       w(:, n) = x(:, i) - y(:, j)
       share(n) = 0
       call reduce(n, w, pairs, share, v)
+      ! the origin is in a tetrahedron
+      if (n == 4) v(:) = 0
+      if (n == 4) sure = .true.
+      if (sure) exit
     end do
     sure = sure .or. step < most_steps
   end subroutine find_hull_distance
@@ -112,37 +116,48 @@ contains
     end do
   end subroutine reduce
 
-  !> Shares of the point of the affine hull that is nearest to the origin, by elimination with pivots.
+  !> Shares of the point of the affine hull that is nearest to the origin, by areas and volumes: squares of lengths alone would lose
+  !> half of the digits where the points are nearly in a line or a plane.
   subroutine solve_affine(n, w, share)
     integer, intent(in) :: n
     real(qp), intent(in) :: w(3, 5)
     real(qp), intent(out) :: share(5)
-    real(qp) :: a(4, 5), row(5), way(3)
-    integer :: i, j, k, pivot
+    real(qp) :: d(3, 3), normal(3), other(3), whole
+    integer :: k
 
-    ! unknown are the shares of all but the first; the sum of all is 1
     share(:) = 0
-    do i = 1, n - 1
-      way(:) = w(:, i + 1) - w(:, 1)
-      do j = 1, n - 1
-        a(i, j) = dot_product(way, w(:, j + 1) - w(:, 1))
-      end do
-      a(i, n) = -dot_product(way, w(:, 1))
+    do k = 1, min(3, n - 1)
+      d(:, k) = w(:, k + 1) - w(:, 1)
     end do
-    do k = 1, n - 1
-      pivot = k - 1 + maxloc(abs(a(k:n - 1, k)), 1)
-      row(1:n) = a(k, 1:n)
-      a(k, 1:n) = a(pivot, 1:n)
-      a(pivot, 1:n) = row(1:n)
-      if (abs(a(k, k)) <= 0) cycle
-      do i = k + 1, n - 1
-        a(i, k:n) = a(i, k:n) - a(i, k)/a(k, k)*a(k, k:n)
-      end do
-    end do
-    do k = n - 1, 1, -1
-      if (abs(a(k, k)) > 0) share(k + 1) = (a(k, n) - dot_product(a(k, k + 1:n - 1), share(k + 2:n)))/a(k, k)
-    end do
+    select case (n)
+    case (2)
+      share(2) = -dot_product(w(:, 1), d(:, 1))/dot_product(d(:, 1), d(:, 1))
+    case (3)
+      normal(:) = cross(d(:, 1), d(:, 2))
+      whole = dot_product(normal, normal)
+      other(:) = cross(d(:, 2), w(:, 1))
+      if (whole > 0) share(2) = dot_product(other, normal)/whole
+      other(:) = cross(w(:, 1), d(:, 1))
+      if (whole > 0) share(3) = dot_product(other, normal)/whole
+    case (4)
+      normal(:) = cross(d(:, 2), d(:, 3))
+      whole = dot_product(d(:, 1), normal)
+      if (abs(whole) > 0) share(2) = -dot_product(w(:, 1), normal)/whole
+      normal(:) = cross(d(:, 3), d(:, 1))
+      if (abs(whole) > 0) share(3) = -dot_product(w(:, 1), normal)/whole
+      normal(:) = cross(d(:, 1), d(:, 2))
+      if (abs(whole) > 0) share(4) = -dot_product(w(:, 1), normal)/whole
+    end select
     share(1) = 1 - sum(share(2:n))
   end subroutine solve_affine
+
+  pure function cross(a, b) result(c)
+    real(qp), intent(in) :: a(3), b(3)
+    real(qp) :: c(3)
+
+    c(1) = a(2)*b(3) - a(3)*b(2)
+    c(2) = a(3)*b(1) - a(1)*b(3)
+    c(3) = a(1)*b(2) - a(2)*b(1)
+  end function cross
 
 end module gravier_hull_oracle
