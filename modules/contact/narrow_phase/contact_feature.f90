@@ -32,6 +32,8 @@ module gravier_contact_feature
   real(dp), parameter :: least_cosine = sqrt(1.0_dp - most_sine**2)
   !> angle at which a side has no share of its sharp corners any more [rad]
   real(dp), parameter :: blend_angle = 0.02_dp
+  !> a corner turns inwards where the sine of its turn is below the opposite of this
+  real(dp), parameter :: inner = 1.0e-9_dp
 
 contains
 
@@ -115,17 +117,19 @@ contains
 
   !> Corners of a face or an edge in the axes of a frame, blended: between those of the core and the sharp ones, the nearer to these the
   !> more a side lies in the plane of contact.
-  pure subroutine lay_out_feature(piece, at, feature, frame, vertex, place)
+  pure subroutine lay_out_feature(piece, at, feature, frame, m, vertex, place)
     type(convex_piece_t), intent(in) :: piece
     type(placement_t), intent(in) :: at
     type(feature_t), intent(in) :: feature
     type(frame_t), intent(in) :: frame
-    !> numbers of the corners' vertices (n)
+    !> corners: those of the feature, but for some that blending has put inside
+    integer, intent(out) :: m
+    !> numbers of the corners' vertices (m or more)
     integer, intent(out) :: vertex(:)
-    !> along both axes of the frame and its normal (3, n) [m]
+    !> along both axes of the frame and its normal (3, m or more) [m]
     real(dp), intent(out) :: place(:, :)
-    real(dp) :: along(3), x(3), side(3, feature%n), share(feature%n)
-    integer :: k, m
+    real(dp) :: along(3), x(3), y(3), side(3, feature%n), sine(feature%n)
+    integer :: k, last
 
     m = feature%n
     if (feature%face > 0) then
@@ -137,47 +141,101 @@ contains
     call turn_back(at, frame%normal, along)
     do k = 1, m
       side(:, k) = piece%vertex(:, vertex(mod(k, m) + 1)) - piece%vertex(:, vertex(k))
-      share(k) = max(0.0_dp, 1.0_dp - sine_of(side(:, k), along)/blend_angle)
+      sine(k) = sine_of(side(:, k), along)
     end do
     do k = 1, m
       x(:) = piece%vertex(:, vertex(k))
-      call blend(piece, feature, vertex(k), side(:, mod(k + m - 2, m) + 1), side(:, k), &
-        & share(mod(k + m - 2, m) + 1), share(k), x)
-      call place_point(at, x, along)
-      x(:) = along - frame%origin
-      place(1, k) = dot_product(x, frame%first)
-      place(2, k) = dot_product(x, frame%second)
-      place(3, k) = dot_product(x, frame%normal)
+      last = mod(k + m - 2, m) + 1
+      if (min(sine(last), sine(k)) < blend_angle) then
+        if (feature%face > 0) then
+          call blend_in_face(piece, feature%face, vertex(k), along, side(:, last), side(:, k), sine(last), sine(k), x)
+        else
+          call blend_along(piece, vertex(k), side(:, k), sine(k), x)
+        end if
+      end if
+      call place_point(at, x, y)
+      y(:) = y - frame%origin
+      place(1, k) = dot_product(y, frame%first)
+      place(2, k) = dot_product(y, frame%second)
+      place(3, k) = dot_product(y, frame%normal)
     end do
+    if (feature%face > 0 .and. m > 3) call drop_inner(sign(1.0_dp, dot_product(along, piece%face_normal(:, feature%face))), m, &
+      & vertex, place)
   end subroutine lay_out_feature
 
-  !> Move a corner towards its sharp place: within the face where both of its sides lie in the plane of contact, along a side where
-  !> only that one does.
-  pure subroutine blend(piece, feature, v, before, behind, share_before, share_behind, x)
+  !> Leave out corners where a polygon turns inwards, as it may beside a corner of which one side only was lengthened.
+  pure subroutine drop_inner(sense, m, vertex, place)
+    !> 1.0 for a polygon that is anticlockwise, -1.0 for one that is clockwise
+    real(dp), intent(in) :: sense
+    integer, intent(inout) :: m, vertex(:)
+    real(dp), intent(inout) :: place(:, :)
+    real(dp) :: u(2), v(2)
+    integer :: k, kept
+
+    k = 1
+    kept = 0
+    do while (kept < m .and. m > 3)
+      u(:) = place(1:2, k) - place(1:2, mod(k + m - 2, m) + 1)
+      v(:) = place(1:2, mod(k, m) + 1) - place(1:2, k)
+      if (sense*(u(1)*v(2) - u(2)*v(1)) >= -inner*sqrt(dot_product(u, u)*dot_product(v, v))) then
+        kept = kept + 1
+        k = mod(k, m) + 1
+      else
+        vertex(k:m - 1) = vertex(k + 1:m)
+        place(:, k:m - 1) = place(:, k + 1:m)
+        m = m - 1
+        kept = 0
+        ! the corner before may now turn inwards
+        k = mod(k + m - 2, m) + 1
+      end if
+    end do
+  end subroutine drop_inner
+
+  !> Move a corner of a face towards its sharp place: within the face where both of its sides lie in the plane of contact, along a
+  !> side where only that one does.
+  pure subroutine blend_in_face(piece, f, v, along, before, behind, sine_before, sine_behind, x)
     type(convex_piece_t), intent(in) :: piece
-    type(feature_t), intent(in) :: feature
+    !> face, corner
+    integer, intent(in) :: f, v
+    !> normal of the plane of contact; sides of the face at the corner, and their sines
+    real(dp), intent(in) :: along(3), before(3), behind(3), sine_before, sine_behind
+    real(dp), intent(inout) :: x(3)
+    real(dp) :: way(3), long_before, long_behind, part_before, part_behind, share_before, share_behind, share
+
+    way(:) = piece%corner(:, v) - piece%vertex(:, v)
+    way(:) = way - dot_product(way, piece%face_normal(:, f))*piece%face_normal(:, f)
+    long_before = sqrt(dot_product(before, before))
+    long_behind = sqrt(dot_product(behind, behind))
+    if (.not. min(long_before, long_behind) > 0.0_dp) return
+    part_before = dot_product(way, before)/long_before
+    part_behind = dot_product(way, behind)/long_behind
+    share_before = share_of(sine_before, abs(part_before), piece%rounding)
+    share_behind = share_of(sine_behind, abs(part_behind), piece%rounding)
+    share = min(share_before*share_behind, share_of(sine_of(way, along), sqrt(dot_product(way, way)), piece%rounding))
+    x(:) = x + share*way + share_before*(1.0_dp - share_behind)*part_before/long_before*before + &
+      & (1.0_dp - share_before)*share_behind*part_behind/long_behind*behind
+  end subroutine blend_in_face
+
+  !> Move an end of an edge towards its sharp place.
+  pure subroutine blend_along(piece, v, side, sine, x)
+    type(convex_piece_t), intent(in) :: piece
     integer, intent(in) :: v
-    !> sides of the face at the corner, and their shares
-    real(dp), intent(in) :: before(3), behind(3), share_before, share_behind
+    real(dp), intent(in) :: side(3), sine
     real(dp), intent(inout) :: x(3)
     real(dp) :: way(3), squared
 
-    if (.not. (share_before > 0.0_dp .or. share_behind > 0.0_dp)) return
     way(:) = piece%corner(:, v) - piece%vertex(:, v)
-    if (feature%face > 0) then
-      associate (normal => piece%face_normal(:, feature%face))
-        way(:) = way - dot_product(way, normal)*normal
-      end associate
-      x(:) = x + share_before*share_behind*way
-      squared = dot_product(before, before)
-      if (squared > 0.0_dp) x(:) = x + share_before*(1.0_dp - share_behind)*dot_product(way, before)/squared*before
-      squared = dot_product(behind, behind)
-      if (squared > 0.0_dp) x(:) = x + (1.0_dp - share_before)*share_behind*dot_product(way, behind)/squared*behind
-    else
-      squared = dot_product(behind, behind)
-      if (squared > 0.0_dp) x(:) = x + share_behind*dot_product(way, behind)/squared*behind
-    end if
-  end subroutine blend
+    squared = dot_product(side, side)
+    if (squared > 0.0_dp) way(:) = dot_product(way, side)/squared*side
+    x(:) = x + share_of(sine, sqrt(dot_product(way, way)), piece%rounding)*way
+  end subroutine blend_along
+
+  !> Share of a way to a sharp corner, by the sine of the angle out of the plane of contact. Long ways, of thin corners, get theirs at
+  !> smaller angles, so that no corner is moved out of the plane by more than a two-hundredth of the rounding.
+  pure real(dp) function share_of(sine, length, rounding)
+    real(dp), intent(in) :: sine, length, rounding
+    share_of = max(0.0_dp, 1.0_dp - sine/blend_angle*max(1.0_dp, length/rounding))
+  end function share_of
 
   !> Number of an edge among the features of a piece: behind those of the vertices, by its place in the list of neighbours of its
   !> lower end; of the lower end where there is no such edge.

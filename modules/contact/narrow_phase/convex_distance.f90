@@ -45,6 +45,8 @@ module gravier_convex_distance
   integer, parameter :: most_steps = 200
   !> from this number of vertices on, the farthest is searched along edges
   integer, parameter :: many_vertices = 48
+  !> a length beyond all others whose fourth power can be had [m]
+  real(dp), parameter :: endless = 1.0e70_dp
   !> below this distance, in parts of the size of the differences, cores count as overlapping
   real(dp), parameter :: touching = 1.0e-11_dp
 
@@ -57,8 +59,9 @@ contains
     !> distance above which the search may end early [m]
     real(dp), intent(in) :: beyond
     type(core_distance_t), intent(out) :: found
-    real(dp) :: w(3, 4), x(3, 4), v(3), share(4), squared, along, size_squared
+    real(dp) :: w(3, 4), x(3, 4), y(3), v(3), u(3), share(4), squared, along, size_squared
     integer :: i, j, n
+    logical :: walk, done
 
     v(:) = -pair%way
     if (.not. dot_product(v, v) > 0.0_dp) v(3) = 1.0_dp
@@ -67,35 +70,45 @@ contains
     j = 1
     size_squared = 0.0_dp
     squared = huge(1.0_dp)
+    along = 0.0_dp
+    walk = max(size(a%vertex, 2), size(b%vertex, 2)) >= many_vertices
     do while (found%steps < most_steps)
       found%steps = found%steps + 1
-      call support_a(a, v, i)
-      call support_b(b, pair, v, j)
-      if (is_known(found, n, i, j)) exit
-      n = n + 1
-      found%vertex_a(n) = i
-      found%vertex_b(n) = j
-      x(:, n) = place_a(a, pair, i)
-      w(:, n) = x(:, n) - place_b(b, pair, j)
-      size_squared = max(size_squared, dot_product(w(:, n), w(:, n)))
-      along = dot_product(v, w(:, n))
+      call support_a(a, v, walk, i)
+      call support_b(b, pair, v, walk, j)
+      call place_a(a, pair, i, x(:, n + 1))
+      call place_b(b, pair, j, y)
+      w(:, n + 1) = x(:, n + 1) - y
+      along = dot_product(v, w(:, n + 1))
       ! the difference that is farthest along -v bounds the distance from below
-      if (along > 0.0_dp .and. along*along > beyond*beyond*dot_product(v, v)) then
+      if (along > 0.0_dp .and. along*along > min(beyond, endless)**2*dot_product(v, v)) then
         found%beyond = .true.
         return
       end if
-      ! no step is better than the last by more than rounding
-      if (n > 1 .and. squared - along <= 4*epsilon(1.0_dp)*sqrt(squared*size_squared)) then
-        n = n - 1
-        exit
+      size_squared = max(size_squared, dot_product(w(:, n + 1), w(:, n + 1)))
+      done = is_known(found, n, i, j)
+      if (n > 0) done = done .or. squared - along <= 4*epsilon(1.0_dp)*sqrt(squared*size_squared)
+      if (.not. done) then
+        call find_nearest(w, n + 1, share, u)
+        done = n > 0 .and. dot_product(u, u) >= squared
       end if
-      call find_nearest(w, n, share, v)
+      if (done) then
+        ! walks end where rounding has bent a piece: all vertices have the last word
+        if (.not. walk) exit
+        walk = .false.
+        cycle
+      end if
+      n = n + 1
+      found%vertex_a(n) = i
+      found%vertex_b(n) = j
+      v(:) = u
       call drop_idle(found, n, share, w, x)
       squared = dot_product(v, v)
       if (n == 4 .or. squared <= touching**2*size_squared) exit
     end do
     found%n = n
-    if (n == 4 .or. squared <= touching**2*size_squared) then
+    ! a slab across v that is not half as wide as the distance: the origin is in a simplex too flat to tell
+    if (n == 4 .or. squared <= touching**2*size_squared .or. (done .and. along < 0.5_dp*squared)) then
       found%overlap = .true.
       return
     end if
@@ -136,69 +149,86 @@ contains
     n = m
   end subroutine drop_idle
 
-  !> Nearest points, distance and normal from the vertices that take part. The shares are bettered by one step of Newton's method,
-  !> which makes the way between the points normal to both features up to rounding.
+  !> Nearest points, distance and normal from the vertices that take part. The way between the points is made normal to both features
+  !> up to rounding, once as a whole and once more as a unit vector, which matters where it is short.
   pure subroutine finish(w, x, found)
     !> differences and vertices of a (3, n)
     real(dp), intent(in) :: w(:, :), x(:, :)
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: v(3), u(3), t(3), d(2), g(3), det
+    real(dp) :: v(3), part(2)
     integer :: k
 
     v(:) = w(:, 1)
     do k = 2, found%n
       v(:) = v + found%share(k)*(w(:, k) - w(:, 1))
     end do
-    if (found%n == 2) then
-      u(:) = w(:, 2) - w(:, 1)
-      g(1) = dot_product(u, u)
-      if (g(1) > 0.0_dp) then
-        d(1) = -dot_product(u, v)/g(1)
-        v(:) = v + d(1)*u
-        found%share(2) = found%share(2) + d(1)
-        found%share(1) = 1.0_dp - found%share(2)
-      end if
-    else if (found%n == 3) then
-      u(:) = w(:, 2) - w(:, 1)
-      t(:) = w(:, 3) - w(:, 1)
-      g(1) = dot_product(u, u)
-      g(2) = dot_product(u, t)
-      g(3) = dot_product(t, t)
-      det = g(1)*g(3) - g(2)*g(2)
-      if (det > epsilon(1.0_dp)*g(1)*g(3)) then
-        d(1) = -(g(3)*dot_product(u, v) - g(2)*dot_product(t, v))/det
-        d(2) = -(g(1)*dot_product(t, v) - g(2)*dot_product(u, v))/det
-        v(:) = v + d(1)*u + d(2)*t
-        found%share(2:3) = found%share(2:3) + d
-        found%share(1) = 1.0_dp - found%share(2) - found%share(3)
-      end if
+    if (found%n > 1) then
+      call make_normal(w, found%n, v, part)
+      found%share(2:found%n) = found%share(2:found%n) + part(1:found%n - 1)
+      found%share(1) = 1.0_dp - sum(found%share(2:found%n))
     end if
+    found%normal(:) = v/sqrt(dot_product(v, v))
+    if (found%n > 1) then
+      call make_normal(w, found%n, found%normal, part)
+      found%normal(:) = found%normal/sqrt(dot_product(found%normal, found%normal))
+    end if
+    ! the vertex with the largest share is the nearest to the foot
+    k = maxloc(found%share(1:found%n), 1)
+    found%distance = dot_product(found%normal, w(:, k))
     found%point_a(:) = x(:, 1)
     do k = 2, found%n
       found%point_a(:) = found%point_a + found%share(k)*(x(:, k) - x(:, 1))
     end do
-    found%point_b(:) = found%point_a - v
-    found%distance = sqrt(dot_product(v, v))
-    found%normal(:) = v/found%distance
+    found%point_b(:) = found%point_a - found%distance*found%normal
   end subroutine finish
 
+  !> v := v + part(1) u + part(2) t, normal to the sides u and t of a simplex.
+  pure subroutine make_normal(w, n, v, part)
+    real(dp), intent(in) :: w(:, :)
+    !> corners: 2 or 3
+    integer, intent(in) :: n
+    real(dp), intent(inout) :: v(3)
+    real(dp), intent(out) :: part(2)
+    real(dp) :: u(3), t(3), uu, ut, tt, det
+
+    part(:) = 0.0_dp
+    u(:) = w(:, 2) - w(:, 1)
+    uu = dot_product(u, u)
+    if (.not. uu > 0.0_dp) return
+    if (n == 2) then
+      part(1) = -dot_product(u, v)/uu
+      v(:) = v + part(1)*u
+      return
+    end if
+    t(:) = w(:, 3) - w(:, 1)
+    ut = dot_product(u, t)
+    tt = dot_product(t, t)
+    det = uu*tt - ut*ut
+    if (det <= epsilon(1.0_dp)*uu*tt) return
+    part(1) = -(tt*dot_product(u, v) - ut*dot_product(t, v))/det
+    part(2) = -(uu*dot_product(t, v) - ut*dot_product(u, v))/det
+    v(:) = v + part(1)*u + part(2)*t
+  end subroutine make_normal
+
   !> The vertex of a that is farthest along -v.
-  pure subroutine support_a(a, v, i)
+  pure subroutine support_a(a, v, walk, i)
     type(convex_piece_t), intent(in) :: a
     real(dp), intent(in) :: v(3)
-    !> where a search along edges begins
+    !> whether to go along edges, from a vertex on
+    logical, intent(in) :: walk
     integer, intent(inout) :: i
     real(dp) :: along(3)
 
     along(:) = -v
-    call find_support(a, along, i)
+    call find_support(a, along, walk, i)
   end subroutine support_a
 
   !> The vertex of b that is farthest along v.
-  pure subroutine support_b(b, pair, v, j)
+  pure subroutine support_b(b, pair, v, walk, j)
     type(convex_piece_t), intent(in) :: b
     type(placed_pair_t), intent(in) :: pair
     real(dp), intent(in) :: v(3)
+    logical, intent(in) :: walk
     integer, intent(inout) :: j
     real(dp) :: along(3)
     integer :: k
@@ -206,19 +236,20 @@ contains
     do k = 1, 3
       along(k) = pair%rotation(1, k)*v(1) + pair%rotation(2, k)*v(2) + pair%rotation(3, k)*v(3)
     end do
-    call find_support(b, along, j)
+    call find_support(b, along, walk, j)
   end subroutine support_b
 
-  !> The vertex that is farthest along a direction. Among few vertices it is the lowest of those equally far; among many it is where
-  !> a walk along edges that go farther ends.
-  pure subroutine find_support(piece, along, best)
+  !> The vertex that is farthest along a direction, the lowest of those equally far. A walk goes along edges that lead farther, and is
+  !> for pieces of many vertices; it may end a rounding too early.
+  pure subroutine find_support(piece, along, walk, best)
     type(convex_piece_t), intent(in) :: piece
     real(dp), intent(in) :: along(3)
+    logical, intent(in) :: walk
     integer, intent(inout) :: best
     real(dp) :: farthest, reach
     integer :: k, from
 
-    if (size(piece%vertex, 2) < many_vertices) then
+    if (.not. walk) then
       best = 1
       farthest = along(1)*piece%vertex(1, 1) + along(2)*piece%vertex(2, 1) + along(3)*piece%vertex(3, 1)
       do k = 2, size(piece%vertex, 2)
@@ -247,26 +278,27 @@ contains
   end subroutine find_support
 
   !> Vertex i of a in the axes of a [m].
-  pure function place_a(a, pair, i) result(x)
+  pure subroutine place_a(a, pair, i, x)
     type(convex_piece_t), intent(in) :: a
     type(placed_pair_t), intent(in) :: pair
     integer, intent(in) :: i
-    real(dp) :: x(3)
+    real(dp), intent(out) :: x(3)
     x(:) = pair%radius_a*a%vertex(:, i)
-  end function place_a
+  end subroutine place_a
 
   !> Vertex j of b in the axes of a, from the centre of a [m].
-  pure function place_b(b, pair, j) result(x)
+  pure subroutine place_b(b, pair, j, x)
     type(convex_piece_t), intent(in) :: b
     type(placed_pair_t), intent(in) :: pair
     integer, intent(in) :: j
-    real(dp) :: x(3), u(3)
+    real(dp), intent(out) :: x(3)
+    real(dp) :: u(3)
     integer :: k
 
     u(:) = pair%radius_b*b%vertex(:, j)
     do k = 1, 3
       x(k) = pair%way(k) + (pair%rotation(k, 1)*u(1) + pair%rotation(k, 2)*u(2) + pair%rotation(k, 3)*u(3))
     end do
-  end function place_b
+  end subroutine place_b
 
 end module gravier_convex_distance

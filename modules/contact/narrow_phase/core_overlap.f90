@@ -65,11 +65,11 @@ contains
 
     i = 1
     j = 1
-    call support_a(a, n, i)
-    call support_b(b, pair, n, j)
-    x(:) = place_a(a, pair, i)
-    y(:) = place_b(b, pair, j)
-    separation = dot_product(n, x - y)
+    call support_a(a, n, .false., i)
+    call support_b(b, pair, n, .false., j)
+    call place_a(a, pair, i, x)
+    call place_b(b, pair, j, y)
+    separation = dot_product(n, x) - dot_product(n, y)
     if (.not. separation > found%distance + better*(pair%radius_a + pair%radius_b)) return
     found%distance = separation
     found%normal(:) = n

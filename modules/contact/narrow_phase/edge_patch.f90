@@ -30,8 +30,8 @@ contains
     real(dp) :: x(3, 2), y(3, 2), along(2), s(2), t(2), ends(2), room, sense
     integer :: v(2), w(2), k, p, q, key
 
-    call lay_out_feature(a, at_a, feature_a, frame, v, x)
-    call lay_out_feature(b, at_b, feature_b, frame, w, y)
+    call lay_out_feature(a, at_a, feature_a, frame, k, v, x)
+    call lay_out_feature(b, at_b, feature_b, frame, k, w, y)
     call find_common_line(x, y, along)
     if (.not. dot_product(along, along) > 0.0_dp) return
     do k = 1, 2
@@ -69,7 +69,8 @@ contains
       way(:) = on_a - on_b
       reach_a = at_a%radius*a%rounding
       reach_b = at_b%radius*b%rounding
-      new%gap = sign(norm2(way), way(3)) - reach_a - reach_b
+      ! what of the way is along the normal may be below 0: by blending, or where cores overlap
+      new%gap = sqrt(way(1)**2 + way(2)**2 + max(way(3), 0.0_dp)**2) + min(way(3), 0.0_dp) - reach_a - reach_b
       new%place(:) = 0.5_dp*(on_a + on_b)
       new%place(3) = new%place(3) + 0.5_dp*(reach_b - reach_a)
       new%key = key

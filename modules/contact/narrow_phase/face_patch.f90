@@ -34,26 +34,26 @@ contains
     type(patch_point_t), intent(inout) :: point(:)
     real(dp) :: x(3, feature_a%n), y(3, feature_b%n), room
     real(dp) :: place(2, room_for_clip(feature_a%n, feature_b%n)), height_a, height_b, reach_a, reach_b
-    integer :: v(feature_a%n), w(feature_b%n), label(size(place, 2)), m, k, key(2)
+    integer :: v(feature_a%n), w(feature_b%n), label(size(place, 2)), na, nb, m, k, key(2)
     type(laid_out_t) :: plane_a, plane_b
     type(patch_point_t) :: new
 
-    call lay_out_feature(a, at_a, feature_a, frame, v, x)
-    call lay_out_feature(b, at_b, feature_b, frame, w, y)
+    call lay_out_feature(a, at_a, feature_a, frame, na, v, x)
+    call lay_out_feature(b, at_b, feature_b, frame, nb, w, y)
     call find_plane(a, at_a, feature_a, frame, x, plane_a)
     call find_plane(b, at_b, feature_b, frame, y, plane_b)
     ! seen along the normal, faces of a turn the other way round than those of b
     if (feature_b%n > 2) then
-      call clip_polygon(x, y, 1.0_dp, m, place, label)
+      call clip_polygon(x(:, 1:na), y(:, 1:nb), 1.0_dp, m, place, label)
     else
-      call clip_polygon(y, x, -1.0_dp, m, place, label)
+      call clip_polygon(y(:, 1:nb), x(:, 1:na), -1.0_dp, m, place, label)
       label(1:m) = -label(1:m)
     end if
     room = equal*min(at_a%radius, at_b%radius)
     reach_a = at_a%radius*a%rounding
     reach_b = at_b%radius*b%rounding
     do k = 1, m
-      call name_corner(label(merge(m, k - 1, k == 1)), label(k), v, w, x, y, room, place(:, k), key)
+      call name_corner(label(merge(m, k - 1, k == 1)), label(k), x(:, 1:na), y(:, 1:nb), room, place(:, k), key)
       if (key(1) > 0 .and. key(2) > 0) then
         if (is_idle(place, m, k, room)) cycle
       end if
@@ -63,7 +63,7 @@ contains
       new%place(3) = 0.5_dp*(height_a - reach_a + height_b + reach_b)
       new%gap = height_a - height_b - reach_a - reach_b
       if (.not. new%gap < alert) cycle
-      new%key = number_of(a, v, plane_a, key(1))*feature_base + number_of(b, w, plane_b, key(2))
+      new%key = number_of(a, v(1:na), plane_a, key(1))*feature_base + number_of(b, w(1:nb), plane_b, key(2))
       call add_point(new, alert, min(at_a%radius, at_b%radius), n, point)
     end do
   end subroutine add_face_points
@@ -108,10 +108,10 @@ contains
   !> What a corner of the common part is on each piece: a corner k of its feature as -k, a side as k, anything within as 0. Corners of
   !> both that are at one place, and ends of sides near a crossing, are taken for corners, first of a: so a name does not depend on
   !> which of two corners at one place is by rounding within the other piece.
-  pure subroutine name_corner(before, behind, v, w, x, y, room, place, key)
+  pure subroutine name_corner(before, behind, x, y, room, place, key)
     !> sides that meet there: of a above 0, of b below
     integer, intent(in) :: before, behind
-    integer, intent(in) :: v(:), w(:)
+    !> corners of both features
     real(dp), intent(in) :: x(:, :), y(:, :), room
     real(dp), intent(inout) :: place(2)
     integer, intent(out) :: key(2)
@@ -140,8 +140,8 @@ contains
       key(1) = max(before, behind)
       key(2) = -min(before, behind)
     end if
-    if (size(v) == 2 .and. key(1) == 0) key(1) = 1
-    if (size(w) == 2 .and. key(2) == 0) key(2) = 1
+    if (size(x, 2) == 2 .and. key(1) == 0) key(1) = 1
+    if (size(y, 2) == 2 .and. key(2) == 0) key(2) = 1
   end subroutine name_corner
 
   !> The end of one of two sides that is nearest to a place, 0 if it is not within a distance.

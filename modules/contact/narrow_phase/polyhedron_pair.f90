@@ -184,7 +184,7 @@ contains
     type(feature_t) :: feature
     type(frame_t) :: frame
     type(patch_point_t) :: point(largest_face(a) + size(a%vertex, 2))
-    integer :: vertex(largest_face(a)), n, k, lowest(1)
+    integer :: vertex(largest_face(a)), n, m, k, lowest(1)
     real(dp) :: place(3, largest_face(a)), along(3), x(3), corner(3)
 
     manifold%n = 0
@@ -197,27 +197,25 @@ contains
     call find_tangents(frame)
     along(:) = -normal
     lowest(1) = 1
-    call find_support(a, along, lowest(1))
+    call find_support(a, along, .false., lowest(1))
     call find_feature(a, along, lowest, feature)
     if (feature%n > 1) then
-      call lay_out_feature(a, at, feature, frame, vertex, place)
+      call lay_out_feature(a, at, feature, frame, m, vertex, place)
     else
-      vertex(1) = lowest(1)
+      m = 0
     end if
     n = 0
     do k = 1, size(a%vertex, 2)
-      if (feature%n > 1 .and. any(vertex(1:feature%n) == k)) cycle
+      if (any(vertex(1:m) == k)) cycle
       call place_vertex(a, at, k, x)
       corner(1) = dot_product(x, frame%first)
       corner(2) = dot_product(x, frame%second)
       corner(3) = dot_product(x, normal)
       call add_point(point_of(k, corner), alert, radius, n, point)
     end do
-    if (feature%n > 1) then
-      do k = 1, feature%n
-        call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
-      end do
-    end if
+    do k = 1, m
+      call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
+    end do
     call fill_manifold(frame, radius, most, n, point, manifold)
     do k = 1, manifold%n
       manifold%cores_overlap = manifold%cores_overlap .or. manifold%gap(k) < -radius*a%rounding
