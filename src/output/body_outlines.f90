@@ -1,6 +1,7 @@
 !> Bodies as polygons for pictures: outlines in the plane, surfaces in space, with sharp corners. What is round has many sides.
 module gravier_body_outlines
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_rotation, only: cross
   use gravier_orientation, only: orientation_matrix
   use gravier_convex_piece, only: convex_piece_t
@@ -225,7 +226,7 @@ contains
     end if
     points(:) = 0.0_dp
     n = outline%first(c + 1) - outline%first(c)
-    do i = 1, int(n)
+    do i = 1, narrow(n)
       associate (point => outline%point(:, outline%first(c) + i - 1))
         do d = 1, bodies%nd
           points(3*(i - 1) + d) = bodies%position(d, k) + bodies%radius(k)*sum(axes(d, :)*point)

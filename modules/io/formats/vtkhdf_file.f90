@@ -5,6 +5,7 @@
 !> Rows are in the order of their keys: nothing tells how many ranks wrote the file.
 module gravier_vtkhdf_file
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_room, only: room_for
   use gravier_text, only: to_text
@@ -367,7 +368,7 @@ contains
     integer :: i, k, n
 
     allocate (corners(table%n_items()), source=self%n_points)
-    if (self%kind == polygons) corners(:) = int(table%field(2)%whole(1, :))
+    if (self%kind == polygons) corners(:) = narrow(table%field(2)%whole(1, :))
     allocate (part(3, sum(corners)))
     n = 0
     do i = 1, size(corners)
