@@ -6,7 +6,8 @@ module gravier_start_overlap
   use gravier_periodic, only: shift_of_code
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_shape_contacts, only: pair_points_t, find_points
+  use gravier_pair_points, only: pair_points_t
+  use gravier_shape_contacts, only: find_points
   use gravier_simulation, only: simulation_t
   implicit none
   private

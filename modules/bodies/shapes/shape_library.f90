@@ -45,6 +45,7 @@ module gravier_shape_library
     type(point_counts_t) :: counts
   contains
     procedure :: add => shape_library_add
+    procedure :: find => shape_library_find
   end type shape_library_t
 
 contains
@@ -88,6 +89,17 @@ contains
     longer(size(longer)) = last
     call move_alloc(longer, list)
   end subroutine lengthen
+
+  !> The number of the shape of a name, 0 where there is none.
+  pure integer function shape_library_find(self, name) result(number)
+    class(shape_library_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+
+    do number = 1, self%n
+      if (self%shape(number)%name == name) return
+    end do
+    number = 0
+  end function shape_library_find
 
   !> The points in which bodies of two shapes may touch: a pair keeps as many impulses.
   pure integer function point_counts_between(self, a, b) result(points)

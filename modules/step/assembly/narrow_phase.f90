@@ -8,7 +8,8 @@ module gravier_narrow_phase
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, round_place
-  use gravier_shape_contacts, only: pair_points_t, find_points, carry_memory
+  use gravier_pair_points, only: pair_points_t, carry_memory
+  use gravier_shape_contacts, only: find_points
   use gravier_pair_laws, only: law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none

@@ -2,39 +2,37 @@
 module gravier_shape_contacts
   use gravier_kinds, only: dp
   use gravier_periodic, only: period_t, shift_of_code
+  use gravier_orientation, only: orientation_matrix
   use gravier_convex_piece, only: convex_piece_t
+  use gravier_shape_library, only: shape_library_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold
-  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
+  use gravier_pair_points, only: pair_points_t
   implicit none
   private
-  public :: pair_points_t, find_points, carry_memory
+  public :: find_points
 
-  !> points of one pair that are nearer to each other than this, over the radius of the candidate, and have the same normal within it,
-  !> are one: those where pieces of a cluster meet
+  !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
+  !> points of two pieces in space
+  integer, parameter :: of_face = 4
 
-  !> Points in ascending order of their keys, and work space.
-  type :: pair_points_t
-    integer :: n = 0
-    !> from the antagonist to the candidate (3, n)
-    real(dp), allocatable :: normal(:, :)
-    !> from the centre of the candidate, half-way between the surfaces (3, n) [m]
-    real(dp), allocatable :: point(:, :)
-    !> (n) [m]
-    real(dp), allocatable :: gap(:)
-    !> of the features of the two pieces, and of the pieces (2, n), both above 0
-    integer, allocatable :: key(:, :)
-    !> points whose cores overlap, over all pairs asked for
-    integer :: overlapping_cores = 0
-    type(placed_piece_t) :: a, b
-  contains
-    procedure :: add => pair_points_add
-  end type pair_points_t
+  !> A body, seen from the centre of the candidate.
+  type :: seen_body_t
+    !> number of its shape, 0 for a disk or a sphere
+    integer :: shape = 0
+    !> [m]
+    real(dp) :: radius = 0.0_dp
+    !> its centre (3) [m]
+    real(dp) :: centre(3) = 0.0_dp
+    !> its angle in the plane [rad], its axes in space, one a column
+    real(dp) :: angle = 0.0_dp, axes(3, 3) = 0.0_dp
+  end type seen_body_t
 
 contains
 
@@ -45,137 +43,371 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: p
     type(pair_points_t), intent(inout) :: points
-    integer :: j
+    type(seen_body_t) :: candidate, antagonist
+    real(dp) :: way(decomposition%nd)
+    integer :: i, j
 
     points%n = 0
-    j = view%list%antagonist(p)
-    if (j > 0) then
-      call touch_body(view, decomposition, p, points)
-    else
-      call touch_boundary(view%bodies, view%list%candidate(p), decomposition, decomposition%boundaries(-j), points)
-    end if
-    call merge_points(same*view%bodies%radius(view%list%candidate(p)), points)
-    call keep_deepest(view%list%points_of(p), points)
-  end subroutine find_points
-
-  !> The points with another body.
-  subroutine touch_body(view, decomposition, p, points)
-    type(local_bodies_t), intent(in) :: view
-    type(decomposition_t), intent(in) :: decomposition
-    integer, intent(in) :: p
-    type(pair_points_t), intent(inout) :: points
-    type(manifold_t) :: manifold
-    real(dp) :: way(decomposition%nd), here(decomposition%nd)
-    integer :: k, l, i, j
-
-    here(:) = 0.0_dp
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
-    associate (bodies => view%bodies)
-      way(:) = bodies%position(:, j) - bodies%position(:, i)
-      if (size(view%list%shift) > 0) call add_shift(decomposition%period, view%list%shift(p), way)
-      if (norm2(way) > bodies%radius(i) + bodies%radius(j) + decomposition%rule%alert_distance) return
-      do k = 1, n_pieces(decomposition, bodies, i)
-        call place(decomposition, bodies, i, k, here, points%a)
-        do l = 1, n_pieces(decomposition, bodies, j)
-          call place(decomposition, bodies, j, l, way, points%b)
-          call find_polygon_manifold(points%a, points%b, decomposition%rule%alert_distance, manifold)
-          call points%add(manifold, k, l)
-        end do
-      end do
+    associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
+      if (j > 0) then
+        way(:) = bodies%position(:, j) - bodies%position(:, i)
+        if (size(view%list%shift) > 0) call add_shift(decomposition%period, view%list%shift(p), way)
+        if (norm2(way) > bodies%radius(i) + bodies%radius(j) + alert) return
+        call see_body(bodies, i, candidate)
+        call see_body(bodies, j, antagonist)
+        antagonist%centre(1:decomposition%nd) = way
+        call touch_body(decomposition%shapes, candidate, antagonist, decomposition%nd, alert, points)
+      else
+        call see_body(bodies, i, candidate)
+        call touch_boundary(decomposition%shapes, candidate, bodies%position(:, i), decomposition%boundaries(-j), alert, points)
+      end if
+      call points%merge_near(same*bodies%radius(i))
     end associate
-  end subroutine touch_body
+    call points%keep_deepest(view%list%points_of(p))
+  end subroutine find_points
 
-  !> The points with a boundary: a plane, a surface that ends at straight edges, or one that is round.
-  subroutine touch_boundary(bodies, i, decomposition, boundary, points)
+  !> What contacts need of body `k`.
+  pure subroutine see_body(bodies, k, seen)
     type(body_set_t), intent(in) :: bodies
-    integer, intent(in) :: i
-    type(decomposition_t), intent(in) :: decomposition
-    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: k
+    type(seen_body_t), intent(out) :: seen
+    integer :: d
+
+    seen%shape = bodies%shape(k)
+    seen%radius = bodies%radius(k)
+    do d = 1, 3
+      seen%axes(d, d) = 1.0_dp
+    end do
+    if (seen%shape == 0) return
+    if (bodies%nd == 2) then
+      seen%angle = bodies%orientation(1, k)
+    else
+      call orientation_matrix(bodies%orientation(:, k), seen%axes)
+    end if
+  end subroutine see_body
+
+  !> The points of two bodies, piece by piece.
+  subroutine touch_body(shapes, a, b, nd, alert, points)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: a, b
+    integer, intent(in) :: nd
+    !> [m]
+    real(dp), intent(in) :: alert
     type(pair_points_t), intent(inout) :: points
     type(manifold_t) :: manifold
-    real(dp) :: normal(decomposition%nd), here(decomposition%nd), distance, corners(3, 4), flat(2, 4)
+    type(placed_piece_t) :: placed_a, placed_b
+    type(convex_piece_t) :: ball
+    integer :: k, l
+
+    call make_ball(nd, ball)
+    do k = 1, n_pieces(shapes, a)
+      if (nd == 2) call place(shapes, ball, a, k, placed_a)
+      do l = 1, n_pieces(shapes, b)
+        if (nd == 2) then
+          call place(shapes, ball, b, l, placed_b)
+          call find_polygon_manifold(placed_a, placed_b, alert, manifold)
+        else if (a%shape == 0) then
+          call meet(ball, b)
+        else
+          call meet(shapes%shape(a%shape)%piece(k), b)
+        end if
+        call points%add(manifold, k, l)
+      end do
+    end do
+
+  contains
+
+    !> Piece l of body b meets a piece of body a in space.
+    subroutine meet(piece, b)
+      type(convex_piece_t), intent(in) :: piece
+      type(seen_body_t), intent(in) :: b
+
+      if (b%shape == 0) then
+        call meet_in_space(piece, ball, a, b, alert, manifold)
+      else
+        call meet_in_space(piece, shapes%shape(b%shape)%piece(l), a, b, alert, manifold)
+      end if
+    end subroutine meet
+
+  end subroutine touch_body
+
+  !> The points of a piece of body a and one of body b in space, in global axes.
+  subroutine meet_in_space(piece_a, piece_b, a, b, alert, manifold)
+    type(convex_piece_t), intent(in) :: piece_a, piece_b
+    type(seen_body_t), intent(in) :: a, b
+    real(dp), intent(in) :: alert
+    type(manifold_t), intent(inout) :: manifold
+    real(dp) :: rotation(3, 3), way(3)
+    integer :: k, l
+
+    do k = 1, 3
+      way(k) = sum(a%axes(:, k)*b%centre)
+      do l = 1, 3
+        rotation(k, l) = sum(a%axes(:, k)*b%axes(:, l))
+      end do
+    end do
+    call find_polyhedron_manifold(piece_a, piece_b, a%radius, b%radius, rotation, way, alert, of_face, manifold)
+    call turn_manifold(a%axes, manifold)
+  end subroutine meet_in_space
+
+  !> From the axes of a body to global axes.
+  pure subroutine turn_manifold(axes, manifold)
+    real(dp), intent(in) :: axes(3, 3)
+    type(manifold_t), intent(inout) :: manifold
+    real(dp) :: before(3)
+    integer :: k, d
+
+    before(:) = manifold%normal
+    do d = 1, 3
+      manifold%normal(d) = sum(axes(d, :)*before)
+    end do
+    do k = 1, manifold%n
+      before(:) = manifold%point(:, k)
+      do d = 1, 3
+        manifold%point(d, k) = sum(axes(d, :)*before)
+      end do
+    end do
+  end subroutine turn_manifold
+
+  !> The points with a boundary: a plane, a surface that ends at straight edges, or one that is round.
+  subroutine touch_boundary(shapes, a, centre, boundary, alert, points)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: a
+    !> of the body (nd) [m]
+    real(dp), intent(in), contiguous :: centre(:)
+    type(boundary_t), intent(in) :: boundary
+    real(dp), intent(in) :: alert
+    type(pair_points_t), intent(inout) :: points
+    type(convex_piece_t) :: ball, sheet
+    type(seen_body_t) :: seen_sheet
+    real(dp) :: normal(size(centre)), distance, corners(3, 4)
     integer :: k, n
 
     if (.not. boundary%present) return
-    call boundary%locate(bodies%position(:, i), distance, normal)
-    if (distance - bodies%radius(i) > decomposition%rule%alert_distance) return
-    call boundary%find_corners(bodies%position(:, i), n, corners)
-    flat(:, :) = corners(1:2, :)
-    here(:) = 0.0_dp
-    do k = 1, n_pieces(decomposition, bodies, i)
-      call place(decomposition, bodies, i, k, here, points%a)
-      if (boundary%is_plane()) then
-        call find_plane_manifold(points%a, normal, -distance, decomposition%rule%alert_distance, manifold)
-        call points%add(manifold, k, 1)
-      else if (n > 0) then
-        call place_piece(flat(:, 1:n), flat(:, 1:n), 0.0_dp, 1.0_dp, 0.0_dp, here, points%b)
-        call find_polygon_manifold(points%a, points%b, decomposition%rule%alert_distance, manifold)
-        call points%add(manifold, k, 1)
+    call boundary%locate(centre, distance, normal)
+    if (distance - a%radius > alert) return
+    call boundary%find_corners(centre, n, corners)
+    call make_ball(size(centre), ball)
+    if (n > 0) call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
+    do k = 1, n_pieces(shapes, a)
+      if (a%shape == 0) then
+        call touch(ball)
       else
-        call touch_round_surface(bodies%position(:, i), boundary, decomposition%rule%alert_distance, k, points)
+        call touch(shapes%shape(a%shape)%piece(k))
       end if
     end do
+
+  contains
+
+    subroutine touch(piece)
+      type(convex_piece_t), intent(in) :: piece
+      type(manifold_t) :: manifold
+
+      if (boundary%is_plane()) then
+        call touch_plane(piece, a, normal, distance, alert, manifold)
+        call points%add(manifold, k, 1)
+      else if (n > 0) then
+        call touch_sheet(piece, a, sheet, seen_sheet, size(centre), alert, manifold)
+        call points%add(manifold, k, 1)
+      else
+        call touch_round_surface(piece, a, centre, boundary, alert, k, points)
+      end if
+    end subroutine touch
+
   end subroutine touch_boundary
 
-  !> The points of a placed piece with a round surface: its vertices, of a piece with more than two the nearest and the nearer of
-  !> those beside it.
-  subroutine touch_round_surface(centre, boundary, alert, piece, points)
+  subroutine touch_plane(piece, a, normal, distance, alert, manifold)
+    type(convex_piece_t), intent(in) :: piece
+    type(seen_body_t), intent(in) :: a
+    !> (nd), and distance of the centre of the body [m]
+    real(dp), intent(in), contiguous :: normal(:)
+    real(dp), intent(in) :: distance, alert
+    type(manifold_t), intent(inout) :: manifold
+    type(placed_piece_t) :: placed
+    real(dp) :: turned(3)
+    integer :: k
+
+    if (size(normal) == 2) then
+      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), placed)
+      call find_plane_manifold(placed, normal, -distance, alert, manifold)
+      return
+    end if
+    do k = 1, 3
+      turned(k) = sum(a%axes(:, k)*normal)
+    end do
+    call find_halfspace_manifold(piece, a%radius, turned, distance, alert, of_face, manifold)
+    call turn_manifold(a%axes, manifold)
+  end subroutine touch_plane
+
+  !> The points with a surface that ends at straight edges, which has no thickness.
+  subroutine touch_sheet(piece, a, sheet, seen_sheet, nd, alert, manifold)
+    type(convex_piece_t), intent(in) :: piece, sheet
+    type(seen_body_t), intent(in) :: a, seen_sheet
+    integer, intent(in) :: nd
+    real(dp), intent(in) :: alert
+    type(manifold_t), intent(inout) :: manifold
+    type(placed_piece_t) :: placed, placed_sheet
+
+    if (nd == 2) then
+      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), placed)
+      call place_piece(sheet%vertex, sheet%corner, 0.0_dp, seen_sheet%radius, 0.0_dp, seen_sheet%centre(1:2), placed_sheet)
+      call find_polygon_manifold(placed, placed_sheet, alert, manifold)
+    else
+      call meet_in_space(piece, sheet, a, seen_sheet, alert, manifold)
+    end if
+  end subroutine touch_sheet
+
+  !> The points with a round surface: vertices, of a polygon the nearest and the nearer of those beside it.
+  subroutine touch_round_surface(piece, a, centre, boundary, alert, number, points)
+    type(convex_piece_t), intent(in) :: piece
+    type(seen_body_t), intent(in) :: a
     real(dp), intent(in) :: centre(:)
     type(boundary_t), intent(in) :: boundary
     real(dp), intent(in) :: alert
-    integer, intent(in) :: piece
+    !> of the piece
+    integer, intent(in) :: number
     type(pair_points_t), intent(inout) :: points
-    type(manifold_t) :: manifold(points%a%n)
-    real(dp) :: distance, normal(size(centre)), at(size(centre))
-    integer :: v, nearest, beside, chosen(2)
+    type(manifold_t) :: manifold
+    real(dp) :: gap(size(piece%vertex, 2)), normal(size(centre)), vertex(3)
+    integer :: v, nd, nearest, beside
 
-    do v = 1, points%a%n
-      at(:) = centre + points%a%vertex(:, v)
+    nd = size(centre)
+    do v = 1, size(gap)
+      call locate_vertex()
+    end do
+    nearest = minloc(gap, dim=1)
+    beside = nearest
+    if (nd == 2) then
+      beside = mod(nearest, size(gap)) + 1
+      v = mod(nearest + size(gap) - 2, size(gap)) + 1
+      if (gap(v) < gap(beside)) beside = v
+    end if
+    do v = 1, size(gap)
+      if (gap(v) > alert .or. (nd == 2 .and. v /= nearest .and. v /= beside)) cycle
+      call locate_vertex()
+      manifold%n = 1
+      manifold%normal(1:nd) = normal
+      manifold%gap(1) = gap(v)
+      manifold%point(:, 1) = vertex
+      manifold%point(1:nd, 1) = vertex(1:nd) - (a%radius*piece%rounding + 0.5_dp*gap(v))*normal
+      manifold%key(1) = feature_base*v
+      call points%add(manifold, number, 1)
+    end do
+
+  contains
+
+    !> Where vertex v is from the centre, and the surface from there.
+    subroutine locate_vertex()
+      real(dp) :: distance, at(size(centre))
+
+      call turn_vertex(piece%vertex(:, v), a, vertex)
+      at(:) = centre + vertex(1:nd)
       call boundary%locate(at, distance, normal)
-      manifold(v)%gap(1) = distance - points%a%rounding
-      manifold(v)%normal(1:size(normal)) = normal
-      manifold(v)%point(1:size(normal), 1) = points%a%vertex(:, v) - (points%a%rounding + 0.5_dp*manifold(v)%gap(1))*normal
-      manifold(v)%key(1) = feature_base*v
-      if (manifold(v)%gap(1) <= alert) manifold(v)%n = 1
-    end do
-    nearest = 1
-    do v = 2, points%a%n
-      if (manifold(v)%gap(1) < manifold(nearest)%gap(1)) nearest = v
-    end do
-    beside = mod(nearest, points%a%n) + 1
-    v = mod(nearest + points%a%n - 2, points%a%n) + 1
-    if (manifold(v)%gap(1) < manifold(beside)%gap(1)) beside = v
-    chosen(1) = min(nearest, beside)
-    chosen(2) = max(nearest, beside)
-    call points%add(manifold(chosen(1)), piece, 1)
-    if (chosen(2) > chosen(1)) call points%add(manifold(chosen(2)), piece, 1)
+      gap(v) = distance - a%radius*piece%rounding
+    end subroutine locate_vertex
+
   end subroutine touch_round_surface
 
-  pure integer function n_pieces(decomposition, bodies, k) result(n)
-    type(decomposition_t), intent(in) :: decomposition
-    type(body_set_t), intent(in) :: bodies
-    integer, intent(in) :: k
+  !> A vertex of a body from its centre, in global axes [m].
+  pure subroutine turn_vertex(vertex, a, turned)
+    !> (nd) of a body of radius 1
+    real(dp), intent(in) :: vertex(:)
+    type(seen_body_t), intent(in) :: a
+    real(dp), intent(out) :: turned(3)
+    integer :: d
+
+    turned(3) = 0.0_dp
+    if (size(vertex) == 2) then
+      turned(1) = a%radius*(cos(a%angle)*vertex(1) - sin(a%angle)*vertex(2))
+      turned(2) = a%radius*(sin(a%angle)*vertex(1) + cos(a%angle)*vertex(2))
+    else
+      do d = 1, 3
+        turned(d) = a%radius*sum(a%axes(d, :)*vertex)
+      end do
+    end if
+  end subroutine turn_vertex
+
+  pure integer function n_pieces(shapes, seen) result(n)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: seen
 
     n = 1
-    if (bodies%shape(k) > 0) n = size(decomposition%shapes%shape(bodies%shape(k))%piece)
+    if (seen%shape > 0) n = size(shapes%shape(seen%shape)%piece)
   end function n_pieces
 
-  !> Put piece `piece` of body `k` in its place, the centre of the body being at `centre`.
-  subroutine place(decomposition, bodies, k, piece, centre, placed)
-    type(decomposition_t), intent(in) :: decomposition
-    type(body_set_t), intent(in) :: bodies
-    integer, intent(in) :: k, piece
-    real(dp), intent(in), contiguous :: centre(:)
-    type(placed_piece_t), intent(inout) :: placed
-    !> a disk is the rounding of its centre
-    real(dp), parameter :: point(2, 1) = 0.0_dp
+  !> A disk or a sphere of radius 1 is the rounding of its centre.
+  pure subroutine make_ball(nd, ball)
+    integer, intent(in) :: nd
+    type(convex_piece_t), intent(out) :: ball
 
-    if (bodies%shape(k) == 0) then
-      call place_piece(point, point, 1.0_dp, bodies%radius(k), 0.0_dp, centre, placed)
+    ball%rounding = 1.0_dp
+    allocate (ball%vertex(nd, 1), ball%corner(nd, 1), source=0.0_dp)
+    allocate (ball%face_first(1), ball%neighbour_first(2), source=1)
+    allocate (ball%face_vertex(0), ball%neighbour(0), ball%face_normal(3, 0))
+  end subroutine make_ball
+
+  !> A segment or a rectangle as a piece without rounding, with one face to either side.
+  pure subroutine make_sheet(nd, corners, sheet, seen)
+    integer, intent(in) :: nd
+    !> from the centre of the candidate, in order around it (3, 2 or 4) [m]
+    real(dp), intent(in) :: corners(:, :)
+    type(convex_piece_t), intent(out) :: sheet
+    type(seen_body_t), intent(out) :: seen
+    integer :: k, n
+
+    n = size(corners, 2)
+    seen%shape = 1
+    seen%centre(:) = sum(corners, dim=2)/n
+    do k = 1, 3
+      seen%axes(k, k) = 1.0_dp
+    end do
+    do k = 1, n
+      seen%radius = max(seen%radius, norm2(corners(:, k) - seen%centre))
+    end do
+    allocate (sheet%vertex(nd, n))
+    do k = 1, n
+      sheet%vertex(:, k) = (corners(1:nd, k) - seen%centre(1:nd))/seen%radius
+    end do
+    sheet%corner = sheet%vertex
+    if (nd == 2) return
+    sheet%face_first = [1, 5, 9]
+    sheet%face_vertex = [1, 2, 3, 4, 4, 3, 2, 1]
+    sheet%neighbour_first = [1, 3, 5, 7, 9]
+    sheet%neighbour = [2, 4, 1, 3, 2, 4, 1, 3]
+    allocate (sheet%face_normal(3, 2))
+    sheet%face_normal(1, 1) = across(2, 3)
+    sheet%face_normal(2, 1) = across(3, 1)
+    sheet%face_normal(3, 1) = across(1, 2)
+    sheet%face_normal(:, 1) = sheet%face_normal(:, 1)/norm2(sheet%face_normal(:, 1))
+    sheet%face_normal(:, 2) = -sheet%face_normal(:, 1)
+
+  contains
+
+    !> A component of the cross product of the edges at the first corner.
+    pure real(dp) function across(d, e)
+      integer, intent(in) :: d, e
+
+      across = (corners(d, 2) - corners(d, 1))*(corners(e, 4) - corners(e, 1)) &
+        & - (corners(e, 2) - corners(e, 1))*(corners(d, 4) - corners(d, 1))
+    end function across
+
+  end subroutine make_sheet
+
+  !> Put piece `k` of a body of the plane in its place.
+  subroutine place(shapes, ball, seen, k, placed)
+    type(shape_library_t), intent(in) :: shapes
+    type(convex_piece_t), intent(in) :: ball
+    type(seen_body_t), intent(in) :: seen
+    integer, intent(in) :: k
+    type(placed_piece_t), intent(inout) :: placed
+
+    if (seen%shape == 0) then
+      call place_piece(ball%vertex, ball%corner, 1.0_dp, seen%radius, 0.0_dp, seen%centre(1:2), placed)
     else
-      associate (this => decomposition%shapes%shape(bodies%shape(k))%piece(piece))
-        call place_piece(this%vertex, this%corner, this%rounding, bodies%radius(k), bodies%orientation(1, k), centre, placed)
+      associate (this => shapes%shape(seen%shape)%piece(k))
+        call place_piece(this%vertex, this%corner, this%rounding, seen%radius, seen%angle, seen%centre(1:2), placed)
       end associate
     end if
   end subroutine place
@@ -193,172 +425,5 @@ contains
       way(d) = way(d) + shift(d)*period%length(d)
     end do
   end subroutine add_shift
-
-  !> Add the points of two pieces.
-  subroutine pair_points_add(self, manifold, piece_a, piece_b)
-    class(pair_points_t), intent(inout) :: self
-    type(manifold_t), intent(in) :: manifold
-    integer, intent(in) :: piece_a, piece_b
-    integer :: k
-
-    if (.not. allocated(self%gap)) allocate (self%normal(3, 8), self%point(3, 8), self%gap(8), self%key(2, 8))
-    if (self%n + manifold%n > size(self%gap)) call lengthen(self, self%n + manifold%n)
-    do k = 1, manifold%n
-      self%n = self%n + 1
-      self%normal(:, self%n) = manifold%normal
-      self%point(:, self%n) = manifold%point(:, k)
-      self%gap(self%n) = manifold%gap(k)
-      self%key(1, self%n) = manifold%key(k) + 1
-      self%key(2, self%n) = feature_base*piece_a + piece_b
-    end do
-    if (manifold%n > 0 .and. manifold%cores_overlap) self%overlapping_cores = self%overlapping_cores + 1
-  end subroutine pair_points_add
-
-  subroutine lengthen(self, least)
-    type(pair_points_t), intent(inout) :: self
-    integer, intent(in) :: least
-    real(dp), allocatable :: normal(:, :), point(:, :), gap(:)
-    integer, allocatable :: key(:, :)
-    integer :: room
-
-    room = max(least, 2*size(self%gap))
-    allocate (normal(3, room), point(3, room), gap(room), key(2, room))
-    normal(:, 1:self%n) = self%normal(:, 1:self%n)
-    point(:, 1:self%n) = self%point(:, 1:self%n)
-    gap(1:self%n) = self%gap(1:self%n)
-    key(:, 1:self%n) = self%key(:, 1:self%n)
-    call move_alloc(normal, self%normal)
-    call move_alloc(point, self%point)
-    call move_alloc(gap, self%gap)
-    call move_alloc(key, self%key)
-  end subroutine lengthen
-
-  !> Of points that are one, keep the deepest, of several the first.
-  pure subroutine merge_points(near, points)
-    !> [m]
-    real(dp), intent(in) :: near
-    type(pair_points_t), intent(inout) :: points
-    logical :: dropped(points%n)
-    integer :: k, l
-
-    if (points%n < 2) return
-    if (points%key(2, 1) == points%key(2, points%n)) return
-    dropped(:) = .false.
-    do k = 1, points%n
-      do l = k + 1, points%n
-        if (points%key(2, k) == points%key(2, l)) cycle
-        if (dropped(k) .or. dropped(l)) cycle
-        if (maxval(abs(points%point(:, k) - points%point(:, l))) > near) cycle
-        if (maxval(abs(points%normal(:, k) - points%normal(:, l))) > same) cycle
-        dropped(l) = points%gap(l) >= points%gap(k)
-        dropped(k) = .not. dropped(l)
-      end do
-    end do
-    call drop(dropped, points)
-  end subroutine merge_points
-
-  !> Keep at most so many points, those with the smallest gaps.
-  pure subroutine keep_deepest(most, points)
-    integer, intent(in) :: most
-    type(pair_points_t), intent(inout) :: points
-    logical :: dropped(points%n)
-    integer :: k, l, shallowest
-
-    if (points%n <= most) return
-    dropped(:) = .false.
-    do k = 1, points%n - most
-      shallowest = 0
-      do l = 1, points%n
-        if (dropped(l)) cycle
-        if (shallowest == 0) shallowest = l
-        if (points%gap(l) >= points%gap(shallowest)) shallowest = l
-      end do
-      dropped(shallowest) = .true.
-    end do
-    call drop(dropped, points)
-  end subroutine keep_deepest
-
-  pure subroutine drop(dropped, points)
-    logical, intent(in) :: dropped(:)
-    type(pair_points_t), intent(inout) :: points
-    integer :: k, n
-
-    n = 0
-    do k = 1, points%n
-      if (dropped(k)) cycle
-      n = n + 1
-      points%normal(:, n) = points%normal(:, k)
-      points%point(:, n) = points%point(:, k)
-      points%gap(n) = points%gap(k)
-      points%key(:, n) = points%key(:, k)
-    end do
-    points%n = n
-  end subroutine drop
-
-  !> Bring the impulses and states that the pair at place `p` keeps to the points of now: to those with the same keys first, then
-  !> what is left, in its order, to the new points. Points take the places of the pair in their order.
-  pure subroutine carry_memory(points, p, list)
-    type(pair_points_t), intent(in) :: points
-    integer, intent(in) :: p
-    type(neighbour_list_t), intent(inout) :: list
-    integer, allocatable :: source(:)
-    logical, allocatable :: taken(:)
-    real(dp), allocatable :: impulse(:, :)
-    integer, allocatable :: state(:, :)
-    integer :: k, l, m, row
-
-    m = list%points_of(p)
-    row = list%memory%key_row
-    if (points%n == 0 .and. all(list%state(row, p:p + m - 1) == 0)) return
-    if (are_the_same()) return
-    impulse = list%impulse(:, p:p + m - 1)
-    state = list%state(:, p:p + m - 1)
-    allocate (source(points%n), source=0)
-    allocate (taken(m), source=.false.)
-    do k = 1, points%n
-      do l = 1, m
-        if (any(state(row:row + 1, l) /= points%key(:, k))) cycle
-        source(k) = l
-        taken(l) = .true.
-      end do
-    end do
-    l = 0
-    do k = 1, points%n
-      if (source(k) > 0) cycle
-      do while (l < m)
-        l = l + 1
-        if (taken(l) .or. state(row, l) == 0) cycle
-        source(k) = l
-        taken(l) = .true.
-        exit
-      end do
-    end do
-    list%impulse(:, p:p + m - 1) = 0.0_dp
-    list%state(:, p:p + m - 1) = 0
-    do k = 1, points%n
-      if (source(k) > 0) then
-        list%impulse(:, p + k - 1) = impulse(:, source(k))
-        list%state(:, p + k - 1) = state(:, source(k))
-      end if
-      list%state(row:row + 1, p + k - 1) = points%key(:, k)
-    end do
-
-  contains
-
-    !> Whether the pair keeps just these points.
-    pure logical function are_the_same()
-      integer :: k
-
-      are_the_same = .true.
-      do k = 1, m
-        if (k <= points%n) then
-          are_the_same = are_the_same .and. all(list%state(row:row + 1, p + k - 1) == points%key(:, k))
-        else
-          are_the_same = are_the_same .and. list%state(row, p + k - 1) == 0
-        end if
-      end do
-    end function are_the_same
-
-  end subroutine carry_memory
 
 end module gravier_shape_contacts
