@@ -5,7 +5,7 @@ module gravier_shapes_file
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_size, size_text
   use gravier_communicator, only: communicator_t
-  use gravier_whole_file, only: read_whole_file
+  use gravier_input_text, only: read_input_text
   use gravier_shape_library, only: body_shape_t, shape_library_t
   use gravier_shape_names, only: find_shape, is_reserved_name
   use gravier_convex_piece, only: convex_piece_t
@@ -35,7 +35,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
-    call read_whole_file(comm, path, "a text file of shapes", text, error)
+    call read_input_text(comm, path, "a text file of shapes", text, error)
     call parse_shapes(path, text, dimension, library, error)
     call comm%agree(error)
   end subroutine read_shapes
