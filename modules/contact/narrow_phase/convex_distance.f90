@@ -71,6 +71,7 @@ contains
     size_squared = 0.0_dp
     squared = huge(1.0_dp)
     along = 0.0_dp
+    done = .false.
     walk = max(size(a%vertex, 2), size(b%vertex, 2)) >= many_vertices
     do while (found%steps < most_steps)
       found%steps = found%steps + 1
