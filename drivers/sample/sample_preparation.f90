@@ -6,7 +6,6 @@ module gravier_sample_preparation
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_body_store, only: body_set_t
-  use gravier_motion, only: grain_volume
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_load_areas, only: facing_area
@@ -261,7 +260,7 @@ contains
         associate (owned => decomposition%owned(s))
           do k = 1, owned%n
             n = n + 1
-            volume(n) = grain_volume(nd, owned%radius(k))
+            volume(n) = simulation%decomposition%figures%volume_of(owned, k)
             moment(n) = volume(n)*(owned%position(nd, k) - floor)
           end do
         end associate

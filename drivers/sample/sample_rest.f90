@@ -1,7 +1,6 @@
 !> When the grains of a sample are at rest.
 module gravier_sample_rest
   use gravier_kinds, only: dp
-  use gravier_motion, only: grain_volume
   use gravier_solve, only: solve_converged
   use gravier_load_areas, only: facing_area
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -125,7 +124,7 @@ contains
         do k = 1, owned%n
           n = n + 1
           mass(n) = owned%mass(k)
-          volume(n) = grain_volume(nd, owned%radius(k))
+          volume(n) = simulation%decomposition%figures%volume_of(owned, k)
         end do
       end associate
     end do

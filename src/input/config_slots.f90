@@ -109,6 +109,7 @@ contains
     case ("body_force"); slot%reals => config%scene%body_force
     case ("bodies"); slot%choice => config%scene%bodies
     case ("bodies_file"); slot%text => config%scene%bodies_file
+    case ("shapes"); slot%text => config%scene%shapes
     case ("column_count"); slot%integer => config%scene%column_count
     case ("radius"); slot%real => config%scene%radius
     case ("mass"); slot%real => config%scene%mass

@@ -100,6 +100,9 @@ module gravier_config_table
            note="required", required=.true.), &
      key_t("scene", "bodies_file", kind_text, "''", "not empty", "path of the bodies file", &
            note="required", chooser="bodies", chosen="file"), &
+     key_t("scene", "shapes", kind_text, "''", "", &
+           "path of a file of shapes, which bodies of the bodies file may have in the place of disks and spheres", &
+           chooser="bodies", chosen="file"), &
      key_t("scene", "column_count", kind_integer, "3", ">= 1", "number of bodies in the column", &
            chooser="bodies", chosen="column"), &
      key_t("scene", "radius", kind_real, "1.0", "> 0", "radius of each body", unit="m", chooser="bodies", chosen="column"), &

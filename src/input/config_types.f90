@@ -32,6 +32,8 @@ module gravier_config_types
     character(len=choice_length) :: bodies
     !> blank unless bodies is file
     character(len=text_length) :: bodies_file
+    !> file of shapes; blank: all bodies are disks or spheres
+    character(len=text_length) :: shapes
     integer :: column_count
     !> m, kg: the disks or spheres of the column
     real(dp) :: radius, mass

@@ -3,7 +3,7 @@ module gravier_final_bodies
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_config_types, only: config_t
-  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls
   use gravier_bodies_hdf5, only: write_bodies_hdf5
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_output, only: output_t, of_end
@@ -51,7 +51,7 @@ contains
     call write_final_bodies(simulation, self%path, error)
   end subroutine final_bodies_write
 
-  !> Write grains, the walls that came with them and the period. Boundaries of the input file are not written: the next
+  !> Write grains with their shapes, the walls that came with them and the period. Boundaries of the input file are not written: the next
   !> input file has its own. Collective; errors are the same on all ranks.
   subroutine write_final_bodies(simulation, path, error)
     type(simulation_t), intent(in) :: simulation
@@ -65,6 +65,7 @@ contains
       nd = decomposition%nd
       nv = decomposition%nv
       call allocate_bodies(data, nd, sum(decomposition%owned%n), .true., path, error)
+      if (decomposition%no > 0) call allocate_shapes(data, path, error)
       call allocate_walls(data, nd, simulation%n_walls, path, error)
       call simulation%comm%agree(error)
       if (allocated(error)) return
@@ -80,6 +81,10 @@ contains
             data%radius(n) = owned%radius(k)
             data%mass(n) = owned%mass(k)
             data%material(n) = owned%material(k)
+            if (owned%no > 0) then
+              data%shape(n) = owned%shape(k)
+              data%orientation(:, n) = owned%orientation(:, k)
+            end if
             if (owned%glued(k) > 0) data%group(n) = decomposition%boundaries(owned%glued(k))%group
           end do
         end associate
@@ -92,8 +97,8 @@ contains
       data%has_box = decomposition%period%on()
       data%origin(:) = decomposition%period%origin
       data%period(:) = decomposition%period%length
+      call write_bodies_hdf5(simulation%comm, path, data, error, decomposition%shapes)
     end associate
-    call write_bodies_hdf5(simulation%comm, path, data, error)
   end subroutine write_final_bodies
 
 end module gravier_final_bodies

@@ -71,6 +71,7 @@ contains
       call file%write_scalar("impulse_entries", int(memory%n_impulse, i8), error)
       call file%write_scalar("law_row", int(memory%law_row, i8), error)
       call file%write_scalar("rest_row", int(memory%rest_row, i8), error)
+      call file%write_scalar("key_row", int(memory%key_row, i8), error)
     end associate
     call file%write_scalar("imbalance", simulation%imbalance, error)
     call file%write_scalar("reached_imbalance", simulation%reached_imbalance, error)

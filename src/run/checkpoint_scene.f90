@@ -4,6 +4,7 @@ module gravier_checkpoint_scene
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_checkpoint_file, only: checkpoint_file_t
+  use gravier_shape_names, only: library_digest
   use gravier_time_table, only: time_table_t
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
@@ -123,6 +124,8 @@ contains
       if (index(line, "  title = ") == 1 .or. index(line, "  start_overlap = ") == 1) cycle
       if (fixed) text = text//line//newline
     end do
+    if (simulation%decomposition%shapes%n > 0) call add_contents(trim(simulation%config%scene%shapes), &
+      & library_digest(simulation%decomposition%shapes))
     call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
     do b = 1, size(simulation%config%boundaries)
       call add_table(simulation%decomposition%boundaries(simulation%n_walls + b)%table, trim(simulation%config%boundaries(b)%table))
@@ -134,8 +137,15 @@ contains
       type(time_table_t), intent(in) :: table
       character(len=*), intent(in) :: path
 
-      if (allocated(table%has)) text = text//"contents of "//path//", digest "//to_text(table%digest())//newline
+      if (allocated(table%has)) call add_contents(path, table%digest())
     end subroutine add_table
+
+    subroutine add_contents(path, digest)
+      character(len=*), intent(in) :: path
+      integer(i8), intent(in) :: digest
+
+      text = text//"contents of "//path//", digest "//to_text(digest)//newline
+    end subroutine add_contents
 
   end function fixed_options
 

@@ -9,7 +9,8 @@ module gravier_run
   use gravier_signals, only: catch_signals, take_signals
   use gravier_timers, only: reset_timers
   use gravier_body_store, only: body_set_t
-  use gravier_file_system, only: make_directory, check_readable
+  use gravier_file_system, only: make_directory
+  use gravier_whole_file, only: read_whole_file
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_solve, only: solve_converged, solve_diverged
@@ -194,32 +195,8 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
 
-    text = ""
-    if (comm%rank == 0) call read_text(path, text, error)
-    call comm%agree(error)
-    if (allocated(error)) return
-    call comm%broadcast_text(text, 0)
+    call read_whole_file(comm, path, "a text file of namelist groups", text, error)
   end subroutine read_input
-
-  !> The whole of a file as text.
-  subroutine read_text(path, text, error)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(inout) :: text
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: unit, length, stat
-
-    call check_readable(path, error)
-    if (allocated(error)) return
-    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat)
-    if (stat == 0) then
-      inquire (unit=unit, size=length)
-      if (allocated(text)) deallocate (text)
-      allocate (character(len=max(length, 0)) :: text)
-      if (length > 0) read (unit, iostat=stat) text
-      close (unit)
-    end if
-    if (stat /= 0) call raise(error, status_input, path//": cannot read this file; expected a text file of namelist groups")
-  end subroutine read_text
 
   !> Make the output directory and take its lock, or say why it cannot be used. Collective.
   subroutine claim_directory(comm, config, command, lock, error)

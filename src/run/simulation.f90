@@ -93,6 +93,8 @@ contains
     call set_control(self)
     call choose_scheme(config, self%method)
     self%decomposition%boundaries = scene%boundaries
+    self%decomposition%shapes = scene%shapes
+    call self%decomposition%figures%init(scene%shapes)
     ! one subdomain until it is known that the scene has room for so many
     call self%decomposition%init(comm, 1, scene%grains, scene%period)
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &

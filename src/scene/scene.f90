@@ -7,6 +7,8 @@ module gravier_scene
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
+  use gravier_shape_library, only: shape_library_t
+  use gravier_shapes_file, only: read_shapes
   use gravier_periodic, only: period_t
   use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_contact_coefficients, only: coefficients_t
@@ -34,6 +36,8 @@ module gravier_scene
     type(body_set_t) :: grains
     !> those that came with the grains, then those of the input file
     type(boundary_t), allocatable :: boundaries(:)
+    !> that bodies may have
+    type(shape_library_t) :: shapes
     integer :: n_walls = 0
     type(period_t) :: period
     !> grains of all ranks, and those of them that are glued to boundaries
@@ -66,7 +70,8 @@ contains
     case ("sample")
       call make_sample(comm, config, data, error)
     case default
-      call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error)
+      if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, scene%shapes, error)
+      call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error, scene%shapes)
       call check_read_grains(comm, config, data%total, error)
     end select
     call check_exact_solution(config, error)
@@ -84,6 +89,7 @@ contains
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
     call check_moments(config, scene%effects, error)
+    call check_shapes(config, scene%effects, error)
     call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
@@ -203,6 +209,19 @@ contains
       & to_text(config%output%fclib_step)//": expected 0 with rolling or pivoting friction, which a file of FCLIB cannot say")
   end subroutine check_moments
 
+  !> Bodies with shapes turn, and no moments resist that: the arms of their contacts do.
+  subroutine check_shapes(config, effects, error)
+    type(config_t), intent(in) :: config
+    type(effects_t), intent(in) :: effects
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. effects%shapes) return
+    if (.not. config%scene%rotation) call raise(error, status_input, config%file// &
+      & ": &scene rotation = .false.: expected .true. where bodies have shapes")
+    if (effects%rolling) call raise(error, status_input, config%file// &
+      & ": rolling or pivoting friction: expected 0 where bodies have shapes")
+  end subroutine check_shapes
+
   !> The criterion 'error' knows the impulses of a column that gravity presses on the ground.
   subroutine check_exact_solution(config, error)
     type(config_t), intent(in) :: config
@@ -272,7 +291,8 @@ contains
       ! moments are in the kernels of friction
       effects%friction = effects%friction .or. effects%rolling
       turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. config%rotation
-      effects%rotation = effects%friction .or. turning
+      if (allocated(data%shape)) effects%shapes = comm%any_true(any(data%shape > 0))
+      effects%rotation = effects%friction .or. turning .or. effects%shapes
       effects%periodic = scene%period%on()
       effects%glued = comm%any_true(any(data%group > 0))
       effects%gravity = any(abs(config%gravity) > 0.0_dp) .or. config%gravity_table /= ""
@@ -311,32 +331,63 @@ contains
     type(config_t), intent(in) :: config
     type(bodies_data_t), intent(in) :: data
     type(scene_t), intent(inout) :: scene
-    integer :: k, nd, nv
+    type(body_layout_t) :: layout
+    integer :: k
 
-    nd = config%scene%dimension
+    layout%nd = config%scene%dimension
     call deduce_effects(comm, config%scene, data, scene)
-    nv = merge(3*nd - 3, nd, scene%effects%rotation)
-    call scene%grains%init(body_layout_t(nd, nv, merge(nd, 0, scene%period%on())), data%n)
+    layout%nv = merge(3*layout%nd - 3, layout%nd, scene%effects%rotation)
+    layout%ni = merge(layout%nd, 0, scene%period%on())
+    if (scene%effects%shapes) layout%no = size(data%orientation, 1)
+    call scene%grains%init(layout, data%n)
     scene%grains%glued(:) = 0
     scene%grains%image(:, :) = 0
     do k = 1, data%n
       scene%grains%id(k) = data%id(k)
       scene%grains%position(:, k) = data%position(:, k)
-      scene%grains%velocity(:, k) = data%velocity(1:nv, k)
-      if (.not. config%scene%rotation) scene%grains%velocity(nd + 1:, k) = 0.0_dp
+      scene%grains%velocity(:, k) = data%velocity(1:layout%nv, k)
+      if (.not. config%scene%rotation) scene%grains%velocity(layout%nd + 1:, k) = 0.0_dp
       scene%grains%radius(k) = data%radius(k)
       scene%grains%material(k) = data%material(k)
-      if (allocated(data%mass)) then
-        scene%grains%mass(k) = data%mass(k)
-      else
-        scene%grains%mass(k) = grain_mass(nd, data%radius(k), density_of(config, data%material(k)))
-      end if
-      if (nv > nd) scene%grains%inertia(k) = grain_inertia(nd, data%radius(k), scene%grains%mass(k))
+      call set_mass(config, data, k, scene%shapes, scene%grains)
     end do
     scene%n_grains = data%total
     if (data%n > 0) scene%largest_radius = maxval(data%radius)
     scene%largest_radius = comm%highest(scene%largest_radius)
     if (data%total > 0) scene%mean_radius = comm%sum_real(data%radius)/real(data%total, dp)
   end subroutine take_data
+
+  !> Mass, inertia, shape and orientation of body `k`.
+  subroutine set_mass(config, data, k, shapes, grains)
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    integer, intent(in) :: k
+    type(shape_library_t), intent(in) :: shapes
+    !> the radius is set
+    type(body_set_t), intent(inout) :: grains
+    integer :: number
+
+    number = 0
+    if (grains%no > 0) then
+      number = data%shape(k)
+      grains%shape(k) = number
+      grains%orientation(:, k) = data%orientation(:, k)
+    end if
+    associate (mass => grains%mass(k), radius => grains%radius(k))
+      if (allocated(data%mass)) then
+        mass = data%mass(k)
+      else if (number > 0) then
+        mass = density_of(config, data%material(k))*shapes%shape(number)%volume*radius**grains%nd
+      else
+        mass = grain_mass(grains%nd, radius, density_of(config, data%material(k)))
+      end if
+      if (grains%nv == grains%nd) return
+      if (number > 0) then
+        grains%inertia(k) = mass*radius**2*maxval(shapes%shape(number)%inertia)
+      else
+        grains%inertia(k) = grain_inertia(grains%nd, radius, mass)
+      end if
+    end associate
+  end subroutine set_mass
 
 end module gravier_scene

@@ -113,7 +113,7 @@ contains
             parts(4*b - 1:4*b - 2 + nd, s) = parts(4*b - 1:4*b - 2 + nd, s) + owned%position(:, k)
             cycle
           end if
-          parts(1, s) = parts(1, s) + grain_volume(nd, owned%radius(k))
+          parts(1, s) = parts(1, s) + simulation%decomposition%figures%volume_of(owned, k)
           far(1:nd) = max(far(1:nd), owned%radius(k) - owned%position(:, k))
           far(4:3 + nd) = max(far(4:3 + nd), owned%radius(k) + owned%position(:, k))
           far(7) = max(far(7), -owned%radius(k))

@@ -6,6 +6,8 @@ module gravier_start_overlap
   use gravier_periodic, only: shift_of_code
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_pair_points, only: pair_points_t
+  use gravier_shape_contacts, only: find_points
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -69,8 +71,10 @@ contains
     type(overlap_t) :: overlap
     integer :: p
 
-    do p = 1, view%list%n
+    p = 1
+    do while (p <= view%list%n)
       call measure(simulation, view, p, overlap)
+      p = p + view%list%points_of(p)
       if (.not. overlap%share > limit) cycle
       number = number + 1
       if (overlap%share > worst%share) worst = overlap
@@ -83,13 +87,28 @@ contains
     type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
     type(overlap_t), intent(out) :: overlap
-    real(dp) :: branch(simulation%decomposition%nd), distance
+    real(dp) :: branch(simulation%decomposition%nd), distance, smaller
+    type(pair_points_t) :: points
     integer :: i, j, shift(3)
 
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     associate (bodies => view%bodies, decomposition => simulation%decomposition)
       overlap%id(1) = bodies%id(i)
+      if (decomposition%no > 0) then
+        if (j < 0) then
+          if (decomposition%boundaries(-j)%remove_at <= simulation%time) return
+        end if
+        call find_points(view, decomposition, p, points)
+        smaller = bodies%radius(i)
+        if (j > 0) smaller = min(smaller, bodies%radius(j))
+        if (points%n > 0) overlap%share = -minval(points%gap(1:points%n))/smaller
+        overlap%boundary = -j
+        if (j < 0) return
+        overlap%id(2) = bodies%id(j)
+        overlap%boundary = max(bodies%glued(i), bodies%glued(j))
+        return
+      end if
       if (j < 0) then
         if (decomposition%boundaries(-j)%remove_at <= simulation%time) return
         call decomposition%boundaries(-j)%locate(bodies%position(:, i), distance, branch)

@@ -143,6 +143,17 @@ class Messages(RunTestCase):
                 file["bodies/id"], file["bodies/position"], file["bodies/radius"] = [1, 2], np.array(position), [1.0, 1.0]
             self.refuse("&scene bodies = 'file', bodies_file = 'bodies.h5' /\n&time step = 1e-3, steps = 1 /\n", "bodies.h5: /bodies/position", word)
 
+    def provoke_shapes(self):
+        write(self.here("bodies.csv"), "id,x,y,shape\n1,0,0,a\n")
+        disk = "disk 0 0 1\n"
+        for text, *words in (("", "no shapes: expected shape and a name, then its pieces"),
+                             ("shape plane\n" + disk, "line 1: shape plane: expected another name", "stand for themselves in bodies files"),
+                             ("shape a\nrounding 0\n" + disk, "line 2: rounding 0.00000000E+000: expected a number from 1e-30"),
+                             ("shape a\npolygon 0 0 1 0 2 0\n", "line 2: shape a: a polygon without area")):
+            write(self.here("a.shapes"), text)
+            self.refuse("&scene bodies = 'file', bodies_file = 'bodies.csv', shapes = 'a.shapes' /\n&time step = 1e-3, steps = 1 /\n",
+                        "a.shapes: ", *words)
+
     def provoke_restarts(self):
         write(self.here("case.nml"), namelist(CASE))
         self.run_program("case.nml", status=0)
@@ -208,6 +219,7 @@ class Messages(RunTestCase):
         write(self.here("pair.csv"), "id,x,y,radius\n1,0.05,0.05,0.05\n2,0.16,0.05,0.05\n")
         self.provoke_cases()
         self.provoke_bodies()
+        self.provoke_shapes()
         self.provoke_restarts()
         self.provoke_studies()
         self.provoke_programs()

@@ -95,6 +95,8 @@ def find_fault(change, places):
     """What is wrong with an entry, or nothing; its path is set."""
     if not (change.file and change.tests and change.old):
         return "file:, tests: and - are needed"
+    if re.search(r"\s", change.tests):
+        return "no test has a blank in its name: | stands between two"
     paths = places.get(change.file, [])
     if len(paths) != 1:
         return f"{len(paths)} files are called {change.file}"

@@ -61,6 +61,7 @@ module gravier_boundary
     procedure :: turns_about => boundary_turns_about
     procedure :: half_width => boundary_half_width
     procedure :: locate => boundary_locate
+    procedure :: find_corners => boundary_find_corners
     procedure :: velocity_at => boundary_velocity_at
     procedure :: last_velocity_at => boundary_last_velocity_at
     procedure :: prescribe => boundary_prescribe
@@ -223,6 +224,28 @@ contains
     call self%surface%locate(from, distance, away)
     normal(:) = away(1:size(x))
   end subroutine boundary_locate
+
+  !> The corners of a surface that ends, in order around it, from a point: two of a segment, four of a rectangle; none of what goes on
+  !> for ever or is round.
+  pure subroutine boundary_find_corners(self, x, n, corners)
+    class(boundary_t), intent(in) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: x(:)
+    integer, intent(out) :: n
+    !> (3, n), those of the image that is nearest to the point [m]
+    real(dp), intent(out) :: corners(3, 4)
+    real(dp) :: from(3)
+
+    n = 0
+    corners(:, :) = 0.0_dp
+    if (self%surface%is%endless .or. .not. any(abs(self%surface%edge) > 0.0_dp)) return
+    call find_image(self, x, from)
+    n = merge(2, 4, .not. any(abs(self%surface%edge(:, 2)) > 0.0_dp))
+    corners(:, 1) = self%surface%point - from
+    corners(:, 2) = corners(:, 1) + self%surface%edge(:, 1)
+    corners(:, 3) = corners(:, 2) + self%surface%edge(:, 2)
+    corners(:, 4) = corners(:, 1) + self%surface%edge(:, 2)
+  end subroutine boundary_find_corners
 
   !> Velocity of the material point at `x` [m/s].
   pure subroutine boundary_velocity_at(self, x, velocity)

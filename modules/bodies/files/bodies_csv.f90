@@ -7,29 +7,39 @@ module gravier_bodies_csv
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
-  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit
+  use gravier_shape_library, only: shape_library_t
+  use gravier_shape_names, only: shape_names
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, make_unit
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
   implicit none
   private
   public :: read_bodies_csv
 
   !> Places of the columns in the table, 0 for a column that the file does not have.
   type :: layout_t
-    integer :: id = 0, radius = 0, mass = 0, shape = 0, group = 0, material = 0
+    integer :: id = 0, radius = 0, mass = 0, shape = 0, group = 0, material = 0, scale = 0
     !> (dimension)
     integer, allocatable :: position(:), normal(:)
     !> (3 or 6)
     integer, allocatable :: velocity(:)
+    !> (1 or 4)
+    integer, allocatable :: turn(:)
   end type layout_t
+
+  !> what a row may be besides a shape of the library, whose number is above 0
+  integer, parameter :: is_grain = 0, is_plane = -1
 
 contains
 
   !> Read the rows of this rank and all walls. Two passes of the file on each rank, line by line: memory holds no more
   !> than the rows of the rank. Failure: status_input, with file, line, column, value and what was expected. Collective.
-  subroutine read_bodies_csv(comm, path, dimension, bodies, error)
+  subroutine read_bodies_csv(comm, path, dimension, shapes, bodies, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> 2 or 3
     integer, intent(in) :: dimension
+    !> that bodies may have; empty where all are disks or spheres
+    type(shape_library_t), intent(in) :: shapes
     type(bodies_data_t), intent(out) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     type(csv_table_t) :: table
@@ -41,8 +51,8 @@ contains
     n_grains = 0
     n_planes = 0
     if (comm%rank == 0) then
-      call open_table(table, path, dimension, layout, error)
-      call count_rows(table, layout, n_grains, n_planes, error)
+      call open_table(table, path, dimension, shapes, layout, error)
+      call count_rows(table, layout, shapes, n_grains, n_planes, error)
       call table%close()
     end if
     call comm%agree(error)
@@ -50,8 +60,9 @@ contains
     bodies%total = comm%total(n_grains)
     call take_count(comm%total(n_planes), path//": planes", n_walls, error)
     call find_own_rows(comm, bodies%total, dimension, path, first, n, error)
-    call open_table(table, path, dimension, layout, error)
+    call open_table(table, path, dimension, shapes, layout, error)
     call allocate_bodies(bodies, dimension, n, layout%mass > 0, path, error)
+    if (shapes%n > 0) call allocate_shapes(bodies, path, error)
     call allocate_walls(bodies, dimension, n_walls, path, error)
     call comm%agree(error)
     if (allocated(error)) then
@@ -59,17 +70,18 @@ contains
       return
     end if
     if (layout%mass > 0) bodies%mass(:) = 0.0_dp
-    call read_rows(table, layout, first, bodies, error)
+    call read_rows(table, layout, shapes, first, bodies, error)
     call table%close()
     call comm%agree(error)
     call settle_masses(comm, path, bodies, error)
   end subroutine read_bodies_csv
 
   !> Open the table and find its columns.
-  subroutine open_table(table, path, dimension, layout, error)
+  subroutine open_table(table, path, dimension, shapes, layout, error)
     type(csv_table_t), intent(inout) :: table
     character(len=*), intent(in) :: path
     integer, intent(in) :: dimension
+    type(shape_library_t), intent(in) :: shapes
     type(layout_t), intent(out) :: layout
     type(error_t), allocatable, intent(inout) :: error
 
@@ -84,7 +96,12 @@ contains
     call find_columns(table, position_names(dimension), layout%position)
     call find_columns(table, normal_names(dimension), layout%normal)
     call find_columns(table, velocity_names(dimension), layout%velocity)
-    call check_columns(table, dimension, layout, error)
+    allocate (layout%turn(0))
+    if (shapes%n > 0) then
+      layout%scale = table%column("scale")
+      call find_columns(table, turn_names(dimension), layout%turn)
+    end if
+    call check_columns(table, dimension, shapes%n > 0, layout, error)
   end subroutine open_table
 
   !> Places of columns by their names, given with ", " between.
@@ -128,24 +145,41 @@ contains
     if (dimension == 3) names = "vx, vy, vz, wx, wy, wz"
   end function velocity_names
 
+  pure function turn_names(dimension) result(names)
+    integer, intent(in) :: dimension
+    character(len=:), allocatable :: names
+    names = "angle"
+    if (dimension == 3) names = "qw, qx, qy, qz"
+  end function turn_names
+
   !> Refuse a table without the columns that every body needs, or with a column of no meaning.
-  subroutine check_columns(table, dimension, layout, error)
+  subroutine check_columns(table, dimension, shaped, layout, error)
     type(csv_table_t), intent(in) :: table
     integer, intent(in) :: dimension
+    !> the scene has a library of shapes
+    logical, intent(in) :: shaped
     type(layout_t), intent(in) :: layout
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: known, required
+    logical :: sized
     integer :: k
 
     required = "id, "//position_names(dimension)//", radius"
     known = required//", "//velocity_names(dimension)//", mass, shape, "//normal_names(dimension)//", group, material"
-    if (layout%id == 0 .or. layout%radius == 0 .or. any(layout%position == 0)) then
+    if (shaped) known = known//", scale, "//turn_names(dimension)
+    sized = layout%radius > 0
+    if (shaped .and. layout%shape > 0) then
+      sized = .true.
+      required = required//" (or shape)"
+    end if
+    if (layout%id == 0 .or. .not. sized .or. any(layout%position == 0)) then
       call table%refuse_file("in "//to_text(dimension)//"D the columns "//required//" are required, but the first line is: "// &
         & header_text(table), error)
     end if
     do k = 1, table%column_count()
       if (k == layout%id .or. k == layout%radius .or. k == layout%mass .or. k == layout%shape .or. &
-        & k == layout%group .or. k == layout%material) cycle
+        & k == layout%group .or. k == layout%material .or. k == layout%scale) cycle
+      if (any(k == layout%turn)) cycle
       if (any(k == layout%position) .or. any(k == layout%normal) .or. any(k == layout%velocity)) cycle
       call table%refuse_file("column "//table%column_name(k)//" is unknown in "//to_text(dimension)//"D; known are "//known, error)
       return
@@ -164,18 +198,20 @@ contains
   end function header_text
 
   !> Number of bodies and of planes in the table.
-  subroutine count_rows(table, layout, n_grains, n_planes, error)
+  subroutine count_rows(table, layout, shapes, n_grains, n_planes, error)
     type(csv_table_t), intent(inout) :: table
     type(layout_t), intent(in) :: layout
+    type(shape_library_t), intent(in) :: shapes
     integer(i8), intent(inout) :: n_grains, n_planes
     type(error_t), allocatable, intent(inout) :: error
-    logical :: found, plane
+    integer :: what
+    logical :: found
 
     do
       call table%next_row(found, error)
       if (.not. found .or. allocated(error)) return
-      call get_shape(table, layout, plane, error)
-      if (plane) then
+      call get_shape(table, layout, shapes, what, error)
+      if (what == is_plane) then
         n_planes = n_planes + 1
       else
         n_grains = n_grains + 1
@@ -183,48 +219,64 @@ contains
     end do
   end subroutine count_rows
 
-  !> Whether the row is a plane.
-  subroutine get_shape(table, layout, plane, error)
+  !> What the row is: is_plane, is_grain, or the number of a shape.
+  subroutine get_shape(table, layout, shapes, what, error)
     type(csv_table_t), intent(in) :: table
     type(layout_t), intent(in) :: layout
-    logical, intent(out) :: plane
+    type(shape_library_t), intent(in) :: shapes
+    integer, intent(out) :: what
     type(error_t), allocatable, intent(inout) :: error
 
-    plane = .false.
+    what = is_grain
     if (table%is_empty(layout%shape)) return
+    what = shapes%find(table%get_text(layout%shape))
+    if (what > 0) return
     select case (lower(table%get_text(layout%shape)))
     case ("plane")
-      plane = .true.
+      what = is_plane
     case ("grain")
-      continue
+      what = is_grain
+    case ("disk", "sphere")
+      if (shapes%n == 0) call table%refuse(layout%shape, "grain or plane", error)
     case default
-      call table%refuse(layout%shape, "grain or plane", error)
+      if (shapes%n == 0) then
+        call table%refuse(layout%shape, "grain or plane", error)
+      else
+        call table%refuse(layout%shape, "grain, disk, sphere, plane or one of the shapes "//shape_names(shapes, ", "), error)
+      end if
     end select
   end subroutine get_shape
 
   !> Read bodies `first` (from 0) and following, as many as there is room for, and all planes.
-  subroutine read_rows(table, layout, first, bodies, error)
+  subroutine read_rows(table, layout, shapes, first, bodies, error)
     type(csv_table_t), intent(inout) :: table
     type(layout_t), intent(in) :: layout
+    type(shape_library_t), intent(in) :: shapes
     integer(i8), intent(in) :: first
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: grain
-    integer :: wall
-    logical :: found, plane
+    integer :: wall, what, i
+    logical :: found
 
     grain = 0
     wall = 0
     do
       call table%next_row(found, error)
       if (.not. found .or. allocated(error)) exit
-      call get_shape(table, layout, plane, error)
-      if (plane) then
+      call get_shape(table, layout, shapes, what, error)
+      if (what == is_plane) then
         wall = wall + 1
         if (wall <= bodies%n_walls) call read_plane(table, layout, wall, bodies, error)
       else
         grain = grain + 1
-        if (grain > first .and. grain <= first + bodies%n) call read_grain(table, layout, narrow(grain - first), bodies, error)
+        if (grain <= first .or. grain > first + bodies%n) cycle
+        i = narrow(grain - first)
+        if (allocated(bodies%shape)) bodies%shape(i) = what
+        call read_grain(table, layout, i, bodies, error)
+        if (shapes%n > 0) call read_turn(table, layout, bodies%orientation(:, i), error)
+        if (what > 0) call take_principal_axes(shapes%shape(what)%turn, bodies%orientation(:, i))
+        call read_size(table, layout, shapes, what, bodies%radius(i), error)
       end if
     end do
     if (grain /= bodies%total .or. wall /= bodies%n_walls) then
@@ -232,6 +284,7 @@ contains
     end if
   end subroutine read_rows
 
+  !> Read what a body has whatever its shape.
   subroutine read_grain(table, layout, i, bodies, error)
     type(csv_table_t), intent(in) :: table
     type(layout_t), intent(in) :: layout
@@ -244,11 +297,70 @@ contains
     call read_quantities(table, layout%position, .true., bodies%position(:, i), error)
     call read_quantities(table, layout%velocity, .false., bodies%velocity(:, i), error)
     call read_numbers(table, layout%normal, .false., ignored, error)
-    call read_positive(table, layout%radius, "a radius > 0", bodies%radius(i), error)
     if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
     call read_number(table, layout%group, "a group", 0, bodies%group(i), error)
     call read_number(table, layout%material, "a material", 1, bodies%material(i), error)
   end subroutine read_grain
+
+  !> Read the radius of a disk or a sphere, or the scale of a shape, from which its radius follows; either may say it.
+  subroutine read_size(table, layout, shapes, number, radius, error)
+    type(csv_table_t), intent(in) :: table
+    type(layout_t), intent(in) :: layout
+    type(shape_library_t), intent(in) :: shapes
+    !> of the shape, 0 for a disk or a sphere
+    integer, intent(in) :: number
+    real(dp), intent(inout) :: radius
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: scale
+    logical :: agrees
+
+    if (allocated(error)) return
+    if (number == 0) then
+      if (layout%radius == 0) then
+        call table%refuse(layout%shape, "a shape (a disk or a sphere needs the column radius)", error)
+      else
+        call read_positive(table, layout%radius, "a radius > 0", radius, error)
+      end if
+      if (.not. table%is_empty(layout%scale)) call table%refuse(layout%scale, "an empty cell for a body without a shape", error)
+      return
+    end if
+    scale = 1.0_dp
+    radius = 0.0_dp
+    if (.not. table%is_empty(layout%scale)) call read_positive(table, layout%scale, "a scale > 0", scale, error)
+    if (.not. table%is_empty(layout%radius)) call read_positive(table, layout%radius, "a radius > 0", radius, error)
+    if (allocated(error)) return
+    call settle_radius(shapes%shape(number)%size, scale, .not. table%is_empty(layout%scale), radius, agrees)
+    if (.not. agrees) then
+      call table%refuse(layout%radius, "an empty cell, or the radius of the shape, which is "// &
+        & to_text(scale*shapes%shape(number)%size)//" at this scale,", error)
+    else if (.not. is_size(radius)) then
+      call table%refuse(layout%shape, "a scale that makes a radius that is "//size_text, error)
+    end if
+  end subroutine read_size
+
+  !> Read how a body is turned; a row that does not say it is not.
+  subroutine read_turn(table, layout, turn, error)
+    type(csv_table_t), intent(in) :: table
+    type(layout_t), intent(in) :: layout
+    !> angle or quaternion
+    real(dp), intent(inout) :: turn(:)
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: given(size(turn))
+    logical :: possible, said
+    integer :: k
+
+    said = .false.
+    do k = 1, size(turn)
+      said = said .or. .not. table%is_empty(layout%turn(k))
+    end do
+    if (.not. said) return
+    given(:) = 0.0_dp
+    call read_quantities(table, layout%turn, .false., given, error)
+    if (allocated(error)) return
+    turn(:) = given
+    call settle_turn(turn, possible)
+    if (.not. possible) call table%refuse(layout%turn(maxloc(layout%turn, dim=1)), "a quaternion that is not zero", error)
+  end subroutine read_turn
 
   subroutine read_plane(table, layout, i, bodies, error)
     type(csv_table_t), intent(in) :: table
@@ -265,6 +377,8 @@ contains
     call read_numbers(table, layout%velocity, .false., ignored, error)
     if (.not. table%is_empty(layout%radius)) call table%get_real(layout%radius, ignored(1), error)
     if (.not. table%is_empty(layout%mass)) call table%get_real(layout%mass, ignored(1), error)
+    if (.not. table%is_empty(layout%scale)) call table%get_real(layout%scale, ignored(1), error)
+    call read_numbers(table, layout%turn, .false., ignored, error)
     call read_number(table, layout%group, "a group", 0, number, error)
     call read_number(table, layout%material, "a material", 1, number, error)
     if (any(layout%normal == 0)) then

@@ -11,7 +11,7 @@ module gravier_bodies_data
   use gravier_sorting, only: argsort
   implicit none
   private
-  public :: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, data_bytes, make_unit, check_unique_ids
+  public :: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, data_bytes, make_unit, check_unique_ids
 
   !> The rows of this rank, in the order of the file, and all walls. SI units.
   type :: bodies_data_t
@@ -34,6 +34,11 @@ module gravier_bodies_data
     integer, allocatable :: group(:)
     !> (n): >= 1, number of the material; 1 where the file has none
     integer, allocatable :: material(:)
+    !> (n): number of the shape in the library of the scene, 0 a disk or a sphere; radii are then those of the balls about the
+    !> centres of mass that hold the bodies. Not allocated where the scene has no library
+    integer, allocatable :: shape(:)
+    !> with the shapes: 2D (1, n), angles [rad]; 3D (4, n), unit quaternions whose real part comes first
+    real(dp), allocatable :: orientation(:, :)
     !> the same on all ranks
     integer :: n_walls = 0
     !> (n_walls)
@@ -76,6 +81,24 @@ contains
     bodies%material(:) = 1
     bodies%velocity(:, :) = 0.0_dp
   end subroutine allocate_bodies
+
+  !> Room for the shapes of the bodies, which are disks or spheres in the axes of the scene so far. Failure: status_failure, without
+  !> memory for them.
+  subroutine allocate_shapes(bodies, what, error)
+    !> allocated
+    type(bodies_data_t), intent(inout) :: bodies
+    !> that has so many, for the message
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: no
+
+    if (allocated(error)) return
+    no = merge(1, 4, bodies%dimension == 2)
+    if (room_for(int(bodies%n, i8), 8*no + 4, what, error) < bodies%n) return
+    allocate (bodies%shape(bodies%n), source=0)
+    allocate (bodies%orientation(no, bodies%n), source=0.0_dp)
+    if (no == 4) bodies%orientation(1, :) = 1.0_dp
+  end subroutine allocate_shapes
 
   !> Room for n walls. Failure: status_failure, without memory for them.
   subroutine allocate_walls(bodies, dimension, n, what, error)

@@ -1,26 +1,28 @@
-!> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group, material}, /walls/{id, point,
-!> normal} and /box/{origin, period}.
+!> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group, material, shape, scale, orientation},
+!> /walls/{id, point, normal} and /box/{origin, period}.
 module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow, take_count
-  use gravier_errors, only: error_t, raise, status_input, status_failure
+  use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_communicator, only: communicator_t
-  use gravier_finite, only: is_finite
   use gravier_hdf5_file, only: h5_file_t
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
-  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows, make_unit
+  use gravier_shape_library, only: shape_library_t
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, make_unit
+  use gravier_bodies_checks, only: check_ids, check_own_ids, check_numbers, check_own_numbers, check_whole, check_box, &
+    & refuse_bad_numbers, direction, quantity, extent
+  use gravier_bodies_shapes, only: read_body_shapes, write_body_shapes
   implicit none
   private
   public :: read_bodies_hdf5, write_bodies_hdf5
 
   character(len=*), parameter :: body_sets(7) = [character(len=8) :: "id", "position", "velocity", "radius", "mass", "group", &
     & "material"]
+  !> those of scenes that have shapes
+  character(len=*), parameter :: shaped_sets(10) = [character(len=11) :: body_sets, "shape", "scale", "orientation"]
   character(len=*), parameter :: wall_sets(3) = [character(len=8) :: "id", "point", "normal"]
   character(len=*), parameter :: box_sets(2) = [character(len=8) :: "origin", "period"]
-  !> kinds of numbers: any of which only ratios count; of a place or velocity; of a size above 0
-  integer, parameter :: direction = 0, quantity = 1, extent = 2
   !> room for the headers of the file
   integer(i8), parameter :: bytes_of_headers = 65536
   integer, parameter :: bytes_of_word = 8
@@ -29,21 +31,27 @@ contains
 
   !> Read the rows of this rank and all walls. Failure: status_input, with file, dataset, row or id, and what was
   !> expected. Collective.
-  subroutine read_bodies_hdf5(comm, path, dimension, bodies, error)
+  subroutine read_bodies_hdf5(comm, path, dimension, shapes, bodies, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> 2 or 3
     integer, intent(in) :: dimension
+    !> that bodies may have; empty where all are disks or spheres
+    type(shape_library_t), intent(in) :: shapes
     type(bodies_data_t), intent(out) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     type(h5_file_t) :: file
 
     call file%open(comm, path, error)
     if (allocated(error)) return
-    call check_members(file, path, "/bodies", body_sets, error)
+    if (shapes%n > 0) then
+      call check_members(file, path, "/bodies", shaped_sets, error)
+    else
+      call check_members(file, path, "/bodies", body_sets, error)
+    end if
     if (file%exists("/walls")) call check_members(file, path, "/walls", wall_sets, error)
     if (file%exists("/box")) call check_members(file, path, "/box", box_sets, error)
-    call read_grains(comm, file, path, dimension, bodies, error)
+    call read_grains(comm, file, path, dimension, shapes, bodies, error)
     call comm%agree(error)
     call read_walls(file, path, dimension, bodies, error)
     call read_box(file, path, dimension, bodies, error)
@@ -84,18 +92,26 @@ contains
     end do
   end function listed
 
-  subroutine read_grains(comm, file, path, dimension, bodies, error)
+  subroutine read_grains(comm, file, path, dimension, shapes, bodies, error)
     type(communicator_t), intent(in) :: comm
     type(h5_file_t), intent(in) :: file
     character(len=*), intent(in) :: path
     integer, intent(in) :: dimension
+    type(shape_library_t), intent(in) :: shapes
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: first
     integer :: n
+    logical :: sized, required(size(shaped_sets))
 
-    call check_lengths(file, path, "/bodies", body_sets, [.true., .true., .false., .true., .false., .false., .false.], &
-      & bodies%total, error)
+    ! the scale of a shape says its radius
+    sized = .false.
+    if (shapes%n > 0) sized = file%exists("/bodies/scale")
+    if (sized) sized = .not. file%exists("/bodies/radius")
+    required(:) = .false.
+    required(1:2) = .true.
+    required(4) = .not. sized
+    call check_lengths(file, path, "/bodies", shaped_sets, required, bodies%total, error)
     if (allocated(error)) return
     call find_own_rows(comm, bodies%total, dimension, path//": /bodies", first, n, error)
     call allocate_bodies(bodies, dimension, n, file%exists("/bodies/mass"), path//": /bodies", error)
@@ -105,7 +121,10 @@ contains
     call check_ids(comm, path//": /bodies/id", first, bodies%id, error)
     call file%read_rows("/bodies/position", first, bodies%position, error)
     call check_numbers(comm, path//": /bodies/position", dimension, bodies%id, bodies%position, quantity, error)
-    call file%read_rows("/bodies/radius", first, bodies%radius, error)
+    bodies%radius(:) = 0.0_dp
+    if (.not. sized) call file%read_rows("/bodies/radius", first, bodies%radius, error)
+    if (shapes%n > 0) call allocate_shapes(bodies, path//": /bodies", error)
+    if (shapes%n > 0) call read_body_shapes(comm, file, path, first, shapes, bodies, error)
     call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, extent, error)
     if (file%exists("/bodies/velocity")) then
       call file%read_rows("/bodies/velocity", first, bodies%velocity, error)
@@ -224,146 +243,31 @@ contains
     end do
   end subroutine check_lengths
 
-  subroutine check_ids(comm, place, first, id, error)
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: place
-    integer(i8), intent(in) :: first
-    integer(i8), intent(in), contiguous :: id(:)
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error)) return
-    call check_own_ids(place, first, id, error)
-    call comm%agree(error)
-  end subroutine check_ids
-
-  !> Refuse ids below 1.
-  subroutine check_own_ids(place, first, id, error)
-    character(len=*), intent(in) :: place
-    integer(i8), intent(in) :: first
-    integer(i8), intent(in), contiguous :: id(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: i
-
-    do i = 1, size(id)
-      if (id(i) >= 1) cycle
-      call raise(error, status_input, place//": row "//to_text(first + i - 1)//" (counted from 0): "//to_text(id(i))// &
-        & ", but an id >= 1 was expected")
-      return
-    end do
-  end subroutine check_own_ids
-
-  subroutine check_numbers(comm, place, n_columns, id, values, kind, error)
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: place
-    integer, intent(in) :: n_columns
-    integer(i8), intent(in), contiguous :: id(:)
-    real(dp), intent(in) :: values(n_columns, size(id))
-    !> direction, quantity or extent
-    integer, intent(in) :: kind
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error)) return
-    call check_own_numbers(place, n_columns, id, values, kind, error)
-    call comm%agree(error)
-  end subroutine check_numbers
-
-  !> Refuse NaN and infinity, and numbers that are not of the kind.
-  subroutine check_own_numbers(place, n_columns, id, values, kind, error)
-    character(len=*), intent(in) :: place
-    integer, intent(in) :: n_columns
-    integer(i8), intent(in), contiguous :: id(:)
-    real(dp), intent(in) :: values(n_columns, size(id))
-    !> direction, quantity or extent
-    integer, intent(in) :: kind
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: i, k
-
-    if (allocated(error)) return
-    do i = 1, size(id)
-      do k = 1, n_columns
-        if (.not. is_finite(values(k, i))) then
-          call raise(error, status_input, place//": id "//to_text(id(i))//": NaN or infinity, but a finite number was expected")
-          return
-        else if (kind == extent .and. .not. values(k, i) > 0) then
-          call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(values(k, i))// &
-            & ", but a number > 0 was expected")
-          return
-        else if (kind == extent .and. .not. is_size(values(k, i))) then
-          call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(values(k, i))//", but "//size_text// &
-            & " was expected")
-          return
-        else if (kind == quantity .and. .not. is_bounded(values(k, i))) then
-          call raise(error, status_input, place//": id "//to_text(id(i))//": "//to_text(values(k, i))//", but "//bounded_text// &
-            & " was expected")
-          return
-        end if
-      end do
-    end do
-  end subroutine check_own_numbers
-
-  !> Refuse a number of a group or a material that is below the least one or too large.
-  subroutine check_whole(comm, path, name, least, id, values, error)
-    type(communicator_t), intent(in) :: comm
-    !> of the file; of the dataset
-    character(len=*), intent(in) :: path, name
-    integer, intent(in) :: least
-    integer(i8), intent(in), contiguous :: id(:), values(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: i
-
-    if (allocated(error)) return
-    do i = 1, size(id)
-      if (values(i) >= least .and. values(i) <= huge(i)) cycle
-      call raise(error, status_input, path//": /bodies/"//name//": id "//to_text(id(i))//": "//to_text(values(i))//", but a "// &
-        & name//" from "//to_text(least)//" to "//to_text(huge(i))//" was expected")
-      exit
-    end do
-    call comm%agree(error)
-  end subroutine check_whole
-
-  !> Refuse a box that is not finite or has a negative length.
-  subroutine check_box(path, bodies, error)
-    character(len=*), intent(in) :: path
-    type(bodies_data_t), intent(in) :: bodies
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error)) return
-    if (.not. all(is_finite(bodies%origin))) then
-      call raise(error, status_input, path//": /box/origin: NaN or infinity, but finite numbers were expected")
-    else if (.not. all(is_finite(bodies%period))) then
-      call raise(error, status_input, path//": /box/period: NaN or infinity, but finite numbers were expected")
-    else if (any(bodies%period < 0)) then
-      call raise(error, status_input, path//": /box/period: "//to_text(minval(bodies%period))// &
-        & ", but a number >= 0 was expected")
-    else if (.not. all(is_bounded(bodies%origin))) then
-      call raise(error, status_input, path//": /box/origin: "//to_text(maxval(abs(bodies%origin)))//" in size, but "// &
-        & bounded_text//" was expected")
-    else if (.not. all(is_bounded(bodies%period))) then
-      call raise(error, status_input, path//": /box/period: "//to_text(maxval(bodies%period))//", but "//bounded_text// &
-        & " was expected")
-    end if
-  end subroutine check_box
-
   !> Write the bodies of all ranks in the order of the ids, the walls, groups where a grain has one, materials where
   !> one is not the first, and the box. The
   !> file appears under its name only when it is complete. Failure: status_failure; what had that name before is left as
   !> it was. Collective.
-  subroutine write_bodies_hdf5(comm, path, bodies, error)
+  subroutine write_bodies_hdf5(comm, path, bodies, error, shapes)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
+    !> of the bodies, where they have any
+    type(shape_library_t), intent(in), optional :: shapes
     type(h5_file_t) :: file
     type(bodies_data_t) :: sorted
+    integer :: words
 
     if (allocated(error)) return
     call sort_by_id(comm, bodies, sorted)
     call refuse_bad_numbers(comm, path, sorted, error)
     if (allocated(error)) return
     call file%create(comm, path, error)
-    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*(5 + 4*sorted%dimension) + &
-      & sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
+    words = 5 + 4*sorted%dimension
+    if (allocated(sorted%shape)) words = words + 2 + size(sorted%orientation, 1)
+    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*words + sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
     call write_groups(comm, file, sorted, error)
+    if (present(shapes) .and. allocated(sorted%shape)) call write_body_shapes(file, sorted, shapes, error)
     call file%close(error)
   end subroutine write_bodies_hdf5
 
@@ -423,11 +327,13 @@ contains
     type(bodies_data_t), intent(out) :: sorted
     integer(i8), allocatable :: records(:, :), ordered(:, :)
     real(dp), allocatable :: column(:, :)
-    integer :: nd, nv
+    integer :: nd, nv, no
 
     nd = bodies%dimension
     nv = size(bodies%velocity, 1)
-    allocate (records(5 + nd + nv, bodies%n), source=0_i8)
+    no = 0
+    if (allocated(bodies%shape)) no = size(bodies%orientation, 1)
+    allocate (records(merge(6, 5, no > 0) + nd + nv + no, bodies%n), source=0_i8)
     records(1, :) = bodies%id
     call pack_reals(1, bodies%radius, 2, records)
     if (allocated(bodies%mass)) call pack_reals(1, bodies%mass, 3, records)
@@ -435,6 +341,10 @@ contains
     call pack_reals(nv, bodies%velocity, 4 + nd, records)
     records(4 + nd + nv, :) = bodies%group
     records(5 + nd + nv, :) = bodies%material
+    if (no > 0) then
+      records(6 + nd + nv, :) = bodies%shape
+      call pack_reals(no, bodies%orientation, 7 + nd + nv, records)
+    end if
     call order_rows(comm, 1, records, ordered)
     sorted%dimension = nd
     sorted%n = size(ordered, 2)
@@ -450,6 +360,10 @@ contains
     call unpack_reals(ordered, 4 + nd, nv, sorted%velocity)
     sorted%group = narrow(ordered(4 + nd + nv, :))
     sorted%material = narrow(ordered(5 + nd + nv, :))
+    if (no > 0) then
+      sorted%shape = narrow(ordered(6 + nd + nv, :))
+      call unpack_reals(ordered, 7 + nd + nv, no, sorted%orientation)
+    end if
     sorted%n_walls = bodies%n_walls
     sorted%wall_id = bodies%wall_id
     sorted%wall_point = bodies%wall_point
@@ -458,29 +372,5 @@ contains
     sorted%origin = bodies%origin
     sorted%period = bodies%period
   end subroutine sort_by_id
-
-  !> What read_bodies would refuse is not written.
-  subroutine refuse_bad_numbers(comm, path, bodies, error)
-    type(communicator_t), intent(in) :: comm
-    character(len=*), intent(in) :: path
-    type(bodies_data_t), intent(in) :: bodies
-    type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: numbers(:)
-
-    call check_ids(comm, path//": /bodies/id", comm%offset(int(bodies%n, i8)), bodies%id, error)
-    call check_numbers(comm, path//": /bodies/position", bodies%dimension, bodies%id, bodies%position, quantity, error)
-    call check_numbers(comm, path//": /bodies/velocity", size(bodies%velocity, 1), bodies%id, bodies%velocity, quantity, error)
-    call check_numbers(comm, path//": /bodies/radius", 1, bodies%id, bodies%radius, extent, error)
-    if (allocated(bodies%mass)) call check_numbers(comm, path//": /bodies/mass", 1, bodies%id, bodies%mass, extent, error)
-    numbers = bodies%group
-    call check_whole(comm, path, "group", 0, bodies%id, numbers, error)
-    numbers = bodies%material
-    call check_whole(comm, path, "material", 1, bodies%id, numbers, error)
-    call check_box(path, bodies, error)
-    call check_ids(comm, path//": /walls/id", 0_i8, bodies%wall_id, error)
-    call check_numbers(comm, path//": /walls/point", bodies%dimension, bodies%wall_id, bodies%wall_point, quantity, error)
-    call check_numbers(comm, path//": /walls/normal", bodies%dimension, bodies%wall_id, bodies%wall_normal, direction, error)
-    if (allocated(error)) error%status = status_failure
-  end subroutine refuse_bad_numbers
 
 end module gravier_bodies_hdf5

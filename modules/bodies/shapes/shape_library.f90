@@ -4,7 +4,15 @@ module gravier_shape_library
   use gravier_convex_piece, only: convex_piece_t
   implicit none
   private
-  public :: body_shape_t, shape_library_t
+  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number
+
+  !> stands for a boundary in the place of the number of a shape
+  integer, parameter :: boundary_number = -1
+  !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge, a face in the plane and in
+  !> space
+  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 4
+  !> pairs of pieces that two bodies touch with at most, besides as many as both have pieces
+  integer, parameter :: more_pairs = 4
 
   !> A rigid body of radius 1: the ball of that radius about the centre of mass holds all of it. Its axes are the principal ones.
   type :: body_shape_t
@@ -17,12 +25,96 @@ module gravier_shape_library
     real(dp) :: inertia(3) = 0.0_dp
     !> radius of that ball in the length unit of the file that the shape comes from
     real(dp) :: size = 1.0_dp
+    !> in 3D, the unit quaternion that turns these axes to where they lie in those of the file; its real part comes first
+    real(dp) :: turn(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp]
   end type body_shape_t
+
+  !> In how many points bodies may touch.
+  type :: point_counts_t
+    !> number of pieces of a shape, and of points of one of them (0 to number of shapes)
+    integer, allocatable :: pieces(:), points(:)
+  contains
+    procedure :: between => point_counts_between
+  end type point_counts_t
 
   !> Shapes by number, from 1; the number 0 stands for disks and spheres.
   type :: shape_library_t
     integer :: n = 0
+    !> room for more than n
     type(body_shape_t), allocatable :: shape(:)
+    type(point_counts_t) :: counts
+  contains
+    procedure :: add => shape_library_add
+    procedure :: find => shape_library_find
   end type shape_library_t
+
+contains
+
+  !> Add a shape to a library; its number is the next one.
+  subroutine shape_library_add(self, shape)
+    class(shape_library_t), intent(inout) :: self
+    type(body_shape_t), intent(in) :: shape
+    type(body_shape_t), allocatable :: longer(:)
+    integer :: k
+
+    if (.not. allocated(self%shape)) then
+      allocate (self%shape(4))
+      self%counts%pieces = [1]
+      self%counts%points = [of_vertex]
+    end if
+    if (self%n == size(self%shape)) then
+      allocate (longer(2*self%n))
+      longer(1:self%n) = self%shape
+      call move_alloc(longer, self%shape)
+    end if
+    self%n = self%n + 1
+    self%shape(self%n) = shape
+    call lengthen(self%counts%pieces, size(shape%piece))
+    call lengthen(self%counts%points, of_vertex)
+    do k = 1, size(shape%piece)
+      associate (most => self%counts%points(self%n + 1), vertex => shape%piece(k)%vertex)
+        if (size(vertex, 2) > 1) most = max(most, of_edge)
+        if (size(vertex, 2) > 2 .and. size(vertex, 1) == 3) most = max(most, of_face)
+      end associate
+    end do
+  end subroutine shape_library_add
+
+  subroutine lengthen(list, last)
+    integer, allocatable, intent(inout) :: list(:)
+    integer, intent(in) :: last
+    integer, allocatable :: longer(:)
+
+    allocate (longer(size(list) + 1))
+    longer(1:size(list)) = list
+    longer(size(longer)) = last
+    call move_alloc(longer, list)
+  end subroutine lengthen
+
+  !> The number of the shape of a name, 0 where there is none.
+  pure integer function shape_library_find(self, name) result(number)
+    class(shape_library_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+
+    do number = 1, self%n
+      if (self%shape(number)%name == name) return
+    end do
+    number = 0
+  end function shape_library_find
+
+  !> The points in which bodies of two shapes may touch: a pair keeps as many impulses.
+  pure integer function point_counts_between(self, a, b) result(points)
+    class(point_counts_t), intent(in) :: self
+    !> numbers of the shapes, 0 for disks and spheres; b may be boundary_number
+    integer, intent(in) :: a, b
+    integer :: pieces_b
+
+    points = self%points(a + 1)
+    pieces_b = 1
+    if (b /= boundary_number) then
+      points = min(points, self%points(b + 1))
+      pieces_b = self%pieces(b + 1)
+    end if
+    points = points*min(self%pieces(a + 1)*pieces_b, self%pieces(a + 1) + pieces_b + more_pairs)
+  end function point_counts_between
 
 end module gravier_shape_library

@@ -11,12 +11,15 @@ module gravier_neighbour_list
     integer :: n_impulse = 0
     !> rows of the states that laws with a memory give pairs, and of the steps at rest, where contacts may sleep; 0 for none
     integer :: law_row = 0, rest_row = 0
+    !> where bodies have shapes: the first of two rows of the key that tells a point of a pair from its others, 0 for no point
+    integer :: key_row = 0
   contains
     procedure :: n_states => pair_memory_n_states
     procedure :: words => pair_memory_words
   end type pair_memory_t
 
-  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier.
+  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. A pair of bodies that may touch
+  !> in several points stands there as often, one time after the other.
   !> The impulses of the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
   !> global axes.
   type :: neighbour_list_t
@@ -37,6 +40,7 @@ module gravier_neighbour_list
     procedure :: init => neighbour_list_init
     procedure :: add => neighbour_list_add
     procedure :: finish => neighbour_list_finish
+    procedure :: points_of => neighbour_list_points_of
     procedure :: keeps => neighbour_list_keeps
     procedure :: n_kept => neighbour_list_n_kept
   end type neighbour_list_t
@@ -46,6 +50,7 @@ contains
   pure integer function pair_memory_n_states(self) result(n)
     class(pair_memory_t), intent(in) :: self
     n = max(self%law_row, self%rest_row)
+    if (self%key_row > 0) n = max(n, self%key_row + 1)
   end function pair_memory_n_states
 
   !> Words of what is kept with a pair.
@@ -111,16 +116,32 @@ contains
     call move_alloc(longer, list)
   end subroutine lengthen
 
+  !> How often the pair that begins at place `p` stands there.
+  pure integer function neighbour_list_points_of(self, p) result(points)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p
+
+    points = 1
+    do while (p + points <= self%n)
+      if (self%candidate(p + points) /= self%candidate(p) .or. self%antagonist(p + points) /= self%antagonist(p)) exit
+      if (size(self%shift) > 0) then
+        if (self%shift(p + points) /= self%shift(p)) exit
+      end if
+      points = points + 1
+    end do
+  end function neighbour_list_points_of
+
   !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses and states to zero.
   subroutine neighbour_list_finish(self, order, memory)
     class(neighbour_list_t), intent(inout) :: self
-    !> (n) a permutation
+    !> places of the pairs as they were added, each as often as the pair is to stand in the list
     integer, intent(in), contiguous :: order(:)
     type(pair_memory_t), intent(in) :: memory
 
     call permute(self%candidate, order)
     call permute(self%antagonist, order)
     if (size(self%shift) > 0) call permute(self%shift, order)
+    self%n = size(order)
     self%memory = memory
     allocate (self%impulse(memory%n_impulse, self%n), source=0.0_dp)
     allocate (self%state(memory%n_states(), self%n), source=0)

@@ -8,6 +8,7 @@ module gravier_decomposition
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, place_word
   use gravier_shape_library, only: shape_library_t
+  use gravier_body_figures, only: body_figures_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_partition, only: partition_t
@@ -30,6 +31,7 @@ module gravier_decomposition
     type(boundary_t), allocatable :: boundaries(:)
     !> the shapes of the bodies, the same on every rank
     type(shape_library_t) :: shapes
+    type(body_figures_t) :: figures
   contains
     procedure :: init => decomposition_init
     procedure :: migrate => decomposition_migrate

@@ -68,6 +68,7 @@ contains
     search%rule = decomposition%rule
     search%period = decomposition%period
     search%boundaries = decomposition%boundaries
+    search%counts = decomposition%shapes%counts
     do s = 1, size(self%view)
       self%reference(s)%position = decomposition%owned(s)%position
       associate (view => self%view(s))

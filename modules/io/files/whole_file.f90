@@ -1,86 +1,49 @@
-!> Files read at once: their text, its lines and words. Not collective.
+!> Text files read as a whole.
 module gravier_whole_file
-  use gravier_kinds, only: i8
-  use gravier_narrow, only: take_count
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_communicator, only: communicator_t
   use gravier_file_system, only: check_readable
   implicit none
   private
-  public :: read_whole_file, lines_t
-
-  !> A text that is gone through line by line.
-  type :: lines_t
-    character(len=:), allocatable :: text
-    !> of the line, from 1; the line is text(first:last)
-    integer :: number = 0
-    integer :: first = 1, last = 0
-    !> where the next word is sought
-    integer :: place = 1
-  contains
-    procedure :: next => lines_next
-    procedure :: word => lines_word
-  end type lines_t
+  public :: read_whole_file
 
 contains
 
-  !> The bytes of a file. Failure (status_input): no such file, not readable, more than 2^31 bytes.
-  subroutine read_whole_file(path, text, error)
+  !> The whole of a file as text, on all ranks; rank 0 alone reads it. Failure: status_input. Errors are the same on all ranks.
+  !> Collective.
+  subroutine read_whole_file(comm, path, expected, text, error)
+    type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
+    !> for the message: a text file of ...
+    character(len=*), intent(in) :: expected
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
-    character(len=200) :: reason
-    integer(i8) :: length
-    integer :: unit, stat, n
+
+    text = ""
+    if (allocated(error)) return
+    if (comm%rank == 0) call read_text(path, expected, text, error)
+    call comm%agree(error)
+    if (allocated(error)) return
+    call comm%broadcast_text(text, 0)
+  end subroutine read_whole_file
+
+  subroutine read_text(path, expected, text, error)
+    character(len=*), intent(in) :: path, expected
+    character(len=:), allocatable, intent(inout) :: text
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: unit, length, stat
 
     call check_readable(path, error)
     if (allocated(error)) return
-    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat, iomsg=reason)
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat)
     if (stat == 0) then
       inquire (unit=unit, size=length)
-      call take_count(length, path//": bytes", n, error)
-      allocate (character(len=n) :: text)
-      if (n > 0) read (unit, iostat=stat, iomsg=reason) text
+      if (allocated(text)) deallocate (text)
+      allocate (character(len=max(length, 0)) :: text)
+      if (length > 0) read (unit, iostat=stat) text
       close (unit)
     end if
-    if (stat /= 0) call raise(error, status_input, path//": cannot read this file: "//trim(reason))
-  end subroutine read_whole_file
-
-  !> Go to the next line; false behind the last one.
-  logical function lines_next(self) result(found)
-    class(lines_t), intent(inout) :: self
-    integer :: length
-
-    if (self%number > 0) self%first = self%last + 2
-    found = self%first <= len(self%text)
-    if (.not. found) return
-    self%number = self%number + 1
-    length = index(self%text(self%first:), new_line("a")) - 1
-    if (length < 0) length = len(self%text) - self%first + 1
-    self%last = self%first + length - 1
-    self%place = self%first
-  end function lines_next
-
-  !> The next word of the line, between blanks, tabs or carriage returns; empty at its end.
-  function lines_word(self) result(word)
-    class(lines_t), intent(inout) :: self
-    character(len=:), allocatable :: word
-    integer :: start
-
-    do while (self%place <= self%last)
-      if (.not. is_blank(self%text(self%place:self%place))) exit
-      self%place = self%place + 1
-    end do
-    start = self%place
-    do while (self%place <= self%last)
-      if (is_blank(self%text(self%place:self%place))) exit
-      self%place = self%place + 1
-    end do
-    word = self%text(start:self%place - 1)
-  end function lines_word
-
-  elemental logical function is_blank(letter)
-    character(len=1), intent(in) :: letter
-    is_blank = letter == " " .or. letter == achar(9) .or. letter == achar(13)
-  end function is_blank
+    if (stat /= 0) call raise(error, status_input, path//": cannot read this file; expected "//expected)
+  end subroutine read_text
 
 end module gravier_whole_file

@@ -33,14 +33,15 @@ module gravier_contact_kernels
   use gravier_block_loops_2d, only: choose_loops_2d
   use gravier_block_loops_3d, only: choose_loops_3d
   use gravier_contact_vectors, only: contact_jacobian, global_impulse, global_moment, tangents, local_operator, &
-    & contact_tangents, project_tangential, tangential_vectors, project_on_cones, moment_vectors, project_moments, rolling_radius
+    & contact_arms, contact_tangents, project_tangential, tangential_vectors, project_on_cones, moment_vectors, project_moments, &
+    & rolling_radius
   implicit none
   private
   public :: kernels_t
   ! this module is the door to the folder
   public :: lanes, n_blocks, block_of, lane_of, contact_jacobian, global_impulse, global_moment, tangents, local_operator
   public :: contact_tangents, project_tangential, tangential_vectors, project_on_cones, moment_vectors, project_moments
-  public :: rolling_radius
+  public :: rolling_radius, contact_arms
 
   !> The loops for the effects of a scene.
   type, extends(kernel_table_t) :: kernels_t

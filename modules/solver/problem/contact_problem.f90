@@ -45,6 +45,8 @@ module gravier_contact_problem
     integer, allocatable :: boundary(:)
     !> of grains (n_grains) [m]
     real(dp), allocatable :: radius(:)
+    !> of grains, where a force acts on their volume (n_grains) [m^3, m^2 in 2D]
+    real(dp), allocatable :: volume(:)
     !> velocity without contacts, M^-1 R^d, with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
     !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
@@ -55,7 +57,8 @@ module gravier_contact_problem
     real(dp), allocatable :: v_global(:, :)
     !> H r~ (nv, n_columns), of all copies after `evaluate`; work space of methods [N s, N m s]
     real(dp), allocatable :: reaction(:, :)
-    !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (nw, n_columns)
+    !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (gravier_body_mass)
+    !> (nw, n_columns)
     real(dp), allocatable :: inverse_mass(:, :)
     !> the same as the method shares masses out (nw, n_columns)
     real(dp), allocatable :: weight(:, :)

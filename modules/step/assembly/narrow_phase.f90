@@ -3,15 +3,18 @@
 module gravier_narrow_phase
   use gravier_kinds, only: dp
   use gravier_periodic, only: period_t, shift_of_code
-  use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t
+  use gravier_surface_velocity, only: contact_place_t, round_place
+  use gravier_pair_points, only: pair_points_t, carry_memory
+  use gravier_shape_contacts, only: find_points
   use gravier_pair_laws, only: law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: contact_list_t, find_contacts
+  public :: contact_list_t, find_contacts, place_of
 
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: contact_list_t
@@ -24,6 +27,10 @@ module gravier_narrow_phase
     real(dp), allocatable :: gap(:), normal(:, :)
     !> where some law has other terms for each pair (n)
     type(contact_terms_t), allocatable :: terms(:)
+    !> where bodies have shapes (n)
+    type(contact_place_t), allocatable :: place(:)
+    !> pairs of pieces whose cores overlap: more than their roundings
+    integer :: overlapping_cores = 0
   end type contact_list_t
 
 contains
@@ -35,16 +42,32 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
-    integer :: p, i, j, nd, row
-    real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
-    type(contact_terms_t) :: terms
+    integer :: nd
 
     nd = decomposition%nd
-    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms)
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms, found%place)
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
     allocate (found%terms(merge(view%list%n, 0, physics%laws%varies)))
+    allocate (found%place(merge(view%list%n, 0, decomposition%no > 0)))
     found%n = 0
-    row = view%list%memory%law_row
+    if (decomposition%no > 0) then
+      call find_contacts_of_shapes(view, decomposition, physics, found)
+    else
+      call find_round_contacts(view, decomposition, physics, found)
+    end if
+    found%n_awake = found%n
+  end subroutine find_contacts
+
+  !> The contacts of disks or spheres: one a pair.
+  subroutine find_round_contacts(view, decomposition, physics, found)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(contact_list_t), intent(inout) :: found
+    integer :: p, i, j, nd
+    real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
+
+    nd = decomposition%nd
     alert = decomposition%rule%alert_distance
     do p = 1, view%list%n
       i = view%list%candidate(p)
@@ -54,7 +77,7 @@ contains
         if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
-        if (is_far()) cycle
+        if (is_far(view%list, p, gap, alert)) cycle
         if (distance > 0.0_dp) then
           normal(:) = branch/distance
         else
@@ -66,45 +89,138 @@ contains
         if (.not. decomposition%boundaries(-j)%present) cycle
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
         gap = distance - view%bodies%radius(i)
-        if (is_far()) cycle
+        if (is_far(view%list, p, gap, alert)) cycle
       end if
-      call find_terms()
-      if (is_far()) cycle
-      if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) cycle
-      found%n = found%n + 1
-      found%source(found%n) = p
-      found%gap(found%n) = gap
-      found%normal(:, found%n) = normal
-      if (size(found%terms) > 0) found%terms(found%n) = terms
+      call add_contact(view, decomposition, physics, p, gap, normal, found)
     end do
-    found%n_awake = found%n
+  end subroutine find_round_contacts
 
-  contains
+  !> The contacts of bodies with shapes: a pair has as many places in the list as it may have points.
+  subroutine find_contacts_of_shapes(view, decomposition, physics, found)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(contact_list_t), intent(inout) :: found
+    type(pair_points_t) :: points
+    type(contact_place_t) :: place
+    real(dp) :: normal(decomposition%nd)
+    integer :: p, k
 
-    !> Whether the pair is no contact: beyond the alert distance, and with nothing to remember.
-    logical function is_far()
-      is_far = gap > alert
-      if (is_far .and. row > 0) is_far = view%list%state(row, p) == 0
-    end function is_far
+    p = 1
+    do while (p <= view%list%n)
+      call find_points(view, decomposition, p, points)
+      call carry_memory(points, p, view%list)
+      do k = 1, points%n
+        normal(:) = points%normal(1:size(normal), k)
+        place = place_of_point(view, decomposition, p, points, k)
+        call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found, place)
+      end do
+      p = p + view%list%points_of(p)
+    end do
+    found%overlapping_cores = points%overlapping_cores
+  end subroutine find_contacts_of_shapes
 
-    subroutine find_terms()
-      type(contact_pair_t) :: pair
-      integer :: l
+  !> Where point `k` of pair `p` is.
+  pure type(contact_place_t) function place_of_point(view, decomposition, p, points, k) result(place)
+    type(local_bodies_t), intent(in) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: p, k
+    type(pair_points_t), intent(in) :: points
+    real(dp) :: way(decomposition%nd)
+    integer :: nd
 
-      l = law_of(view, decomposition%boundaries, physics%laws, p)
-      if (.not. physics%laws%varies_at(l)) then
-        terms = terms_of(physics%laws, l, gap)
-        return
+    nd = decomposition%nd
+    place%arm_i(:) = points%point(:, k)
+    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
+      if (j > 0) then
+        way(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
+        if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), way)
+        place%arm_j(1:nd) = way + points%point(1:nd, k)
+      else
+        place%on_wall(1:nd) = view%bodies%position(:, i) + points%point(1:nd, k) - 0.5_dp*points%gap(k)*points%normal(1:nd, k)
       end if
-      pair%first = physics%first
-      pair%gap = gap
-      if (row > 0) pair%state = view%list%state(row, p)
-      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, normal, pair)
-      if (row > 0) view%list%state(row, p) = pair%state
-      terms = pair%terms
-    end subroutine find_terms
+    end associate
+  end function place_of_point
 
-  end subroutine find_contacts
+  !> Whether a pair is no contact: beyond the alert distance, and with nothing to remember.
+  pure logical function is_far(list, p, gap, alert)
+    type(neighbour_list_t), intent(in) :: list
+    integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap, alert
+
+    is_far = gap > alert
+    if (is_far .and. list%memory%law_row > 0) is_far = list%state(list%memory%law_row, p) == 0
+  end function is_far
+
+  !> Add the contact at place `p` of the list, if it is one under its law.
+  subroutine add_contact(view, decomposition, physics, p, gap, normal, found, place)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    !> [m], (nd)
+    real(dp), intent(in) :: gap, normal(:)
+    type(contact_list_t), intent(inout) :: found
+    !> of bodies with shapes
+    type(contact_place_t), intent(in), optional :: place
+    type(contact_terms_t) :: terms
+
+    call find_terms(view, decomposition, physics, p, gap, normal, terms, place)
+    if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
+    if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) return
+    found%n = found%n + 1
+    found%source(found%n) = p
+    found%gap(found%n) = gap
+    found%normal(:, found%n) = normal
+    if (size(found%terms) > 0) found%terms(found%n) = terms
+    if (present(place)) found%place(found%n) = place
+  end subroutine add_contact
+
+  !> What the law of a pair makes of the step, and the state that it gives the pair.
+  subroutine find_terms(view, decomposition, physics, p, gap, normal, terms, place)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    !> [m], (nd)
+    real(dp), intent(in) :: gap, normal(:)
+    type(contact_terms_t), intent(out) :: terms
+    !> of bodies with shapes
+    type(contact_place_t), intent(in), optional :: place
+    type(contact_pair_t) :: pair
+    integer :: l, row
+
+    row = view%list%memory%law_row
+    l = law_of(view, decomposition%boundaries, physics%laws, p)
+    if (.not. physics%laws%varies_at(l)) then
+      terms = terms_of(physics%laws, l, gap)
+      return
+    end if
+    pair%first = physics%first
+    pair%gap = gap
+    if (row > 0) pair%state = view%list%state(row, p)
+    if (present(place)) then
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, place, normal, pair)
+    else
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, round_place(view, p, gap, normal), normal, pair)
+    end if
+    if (row > 0) view%list%state(row, p) = pair%state
+    terms = pair%terms
+  end subroutine find_terms
+
+  !> Where contact `f` of those found is.
+  pure type(contact_place_t) function place_of(view, found, f) result(place)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: f
+
+    if (size(found%place) > 0) then
+      place = found%place(f)
+    else
+      place = round_place(view, found%source(f), found%gap(f), found%normal(:, f))
+    end if
+  end function place_of
 
   !> Take the shift of the antagonist into account in the way from it to the candidate.
   pure subroutine shift_back(period, code, branch)

@@ -8,7 +8,7 @@ module gravier_pair_laws
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_surface_velocity, only: find_start_velocity, find_surface_velocity, find_wall_point
+  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity
   implicit none
   private
   public :: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair, conclude_pairs
@@ -84,30 +84,29 @@ contains
   end function material_of
 
   !> The terms of pair `p` over a step under law `l`, and its state.
-  pure subroutine evaluate_pair(view, boundaries, laws, l, p, normal, pair)
+  pure subroutine evaluate_pair(view, boundaries, laws, l, p, place, normal, pair)
     type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
     integer, intent(in) :: l, p
+    type(contact_place_t), intent(in) :: place
     !> (nd) from the antagonist to the candidate
     real(dp), intent(in) :: normal(:)
     !> with its gap, its state and whether the step is the first
     type(contact_pair_t), intent(inout) :: pair
-    real(dp) :: v(size(normal)), w(size(normal)), arm(size(normal))
-    integer :: i, j
+    real(dp) :: v(size(normal)), w(size(normal))
+    integer :: i, j, nd
 
+    nd = size(normal)
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     pair%radius = view%bodies%radius(i)
-    arm(:) = -view%bodies%radius(i)*normal
-    call find_surface_velocity(view, boundaries, i, arm, v)
+    call find_surface_velocity(view, boundaries, i, place%arm_i(1:nd), v)
     if (j > 0) then
       pair%radius = sqrt(view%bodies%radius(i)*view%bodies%radius(j))
-      arm(:) = view%bodies%radius(j)*normal
-      call find_surface_velocity(view, boundaries, j, arm, w)
+      call find_surface_velocity(view, boundaries, j, place%arm_j(1:nd), w)
     else
-      call find_wall_point(view, i, pair%gap, normal, arm)
-      call find_start_velocity(view, boundaries, j, arm, w)
+      call find_start_velocity(view, boundaries, j, place%on_wall(1:nd), w)
     end if
     v(:) = v - w
     pair%normal_velocity = sum(v*normal)

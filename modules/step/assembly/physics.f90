@@ -2,7 +2,7 @@
 module gravier_physics
   use gravier_kinds, only: dp
   use gravier_body_store, only: body_set_t
-  use gravier_motion, only: grain_volume
+  use gravier_body_figures, only: body_figures_t
   use gravier_law_set, only: law_set_t
   implicit none
   private
@@ -31,21 +31,23 @@ module gravier_physics
 contains
 
   !> Turn the velocity of grain `k` at the start of a step into that without contacts, M^-1 R^d = V_i + h M^-1 F
-  !> (paper, (1)); no force here turns a grain.
-  pure subroutine physics_accelerate(self, bodies, k, v)
+  !> (paper, (1)); no force here turns a grain, and a body with unlike moments of inertia changes its spin by itself.
+  pure subroutine physics_accelerate(self, figures, bodies, k, v)
     class(physics_t), intent(in) :: self
+    type(body_figures_t), intent(in) :: figures
     type(body_set_t), intent(in) :: bodies
     integer, intent(in) :: k
     !> (nv)
-    real(dp), intent(inout) :: v(:)
+    real(dp), intent(inout), contiguous :: v(:)
     integer :: d
 
+    if (bodies%no > 0) call figures%turn_freely(bodies, k, self%h, v)
     do d = 1, bodies%nd
       v(d) = v(d) + self%h*self%gravity(d)
     end do
     if (.not. any(abs(self%body_force) > 0.0_dp)) return
     do d = 1, bodies%nd
-      v(d) = v(d) + self%h*self%body_force(d)*grain_volume(bodies%nd, bodies%radius(k))/bodies%mass(k)
+      v(d) = v(d) + self%h*self%body_force(d)*figures%volume_of(bodies, k)/bodies%mass(k)
     end do
   end subroutine physics_accelerate
 

@@ -2,6 +2,7 @@
 module gravier_problem_builder
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_detection, phase_interface, phase_setup
+  use gravier_body_figures, only: body_figures_t
   use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_terms_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
@@ -10,10 +11,10 @@ module gravier_problem_builder
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_surface_velocity, only: find_start_velocity, find_wall_point, approach_velocity
+  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, approach_velocity
   use gravier_pair_laws, only: boundary_of, law_of, terms_of
   use gravier_physics, only: physics_t
-  use gravier_narrow_phase, only: contact_list_t, find_contacts
+  use gravier_narrow_phase, only: contact_list_t, find_contacts, place_of
   use gravier_sleeping, only: put_sleepers_last
   use gravier_interface, only: interface_statistics_t, find_interface, count_figures
   implicit none
@@ -114,7 +115,8 @@ contains
         numbers%of_boundary(b) = sub%n_columns
       end do
       call allocate_bodies(kernels, sub%n_columns + n, sub)
-      call pack_grains(view, numbers%of_grain, kernels, physics, sub)
+      if (any(abs(physics%body_force) > 0.0_dp)) allocate (sub%volume(sub%n_grains))
+      call pack_grains(view, numbers%of_grain, decomposition%figures, kernels, physics, sub)
       do b = 1, size(boundaries)
         if (numbers%of_boundary(b) == 0 .or. boundaries(b)%turns()) cycle
         call pack_boundary(boundaries(b), b, numbers%of_boundary(b), decomposition%n_subdomains, kernels, sub)
@@ -149,9 +151,10 @@ contains
     allocate (sub%boundary(sub%n_grains + 1:n_columns), source=0)
   end subroutine allocate_bodies
 
-  subroutine pack_grains(view, number_of, kernels, physics, sub)
+  subroutine pack_grains(view, number_of, figures, kernels, physics, sub)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in), contiguous :: number_of(:)
+    type(body_figures_t), intent(in) :: figures
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
@@ -165,12 +168,14 @@ contains
       sub%place(b) = view%origin(k)
       sub%radius(b) = view%bodies%radius(k)
       sub%v_free(:, b) = view%bodies%velocity(1:kernels%nv, k)
-      call physics%accelerate(view%bodies, k, sub%v_free(:, b))
+      call physics%accelerate(figures, view%bodies, k, sub%v_free(:, b))
       associate (before => view%bodies%velocity(1:kernels%nd, k), after => sub%v_free(1:kernels%nd, b))
         sub%largest_term = max(sub%largest_term, view%bodies%mass(k)*max(norm2(before), norm2(after - before)))
       end associate
       sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/view%bodies%mass(k)
-      if (kernels%nw > kernels%nd .and. physics%rotation) sub%inverse_mass(kernels%nw, b) = 1.0_dp/view%bodies%inertia(k)
+      if (allocated(sub%volume)) sub%volume(b) = figures%volume_of(view%bodies, k)
+      if (kernels%nw > kernels%nd .and. physics%rotation) call figures%find_inverse_inertia(view%bodies, k, &
+        & sub%inverse_mass(kernels%nd + 1:, b))
     end do
   end subroutine pack_grains
 
@@ -277,25 +282,38 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: point(kernels%nd)
+    real(dp) :: points(kernels%nd, 2)
     integer :: nd
 
     nd = kernels%nd
     sub%n_columns = sub%n_columns + 1
     sub%id(sub%n_columns) = boundary%id
     sub%boundary(sub%n_columns) = this%b
-    if (this%j < 0) then
-      call find_wall_point(view, this%i, found%gap(this%f), found%normal(:, this%f), point)
-    else if (view%bodies%glued(this%i) > 0) then
-      point(:) = view%bodies%position(:, this%i) - view%bodies%radius(this%i)*found%normal(:, this%f)
-    else
-      point(:) = view%bodies%position(:, this%j) + view%bodies%radius(this%j)*found%normal(:, this%f)
-    end if
-    call boundary%velocity_at(point, sub%v_free(1:nd, sub%n_columns))
+    call find_touching_points(view, found, this, points)
+    call boundary%velocity_at(points(:, merge(1, 2, view%bodies%glued(this%i) > 0)), sub%v_free(1:nd, sub%n_columns))
     ! levers of boundaries are 0: rolling alone sees the spin
     sub%v_free(nd + 1:, sub%n_columns) = boundary%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
     sub%pair(merge(1, 2, view%bodies%glued(this%i) > 0), this%c) = sub%n_columns
   end subroutine add_column
+
+  !> The points of the candidate and of the antagonist that touch (nd, 2) [m].
+  pure subroutine find_touching_points(view, found, this, points)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    type(packed_t), intent(in) :: this
+    real(dp), intent(out) :: points(:, :)
+    type(contact_place_t) :: place
+    integer :: nd
+
+    nd = size(points, 1)
+    place = place_of(view, found, this%f)
+    points(:, 1) = view%bodies%position(:, this%i) + place%arm_i(1:nd)
+    if (this%j > 0) then
+      points(:, 2) = view%bodies%position(:, this%j) + place%arm_j(1:nd)
+    else
+      points(:, 2) = place%on_wall(1:nd)
+    end if
+  end subroutine find_touching_points
 
   !> The contact data: normal and levers, and what the law of the pair makes of the step.
   subroutine pack_terms(view, found, boundaries, kernels, physics, this, sub)
@@ -315,16 +333,20 @@ contains
     end if
     associate (q => this%q, g => this%g, i => this%i, j => this%j, row => kernels%row)
       sub%hot(q, 1:kernels%nd, g) = found%normal(:, this%f)
+      if (row%arm_i > 0) then
+        call pack_arms(view, found, kernels, this, sub)
+      else if (row%lever_i > 0) then
+        sub%hot(q, row%lever_i, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
+        sub%hot(q, row%lever_j, g) = 0.0_dp
+        if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
+      end if
       if (terms%restitution > 0.0_dp) then
-        sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, this, sub)
+        sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, kernels, this, sub)
       else
         sub%hot(q, row%shift, g) = terms%free_gap/physics%h
       end if
       if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) return
-      sub%hot(q, row%lever_i, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
-      sub%hot(q, row%lever_j, g) = 0.0_dp
-      if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
       sub%hot(q, row%friction, g) = terms%friction
       if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, terms%tangential_restitution, this, sub)
       if (row%rolling_radius == 0) return
@@ -337,14 +359,26 @@ contains
   !> Normal velocity at the start of the step as far as the contact sends it back. It counts where the contact opens, too: what
   !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
   !> the contact comes to rest.
-  real(dp) function returned_velocity(view, found, boundaries, this, sub) result(returned)
+  real(dp) function returned_velocity(view, found, boundaries, kernels, this, sub) result(returned)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
+    type(kernels_t), intent(in) :: kernels
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(in) :: sub
+    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
     integer :: nd
 
+    if (kernels%row%arm_i > 0) then
+      call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
+      call find_start_velocities(view, found, boundaries, this, vi, vj)
+      returned = sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj)
+      if (returned <= 0.0_dp) return
+      vi(:) = sub%v_free(:, sub%pair(1, this%c))
+      vj(:) = sub%v_free(:, sub%pair(2, this%c))
+      if (sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj) < 0.0_dp) returned = 0.0_dp
+      return
+    end if
     nd = size(found%normal, 1)
     returned = approach_velocity(view, boundaries, this%p, found%gap(this%f), found%normal(:, this%f))
     if (returned <= 0.0_dp) return
@@ -362,24 +396,58 @@ contains
     real(dp), intent(in) :: restitution
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), point(kernels%nd)
+    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
     integer :: d
 
     call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
-    associate (i => this%i, j => this%j, normal => found%normal(:, this%f))
-      point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*normal
-      call find_start_velocity(view, boundaries, i, point, vi)
-      if (j < 0) then
-        call find_wall_point(view, i, found%gap(this%f), normal, point)
-      else
-        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*normal
-      end if
-      call find_start_velocity(view, boundaries, j, point, vj)
-    end associate
+    call find_start_velocities(view, found, boundaries, this, vi, vj)
     do d = 2, kernels%nd
       sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
     end do
   end subroutine pack_tangential_shift
+
+  !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched.
+  subroutine find_start_velocities(view, found, boundaries, this, vi, vj)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(packed_t), intent(in) :: this
+    !> (nv) [m/s, rad/s]
+    real(dp), intent(out) :: vi(:), vj(:)
+    real(dp) :: points(size(found%normal, 1), 2)
+
+    call find_touching_points(view, found, this, points)
+    call find_start_velocity(view, boundaries, this%i, points(:, 1), vi)
+    call find_start_velocity(view, boundaries, this%j, points(:, 2), vj)
+  end subroutine find_start_velocities
+
+  !> The arms of a contact between bodies with shapes (contact_rows_t); those of grains that are part of a boundary are 0.
+  pure subroutine pack_arms(view, found, kernels, this, sub)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    type(kernels_t), intent(in) :: kernels
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(inout) :: sub
+    type(contact_place_t) :: place
+    logical :: free
+
+    place = place_of(view, found, this%f)
+    if (view%bodies%glued(this%i) > 0) place%arm_i(:) = 0.0_dp
+    free = .false.
+    if (this%j > 0) free = view%bodies%glued(this%j) == 0
+    if (.not. free) place%arm_j(:) = 0.0_dp
+    associate (row => kernels%row, contact => sub%hot(this%q, :, this%g), normal => found%normal(:, this%f))
+      if (kernels%nd == 3) then
+        contact(row%arm_i:row%arm_i + 2) = place%arm_i
+        contact(row%arm_j:row%arm_j + 2) = place%arm_j
+      else
+        contact(row%lever_i) = -sum(place%arm_i(1:2)*normal)
+        contact(row%lever_j) = sum(place%arm_j(1:2)*normal)
+        contact(row%arm_i) = place%arm_i(1)*normal(2) - place%arm_i(2)*normal(1)
+        contact(row%arm_j) = place%arm_j(1)*normal(2) - place%arm_j(2)*normal(1)
+      end if
+    end associate
+  end subroutine pack_arms
 
   !> Scales of the residual, of the jump and of roundings: largest |R^d|, over the components that can move, largest free speed,
   !> and largest term of R^d of a body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may

@@ -7,9 +7,38 @@ module gravier_surface_velocity
   use gravier_halo, only: local_bodies_t
   implicit none
   private
-  public :: find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
+  public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
+
+  !> Where two bodies touch.
+  type :: contact_place_t
+    !> from the centre of the candidate, and of an antagonist that is a grain, to the contact [m]
+    real(dp) :: arm_i(3) = 0.0_dp, arm_j(3) = 0.0_dp
+    !> point of the surface of an antagonist that is a boundary [m]
+    real(dp) :: on_wall(3) = 0.0_dp
+  end type contact_place_t
 
 contains
+
+  !> Where the disks or spheres of pair `p` touch, or one of them a boundary: on their surfaces, across the gap.
+  pure type(contact_place_t) function round_place(view, p, gap, normal) result(place)
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in) :: p
+    !> [m]
+    real(dp), intent(in) :: gap
+    !> (nd) from the antagonist to the candidate
+    real(dp), intent(in) :: normal(:)
+    integer :: nd
+
+    nd = size(normal)
+    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
+      place%arm_i(1:nd) = -view%bodies%radius(i)*normal
+      if (j > 0) then
+        place%arm_j(1:nd) = view%bodies%radius(j)*normal
+      else
+        call find_wall_point(view, i, gap, normal, place%on_wall(1:nd))
+      end if
+    end associate
+  end function round_place
 
   !> Velocity of body `k`: of a free grain, translation and spin; of a boundary, the velocity of its material at a point, as a
   !> translation without spin.

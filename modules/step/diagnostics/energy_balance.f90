@@ -3,9 +3,9 @@
 module gravier_energy_balance
   use gravier_kinds, only: dp, i8
   use gravier_boundary, only: boundary_t
-  use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
-  use gravier_contact_kernels, only: global_moment, lanes, n_blocks, lane_of, block_of
+  use gravier_body_figures, only: body_figures_t
+  use gravier_contact_kernels, only: contact_arms, global_moment, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
@@ -95,7 +95,7 @@ contains
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (owned%glued(k) == 0) call add_kinetic(owned, k, owned%velocity(:, k), parts(1, s), parts(2, s))
+          if (owned%glued(k) == 0) call add_kinetic(decomposition%figures, owned, k, owned%velocity(:, k), parts(1, s), parts(2, s))
         end do
       end associate
     end do
@@ -110,15 +110,16 @@ contains
   end subroutine energy_begin
 
   !> Add the kinetic energies of grain `k` at a velocity.
-  pure subroutine add_kinetic(bodies, k, velocity, translation, rotation)
+  pure subroutine add_kinetic(figures, bodies, k, velocity, translation, rotation)
+    type(body_figures_t), intent(in) :: figures
     type(body_set_t), intent(in) :: bodies
     integer, intent(in) :: k
     !> (nv)
-    real(dp), intent(in) :: velocity(:)
+    real(dp), intent(in), contiguous :: velocity(:)
     real(dp), intent(inout) :: translation, rotation
 
     translation = translation + 0.5_dp*bodies%mass(k)*sum(velocity(1:bodies%nd)**2)
-    if (bodies%nv > bodies%nd) rotation = rotation + 0.5_dp*bodies%inertia(k)*sum(velocity(bodies%nd + 1:)**2)
+    call figures%add_rotation(bodies, k, velocity, rotation)
   end subroutine add_kinetic
 
   !> Kinetic energy of the free components of a boundary; 0 once it is removed.
@@ -145,8 +146,8 @@ contains
     end do
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
-      call add_grains(step%halo%view(s), step%decomposition%owned(s), step%physics, parts(:, s))
-      call add_contacts(step%halo%view(s), earlier, step%problem, s, parts(:, s))
+      call add_grains(step%halo%view(s), step%decomposition, s, step%physics, parts(:, s))
+      call add_contacts(step, earlier, s, parts(:, s))
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
     if (step%some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
@@ -160,22 +161,24 @@ contains
   end subroutine energy_take_step
 
   !> Energies of the grains of a subdomain, and the work of the loads on them, h F . (V_i + V_{i+1})/2.
-  pure subroutine add_grains(view, owned, physics, part)
+  pure subroutine add_grains(view, decomposition, s, physics, part)
     type(local_bodies_t), intent(in) :: view
-    type(body_set_t), intent(in) :: owned
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: s
     type(physics_t), intent(in) :: physics
     real(dp), intent(inout) :: part(n_sums)
-    real(dp) :: fall(owned%nv), rotation
+    real(dp) :: fall(decomposition%nv), rotation
     integer :: k
 
     rotation = 0.0_dp
     do k = 1, view%bodies%n
       if (view%origin(k) == 0 .or. view%bodies%glued(k) > 0) cycle
-      associate (before => view%bodies%velocity(:, k), after => owned%velocity(:, view%origin(k)))
-        call add_kinetic(view%bodies, k, after, part(in_translation), part(in_rotation))
-        call add_kinetic(view%bodies, k, before, part(in_start), rotation)
+      associate (before => view%bodies%velocity(:, k), after => decomposition%owned(s)%velocity(:, view%origin(k)), &
+        & figures => decomposition%figures)
+        call add_kinetic(figures, view%bodies, k, after, part(in_translation), part(in_rotation))
+        call add_kinetic(figures, view%bodies, k, before, part(in_start), rotation)
         fall(:) = 0.0_dp
-        call physics%accelerate(view%bodies, k, fall)
+        call physics%accelerate(figures, view%bodies, k, fall)
         part(in_load) = part(in_load) + view%bodies%mass(k)*sum(fall*(0.5_dp*(before + after)))
       end associate
     end do
@@ -184,19 +187,18 @@ contains
 
   !> Dissipation in the contacts of a subdomain, -r . (v_i + v_{i+1})/2 with the H of q_m, and the work of boundaries at
   !> them.
-  subroutine add_contacts(view, earlier, problem, s, part)
-    type(local_bodies_t), intent(in) :: view
+  subroutine add_contacts(step, earlier, s, part)
+    type(solved_step_t), intent(in) :: step
     !> boundaries with the velocities of the start of the step
     type(boundary_t), intent(in) :: earlier(:)
-    type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
     real(dp), intent(inout) :: part(n_sums)
     real(dp), allocatable :: mean(:, :), v(:, :, :)
     integer :: c, q, g
 
-    associate (sub => problem%sub(s), kernels => problem%kernels)
+    associate (sub => step%problem%sub(s), kernels => step%problem%kernels)
       allocate (mean(kernels%nv, sub%n_columns), v(lanes, kernels%nc, n_blocks(sub%n_contacts)))
-      call find_start(view, earlier, kernels%nd, sub, mean)
+      call find_start(step, earlier, s, mean)
       mean(:, :) = 0.5_dp*(mean + sub%v_global)
       call kernels%contact_velocity(sub%pair, sub%hot, mean, v)
       do c = 1, sub%n_contacts
@@ -212,10 +214,10 @@ contains
 
     subroutine add_boundary_work(c)
       integer, intent(in) :: c
-      real(dp) :: p(problem%kernels%nd), m(problem%kernels%nv - problem%kernels%nd)
+      real(dp) :: p(step%problem%kernels%nd), m(step%problem%kernels%nv - step%problem%kernels%nd)
       integer :: column, d
 
-      associate (sub => problem%sub(s))
+      associate (problem => step%problem, sub => step%problem%sub(s))
         call problem%impulse_on_candidate(s, c, p)
         column = sub%pair(2, c)
         if (sub%pair(1, c) > sub%n_grains) then
@@ -234,49 +236,77 @@ contains
 
   end subroutine add_contacts
 
-  !> Velocities of the columns of a subproblem at the start of the step.
-  subroutine find_start(view, earlier, nd, sub, start)
-    type(local_bodies_t), intent(in) :: view
+  !> Velocities of the columns of a subproblem at the start of the step; spins as they are at its end without moments, which have the
+  !> same energy.
+  subroutine find_start(step, earlier, s, start)
+    type(solved_step_t), intent(in) :: step
     type(boundary_t), intent(in) :: earlier(:)
-    integer, intent(in) :: nd
-    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: s
     !> (nv, n_columns)
-    real(dp), intent(out) :: start(:, :)
-    integer :: c, i, j
+    real(dp), intent(out), contiguous :: start(:, :)
+    integer :: c, i, j, nd
 
+    nd = step%problem%kernels%nd
     start(:, :) = 0.0_dp
-    do c = 1, sub%n_contacts
-      i = view%list%candidate(sub%source(c))
-      j = view%list%antagonist(sub%source(c))
-      call fill(sub%pair(1, c), i)
-      call fill(sub%pair(2, c), j)
-    end do
+    associate (sub => step%problem%sub(s), list => step%halo%view(s)%list)
+      do c = 1, sub%n_contacts
+        i = list%candidate(sub%source(c))
+        j = list%antagonist(sub%source(c))
+        call fill(sub%pair(1, c), i)
+        call fill(sub%pair(2, c), j)
+      end do
+    end associate
 
   contains
 
     !> A column that stands for grain `k` of the view, or for a boundary.
     subroutine fill(column, k)
       integer, intent(in) :: column, k
-      real(dp) :: point(nd), normal(nd)
+      real(dp) :: point(nd)
 
-      if (column <= sub%n_grains) then
-        start(:, column) = view%bodies%velocity(1:size(start, 1), k)
-        return
-      end if
-      ! where the free grain touches it
-      normal(:) = sub%hot(lane_of(c), 1:nd, block_of(c))
-      if (k < 0) then
-        point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + sub%gap(c))*normal
-      else if (k == i) then
-        point(:) = view%bodies%position(:, i) - view%bodies%radius(i)*normal
-      else
-        point(:) = view%bodies%position(:, j) + view%bodies%radius(j)*normal
-      end if
-      call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
-      start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
+      associate (bodies => step%halo%view(s)%bodies, sub => step%problem%sub(s))
+        if (column <= sub%n_grains) then
+          start(:, column) = bodies%velocity(1:size(start, 1), k)
+          call step%decomposition%figures%turn_freely(bodies, k, step%physics%h, start(:, column))
+          return
+        end if
+        call find_touched_point(step, s, c, k, point)
+        call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
+        start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
+      end associate
     end subroutine fill
 
   end subroutine find_start
+
+  !> Where a free grain touches boundary -k, or grain `k` that is part of one, at contact `c`.
+  pure subroutine find_touched_point(step, s, c, k, point)
+    type(solved_step_t), intent(in) :: step
+    integer, intent(in) :: s, c, k
+    !> (nd) [m]
+    real(dp), intent(out) :: point(:)
+    real(dp), dimension(size(point)) :: normal, arm_i, arm_j
+    integer :: i, j
+
+    associate (sub => step%problem%sub(s), bodies => step%halo%view(s)%bodies, list => step%halo%view(s)%list)
+      i = list%candidate(sub%source(c))
+      j = list%antagonist(sub%source(c))
+      normal(:) = sub%hot(lane_of(c), 1:size(point), block_of(c))
+      if (step%problem%kernels%row%arm_i > 0) then
+        call contact_arms(step%problem%kernels, sub%hot, c, arm_i, arm_j)
+        if (k == i) then
+          point(:) = bodies%position(:, j) + arm_j
+        else
+          point(:) = bodies%position(:, i) + arm_i
+        end if
+      else if (k < 0) then
+        point(:) = bodies%position(:, i) - (bodies%radius(i) + sub%gap(c))*normal
+      else if (k == i) then
+        point(:) = bodies%position(:, i) - bodies%radius(i)*normal
+      else
+        point(:) = bodies%position(:, j) + bodies%radius(j)*normal
+      end if
+    end associate
+  end subroutine find_touched_point
 
   !> Energies of the boundaries that forces move, and the work of these forces.
   pure subroutine take_boundaries(self, boundaries, impulses)
@@ -327,7 +357,8 @@ contains
           do d = 1, owned%nd
             x = owned%position(d, k)
             if (owned%ni > 0) x = x + owned%image(d, k)*decomposition%period%length(d)
-            part(s) = part(s) - (owned%mass(k)*physics%gravity(d) + grain_volume(owned%nd, owned%radius(k))*physics%body_force(d))*x
+            part(s) = part(s) - (owned%mass(k)*physics%gravity(d) &
+              & + decomposition%figures%volume_of(owned, k)*physics%body_force(d))*x
           end do
         end do
       end associate

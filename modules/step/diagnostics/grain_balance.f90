@@ -4,8 +4,8 @@
 !> dissipates, and where, is for gravier_energy_balance.
 module gravier_grain_balance
   use gravier_kinds, only: dp
-  use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
+  use gravier_body_figures, only: body_figures_t
   use gravier_contact_problem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
@@ -48,7 +48,7 @@ contains
 
     parts(:, :) = 0.0_dp
     do s = 1, size(parts, 2)
-      call add_grains(decomposition%owned(s), physics, parts(:, s))
+      call add_grains(decomposition%figures, decomposition%owned(s), physics, parts(:, s))
     end do
     call decomposition%comm%sum_parts(parts, sums)
     call keep_motion(self, sums)
@@ -71,7 +71,7 @@ contains
       parts(:, :) = 0.0_dp
       do s = 1, size(parts, 2)
         associate (view => step%halo%view(s))
-          call add_grains(view%bodies, step%physics, parts(:, s), view%origin)
+          call add_grains(step%decomposition%figures, view%bodies, step%physics, parts(:, s), view%origin)
         end associate
       end do
       call step%decomposition%comm%sum_parts(parts, sums)
@@ -82,7 +82,7 @@ contains
     flux(:) = self%flux
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
-      call add_grains(step%decomposition%owned(s), step%physics, parts(:, s))
+      call add_grains(step%decomposition%figures, step%decomposition%owned(s), step%physics, parts(:, s))
       call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%kernels%nv, parts(in_contacts, s))
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
@@ -106,7 +106,8 @@ contains
   end subroutine keep_motion
 
   !> Sums over the free grains that are owned by a subdomain.
-  pure subroutine add_grains(bodies, physics, part, origin)
+  pure subroutine add_grains(figures, bodies, physics, part, origin)
+    type(body_figures_t), intent(in) :: figures
     type(body_set_t), intent(in) :: bodies
     type(physics_t), intent(in) :: physics
     real(dp), intent(inout) :: part(n_sums)
@@ -119,12 +120,13 @@ contains
       if (present(origin)) then
         if (origin(k) == 0) cycle
       end if
-      call add_grain(bodies, k, physics, part)
+      call add_grain(figures, bodies, k, physics, part)
     end do
   end subroutine add_grains
 
   !> Add kinetic energy, speed and momentum of grain `k`.
-  pure subroutine add_grain(bodies, k, physics, part)
+  pure subroutine add_grain(figures, bodies, k, physics, part)
+    type(body_figures_t), intent(in) :: figures
     type(body_set_t), intent(in) :: bodies
     integer, intent(in) :: k
     type(physics_t), intent(in) :: physics
@@ -136,12 +138,12 @@ contains
     square = sum(bodies%velocity(1:nd, k)**2)
     part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*square
     part(in_speeds) = part(in_speeds) + sqrt(square)
-    if (bodies%nv > nd) part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%inertia(k)*sum(bodies%velocity(nd + 1:, k)**2)
+    call figures%add_rotation(bodies, k, bodies%velocity(:, k), part(in_kinetic))
     do d = 1, nd
       part(in_momentum + d) = part(in_momentum + d) + bodies%mass(k)*bodies%velocity(d, k)
     end do
     if (.not. any(abs(physics%body_force) > 0.0_dp)) return
-    volume = grain_volume(nd, bodies%radius(k))
+    volume = figures%volume_of(bodies, k)
     do d = 1, nd
       part(in_flux + d) = part(in_flux + d) + volume*bodies%velocity(d, k)
     end do
@@ -165,7 +167,7 @@ contains
         twice = twice + sub%contact_reaction(d, b)*((sub%free_velocity(d, b) + sub%v_global(d, b)) - physics%h*physics%gravity(d))
       end do
       if (has_body_force) then
-        volume = grain_volume(nd, sub%radius(b))
+        volume = sub%volume(b)
         do d = 1, nd
           twice = twice - sub%contact_reaction(d, b)*(physics%h*physics%body_force(d)*volume*sub%inverse_mass(d, b))
         end do

@@ -2,8 +2,7 @@
 module gravier_mean_stress
   use gravier_kinds, only: dp
   use gravier_facing_planes, only: find_facing_planes
-  use gravier_motion, only: grain_volume
-  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
@@ -76,7 +75,7 @@ contains
       call add_contacts(problem, s, parts(1:nd**2, s))
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          parts(nd**2 + 1, s) = parts(nd**2 + 1, s) + grain_volume(nd, owned%radius(k))
+          parts(nd**2 + 1, s) = parts(nd**2 + 1, s) + decomposition%figures%volume_of(owned, k)
         end do
       end associate
     end do
@@ -97,31 +96,42 @@ contains
     integer, intent(in) :: s
     !> (nd**2) [N m s]
     real(dp), intent(inout) :: part(:)
-    real(dp) :: p(problem%kernels%nd)
+    real(dp) :: p(problem%kernels%nd), branch(problem%kernels%nd)
     integer :: c, d, nd
 
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
       do c = 1, sub%n_contacts
         call problem%impulse_on_candidate(s, c, p)
+        call find_branch(problem%kernels, sub, c, branch)
         do d = 1, nd
-          part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + p*(branch_length(sub, c)*sub%hot(lane_of(c), d, block_of(c)))
+          part((d - 1)*nd + 1:d*nd) = part((d - 1)*nd + 1:d*nd) + p*branch(d)
         end do
       end do
     end associate
   end subroutine add_contacts
 
-  !> Length of the branch of contact `c`, along its normal: that part of it which lies outside boundaries [m].
-  pure real(dp) function branch_length(sub, c) result(length)
+  !> The branch of contact `c`, that part of it which lies outside boundaries [m]. Of disks and spheres it is along the normal.
+  pure subroutine find_branch(kernels, sub, c, branch)
+    type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: c
+    !> (nd)
+    real(dp), intent(out) :: branch(:)
+    real(dp) :: arm_i(kernels%nd), arm_j(kernels%nd), length
     integer :: k
 
+    if (kernels%row%arm_i > 0) then
+      call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
+      branch(:) = arm_j - arm_i
+      return
+    end if
     length = sub%gap(c)
     do k = 1, 2
       if (sub%pair(k, c) <= sub%n_grains) length = length + sub%radius(sub%pair(k, c))
     end do
-  end function branch_length
+    branch(:) = length*sub%hot(lane_of(c), 1:kernels%nd, block_of(c))
+  end subroutine find_branch
 
   !> Volume that the scene takes: along each axis the period, or else the way between the planes that shut it in, with the
   !> outermost points of the grains in the place of planes that are not there. Collective.

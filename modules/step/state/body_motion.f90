@@ -2,7 +2,9 @@
 module gravier_body_motion
   use gravier_kinds, only: dp, i8
   use gravier_time_table, only: time_table_t
+  use gravier_orientation, only: turn_orientation
   use gravier_motion, only: predict_position, advance_position
+  use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   use gravier_load_areas, only: facing_area
@@ -35,6 +37,7 @@ contains
           if (owned%glued(k) == 0) owned%position(:, k) = predict_position(owned%position(:, k), owned%velocity(1:nd, k), &
             & physics%h, theta)
         end do
+        if (owned%no > 0) call turn_bodies(owned, part)
       end associate
     end do
     if (some_glued) call carry_glued(decomposition, part)
@@ -47,6 +50,18 @@ contains
       end associate
     end do
   end subroutine move_to_middle
+
+  !> Turn the free bodies for a time at the spins that they have.
+  pure subroutine turn_bodies(bodies, duration)
+    type(body_set_t), intent(inout) :: bodies
+    !> [s]
+    real(dp), intent(in) :: duration
+    integer :: k
+
+    do k = 1, bodies%n
+      if (bodies%glued(k) == 0) call turn_orientation(bodies%orientation(:, k), bodies%velocity(bodies%nd + 1:, k), duration)
+    end do
+  end subroutine turn_bodies
 
   !> Gravity and the velocities of boundaries at the end of the step, without contacts.
   subroutine drive(decomposition, physics, gravity_table, time, changed)
@@ -119,6 +134,7 @@ contains
           if (owned%glued(k) == 0) owned%position(:, k) = advance_position(owned%position(:, k), owned%velocity(1:nd, k), &
             & physics%h, theta)
         end do
+        if (owned%no > 0) call turn_bodies(owned, theta*physics%h)
       end associate
     end do
     if (some_glued) call carry_glued(decomposition, theta*physics%h)

@@ -1,6 +1,8 @@
 !> What grains do to boundaries: impulses of a step, and the velocities and displacements of boundaries that forces move.
 module gravier_boundary_loads
   use gravier_kinds, only: dp
+  use gravier_orientation, only: turn_orientation
+  use gravier_boundary, only: boundary_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   implicit none
@@ -105,11 +107,27 @@ contains
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (owned%glued(k) > 0) call decomposition%boundaries(owned%glued(k))%carry(duration, owned%position(:, k))
+          if (owned%glued(k) == 0) cycle
+          call decomposition%boundaries(owned%glued(k))%carry(duration, owned%position(:, k))
+          if (owned%no > 0) call turn_with(decomposition%boundaries(owned%glued(k)), duration, owned%orientation(:, k))
         end do
       end associate
     end do
   end subroutine carry_glued
+
+  !> Turn a body as a boundary turns for a time.
+  pure subroutine turn_with(boundary, duration, orientation)
+    type(boundary_t), intent(in) :: boundary
+    !> [s]
+    real(dp), intent(in) :: duration
+    real(dp), intent(inout) :: orientation(:)
+
+    if (size(orientation) == 1) then
+      call turn_orientation(orientation, boundary%spin(3:3), duration)
+    else
+      call turn_orientation(orientation, boundary%spin, duration)
+    end if
+  end subroutine turn_with
 
   !> Give glued grains the velocity of their boundary where they are.
   subroutine set_glued_velocities(decomposition)

@@ -31,6 +31,7 @@ contains
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
     memory%law_row = merge(1, 0, remembers)
     if (counts_rest) memory%rest_row = memory%law_row + 1
+    if (kernels%row%arm_i > 0) memory%key_row = memory%n_states() + 1
   end function memory_of
 
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
@@ -237,20 +238,26 @@ contains
     type(local_bodies_t), intent(inout) :: view
     integer(i8), allocatable :: keys(:, :)
     integer, allocatable :: order(:)
-    integer :: p, k, e
+    integer :: p, k, e, repeated
 
     allocate (keys(2, size(records, 2)), order(size(records, 2)))
     keys(:, :) = records(1:2, :)
     call argsort_rows(keys, order)
     associate (list => view%list)
+      repeated = 0
       do p = 1, list%n
-        k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p))
+        ! the points of a pair get its records in their order
+        if (p > 1) repeated = merge(repeated + 1, 0, list%candidate(p) == list%candidate(max(p - 1, 1)) .and. &
+          & list%antagonist(p) == list%antagonist(max(p - 1, 1)))
+        k = find_pair(keys, order, view%bodies%id(list%candidate(p)), antagonist_id(view, p), repeated)
         if (k == 0) cycle
         do e = 1, min(list%memory%n_impulse, kept%n_impulse)
           list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
         end do
         call take_state(list%memory%law_row, kept%law_row)
         call take_state(list%memory%rest_row, kept%rest_row)
+        call take_state(list%memory%key_row, kept%key_row)
+        if (list%memory%key_row > 0) call take_state(list%memory%key_row + 1, kept%key_row + 1)
       end do
     end associate
 
@@ -264,26 +271,30 @@ contains
 
   end subroutine match_impulses
 
-  !> Place of a pair among keys that `order` sorts, or 0.
-  pure integer function find_pair(keys, order, candidate, antagonist) result(place)
+  !> Place of a record of a pair among keys that `order` sorts, or 0: of the first one, or of that `repeated` behind it.
+  pure integer function find_pair(keys, order, candidate, antagonist, repeated) result(place)
     integer(i8), intent(in), contiguous :: keys(:, :)
     integer, intent(in), contiguous :: order(:)
     integer(i8), intent(in) :: candidate, antagonist
+    integer, intent(in) :: repeated
     integer :: low, high, middle
 
+    ! the first record that is not before the pair
     low = 1
-    high = size(order)
-    do while (low <= high)
+    high = size(order) + 1
+    do while (low < high)
       middle = (low + high)/2
       place = order(middle)
-      if (keys(1, place) == candidate .and. keys(2, place) == antagonist) return
       if (keys(1, place) < candidate .or. (keys(1, place) == candidate .and. keys(2, place) < antagonist)) then
         low = middle + 1
       else
-        high = middle - 1
+        high = middle
       end if
     end do
     place = 0
+    if (low + repeated > size(order)) return
+    if (keys(1, order(low + repeated)) == candidate .and. keys(2, order(low + repeated)) == antagonist) &
+      & place = order(low + repeated)
   end function find_pair
 
 end module gravier_impulse_memory

@@ -1,6 +1,7 @@
 !> From the solved problem of a step back to the grains: velocities, and displacements of projections, to their owners.
 module gravier_velocity_return
   use gravier_kinds, only: dp, i8
+  use gravier_orientation, only: turn_orientation
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
@@ -23,14 +24,14 @@ contains
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (owned%glued(k) == 0) call physics%accelerate(owned, k, owned%velocity(:, k))
+          if (owned%glued(k) == 0) call physics%accelerate(decomposition%figures, owned, k, owned%velocity(:, k))
         end do
       end associate
     end do
     call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 
-  !> Move the grains in contact by what v_global holds in the place of velocities [m]. Collective.
+  !> Move the grains in contact by what v_global holds in the place of velocities [m], and turn those with shapes [rad]. Collective.
   subroutine take_displacements(decomposition, problem)
     type(decomposition_t), intent(inout) :: decomposition
     type(contact_problem_t), intent(in) :: problem
@@ -77,6 +78,7 @@ contains
       associate (owned => decomposition%owned(h))
         if (displace) then
           owned%position(:, place) = owned%position(:, place) + v(1:decomposition%nd)
+          if (owned%no > 0) call turn_orientation(owned%orientation(:, place), v(decomposition%nd + 1:), 1.0_dp)
         else
           owned%velocity(1:size(v), place) = v
         end if

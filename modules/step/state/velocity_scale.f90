@@ -201,13 +201,15 @@ contains
     real(dp), intent(in) :: frame(3)
     !> (2 + nd)
     real(dp), intent(inout) :: sums(:)
-    real(dp) :: v(size(sums) - 2), m
+    real(dp) :: v(size(sums) - 2), m, volume
     integer :: b, nd
 
     nd = size(v)
     do b = 1, sub%n_grains
       m = 1.0_dp/sub%inverse_mass(1, b)
-      v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*grain_volume(nd, sub%radius(b))/m)
+      volume = 0.0_dp
+      if (allocated(sub%volume)) volume = sub%volume(b)
+      v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*volume/m)
       if (allocated(sub%attraction_load)) v(:) = v - sub%inverse_mass(1, b)*sub%attraction_load(1:nd, b)
       v(:) = v - frame(1:nd)
       m = m/sub%multiplicity(b)

@@ -90,7 +90,7 @@ contains
     do g = 1, n_grains
       if (mod(g, max(1, comm%size - 1)) == comm%rank) n = n + 1
     end do
-    call newcomers(1)%init(nd, nd, decomposition%ni, n)
+    call newcomers(1)%init(decomposition%layout(), n)
     n = 0
     do g = 1, n_grains
       if (mod(g, max(1, comm%size - 1)) /= comm%rank) cycle

@@ -14,6 +14,8 @@ program test_partition
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_grains = 1500
+  !> places of a lattice along each axis, and points of a pile
+  integer, parameter :: side = 64, most_in_pile = 16
   type(communicator_t) :: comm, alone
 
   call start_parallel()
@@ -36,6 +38,7 @@ program test_partition
   call test_extremes()
   call test_weights()
   call test_share_out()
+  call test_piles()
   call test_levels(2, 40, .false.)
   call test_levels(2, 25, .true.)
   call test_levels(3, 16, .true.)
@@ -596,6 +599,36 @@ contains
     call check_routes(partition, serial, nd)
     call check_saved(partition, nd)
   end subroutine test_levels
+
+  !> Two levels, and points that pile up: each place of a lattice has one point, and sixteen on a quarter of the square. Groups
+  !> hold cells of both kinds, and all the points of a piece count.
+  subroutine test_piles()
+    type(partition_t) :: partition
+    type(error_t), allocatable :: error
+    integer, parameter :: n_points = side**2*(3 + most_in_pile)/4
+    real(dp), allocatable :: points(:, :)
+    integer, allocatable :: weights(:)
+    integer :: x, y, k, n
+
+    allocate (points(2, n_points), weights(n_points))
+    n = 0
+    do y = 1, side
+      do x = 1, side
+        do k = 1, merge(most_in_pile, 1, (4*(x - 1))/side == 1)
+          n = n + 1
+          points(1, n) = (x - 0.5_dp)/side
+          points(2, n) = (y - 0.5_dp)/side
+        end do
+      end do
+    end do
+    weights(:) = 1
+    partition%cell_limit = 128
+    call partition%init_graph(alone, [0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp], 1.0_dp/side, points, weights, 12, error)
+    call check(.not. allocated(error), "piles shared out on two levels")
+    if (allocated(error)) return
+    call check(partition%groups%n > 1 .and. partition%cells%split > 1, "there are two levels of piles")
+    call check_loads(partition, points, 12)
+  end subroutine test_piles
 
   !> What this rank knows, it knows as one rank alone does; it knows the points of its own subdomains.
   subroutine check_levels(partition, serial, points)

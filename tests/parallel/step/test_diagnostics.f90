@@ -2,7 +2,8 @@
 module own_diagnostics
   use gravier_kinds, only: dp, i8
   use gravier_decomposition, only: decomposition_t
-  use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, in_written_steps
+  use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t, &
+    & in_written_steps
   implicit none
   private
   public :: counter_t, least_t
@@ -17,6 +18,7 @@ module own_diagnostics
     procedure :: take_step => counter_take_step
     procedure :: measure => counter_measure
     procedure :: columns => counter_columns
+    procedure :: get_histogram => counter_get_histogram
   end type counter_t
 
   !> One with what every diagnostic must have, and nothing else.
@@ -64,6 +66,18 @@ contains
     call list%add("measured", real(self%measured, dp))
   end subroutine counter_columns
 
+  subroutine counter_get_histogram(self, histogram)
+    class(counter_t), intent(in) :: self
+    type(histogram_t), allocatable, intent(out) :: histogram
+
+    allocate (histogram)
+    histogram%name = "calls"
+    histogram%bin_width = 0.5_dp
+    allocate (histogram%counts(2))
+    histogram%counts(1) = self%taken
+    histogram%counts(2) = self%measured
+  end subroutine counter_get_histogram
+
   pure function least_features() result(features)
     type(diagnostic_features_t) :: features
     features%key = "least"
@@ -92,6 +106,7 @@ program test_diagnostics
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics, diagnostic_place
   use gravier_diagnostics, only: diagnostics_t
   use gravier_boundary_forces, only: boundary_forces_t
+  use gravier_contact_structure, only: contact_structure_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use own_diagnostics, only: counter_t, least_t
@@ -108,6 +123,7 @@ program test_diagnostics
   call test_registry()
   call test_columns()
   call test_calls()
+  call test_histograms()
   call test_asked()
   call test_boundary_forces()
   call finish_checks()
@@ -174,7 +190,9 @@ contains
     end do
     call check_equal(list%n, 50, "columns")
     call check_equal(trim(list%name(17)), "column 1", "a name")
-    call check_close(list%value(50), 50.0_dp, 0.0_dp, "a value")
+    do k = 1, 50
+      call check_close(list%value(k), real(k, dp), 0.0_dp, "a value")
+    end do
     call list%clear()
     tensor(1, :) = [1.0_dp, 2.0_dp]
     tensor(2, :) = [3.0_dp, 4.0_dp]
@@ -238,6 +256,32 @@ contains
     call check_close(sim%diagnostics%value(4), time, 1.0e-15_dp, "start of the step")
   end subroutine check_values
 
+  !> Histograms are those of the present step, in the order of the diagnostics.
+  subroutine test_histograms()
+    type(simulation_t) :: sim
+    type(diagnostic_holder_t) :: list(2)
+    type(histogram_t), allocatable :: histograms(:)
+
+    call make(case_text//" &output every = 2 /", sim)
+    allocate (list(1)%diagnostic, source=contact_structure_t())
+    allocate (list(2)%diagnostic, source=counter_t())
+    call sim%diagnostics%take(sim%decomposition, list, [.true., .true.])
+    call sim%diagnostics%get_histograms(histograms)
+    call check_equal(size(histograms), 0, "no histogram before the first step")
+    call advance(sim)
+    call sim%diagnostics%get_histograms(histograms)
+    call check_equal(size(histograms), 1, "step 1 is not written")
+    call check_equal(histograms(1)%name, "force_histogram", "the histogram of each step")
+    call advance(sim)
+    call sim%diagnostics%get_histograms(histograms)
+    call check_equal(size(histograms), 2, "step 2 is")
+    call check_equal(histograms(1)%name//" "//histograms(2)%name, "force_histogram calls", "histograms in their order")
+    call check_close(histograms(2)%bin_width, 0.5_dp, 0.0_dp, "width of the bins of the second one")
+    call check_equal(histograms(2)%counts(1), 2_i8, "its first bin")
+    call check_equal(histograms(2)%counts(2), 1_i8, "its second bin")
+    call sim%free()
+  end subroutine test_histograms
+
   !> What is not asked for is not there, whatever else is.
   subroutine test_asked()
     type(simulation_t) :: sim
@@ -291,6 +335,13 @@ contains
     call sim%decomposition%boundaries(size(sim%decomposition%boundaries))%find_place(place)
     call check_close(sim%diagnostics%value(k + 3), place(2), 0.0_dp, "its place")
     call check(sim%diagnostics%in_history(k) .and. .not. sim%diagnostics%in_results(k), "they are in the history alone")
+    call sim%free()
+    call make(case_text//" &boundary shape = 'plane', normal = 0, 1, point = 1, -9, velocity = 0.5, 0, name = 'belt' / "// &
+      & "&output boundary_forces = T /", sim)
+    call advance(sim)
+    k = 4*size(sim%decomposition%boundaries) - 1
+    call check_equal(trim(sim%diagnostics%name(k)), "position_x:belt", "a boundary that moves")
+    call check_close(sim%diagnostics%value(k), 1.005_dp, 1.0e-15_dp, "its place is that of the end of the step")
     call sim%free()
   end subroutine test_boundary_forces
 

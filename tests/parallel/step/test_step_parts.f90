@@ -9,7 +9,7 @@ program test_step_parts
   use gravier_energy_balance, only: energy_balance_t
   use gravier_grain_balance, only: grain_balance_t
   use gravier_mean_stress, only: mean_stress_t
-  use gravier_contact_structure, only: contact_structure_t, bin_width
+  use gravier_contact_structure, only: contact_structure_t, bin_width, n_bins
   use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: wake_all, put_sleepers_last, count_rest
@@ -48,9 +48,14 @@ program test_step_parts
   call check_sliding(0.0_dp)
   call check_sliding(0.5_dp)
   call check_loads()
+  call check_period()
   call check_turning_glued(1)
   call check_turning_glued(2)
-  call check_structure()
+  call check_structure(3.0_dp, 0.0_dp)
+  call check_structure(-0.1_dp, 3.0_dp)
+  call check_crowd()
+  call check_turning_rolling()
+  call check_body_force_in_contact()
   call check_falling_lid()
   call check_departures()
   call check_sleeping()
@@ -322,6 +327,7 @@ contains
     !> [m/s]
     real(dp), intent(in) :: speed
     real(dp), parameter :: mu = 0.3_dp, m = 2.0_dp, v = 1.0_dp
+    type(mean_stress_t) :: stress
     type(contact_structure_t) :: structure
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
@@ -342,6 +348,10 @@ contains
     call check_energy(energy_of(sim), 0.5_dp*m*(v - p/m)**2 + 0.5_dp*(g*h)**2, p**2/m, 0.5_dp*(g*h)**2, -p*speed, &
       & 0.0_dp, 0.0_dp, p*slip)
     call check_balance(sim%balance, 0.5_dp*m*(v - p/m)**2 + p**2/m + 0.5_dp*(g*h)**2, 0.5_dp*(g*h)**2, -p*(slip + speed))
+    ! the force has a part along x, and the branch of 0.1 m is along y
+    stress = stress_of(sim)
+    call check_close(stress%stress(1, 2)*stress%volume, -p*0.1_dp/h, solved, "shear stress: row of the force, column of the branch")
+    call check_close(stress%stress(2, 1)*stress%volume, 0.0_dp, solved, "and none the other way")
     structure = structure_of(sim)
     call check_close(structure%sliding_fraction, 1.0_dp, 0.0_dp, "the contact slides")
     call check_close(structure%fabric(2, 2), 0.0_dp, 0.0_dp, "the fabric is that of grains among each other")
@@ -379,6 +389,35 @@ contains
     call check_columns(sim)
     call sim%free()
   end subroutine check_loads
+
+  !> A grain leaves a periodic scene at 2 m/s and comes back on the other side, with a load along its way: its potential is that of
+  !> the way that it has made.
+  subroutine check_period()
+    type(energy_balance_t) :: energy
+    type(mean_stress_t) :: stress
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp), parameter :: m = 2.0_dp, a = 0.5_dp, t = 5*h, start = 3.95_dp
+    integer :: k
+
+    call add_grain(1, m, 0, start, 3.0_dp, 2.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, m, 0, 1.0_dp, 0.0_dp, -1.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0.5, 0, period = 4, 0, overlap_projection = F /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    do k = 1, 5
+      call advance(sim, figures)
+    end do
+    energy = energy_of(sim)
+    stress = stress_of(sim)
+    ! along y from the lower grain to the upper one
+    call check_close(stress%volume, 4.0_dp*3.2_dp, solved, "volume of a periodic scene")
+    call check_close(stress%solid_fraction, 2.0_dp*acos(-1.0_dp)*0.01_dp/(4.0_dp*3.2_dp), solved, "solid fraction")
+    call check_close(grain(sim, 1, 1, .true.), start + 2.0_dp*t + 0.5_dp*a*t**2 - 4.0_dp, solved, "it is back in the period")
+    call check_close(energy%potential, -m*a*(start + 1.0_dp + t + a*t**2), solved, "potential of the way made")
+    call check_close(energy%translation + energy%potential, 0.5_dp*m*5.0_dp - m*a*(start + 1.0_dp), solved, &
+      & "what the potential loses is motion")
+    call sim%free()
+  end subroutine check_period
 
   !> A balance goes on from its state, bit for bit.
   subroutine check_state(energy)
@@ -432,8 +471,11 @@ contains
     call sim%free()
   end subroutine check_turning_glued
 
-  !> Three disks in a row under 1 m/s from the left: chain of two contacts, figures of coordination.
-  subroutine check_structure()
+  !> Three disks in a row under 1 m/s from the left: chain of two contacts, figures of coordination. A fourth one, which touches
+  !> nobody, decides where the scene is divided: apart from the chain, or through its middle.
+  subroutine check_structure(x, y)
+    !> of the fourth disk [m]
+    real(dp), intent(in) :: x, y
     type(contact_structure_t) :: structure
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
@@ -442,10 +484,11 @@ contains
     call add_grain(1, 1.0_dp, 0, -0.3_dp - 1.5_dp*h, 0.0_dp, 3.0_dp, 0.0_dp, 0.0_dp)
     call add_grain(2, 1.0_dp, 0, -0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     call add_grain(3, 1.0_dp, 0, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
-    call add_grain(4, 1.0_dp, 0, 3.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(4, 1.0_dp, 0, x, y, 0.0_dp, 0.0_dp, 0.0_dp)
     call make(sim, "gravity = 0, 0, overlap_projection = F, friction = 0 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
+    call check_equal(figures%interface_statistics%bodies, merge(1_i8, 0_i8, x < 0.0_dp), "disks that two subdomains share")
     ! all three end at 1 m/s: impulses 2 and 1
     forces = [2.0_dp, 1.0_dp]/h
     structure = structure_of(sim)
@@ -462,7 +505,84 @@ contains
     call sim%free()
   end subroutine check_structure
 
-  !> A lid of 4 kg under 8 N that touches nothing: its energy is the work of the force.
+  !> Twelve disks on a floor, one of them a thousand times as heavy and in overlap, one that slides; a thirteenth floats above the
+  !> floor by less than the alert distance. One force is beyond the histogram.
+  subroutine check_crowd()
+    type(contact_structure_t) :: structure
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: heavy, light, mean
+    integer :: k
+
+    do k = 1, 13
+      call add_grain(k, merge(1000.0_dp, 1.0_dp, k == 2), 0, 0.5_dp*k, merge(0.095_dp, merge(0.115_dp, 0.1_dp, k == 13), k == 2), &
+        & merge(1.0_dp, 0.0_dp, k == 5), 0.0_dp, 0.0_dp)
+    end do
+    call make(sim, "gravity = 0, -9.81, friction = 0.3, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    heavy = 1000.0_dp*g
+    light = g
+    mean = (heavy + 11.0_dp*light)/12.0_dp
+    structure = structure_of(sim)
+    call check_close(structure%carrying_fraction, 12.0_dp/13.0_dp, 1.0e-15_dp, "what floats does not carry")
+    call check_close(structure%sliding_fraction, 1.0_dp/12.0_dp, 1.0e-15_dp, "one contact slides")
+    call check_close(structure%force_mean, mean, 1.0e-6_dp, "mean force of a crowd")
+    call check_close(structure%force_max, heavy, 1.0e-6_dp, "force of the heavy one")
+    call check_close(structure%force_deviation, sqrt(((heavy - mean)**2 + 11.0_dp*(light - mean)**2)/12.0_dp)/mean, 1.0e-8_dp, &
+      & "deviation of a crowd")
+    call check_close(structure%overlap_mean, 0.005_dp, solved, "mean overlap of those that overlap")
+    call check_equal(structure%histogram(n_bins + 1), 1_i8, "more than ten times the mean")
+    call check_equal(structure%histogram(n_bins), 0_i8, "nothing is in the last bin")
+    call check_equal(structure%histogram(1), 11_i8, "a hundredth of the mean")
+    call check_equal(structure%rattlers, 13_i8, "one contact holds nobody")
+    call sim%free()
+  end subroutine check_crowd
+
+  !> The scene of a boundary that turns, with resistance to rolling: its moment works on the boundary too, and the balance closes.
+  subroutine check_turning_rolling()
+    type(energy_balance_t) :: energy
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+
+    call add_grain(1, 1.0_dp, 1, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 1.0_dp, 0.18_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, overlap_projection = F, friction = 0.5, rolling_friction = 0.3 /"//newline// &
+      & "&boundary shape = 'grains', group = 1, rotation = 2.0, pivot = 0, 0, friction = 0.5, rolling_friction = 0.3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    energy = energy_of(sim)
+    call check(energy%boundary_work > 1.0_dp, "the boundary works")
+    call check_close(energy%error(), 0.0_dp, solved, "the balance closes with moments")
+    call check_close(sim%balance%error(), 0.0_dp, solved, "balance of grains: it closes with moments")
+    call sim%free()
+  end subroutine check_turning_rolling
+
+  !> A body force presses a disk that slides onto a floor: both balances close, and the floor bears the force.
+  subroutine check_body_force_in_contact()
+    real(dp), parameter :: force = 300.0_dp*acos(-1.0_dp)*0.01_dp, mu = 0.3_dp, m = 2.0_dp, v = 1.0_dp
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp) :: p
+
+    call add_grain(1, m, 0, 0.0_dp, 0.1_dp, v, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, 1.0_dp, 5.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0, body_force = 0, -300, friction = 0.3, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
+    call advance(sim, figures)
+    p = mu*force*h
+    call check_close(sim%boundary_impulses(2, 1), -force*h, solved, "a body force presses on the floor")
+    call check_close(sim%balance%contact_work, -p*(v - 1.5_dp*p/m), solved, "balance of grains: friction under a body force")
+    call check_close(sim%balance%error(), 0.0_dp, solved, "balance of grains: it closes under a body force")
+    ! the other disk falls
+    call check_energy(energy_of(sim), 0.5_dp*m*(v - p/m)**2 + 0.5_dp*(force*h)**2, p**2/m, 0.5_dp*(force*h)**2, 0.0_dp, 0.0_dp, &
+      & 0.0_dp, p*(v - 1.5_dp*p/m))
+    call sim%free()
+  end subroutine check_body_force_in_contact
+
+  !> A lid of 4 kg under 8 N that touches nothing: its energy is the work of the force, and goes with it.
   subroutine check_falling_lid()
     type(energy_balance_t) :: energy
     type(simulation_t) :: sim
@@ -473,8 +593,8 @@ contains
     call add_grain(2, 1.0_dp, 0, 2.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline// &
       & "&boundary shape = 'plane', point = 0, 3, normal = 0, -1, "// &
-      & "free = F, T, mass = 4.0, force = 0, -8.0 /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact//" /"// &
-      & newline//all_figures)
+      & "free = F, T, mass = 4.0, force = 0, -8.0, remove_at = 0.02 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call advance(sim, figures)
     call advance(sim, figures)
     v = -2.0_dp*h*2.0_dp
@@ -483,6 +603,13 @@ contains
     call check_close(energy%boundaries, 2.0_dp*v**2, solved, "its kinetic energy")
     call check_close(energy%boundary_work, 2.0_dp*v**2, solved, "the work of the force")
     call check_close(energy%error(), 0.0_dp, solved, "the balance closes")
+    call advance(sim, figures)
+    energy = energy_of(sim)
+    call check(.not. sim%decomposition%boundaries(1)%present, "the lid is taken away")
+    call check_close(energy%boundaries, 0.0_dp, 0.0_dp, "and has no energy left")
+    call check_close(energy%carried_away, 2.0_dp*v**2, solved, "which it takes along")
+    call check_close(energy%boundary_work, 2.0_dp*v**2, solved, "and no force works on it")
+    call check_close(energy%error(), 0.0_dp, solved, "the balance closes without it")
     call sim%free()
   end subroutine check_falling_lid
 
@@ -498,6 +625,8 @@ contains
     call add_grain(3, 1.0_dp, 0, 2.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     call add_grain(4, 1.0_dp, 1, 3.0_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     call add_grain(5, 1.0_dp, 1, 3.2_dp, -0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    ! close to the middle of the scene, and a ghost to the other half
+    call add_grain(6, 1.0_dp, 0, 1.55_dp, 3.0_dp, 0.0_dp, 0.5_dp, 0.0_dp)
     call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline// &
       & "&boundary shape = 'outlet', point = 0, 0, normal = 0, 1 /"//newline//"&boundary shape = 'grains', group = 1 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)

@@ -8,6 +8,9 @@ program test_velocity_scale
   use gravier_random_hash, only: hash_uniform
   use gravier_motion, only: grain_mass
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_body_store, only: body_layout_t, body_set_t
+  use gravier_boundary, only: boundary_t
+  use gravier_test_scenes, only: plane, change_shape
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -48,6 +51,7 @@ program test_velocity_scale
   call start_parallel()
   call comm%init()
   call alone%init(MPI_COMM_SELF)
+  call test_levers()
   do nd = 2, 3
     call test_loads(nd)
     call test_drives(nd)
@@ -99,6 +103,49 @@ contains
     call check(figures%contacts > 60, "grains are in contact")
     call check_close(sim%problem%error_scale, sim%velocity_scale%value, 0.0_dp, "the contact problem has the scale")
   end subroutine assemble
+
+  !> Levers of boundaries: across the axis that they turn about, up to the farthest corner, the farthest grain of a plane, the
+  !> farthest grain of those that are glued; from the pivot where only a table knows the axis; none of what does not turn. Each rank
+  !> has its own grains, the farthest ones are those of the last.
+  subroutine test_levers()
+    type(velocity_scale_t) :: scale
+    type(body_set_t) :: grains
+    type(boundary_t) :: boundaries(5)
+    integer :: b
+
+    do b = 1, 4, 3
+      call change_shape("rectangle", boundaries(b))
+      boundaries(b)%surface%point(:) = [3.0_dp, 0.0_dp, 7.0_dp]
+      boundaries(b)%surface%edge(:, 1) = [0.0_dp, 4.0_dp, 0.0_dp]
+      boundaries(b)%surface%edge(:, 2) = [0.0_dp, 0.0_dp, 1.0_dp]
+      boundaries(b)%pivot(:) = [0.0_dp, 0.0_dp, 5.0_dp]
+    end do
+    boundaries(1)%given_spin(3) = -2.0_dp
+    boundaries(2) = plane(2, [0.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp, 1.0_dp])
+    boundaries(2)%given_spin(3) = 1.0_dp
+    boundaries(3)%given_spin(1) = 1.0_dp
+    ! vx vy vz, wx wy wz, fx fy fz, pressure
+    allocate (boundaries(4)%table%has(10), source=.false.)
+    boundaries(4)%table%has(6) = .true.
+    boundaries(5) = boundaries(2)
+    boundaries(5)%given_spin(:) = 0.0_dp
+    call grains%init(body_layout_t(3, 6, 0), 2)
+    grains%mass(:) = 1.0_dp
+    grains%radius(1) = 0.5_dp
+    grains%radius(2) = 0.25_dp
+    grains%glued(1) = 0
+    grains%glued(2) = 3
+    grains%position(:, 1) = [6.0_dp, 8.0_dp, 100.0_dp]
+    grains%position(:, 2) = [1.0_dp, 0.0_dp, 2.0_dp]
+    if (comm%rank < comm%size - 1) grains%position(:, :) = 0.5_dp*grains%position
+    call scale%init(comm, grains, boundaries, 1.0_dp, 0.0_dp)
+    call check_close(scale%lever(1), 5.0_dp, rounding, "lever of a rectangle that turns")
+    call check_close(scale%lever(2), 10.5_dp, rounding, "lever of a plane: the farthest grain")
+    call check_close(scale%lever(3), 2.25_dp, rounding, "lever of glued grains: the farthest of them")
+    call check_close(scale%lever(4), sqrt(34.0_dp), rounding, "lever about an axis that a table knows")
+    call check_close(scale%lever(5), 0.0_dp, 0.0_dp, "what does not turn has none")
+    call check_close(scale%diameter, 0.75_dp, rounding, "mean diameter")
+  end subroutine test_levers
 
   !> Input file of a scene, in its units.
   function text_of(scene) result(text)

@@ -130,7 +130,7 @@ contains
     do b = 1, 7
       call bodies%get_record(b, records(:, b))
     end do
-    call back%init(sizes(1), sizes(2), sizes(3), 7)
+    call back%init(body_layout_t(sizes(1), sizes(2), sizes(3)), 7)
     do b = 1, 7
       call back%set_record(8 - b, records(:, b))
     end do
@@ -288,7 +288,8 @@ contains
       f = f + 1
       call bodies%describe_field(f, name, bytes, entries)
       if (len(name) == 0) exit
-      call check_equal(bytes, merge(4, 8, name == "glued" .or. name == "material" .or. name == "image"), "bytes of "//name)
+      call check_equal(bytes, merge(4, 8, name == "glued" .or. name == "material" .or. name == "image" .or. name == "shape"), &
+        & "bytes of "//name)
       names = names//name//" "
       words = words + entries
     end do

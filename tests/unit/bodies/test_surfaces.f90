@@ -40,7 +40,14 @@ contains
       features = surfaces(k)%surface%features()
       call surfaces(k)%surface%keys(own)
       call check(own(1)%name == point_key%name .and. own(1)%count == 3, "the first key of "//features%kind)
-      call check(any(features%dimensions), "dimensions of "//features%kind)
+      select case (features%kind)
+      case ("segment", "circle")
+        call check(features%dimensions(2) .and. .not. features%dimensions(3), "a shape of the plane: "//features%kind)
+      case ("rectangle", "cylinder")
+        call check(features%dimensions(3) .and. .not. features%dimensions(2), "a shape of space: "//features%kind)
+      case default
+        call check(all(features%dimensions), "a shape of both: "//features%kind)
+      end select
     end do
     k = collected%find("radius")
     call check(k > 0, "radius is a key")
@@ -98,6 +105,10 @@ contains
     call segment%level(2, level, known)
     call check(known, "a flat segment faces along y")
     call check_close(level, 1.0_dp, 0.0_dp, "where it stands")
+    call expect(segment, reshape([0.0_dp, 1.0_dp, 0.0_dp, 2.0_dp, 1.015625_dp, 0.0_dp], [3, 2]), "", "", "a slight slope")
+    call segment%level(2, level, known)
+    call check(known, "a slight slope faces along y")
+    call check_close(level, 1.0078125_dp, 0.0_dp, "it stands where its middle is")
 
     call expect(rectangle, reshape([zero, [2.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 3.0_dp, 0.0_dp]], [3, 3]), "", "", "a rectangle")
     call check_close(rectangle%own_area(), 6.0_dp, rounding, "area of a rectangle")
@@ -127,6 +138,7 @@ contains
     call circle%level(2, level, known)
     call check(.not. known, "a circle faces along no axis")
     call expect(circle, reshape([zero, -1.0_dp, 0.0_dp, 0.0_dp], [3, 2]), "radius", "", "a radius below 0")
+    call expect(circle, reshape([zero, zero], [3, 2]), "radius", "", "a radius of 0")
     call expect(cylinder, reshape([zero, [0.0_dp, 0.0_dp, 2.0_dp], [1.5_dp, 0.0_dp, 0.0_dp]], [3, 3]), "", "", "a cylinder")
     call check_close(cylinder%axis(3), 1.0_dp, 0.0_dp, "its unit axis")
     call check(cylinder%support(3, 1.0_dp) >= huge(1.0_dp), "an upright drum carries nothing")
@@ -139,6 +151,7 @@ contains
   subroutine test_ways()
     type(plane_t) :: plane, plane_before
     type(segment_t) :: segment, segment_before
+    type(rectangle_t) :: rectangle, rectangle_before
 
     plane_before%axis(2) = 1.0_dp
     plane = plane_before
@@ -151,6 +164,14 @@ contains
     segment%point(1) = 3.0_dp
     segment%edge(:, 1) = segment_before%edge(:, 1)
     call check_close(segment%way(segment_before), 3.0_dp, rounding, "a segment that is shifted")
+    rectangle_before%edge(1, 1) = 2.0_dp
+    rectangle_before%edge(2, 2) = 5.0_dp
+    rectangle = rectangle_before
+    rectangle%edge(:, 2) = [0.0_dp, 0.0_dp, 5.0_dp]
+    call check_close(rectangle%way(rectangle_before), sqrt(50.0_dp), rounding, "a rectangle that turns about its first edge")
+    rectangle%edge(:, 1) = [0.0_dp, 0.0_dp, -2.0_dp]
+    rectangle%edge(:, 2) = rectangle_before%edge(:, 2)
+    call check_close(rectangle%way(rectangle_before), sqrt(8.0_dp), rounding, "a rectangle that turns about its second edge")
   end subroutine test_ways
 
   !> Vectors whose squares are out of range have a direction too.

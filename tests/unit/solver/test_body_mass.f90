@@ -1,8 +1,9 @@
 !> The mass matrix of a body, of a disk that turns, a sphere, and a boundary that moves along one axis: products and inverses.
 program test_body_mass
   use gravier_kinds, only: dp
-  use gravier_body_mass, only: can_move, inverse_of_translation, diagonal_mass, multiply_mass, mass_product, add_inverse_mass, &
-    & subtract_inverse_mass, apply_inverse_mass, velocities_under, inverse_product, inverse_products
+  use gravier_body_mass, only: can_move, inverse_of_translation, mass_column, multiply_mass, mass_product, add_inverse_mass, &
+    & subtract_inverse_mass, multiply_symmetric, invert_symmetric, apply_inverse_mass, velocities_under, inverse_product, &
+    & inverse_products
   use gravier_check, only: check, check_close, finish_checks
   implicit none
 
@@ -10,26 +11,32 @@ program test_body_mass
   !> a disk of 2 kg and 0.5 kg m^2, a sphere of 2 kg and 0.5 kg m^2, a boundary of 4 kg that moves along y
   real(dp), parameter :: disk(3) = [0.5_dp, 0.5_dp, 2.0_dp], sphere(4) = [0.5_dp, 0.5_dp, 0.5_dp, 2.0_dp]
   real(dp), parameter :: lid(3) = [0.0_dp, 0.25_dp, 0.0_dp]
+  !> a stone of 2 kg with a symmetric matrix, of eigenvalues above 0, in the place of one over an inertia
+  real(dp), parameter :: stone(9) = [0.5_dp, 0.5_dp, 0.5_dp, 2.0_dp, 1.5_dp, 3.0_dp, 0.25_dp, -0.5_dp, 0.125_dp]
 
   call test_rows()
   call test_inverse()
   call test_products()
   call test_all_bodies()
+  call test_stone()
   call finish_checks()
 
 contains
 
   subroutine test_rows()
-    real(dp) :: shared(3)
+    real(dp) :: shared(3), column(3)
 
     call check(can_move(sphere, 6) .and. can_move(disk, 3), "grains move and turn")
     call check(can_move(lid, 2) .and. .not. can_move(lid, 1) .and. .not. can_move(lid, 3), "a lid moves along one axis")
     call check_close(inverse_of_translation(lid, 2), 0.25_dp, rounding, "one over the mass of a lid")
     call check_close(inverse_of_translation(lid(1:1), 1), 0.0_dp, rounding, "what cannot move")
     shared(:) = 2.0_dp*disk
-    call check_close(diagonal_mass(disk, shared, 1), 1.0_dp, rounding, "half of a mass that two share")
-    call check_close(diagonal_mass(disk, shared, 3), 0.25_dp, rounding, "half of its inertia")
-    call check_close(diagonal_mass(lid, lid, 1), 0.0_dp, rounding, "no mass along what is fixed")
+    call mass_column(disk, shared, 1, column)
+    call check_close(norm2(column - [1.0_dp, 0.0_dp, 0.0_dp]), 0.0_dp, rounding, "half of a mass that two share")
+    call mass_column(disk, shared, 3, column)
+    call check_close(norm2(column - [0.0_dp, 0.0_dp, 0.25_dp]), 0.0_dp, rounding, "half of its inertia")
+    call mass_column(lid, lid, 1, column)
+    call check_close(norm2(column), 0.0_dp, rounding, "no mass along what is fixed")
   end subroutine test_rows
 
   !> M^-1 M v = v where the body can move.
@@ -99,5 +106,71 @@ contains
     call check_close(v(6, 1), 5.0_dp, rounding, "spin about the last axis")
     call check_close(norm2(v(:, 2) - v_free(:, 2)), 0.0_dp, rounding, "what moves as prescribed does so under impulses")
   end subroutine test_all_bodies
+
+  !> The same procedures for a body with a symmetric matrix, against the matrix written out.
+  subroutine test_stone()
+    real(dp) :: inverse(6), product(3), v(6), p(6), w(6), column(6), sums(6), copies_of(9, 1)
+    real(dp), parameter :: unit(6) = [0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp]
+    real(dp), dimension(6, 1) :: x, y, z
+
+    call check(can_move(stone, 4) .and. can_move(stone, 6), "a stone turns")
+    p(:) = [1.0_dp, -2.0_dp, 3.0_dp, 0.5_dp, 4.0_dp, -1.0_dp]
+    call multiply_symmetric(stone(4:9), p(4:6), product)
+    w(4:6) = under(p, 4, 6)
+    call check_close(norm2(product - w(4:6)), 0.0_dp, rounding, "a symmetric matrix and a vector")
+    call invert_symmetric(stone(4:9), inverse)
+    call multiply_symmetric(inverse, product, v(4:6))
+    call check_close(norm2(v(4:6) - p(4:6)), 0.0_dp, 10*rounding, "its inverse")
+    call apply_inverse_mass(stone, p, v)
+    w(:) = under(p, 1, 6)
+    call check_close(norm2(v - w), 0.0_dp, rounding, "the velocity that an impulse gives a stone")
+    w(:) = v
+    call multiply_mass(stone, stone, w)
+    call check_close(norm2(w - p), 0.0_dp, 10*rounding, "the impulse that gives it")
+    call mass_column(stone, stone, 5, column)
+    w(:) = under(column, 1, 6)
+    call check_close(norm2(w - unit), 0.0_dp, 10*rounding, &
+      & "a column of the mass matrix of a stone")
+    w(:) = 1.0_dp
+    call add_inverse_mass(stone, p, w)
+    call check_close(norm2(w - 1.0_dp - v), 0.0_dp, 10*rounding, "an impulse is added to a stone")
+    call subtract_inverse_mass(stone, p, w)
+    call check_close(norm2(w - 1.0_dp), 0.0_dp, 10*rounding, "and taken away")
+    call check_close(mass_product(stone, v, v), dot_product(p, v), 100*rounding, "product of velocities of a stone")
+    call check_close(inverse_product(stone, p, p), dot_product(p, v), 100*rounding, "product of impulses on a stone")
+    copies_of(:, 1) = stone
+    x(:, 1) = p
+    y(:, 1) = [0.5_dp, 1.0_dp, -1.0_dp, 2.0_dp, -3.0_dp, 1.0_dp]
+    w(:) = under(y(:, 1), 1, 6)
+    call inverse_products(copies_of, [2], x, y, y, sums)
+    call check_close(sums(1), 0.5_dp*dot_product(p, v), 100*rounding, "x with x of a stone that two share")
+    call check_close(sums(2), 0.5_dp*dot_product(y(:, 1), v), 100*rounding, "x with y")
+    call check_close(sums(3), 0.5_dp*dot_product(y(:, 1), w), 100*rounding, "y with y")
+    z(:, :) = 0.0_dp
+    call velocities_under(copies_of, y, z, x)
+    call check_close(norm2(x(:, 1) - w), 0.0_dp, 100*rounding, "the velocities of all stones")
+  end subroutine test_stone
+
+  !> The matrix of the stone, written out, times a vector: rows `first` to `last` of it.
+  pure function under(a, first, last) result(b)
+    real(dp), intent(in) :: a(6)
+    integer, intent(in) :: first, last
+    real(dp) :: b(last - first + 1), matrix(6, 6)
+    integer :: r, c
+
+    matrix(:, :) = 0.0_dp
+    do r = 1, 3
+      matrix(r, r) = 0.5_dp
+    end do
+    matrix(4, 4:6) = [2.0_dp, 0.25_dp, -0.5_dp]
+    matrix(5, 4:6) = [0.25_dp, 1.5_dp, 0.125_dp]
+    matrix(6, 4:6) = [-0.5_dp, 0.125_dp, 3.0_dp]
+    b(:) = 0.0_dp
+    do r = first, last
+      do c = 1, 6
+        b(r - first + 1) = b(r - first + 1) + matrix(r, c)*a(c)
+      end do
+    end do
+  end function under
 
 end program test_body_mass

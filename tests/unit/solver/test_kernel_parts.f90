@@ -76,17 +76,18 @@ contains
 
   !> Each set of effects has loops of its own.
   subroutine test_choices()
-    type(kernel_table_t) :: tables(10)
-    logical, parameter :: friction(5) = [.false., .true., .true., .true., .true.]
-    logical, parameter :: shifted(5) = [.false., .false., .true., .false., .true.]
-    logical, parameter :: rolling(5) = [.false., .false., .false., .true., .true.]
+    type(kernel_table_t) :: tables(14)
+    logical, parameter :: friction(7) = [.false., .true., .true., .true., .true., .true., .true.]
+    logical, parameter :: shifted(7) = [.false., .false., .true., .false., .true., .false., .true.]
+    logical, parameter :: rolling(7) = [.false., .false., .false., .true., .true., .false., .false.]
+    logical, parameter :: shaped(7) = [.false., .false., .false., .false., .false., .true., .true.]
     integer :: k, l
 
-    do k = 1, 5
-      call choose_sweeps_2d(tables(k), friction(k), shifted(k), rolling(k))
-      call choose_loops_2d(tables(k), friction(k), shifted(k), rolling(k))
-      call choose_sweeps_3d(tables(5 + k), friction(k), shifted(k), rolling(k))
-      call choose_loops_3d(tables(5 + k), friction(k), shifted(k), rolling(k))
+    do k = 1, 7
+      call choose_sweeps_2d(tables(k), friction(k), shifted(k), rolling(k), shaped(k))
+      call choose_loops_2d(tables(k), friction(k), shifted(k), rolling(k), shaped(k))
+      call choose_sweeps_3d(tables(7 + k), friction(k), shifted(k), rolling(k), shaped(k))
+      call choose_loops_3d(tables(7 + k), friction(k), shifted(k), rolling(k), shaped(k))
     end do
     do k = 1, size(tables)
       call check(associated(tables(k)%sweep_recording) .and. associated(tables(k)%sweep_momentum_recording) &
@@ -107,8 +108,8 @@ contains
     real(dp) :: hot(lanes, 5, 1), weight(3, 2), velocity(3, 2), impulse(lanes, 1, 1), sums(2), reaction(3, 2), residuals(3)
     integer :: pair(2, lanes)
 
-    call choose_sweeps_3d(kernels, .false., .false., .false.)
-    call choose_loops_3d(kernels, .false., .false., .false.)
+    call choose_sweeps_3d(kernels, .false., .false., .false., .false.)
+    call choose_loops_3d(kernels, .false., .false., .false., .false.)
     pair(:, :) = 1
     pair(2, 1) = 2
     hot(:, :, :) = 0.0_dp

@@ -1,6 +1,7 @@
 !> Which near pairs are contacts, with gaps, normals and terms; which law a pair has, and the velocities that it sees.
 !> The pairs are put together by hand, and what is expected follows from the places.
 program test_narrow_phase
+  use gravier_body_store, only: body_layout_t
   use gravier_kinds, only: dp
   use gravier_periodic, only: shift_code
   use gravier_contact_coefficients, only: coefficients_t
@@ -8,7 +9,8 @@ program test_narrow_phase
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_halo, only: local_bodies_t
-  use gravier_surface_velocity, only: find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
+  use gravier_surface_velocity, only: round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
+    & approach_velocity
   use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, find_contacts
@@ -54,7 +56,7 @@ contains
     decomposition%boundaries(1) = plane(101, point, normal)
     point(nd) = -1.0_dp
     decomposition%boundaries(2) = plane(102, point, normal)
-    call view%bodies%init(nd, 3*nd - 3, 0, size(places, 2))
+    call view%bodies%init(body_layout_t(nd, 3*nd - 3, 0), size(places, 2))
     do k = 1, size(places, 2)
       view%bodies%id(k) = k
     end do
@@ -262,7 +264,8 @@ contains
     view%bodies%velocity(:, 1) = [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp, 5.0_dp, 6.0_dp]
     view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
     call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
-    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
+    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, n), &
+      & n, pair)
     ! V + w x (-0.1 n) of the first grain, less V + w x (0.1 n) of the second
     v = cross([4.0_dp, 5.0_dp, 6.0_dp], n)
     w = cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
@@ -276,11 +279,13 @@ contains
     call make(2, reshape([0.0_dp, 0.1_dp], [2, 1]), view, decomposition)
     view%bodies%velocity(:, 1) = [0.3_dp, -0.2_dp, 5.0_dp]
     call list(view, reshape([1, -1], [2, 1]), pair_memory_t())
-    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, [0.0_dp, 1.0_dp], pair)
+    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
+      & [0.0_dp, 1.0_dp], pair)
     call check_close(pair%normal_velocity, -0.2_dp, rounding, "a disk approaches a plane")
     call check_close(pair%slip, 0.8_dp, rounding, "and slips: 0.3 + 5 0.1")
     decomposition%boundaries(1)%last_velocity(1) = 0.8_dp
-    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, [0.0_dp, 1.0_dp], pair)
+    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
+      & [0.0_dp, 1.0_dp], pair)
     call check_close(pair%slip, 0.0_dp, rounding, "a plane that moves with it")
   end subroutine check_velocities
 
@@ -319,7 +324,8 @@ contains
       call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
       n(1) = 0.0_dp
       n(2) = merge(-1.0_dp, 1.0_dp, order == 1)
-      call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, n, pair)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, n), &
+      & n, pair)
       ! at (1, 0.1) the boundary has the velocity (-0.3, 3)
       call check_close(pair%slip, 0.8_dp, 10*rounding, "slip against a glued grain, in either order")
       call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")

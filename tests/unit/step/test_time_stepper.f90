@@ -154,14 +154,16 @@ contains
     call check_equal(stepper%step, 0, "back to step 0")
   end subroutine test_step
 
-  !> Of a column of three: the bodies of the contact with a NaN, and of that with the largest impulse.
+  !> Of a column of three with friction: the bodies of the contact with a NaN, of that whose body has a velocity without a square,
+  !> and of that with the largest impulse, all of whose components count.
   subroutine test_failed_contact()
     type(simulation_t) :: simulation
     type(step_figures_t) :: figures
     character(len=:), allocatable :: cause
-    integer :: c
+    integer :: c, top
 
-    call make(column//"&time step = 0.01, steps = 1 /", simulation)
+    call make("&scene bodies = 'column', column_count = 3, radius = 0.5, gravity = 0, -10, friction = 0.5 / "// &
+      & "&time step = 0.01, steps = 1 /", simulation)
     call simulation%assemble(figures)
     associate (sub => simulation%problem%sub(1))
       call check_equal(sub%n_contacts, 3, "contacts of a column of three")
@@ -173,6 +175,22 @@ contains
       sub%impulse(lane_of(2), 1, block_of(2)) = 5.0_dp
       call find_largest_impulse(simulation%problem, cause)
       call check(index(cause, "largest impulse: contact of bodies "//text_of(simulation, 2)) == 1, "the largest impulse: "//cause)
+      sub%impulse(lane_of(1), 2, block_of(1)) = -6.0_dp
+      call find_largest_impulse(simulation%problem, cause)
+      call check(index(cause, "largest impulse: contact of bodies "//text_of(simulation, 1)) == 1, "one that slides: "//cause)
+      ! one contact has the uppermost disk, whose identifier is 3
+      top = 1
+      do c = 1, sub%n_contacts
+        if (sub%id(sub%pair(1, c)) == 3 .or. sub%id(sub%pair(2, c)) == 3) top = c
+      end do
+      do c = 1, 2
+        if (sub%id(sub%pair(c, top)) == 3) sub%velocity(2, sub%pair(c, top)) = 1e200_dp
+      end do
+      call find_divergence(simulation%problem, cause)
+      call check(index(cause, "contact of bodies "//text_of(simulation, top)) == 1, "a velocity without a square: "//cause)
+      do c = 1, 2
+        if (sub%id(sub%pair(c, top)) == 3) sub%velocity(2, sub%pair(c, top)) = 0.0_dp
+      end do
       sub%impulse(lane_of(3), 1, block_of(3)) = ieee_value(1.0_dp, ieee_quiet_nan)
       call find_divergence(simulation%problem, cause)
       call check(index(cause, "contact of bodies "//text_of(simulation, 3)) == 1, "the contact with a NaN: "//cause)
@@ -206,16 +224,23 @@ contains
     solve%velocity_scale = 0.1_dp
     solve%residual = 2e-2_dp
     call tally%add_solve(solve, "load of a step")
+    ! a pass over layers that the solve went on from, then one that it did not
+    solve%layered_sweeps = 1.5_dp
+    solve%layered = .true.
     solve%status = solve_stagnated
     solve%velocity_error = 0.06_dp
     solve%residual = 1e-2_dp
     call tally%add_solve(solve, "load of a step")
+    solve%layered = .false.
     solve%status = solve_diverged
     solve%velocity_error = 1e9_dp
     solve%velocity_scale = 0.4_dp
     call tally%add_solve(solve, "speeds")
     call check_equal(int(tally%solves), 3, "solves")
     call check_equal(int(tally%missed()), 2, "missed")
+    call check_equal(int(tally%tried_layers), 2, "passes over layers that were tried")
+    call check_equal(int(tally%took_layers), 1, "and gone on from")
+    call check_close(tally%layered_sweeps, 3.0_dp, 0.0_dp, "sweeps of both")
     call check_equal(int(tally%stagnated), 1, "stagnated")
     call check_equal(int(tally%diverged), 1, "diverged")
     call check_close(tally%worst_error, 0.6_dp, 1e-12_dp, "worst error over the scale, of those that are numbers")

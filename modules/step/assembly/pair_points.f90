@@ -1,0 +1,201 @@
+!> The points in which a pair of bodies touches, and what is kept with them from one step to the next.
+module gravier_pair_points
+  use gravier_kinds, only: dp
+  use gravier_manifold, only: manifold_t, feature_base
+  use gravier_neighbour_list, only: neighbour_list_t
+  implicit none
+  private
+  public :: pair_points_t, carry_memory
+
+  !> directions of normals that are the same
+  real(dp), parameter :: same = 1.0e-6_dp
+
+  !> Points in ascending order of their keys.
+  type :: pair_points_t
+    integer :: n = 0
+    !> from the antagonist to the candidate (3, n)
+    real(dp), allocatable :: normal(:, :)
+    !> from the centre of the candidate, half-way between the surfaces (3, n) [m]
+    real(dp), allocatable :: point(:, :)
+    !> (n) [m]
+    real(dp), allocatable :: gap(:)
+    !> of the features of the two pieces, and of the pieces (2, n), both above 0
+    integer, allocatable :: key(:, :)
+    !> pairs of pieces whose cores overlap, over all pairs asked for
+    integer :: overlapping_cores = 0
+  contains
+    procedure :: add => pair_points_add
+    procedure :: merge_near => pair_points_merge_near
+    procedure :: keep_deepest => pair_points_keep_deepest
+  end type pair_points_t
+
+contains
+
+  !> Add the points of two pieces.
+  subroutine pair_points_add(self, manifold, piece_a, piece_b)
+    class(pair_points_t), intent(inout) :: self
+    type(manifold_t), intent(in) :: manifold
+    integer, intent(in) :: piece_a, piece_b
+    integer :: k
+
+    if (.not. allocated(self%gap)) allocate (self%normal(3, 8), self%point(3, 8), self%gap(8), self%key(2, 8))
+    if (self%n + manifold%n > size(self%gap)) call lengthen(self, self%n + manifold%n)
+    do k = 1, manifold%n
+      self%n = self%n + 1
+      self%normal(:, self%n) = manifold%normal
+      self%point(:, self%n) = manifold%point(:, k)
+      self%gap(self%n) = manifold%gap(k)
+      self%key(1, self%n) = manifold%key(k) + 1
+      self%key(2, self%n) = feature_base*piece_a + piece_b
+    end do
+    if (manifold%n > 0 .and. manifold%cores_overlap) self%overlapping_cores = self%overlapping_cores + 1
+  end subroutine pair_points_add
+
+  subroutine lengthen(self, least)
+    type(pair_points_t), intent(inout) :: self
+    integer, intent(in) :: least
+    real(dp), allocatable :: normal(:, :), point(:, :), gap(:)
+    integer, allocatable :: key(:, :)
+    integer :: room
+
+    room = max(least, 2*size(self%gap))
+    allocate (normal(3, room), point(3, room), gap(room), key(2, room))
+    normal(:, 1:self%n) = self%normal(:, 1:self%n)
+    point(:, 1:self%n) = self%point(:, 1:self%n)
+    gap(1:self%n) = self%gap(1:self%n)
+    key(:, 1:self%n) = self%key(:, 1:self%n)
+    call move_alloc(normal, self%normal)
+    call move_alloc(point, self%point)
+    call move_alloc(gap, self%gap)
+    call move_alloc(key, self%key)
+  end subroutine lengthen
+
+  !> Of points that are one, where pieces of a cluster meet, keep the deepest, of several the first.
+  pure subroutine pair_points_merge_near(points, near)
+    class(pair_points_t), intent(inout) :: points
+    !> points of two pairs of pieces nearer to each other than this, with the same normal, are one [m]
+    real(dp), intent(in) :: near
+    logical :: dropped(points%n)
+    integer :: k, l
+
+    if (points%n < 2) return
+    if (points%key(2, 1) == points%key(2, points%n)) return
+    dropped(:) = .false.
+    do k = 1, points%n
+      do l = k + 1, points%n
+        if (points%key(2, k) == points%key(2, l)) cycle
+        if (dropped(k) .or. dropped(l)) cycle
+        if (maxval(abs(points%point(:, k) - points%point(:, l))) > near) cycle
+        if (maxval(abs(points%normal(:, k) - points%normal(:, l))) > same) cycle
+        dropped(l) = points%gap(l) >= points%gap(k)
+        dropped(k) = .not. dropped(l)
+      end do
+    end do
+    call drop(dropped, points)
+  end subroutine pair_points_merge_near
+
+  !> Keep at most so many points, those with the smallest gaps.
+  pure subroutine pair_points_keep_deepest(points, most)
+    class(pair_points_t), intent(inout) :: points
+    integer, intent(in) :: most
+    logical :: dropped(points%n)
+    integer :: k, l, shallowest
+
+    if (points%n <= most) return
+    dropped(:) = .false.
+    do k = 1, points%n - most
+      shallowest = 0
+      do l = 1, points%n
+        if (dropped(l)) cycle
+        if (shallowest == 0) shallowest = l
+        if (points%gap(l) >= points%gap(shallowest)) shallowest = l
+      end do
+      dropped(shallowest) = .true.
+    end do
+    call drop(dropped, points)
+  end subroutine pair_points_keep_deepest
+
+  pure subroutine drop(dropped, points)
+    logical, intent(in) :: dropped(:)
+    class(pair_points_t), intent(inout) :: points
+    integer :: k, n
+
+    n = 0
+    do k = 1, points%n
+      if (dropped(k)) cycle
+      n = n + 1
+      points%normal(:, n) = points%normal(:, k)
+      points%point(:, n) = points%point(:, k)
+      points%gap(n) = points%gap(k)
+      points%key(:, n) = points%key(:, k)
+    end do
+    points%n = n
+  end subroutine drop
+
+  !> Bring the impulses and states that the pair at place `p` keeps to the points of now: to those with the same keys first, then
+  !> what is left, in its order, to the new points. Points take the places of the pair in their order.
+  pure subroutine carry_memory(points, p, list)
+    type(pair_points_t), intent(in) :: points
+    integer, intent(in) :: p
+    type(neighbour_list_t), intent(inout) :: list
+    integer, allocatable :: source(:)
+    logical, allocatable :: taken(:)
+    real(dp), allocatable :: impulse(:, :)
+    integer, allocatable :: state(:, :)
+    integer :: k, l, m, row
+
+    m = list%points_of(p)
+    row = list%memory%key_row
+    if (points%n == 0 .and. all(list%state(row, p:p + m - 1) == 0)) return
+    if (are_the_same()) return
+    impulse = list%impulse(:, p:p + m - 1)
+    state = list%state(:, p:p + m - 1)
+    allocate (source(points%n), source=0)
+    allocate (taken(m), source=.false.)
+    do k = 1, points%n
+      do l = 1, m
+        if (any(state(row:row + 1, l) /= points%key(:, k))) cycle
+        source(k) = l
+        taken(l) = .true.
+      end do
+    end do
+    l = 0
+    do k = 1, points%n
+      if (source(k) > 0) cycle
+      do while (l < m)
+        l = l + 1
+        if (taken(l) .or. state(row, l) == 0) cycle
+        source(k) = l
+        taken(l) = .true.
+        exit
+      end do
+    end do
+    list%impulse(:, p:p + m - 1) = 0.0_dp
+    list%state(:, p:p + m - 1) = 0
+    do k = 1, points%n
+      if (source(k) > 0) then
+        list%impulse(:, p + k - 1) = impulse(:, source(k))
+        list%state(:, p + k - 1) = state(:, source(k))
+      end if
+      list%state(row:row + 1, p + k - 1) = points%key(:, k)
+    end do
+
+  contains
+
+    !> Whether the pair keeps just these points.
+    pure logical function are_the_same()
+      integer :: k
+
+      are_the_same = .true.
+      do k = 1, m
+        if (k <= points%n) then
+          are_the_same = are_the_same .and. all(list%state(row:row + 1, p + k - 1) == points%key(:, k))
+        else
+          are_the_same = are_the_same .and. list%state(row, p + k - 1) == 0
+        end if
+      end do
+    end function are_the_same
+
+  end subroutine carry_memory
+
+end module gravier_pair_points

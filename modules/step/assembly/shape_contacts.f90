@@ -1,0 +1,429 @@
+!> The points in which two bodies touch, or a body and a boundary, where bodies have shapes.
+module gravier_shape_contacts
+  use gravier_kinds, only: dp
+  use gravier_periodic, only: period_t, shift_of_code
+  use gravier_orientation, only: orientation_matrix
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_shape_library, only: shape_library_t
+  use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t
+  use gravier_manifold, only: manifold_t, feature_base
+  use gravier_polygon_pair, only: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold
+  use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
+  use gravier_decomposition, only: decomposition_t
+  use gravier_halo, only: local_bodies_t
+  use gravier_pair_points, only: pair_points_t
+  implicit none
+  private
+  public :: find_points
+
+  !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
+  real(dp), parameter :: same = 1.0e-6_dp
+  !> points of two pieces in space
+  integer, parameter :: of_face = 4
+
+  !> A body, seen from the centre of the candidate.
+  type :: seen_body_t
+    !> number of its shape, 0 for a disk or a sphere
+    integer :: shape = 0
+    !> [m]
+    real(dp) :: radius = 0.0_dp
+    !> its centre (3) [m]
+    real(dp) :: centre(3) = 0.0_dp
+    !> its angle in the plane [rad], its axes in space, one a column
+    real(dp) :: angle = 0.0_dp, axes(3, 3) = 0.0_dp
+  end type seen_body_t
+
+contains
+
+  !> The points of pair `p` of a view whose gap is at most the alert distance; at most as many as the pair has places in the list,
+  !> those with the smallest gaps.
+  subroutine find_points(view, decomposition, p, points)
+    type(local_bodies_t), intent(in) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: p
+    type(pair_points_t), intent(inout) :: points
+    type(seen_body_t) :: candidate, antagonist
+    real(dp) :: way(decomposition%nd)
+    integer :: i, j
+
+    points%n = 0
+    i = view%list%candidate(p)
+    j = view%list%antagonist(p)
+    associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
+      if (j > 0) then
+        way(:) = bodies%position(:, j) - bodies%position(:, i)
+        if (size(view%list%shift) > 0) call add_shift(decomposition%period, view%list%shift(p), way)
+        if (norm2(way) > bodies%radius(i) + bodies%radius(j) + alert) return
+        call see_body(bodies, i, candidate)
+        call see_body(bodies, j, antagonist)
+        antagonist%centre(1:decomposition%nd) = way
+        call touch_body(decomposition%shapes, candidate, antagonist, decomposition%nd, alert, points)
+      else
+        call see_body(bodies, i, candidate)
+        call touch_boundary(decomposition%shapes, candidate, bodies%position(:, i), decomposition%boundaries(-j), alert, points)
+      end if
+      call points%merge_near(same*bodies%radius(i))
+    end associate
+    call points%keep_deepest(view%list%points_of(p))
+  end subroutine find_points
+
+  !> What contacts need of body `k`.
+  pure subroutine see_body(bodies, k, seen)
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    type(seen_body_t), intent(out) :: seen
+    integer :: d
+
+    seen%shape = bodies%shape(k)
+    seen%radius = bodies%radius(k)
+    do d = 1, 3
+      seen%axes(d, d) = 1.0_dp
+    end do
+    if (seen%shape == 0) return
+    if (bodies%nd == 2) then
+      seen%angle = bodies%orientation(1, k)
+    else
+      call orientation_matrix(bodies%orientation(:, k), seen%axes)
+    end if
+  end subroutine see_body
+
+  !> The points of two bodies, piece by piece.
+  subroutine touch_body(shapes, a, b, nd, alert, points)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: a, b
+    integer, intent(in) :: nd
+    !> [m]
+    real(dp), intent(in) :: alert
+    type(pair_points_t), intent(inout) :: points
+    type(manifold_t) :: manifold
+    type(placed_piece_t) :: placed_a, placed_b
+    type(convex_piece_t) :: ball
+    integer :: k, l
+
+    call make_ball(nd, ball)
+    do k = 1, n_pieces(shapes, a)
+      if (nd == 2) call place(shapes, ball, a, k, placed_a)
+      do l = 1, n_pieces(shapes, b)
+        if (nd == 2) then
+          call place(shapes, ball, b, l, placed_b)
+          call find_polygon_manifold(placed_a, placed_b, alert, manifold)
+        else if (a%shape == 0) then
+          call meet(ball, b)
+        else
+          call meet(shapes%shape(a%shape)%piece(k), b)
+        end if
+        call points%add(manifold, k, l)
+      end do
+    end do
+
+  contains
+
+    !> Piece l of body b meets a piece of body a in space.
+    subroutine meet(piece, b)
+      type(convex_piece_t), intent(in) :: piece
+      type(seen_body_t), intent(in) :: b
+
+      if (b%shape == 0) then
+        call meet_in_space(piece, ball, a, b, alert, manifold)
+      else
+        call meet_in_space(piece, shapes%shape(b%shape)%piece(l), a, b, alert, manifold)
+      end if
+    end subroutine meet
+
+  end subroutine touch_body
+
+  !> The points of a piece of body a and one of body b in space, in global axes.
+  subroutine meet_in_space(piece_a, piece_b, a, b, alert, manifold)
+    type(convex_piece_t), intent(in) :: piece_a, piece_b
+    type(seen_body_t), intent(in) :: a, b
+    real(dp), intent(in) :: alert
+    type(manifold_t), intent(inout) :: manifold
+    real(dp) :: rotation(3, 3), way(3)
+    integer :: k, l
+
+    do k = 1, 3
+      way(k) = sum(a%axes(:, k)*b%centre)
+      do l = 1, 3
+        rotation(k, l) = sum(a%axes(:, k)*b%axes(:, l))
+      end do
+    end do
+    call find_polyhedron_manifold(piece_a, piece_b, a%radius, b%radius, rotation, way, alert, of_face, manifold)
+    call turn_manifold(a%axes, manifold)
+  end subroutine meet_in_space
+
+  !> From the axes of a body to global axes.
+  pure subroutine turn_manifold(axes, manifold)
+    real(dp), intent(in) :: axes(3, 3)
+    type(manifold_t), intent(inout) :: manifold
+    real(dp) :: before(3)
+    integer :: k, d
+
+    before(:) = manifold%normal
+    do d = 1, 3
+      manifold%normal(d) = sum(axes(d, :)*before)
+    end do
+    do k = 1, manifold%n
+      before(:) = manifold%point(:, k)
+      do d = 1, 3
+        manifold%point(d, k) = sum(axes(d, :)*before)
+      end do
+    end do
+  end subroutine turn_manifold
+
+  !> The points with a boundary: a plane, a surface that ends at straight edges, or one that is round.
+  subroutine touch_boundary(shapes, a, centre, boundary, alert, points)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: a
+    !> of the body (nd) [m]
+    real(dp), intent(in), contiguous :: centre(:)
+    type(boundary_t), intent(in) :: boundary
+    real(dp), intent(in) :: alert
+    type(pair_points_t), intent(inout) :: points
+    type(convex_piece_t) :: ball, sheet
+    type(seen_body_t) :: seen_sheet
+    real(dp) :: normal(size(centre)), distance, corners(3, 4)
+    integer :: k, n
+
+    if (.not. boundary%present) return
+    call boundary%locate(centre, distance, normal)
+    if (distance - a%radius > alert) return
+    call boundary%find_corners(centre, n, corners)
+    call make_ball(size(centre), ball)
+    if (n > 0) call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
+    do k = 1, n_pieces(shapes, a)
+      if (a%shape == 0) then
+        call touch(ball)
+      else
+        call touch(shapes%shape(a%shape)%piece(k))
+      end if
+    end do
+
+  contains
+
+    subroutine touch(piece)
+      type(convex_piece_t), intent(in) :: piece
+      type(manifold_t) :: manifold
+
+      if (boundary%is_plane()) then
+        call touch_plane(piece, a, normal, distance, alert, manifold)
+        call points%add(manifold, k, 1)
+      else if (n > 0) then
+        call touch_sheet(piece, a, sheet, seen_sheet, size(centre), alert, manifold)
+        call points%add(manifold, k, 1)
+      else
+        call touch_round_surface(piece, a, centre, boundary, alert, k, points)
+      end if
+    end subroutine touch
+
+  end subroutine touch_boundary
+
+  subroutine touch_plane(piece, a, normal, distance, alert, manifold)
+    type(convex_piece_t), intent(in) :: piece
+    type(seen_body_t), intent(in) :: a
+    !> (nd), and distance of the centre of the body [m]
+    real(dp), intent(in), contiguous :: normal(:)
+    real(dp), intent(in) :: distance, alert
+    type(manifold_t), intent(inout) :: manifold
+    type(placed_piece_t) :: placed
+    real(dp) :: turned(3)
+    integer :: k
+
+    if (size(normal) == 2) then
+      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), placed)
+      call find_plane_manifold(placed, normal, -distance, alert, manifold)
+      return
+    end if
+    do k = 1, 3
+      turned(k) = sum(a%axes(:, k)*normal)
+    end do
+    call find_halfspace_manifold(piece, a%radius, turned, distance, alert, of_face, manifold)
+    call turn_manifold(a%axes, manifold)
+  end subroutine touch_plane
+
+  !> The points with a surface that ends at straight edges, which has no thickness.
+  subroutine touch_sheet(piece, a, sheet, seen_sheet, nd, alert, manifold)
+    type(convex_piece_t), intent(in) :: piece, sheet
+    type(seen_body_t), intent(in) :: a, seen_sheet
+    integer, intent(in) :: nd
+    real(dp), intent(in) :: alert
+    type(manifold_t), intent(inout) :: manifold
+    type(placed_piece_t) :: placed, placed_sheet
+
+    if (nd == 2) then
+      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), placed)
+      call place_piece(sheet%vertex, sheet%corner, 0.0_dp, seen_sheet%radius, 0.0_dp, seen_sheet%centre(1:2), placed_sheet)
+      call find_polygon_manifold(placed, placed_sheet, alert, manifold)
+    else
+      call meet_in_space(piece, sheet, a, seen_sheet, alert, manifold)
+    end if
+  end subroutine touch_sheet
+
+  !> The points with a round surface: vertices, of a polygon the nearest and the nearer of those beside it.
+  subroutine touch_round_surface(piece, a, centre, boundary, alert, number, points)
+    type(convex_piece_t), intent(in) :: piece
+    type(seen_body_t), intent(in) :: a
+    real(dp), intent(in) :: centre(:)
+    type(boundary_t), intent(in) :: boundary
+    real(dp), intent(in) :: alert
+    !> of the piece
+    integer, intent(in) :: number
+    type(pair_points_t), intent(inout) :: points
+    type(manifold_t) :: manifold
+    real(dp) :: gap(size(piece%vertex, 2)), normal(size(centre)), vertex(3)
+    integer :: v, nd, nearest, beside
+
+    nd = size(centre)
+    do v = 1, size(gap)
+      call locate_vertex()
+    end do
+    nearest = minloc(gap, dim=1)
+    beside = nearest
+    if (nd == 2) then
+      beside = mod(nearest, size(gap)) + 1
+      v = mod(nearest + size(gap) - 2, size(gap)) + 1
+      if (gap(v) < gap(beside)) beside = v
+    end if
+    do v = 1, size(gap)
+      if (gap(v) > alert .or. (nd == 2 .and. v /= nearest .and. v /= beside)) cycle
+      call locate_vertex()
+      manifold%n = 1
+      manifold%normal(1:nd) = normal
+      manifold%gap(1) = gap(v)
+      manifold%point(:, 1) = vertex
+      manifold%point(1:nd, 1) = vertex(1:nd) - (a%radius*piece%rounding + 0.5_dp*gap(v))*normal
+      manifold%key(1) = feature_base*v
+      call points%add(manifold, number, 1)
+    end do
+
+  contains
+
+    !> Where vertex v is from the centre, and the surface from there.
+    subroutine locate_vertex()
+      real(dp) :: distance, at(size(centre))
+
+      call turn_vertex(piece%vertex(:, v), a, vertex)
+      at(:) = centre + vertex(1:nd)
+      call boundary%locate(at, distance, normal)
+      gap(v) = distance - a%radius*piece%rounding
+    end subroutine locate_vertex
+
+  end subroutine touch_round_surface
+
+  !> A vertex of a body from its centre, in global axes [m].
+  pure subroutine turn_vertex(vertex, a, turned)
+    !> (nd) of a body of radius 1
+    real(dp), intent(in) :: vertex(:)
+    type(seen_body_t), intent(in) :: a
+    real(dp), intent(out) :: turned(3)
+    integer :: d
+
+    turned(3) = 0.0_dp
+    if (size(vertex) == 2) then
+      turned(1) = a%radius*(cos(a%angle)*vertex(1) - sin(a%angle)*vertex(2))
+      turned(2) = a%radius*(sin(a%angle)*vertex(1) + cos(a%angle)*vertex(2))
+    else
+      do d = 1, 3
+        turned(d) = a%radius*sum(a%axes(d, :)*vertex)
+      end do
+    end if
+  end subroutine turn_vertex
+
+  pure integer function n_pieces(shapes, seen) result(n)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: seen
+
+    n = 1
+    if (seen%shape > 0) n = size(shapes%shape(seen%shape)%piece)
+  end function n_pieces
+
+  !> A disk or a sphere of radius 1 is the rounding of its centre.
+  pure subroutine make_ball(nd, ball)
+    integer, intent(in) :: nd
+    type(convex_piece_t), intent(out) :: ball
+
+    ball%rounding = 1.0_dp
+    allocate (ball%vertex(nd, 1), ball%corner(nd, 1), source=0.0_dp)
+    allocate (ball%face_first(1), ball%neighbour_first(2), source=1)
+    allocate (ball%face_vertex(0), ball%neighbour(0), ball%face_normal(3, 0))
+  end subroutine make_ball
+
+  !> A segment or a rectangle as a piece without rounding, with one face to either side.
+  pure subroutine make_sheet(nd, corners, sheet, seen)
+    integer, intent(in) :: nd
+    !> from the centre of the candidate, in order around it (3, 2 or 4) [m]
+    real(dp), intent(in) :: corners(:, :)
+    type(convex_piece_t), intent(out) :: sheet
+    type(seen_body_t), intent(out) :: seen
+    integer :: k, n
+
+    n = size(corners, 2)
+    seen%shape = 1
+    seen%centre(:) = sum(corners, dim=2)/n
+    do k = 1, 3
+      seen%axes(k, k) = 1.0_dp
+    end do
+    do k = 1, n
+      seen%radius = max(seen%radius, norm2(corners(:, k) - seen%centre))
+    end do
+    allocate (sheet%vertex(nd, n))
+    do k = 1, n
+      sheet%vertex(:, k) = (corners(1:nd, k) - seen%centre(1:nd))/seen%radius
+    end do
+    sheet%corner = sheet%vertex
+    if (nd == 2) return
+    sheet%face_first = [1, 5, 9]
+    sheet%face_vertex = [1, 2, 3, 4, 4, 3, 2, 1]
+    sheet%neighbour_first = [1, 3, 5, 7, 9]
+    sheet%neighbour = [2, 4, 1, 3, 2, 4, 1, 3]
+    allocate (sheet%face_normal(3, 2))
+    sheet%face_normal(1, 1) = across(2, 3)
+    sheet%face_normal(2, 1) = across(3, 1)
+    sheet%face_normal(3, 1) = across(1, 2)
+    sheet%face_normal(:, 1) = sheet%face_normal(:, 1)/norm2(sheet%face_normal(:, 1))
+    sheet%face_normal(:, 2) = -sheet%face_normal(:, 1)
+
+  contains
+
+    !> A component of the cross product of the edges at the first corner.
+    pure real(dp) function across(d, e)
+      integer, intent(in) :: d, e
+
+      across = (corners(d, 2) - corners(d, 1))*(corners(e, 4) - corners(e, 1)) &
+        & - (corners(e, 2) - corners(e, 1))*(corners(d, 4) - corners(d, 1))
+    end function across
+
+  end subroutine make_sheet
+
+  !> Put piece `k` of a body of the plane in its place.
+  subroutine place(shapes, ball, seen, k, placed)
+    type(shape_library_t), intent(in) :: shapes
+    type(convex_piece_t), intent(in) :: ball
+    type(seen_body_t), intent(in) :: seen
+    integer, intent(in) :: k
+    type(placed_piece_t), intent(inout) :: placed
+
+    if (seen%shape == 0) then
+      call place_piece(ball%vertex, ball%corner, 1.0_dp, seen%radius, 0.0_dp, seen%centre(1:2), placed)
+    else
+      associate (this => shapes%shape(seen%shape)%piece(k))
+        call place_piece(this%vertex, this%corner, this%rounding, seen%radius, seen%angle, seen%centre(1:2), placed)
+      end associate
+    end if
+  end subroutine place
+
+  !> Take the shift of the antagonist into account in the way from the candidate to it.
+  pure subroutine add_shift(period, code, way)
+    type(period_t), intent(in) :: period
+    integer, intent(in) :: code
+    !> (nd) [m]
+    real(dp), intent(inout) :: way(:)
+    integer :: shift(3), d
+
+    shift(:) = shift_of_code(code)
+    do d = 1, size(way)
+      way(d) = way(d) + shift(d)*period%length(d)
+    end do
+  end subroutine add_shift
+
+end module gravier_shape_contacts
