@@ -5,9 +5,9 @@ module gravier_shapes_file
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_size, size_text
   use gravier_communicator, only: communicator_t
-  use gravier_whole_file, only: read_whole_file
+  use gravier_input_text, only: read_input_text
   use gravier_shape_library, only: body_shape_t, shape_library_t
-  use gravier_shape_names, only: is_reserved_name
+  use gravier_shape_names, only: find_shape, is_reserved_name
   use gravier_convex_piece, only: convex_piece_t
   use gravier_mass_properties, only: mass_t, mass_of_sum, find_principal_axes
   use gravier_polyhedron, only: make_piece, make_capsule_piece, make_shape
@@ -35,7 +35,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
-    call read_whole_file(comm, path, "a text file of shapes", text, error)
+    call read_input_text(comm, path, "a text file of shapes", text, error)
     call parse_shapes(path, text, dimension, library, error)
     call comm%agree(error)
   end subroutine read_shapes
@@ -88,7 +88,7 @@ contains
       else if (is_reserved_name(name)) then
         call refuse(path, statement, "shape "//name//": expected another name: grain, disk, sphere and plane stand for "// &
           & "themselves in bodies files", error)
-      else if (library%find(name) > 0) then
+      else if (find_shape(library, name) > 0) then
         call refuse(path, statement, "shape "//name//": expected a name that no shape above has", error)
       end if
     end associate

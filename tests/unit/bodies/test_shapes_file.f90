@@ -4,7 +4,7 @@ program test_shapes_file
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_names, only: shape_names, library_digest
+  use gravier_shape_names, only: find_shape, shape_names, library_digest
   use gravier_shapes_file, only: parse_shapes
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -41,8 +41,8 @@ contains
     if (allocated(error)) return
     call check_equal(library%n, 4, "number of shapes")
     call check_equal(shape_names(library, " "), "brick two coin pill", "names")
-    call check_equal(library%find("coin"), 3, "a shape by its name")
-    call check_equal(library%find("coi"), 0, "no shape of that name")
+    call check_equal(find_shape(library, "coin"), 3, "a shape by its name")
+    call check_equal(find_shape(library, "coi"), 0, "no shape of that name")
     associate (brick => library%shape(1), two => library%shape(2), coin => library%shape(3), pill => library%shape(4))
       call check_close(brick%size, sqrt(5.0_dp), rounding_error, "size of a rectangle")
       call check_close(brick%volume*brick%size**2, 8.0_dp, 10*rounding_error, "area of a rectangle")

@@ -1,17 +1,17 @@
 !> Text files read as a whole.
-module gravier_whole_file
+module gravier_input_text
   use gravier_errors, only: error_t, raise, status_input
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: check_readable
   implicit none
   private
-  public :: read_whole_file
+  public :: read_input_text
 
 contains
 
   !> The whole of a file as text, on all ranks; rank 0 alone reads it. Failure: status_input. Errors are the same on all ranks.
   !> Collective.
-  subroutine read_whole_file(comm, path, expected, text, error)
+  subroutine read_input_text(comm, path, expected, text, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> for the message: a text file of ...
@@ -25,7 +25,7 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     call comm%broadcast_text(text, 0)
-  end subroutine read_whole_file
+  end subroutine read_input_text
 
   subroutine read_text(path, expected, text, error)
     character(len=*), intent(in) :: path, expected
@@ -46,4 +46,4 @@ contains
     if (stat /= 0) call raise(error, status_input, path//": cannot read this file; expected "//expected)
   end subroutine read_text
 
-end module gravier_whole_file
+end module gravier_input_text
