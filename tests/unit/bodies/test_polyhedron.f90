@@ -357,6 +357,7 @@ contains
         end do
       end do
       call find_principal_axes(tensor, moment, axes)
+      call check(axes(1, 1) + axes(2, 2) + axes(3, 3) >= 1.0_dp, "axes of a small turn")
       do k = 1, 3
         left(:) = matmul(tensor, axes(:, k))
         call check_close(norm2(left - moment(k)*axes(:, k)), 0.0_dp, 1.0e-14_dp, "an axis is one")
