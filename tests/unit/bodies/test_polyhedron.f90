@@ -213,7 +213,7 @@ contains
     do trial = 1, 50
       turn = random_turn(draws)
       do k = 1, 20
-        turned(:, k) = matmul(turn%m, points(:, k)) + 10.0_dp
+        turned(:, k) = points(1, k)*turn%m(:, 1) + points(2, k)*turn%m(:, 2) + points(3, k)*turn%m(:, 3) + 10.0_dp
       end do
       call make_polyhedron("flat dodecahedron", turned, 0.01_dp, shape, error)
       right = right .and. .not. allocated(error)

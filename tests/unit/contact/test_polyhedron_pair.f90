@@ -485,10 +485,10 @@ contains
       call check_equal(one%n, other%n, "seen from the other: points")
       if (one%n == 0 .or. one%cores_overlap) cycle
       met = met + 1
-      place%x(:) = matmul(turn%m, other%normal)
+      place = on(turn, vector_t(other%normal))
       call check_close(norm2(one%normal + place%x), 0.0_dp, 1.0e-11_dp, "seen from the other: normal")
       do k = 1, other%n
-        place%x(:) = matmul(turn%m, other%point(:, k))
+        place = on(turn, vector_t(other%point(:, k)))
         place%x(:) = place%x + way%x
         call check(has_point(one, place, 1.0e-9_dp), "seen from the other: a point")
       end do
