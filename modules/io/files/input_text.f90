@@ -2,7 +2,7 @@
 module gravier_input_text
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
-  use gravier_whole_file, only: read_whole_file
+  use gravier_file_lines, only: read_whole_file
   implicit none
   private
   public :: read_input_text
