@@ -33,7 +33,8 @@ program test_polyhedron_fuzz
   call MPI_Comm_rank(MPI_COMM_WORLD, rank)
   call MPI_Comm_size(MPI_COMM_WORLD, ranks)
   count = argument(1, 40000)
-  seed = argument(2, 1)
+  ! of this seed come two pairs that a search with less care for rounding gets wrong
+  seed = argument(2, 11)
   if (rank == 0) print "(2(a, i0))", "pairs ", count, ", seed ", seed
   draws%seed = seed
   call make_library(draws, library)
