@@ -2,7 +2,7 @@
 module gravier_input_text
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
-  use gravier_whole_file, only: read_whole_file
+  use gravier_file_lines, only: lines_t
   implicit none
   private
   public :: read_input_text
@@ -16,12 +16,13 @@ contains
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
+    type(lines_t) :: lines
 
     if (allocated(error)) return
+    text = ""
     if (comm%rank == 0) then
-      call read_whole_file(path, text, error)
-    else
-      text = ""
+      call lines%open(path, error)
+      if (allocated(lines%text)) call move_alloc(lines%text, text)
     end if
     call comm%agree(error)
     if (allocated(error)) return
