@@ -1,7 +1,7 @@
 !> Contacts of pieces of the plane: bricks, disks and capsules in known places, and random pairs whose distance is proved by duality.
 program test_polygon_pair
   use gravier_kinds, only: dp, i8
-  use gravier_random_hash, only: random_unit
+  use gravier_random_hash, only: hash_uniform
   use gravier_polygon, only: flat_piece_t, polygon_piece
   use gravier_manifold, only: manifold_t
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold
@@ -189,7 +189,7 @@ contains
     beyond = 0
     do k = 1, n_pairs
       call put_random(2_i8*k, 0.0_dp, a)
-      call put_random(2_i8*k + 1_i8, 1.0_dp + 1.5_dp*random_unit(7_i8, int(k, i8), 1), b)
+      call put_random(2_i8*k + 1_i8, 1.0_dp + 1.5_dp*hash_uniform(7, int(k, i8), 1), b)
       call find_polygon_manifold(a, b, 0.5_dp, manifold)
       if (manifold%n == 0) then
         ! some direction separates them by more than the alert distance
@@ -217,15 +217,15 @@ contains
     real(dp) :: corners(2, 9), centre(2), angle, width
     integer :: n, k
 
-    n = 3 + int(6.99_dp*random_unit(1_i8, seed, 1))
-    width = 0.05_dp + 0.9_dp*random_unit(2_i8, seed, 1)
+    n = 3 + int(6.99_dp*hash_uniform(1, seed, 1))
+    width = 0.05_dp + 0.9_dp*hash_uniform(2, seed, 1)
     do k = 1, n
-      angle = 2.0_dp*pi*(k + 0.4_dp*random_unit(3_i8, seed, k))/n
+      angle = 2.0_dp*pi*(k + 0.4_dp*hash_uniform(3, seed, k))/n
       corners(:, k) = [cos(angle), width*sin(angle)]
     end do
     call polygon_piece(corners(:, 1:n), 0.001_dp, made, message)
-    centre(:) = [x, 0.3_dp*random_unit(4_i8, seed, 1)]
-    call place_piece(made%piece%vertex, made%piece%corner, rho, 1.0_dp, 2.0_dp*pi*random_unit(5_i8, seed, 1), centre, placed)
+    centre(:) = [x, 0.3_dp*hash_uniform(4, seed, 1)]
+    call place_piece(made%piece%vertex, made%piece%corner, rho, 1.0_dp, 2.0_dp*pi*hash_uniform(5, seed, 1), centre, placed)
   end subroutine put_random
 
   pure real(dp) function separation(a, b, normal)
