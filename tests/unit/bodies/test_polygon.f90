@@ -65,7 +65,8 @@ contains
 
     do n = 3, 12
       do k = 1, n
-        corners(:, k) = [cos(2.0_dp*pi*k/n), sin(2.0_dp*pi*k/n)]
+        corners(1, k) = cos(2.0_dp*pi*k/n)
+        corners(2, k) = sin(2.0_dp*pi*k/n)
       end do
       call make_polygon("regular", corners(:, 1:n), 0.001_dp, shape, message)
       call check_close(shape%volume, 0.5_dp*n*sin(2.0_dp*pi/n), rounding, "area of a regular polygon")
@@ -99,7 +100,8 @@ contains
     integer :: k
 
     do k = 1, 2
-      corners(1, :) = [0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp] + (k - 1)
+      corners(1, :) = [0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp]
+      corners(1, :) = corners(1, :) + (k - 1)
       corners(2, :) = [0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp]
       call polygon_piece(corners, 0.01_dp, made(k), message)
     end do
