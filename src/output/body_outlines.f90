@@ -13,9 +13,11 @@ module gravier_body_outlines
 
   !> The polygons of a body of radius 1, in its axes from its centre of mass.
   type :: outline_t
-    !> polygon c has the points point(:, first(c):first(c + 1) - 1) (polygons + 1), (3, points); z is 0 in the plane
+    !> polygon c has the points point(:, first(c):first(c + 1) - 1), (3, points); z is 0 in the plane; both have room for more
     integer, allocatable :: first(:)
     real(dp), allocatable :: point(:, :)
+    !> polygons
+    integer :: n = 0
   end type outline_t
 
   real(dp), parameter :: pi = acos(-1.0_dp)
@@ -34,7 +36,7 @@ contains
 
     allocate (outline(0:library%n))
     do k = 0, library%n
-      allocate (outline(k)%first(1), outline(k)%point(3, 0))
+      allocate (outline(k)%first(8), outline(k)%point(3, 32))
       outline(k)%first(1) = 1
     end do
     round%rounding = 1.0_dp
@@ -188,17 +190,23 @@ contains
     type(outline_t), intent(inout) :: outline
     real(dp), allocatable :: points(:, :)
     integer, allocatable :: first(:)
-    integer :: n, m
+    integer :: n, last
 
-    n = size(outline%point, 2)
-    m = size(outline%first)
-    allocate (points(3, n + size(point, 2)), first(m + 1))
-    points(:, 1:n) = outline%point
-    points(:, n + 1:) = point
-    first(1:m) = outline%first
-    first(m + 1) = n + size(point, 2) + 1
-    call move_alloc(points, outline%point)
-    call move_alloc(first, outline%first)
+    last = outline%first(outline%n + 1) - 1
+    n = last + size(point, 2)
+    if (n > size(outline%point, 2)) then
+      allocate (points(3, 2*n))
+      points(:, 1:last) = outline%point(:, 1:last)
+      call move_alloc(points, outline%point)
+    end if
+    if (outline%n + 2 > size(outline%first)) then
+      allocate (first(2*size(outline%first)))
+      first(1:outline%n + 1) = outline%first
+      call move_alloc(first, outline%first)
+    end if
+    outline%point(:, last + 1:n) = point
+    outline%n = outline%n + 1
+    outline%first(outline%n + 1) = n + 1
   end subroutine add_polygon
 
   !> The points of polygon `c` of an outline where body `k` has it, and how many they are.

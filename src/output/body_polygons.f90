@@ -33,7 +33,7 @@ contains
       associate (owned => simulation%decomposition%owned(s))
         do k = 1, owned%n
           i = i + 1
-          do c = 1, size(outline(owned%shape(k))%first) - 1
+          do c = 1, outline(owned%shape(k))%n
             n = n + 1
             body(n) = i
             table%key(1, n) = owned%id(k)
@@ -54,19 +54,19 @@ contains
     !> by shape, from 0
     type(outline_t), intent(in) :: outline(0:)
     integer, intent(out) :: n, most
-    integer :: s, k
+    integer :: s, k, c
 
     n = 0
     most = 0
     do k = 0, ubound(outline, 1)
-      associate (first => outline(k)%first)
-        most = max(most, maxval(first(2:) - first(:size(first) - 1)))
-      end associate
+      do c = 1, outline(k)%n
+        most = max(most, outline(k)%first(c + 1) - outline(k)%first(c))
+      end do
     end do
     do s = 1, size(simulation%decomposition%owned)
       associate (owned => simulation%decomposition%owned(s))
         do k = 1, owned%n
-          n = n + size(outline(owned%shape(k))%first) - 1
+          n = n + outline(owned%shape(k))%n
         end do
       end associate
     end do

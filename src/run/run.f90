@@ -195,7 +195,7 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
 
-    call read_input_text(comm, path, "a text file of namelist groups", text, error)
+    call read_input_text(comm, path, text, error)
   end subroutine read_input
 
   !> Make the output directory and take its lock, or say why it cannot be used. Collective.

@@ -48,8 +48,8 @@ box 0.02 0.01 0.01
 box 0.01 0.01 0.02  0 0.01 0
 """}
 TILES = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "bodies.csv", "shapes": "a.shapes", "friction": 0.3},
-         "time": {"step": 1e-3, "steps": 40},
-         "output": {"directory": "results", "every": 10, "vtk": True, "checkpoint_every": 10}}
+         "time": {"step": 1e-3, "steps": 120},
+         "output": {"directory": "results", "every": 30, "vtk": True, "checkpoint_every": 10}}
 # without gravity nothing falls
 BLOCKS = merged(TILES, {"scene": {"dimension": 3, "gravity": [0.0, 0.0, 0.0]}})
 
@@ -64,7 +64,8 @@ def write_shapes(directory, case):
     rows = ["id,shape,scale,radius," + ("x,y,angle,omega,nx,ny" if d == 2 else "x,y,z,qw,qx,qy,qz,wx,wy,wz,nx,ny,nz")]
     for k in range(20):
         what = ",,0.01" if k % 5 == 4 else f"{names[k % len(names)]},{1.0 + 0.02 * k},"
-        rows.append(f"{k + 1},{what}," + (f"{0.1 * k},0.04,{0.3 * k},{k % 3},," if d == 2
+        # in the plane every other one falls onto that before it
+        rows.append(f"{k + 1},{what}," + (f"{0.1 * (k // 2)},{0.035 + 0.065 * (k % 2)},{0.3 * k},{k % 3},," if d == 2
                                           else f"{0.1 * k},0,0.1,1,{0.1 * k},0.2,{-0.05 * k},1,{k % 3},0.5,,,"))
     rows.append("99,plane,,," + ("0,0,,,0,1" if d == 2 else "0,0,0,,,,,,,,0,0,1"))
     write(os.path.join(directory, "bodies.csv"), "\n".join(rows) + "\n")
@@ -95,7 +96,8 @@ def read(path):
             rows, before = int(cells["NumberOfCells"][k]), int(when["CellOffsets"][k, kind])
             offsets = cells["Offsets"][before + k:before + k + rows + 1]
             assert (offsets[0], offsets[-1]) == (0, number) and int(cells["NumberOfConnectivityIds"][k]) == number
-            assert np.array_equal(cells["Connectivity"][first:first + number], np.arange(number))
+            start = int(when["ConnectivityIdOffsets"][k, kind])
+            assert np.array_equal(cells["Connectivity"][start:start + number], np.arange(number))
             steps[int(file["step"][k])] = {"time": when["Values"][k], "points": root["Points"][first:first + number],
                                            "corners": np.diff(offsets)}
             for name, values in root[group].items():
@@ -323,6 +325,13 @@ class Pictures(RunTestCase):
                     self.assertLess(np.abs(bounds[0] - bounds[1]).max(), 0.05 * expected.radius[k])
             self.assertEqual(set(found["id"]), set(expected.id))
         self.assertTrue(np.all(run.subdomain() == 1))
+        # contacts reach from centre to centre, or to the ground, in the middle of a step in which all are slow
+        for step, found in read(os.path.join(directory, NAMES[1])).items() if run.dimension == 2 else ():
+            bodies, contacts = run.bodies(step), run.contacts(step)
+            centre = {number: place for number, place in zip(bodies.id, bodies.position)}
+            for ends, one, other, point in zip(found["points"].reshape(-1, 2, 3), contacts.candidate, contacts.antagonist, contacts.point):
+                self.assertLess(np.abs(ends[0, :2] - centre[one]).max(), 1e-3)
+                self.assertLess(np.abs(ends[1, :2] - (centre[other] if other in centre else point)).max(), 1e-3)
 
 
 if __name__ == "__main__":

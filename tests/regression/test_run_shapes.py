@@ -12,6 +12,7 @@ import numpy as np
 from gravier_runs import SOURCE, RunTestCase, contents, differences, each, gravier, merged, namelist, run_case, write
 
 import gravier as package
+from gravier.shapes import axes_of
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
 import gravier_plot  # noqa: E402
@@ -283,6 +284,26 @@ class Shapes(RunTestCase):
         np.testing.assert_allclose(force, weight / 2.0, rtol=2e-2)
         # sum of f l/(d V), by hand
         np.testing.assert_allclose(results.pressure(), weight * 0.1 / (2.0 * 0.08), rtol=2e-2)
+
+    def test_inertia(self):
+        """The kinetic energy of bodies that fly and turn is that of their masses and moments of inertia, scaled as they are."""
+        bodies = "id,x,y,vx,omega,shape,scale\n1,0,0,0,3,brick,0.5\n2,1,0,2,0,pill,\n3,2,0,0,7,pill,2\n"
+        run = run_case(merged(CASE, {"scene": {"gravity": [0.0, 0.0, 0.0]}, "time": {"steps": 1}}), 1, self.prepare("inertia", bodies=bodies))
+        self.assert_status(run, 0)
+        mass = 2500.0 * np.array([0.2 * 0.1, 0.02 + np.pi * 0.05**2, 4.0 * (0.02 + np.pi * 0.05**2)])
+        # a rectangle and two half disks, whose centres of mass are 4 r/(3 pi) from their flat sides
+        r, length = 0.1, 0.4
+        pill = 2500.0 * (2.0 * r * length * (length**2 + 4.0 * r**2) / 12.0 + np.pi * r**4 / 2.0 + np.pi * r**2 * length**2 / 4.0
+                         + 4.0 * r**3 * length / 3.0)
+        expected = 0.5 * (mass[0] * (0.2**2 + 0.1**2) / 12.0 * 3.0**2 + mass[1] * 2.0**2 + pill * 7.0**2)
+        np.testing.assert_allclose(run.history()["kinetic_energy"], expected, rtol=1e-12)
+        # in space about each of the axes of a box, turned somehow
+        for axis, moment in enumerate((0.1**2 + 0.3**2, 0.2**2 + 0.3**2, 0.2**2 + 0.1**2)):
+            spin = axes_of(np.array([[0.5, 0.1, 0.7, 0.5]]))[0][:, axis]
+            bodies = f"id,x,y,z,shape,scale,qw,qx,qy,qz,wx,wy,wz\n1,0,0,0,box,2,0.5,0.1,0.7,0.5,{','.join(map(str, spin))}\n"
+            run = run_case(merged(SOLID_CASE, {"time": {"steps": 1}}), 1, self.prepare(f"inertia {axis}", SOLIDS, bodies))
+            self.assert_status(run, 0)
+            np.testing.assert_allclose(run.history()["kinetic_energy"], 0.5 * 2500.0 * 0.006 * 8.0 * moment * 4.0 / 12.0, rtol=1e-9)
 
     def test_restart_of_another_library(self):
         """A library that changed in one number is another scene; one that is written in another way is the same."""

@@ -5,7 +5,7 @@ module gravier_obj_file
   use gravier_narrow, only: narrow
   use gravier_number_text, only: read_integer, read_real, size_usual, size_tiny
   use gravier_text, only: to_text
-  use gravier_whole_file, only: lines_t, read_whole_file
+  use gravier_file_lines, only: lines_t
   implicit none
   private
   public :: read_obj
@@ -25,7 +25,7 @@ contains
     integer :: counts(3)
 
     if (allocated(error)) return
-    call read_whole_file(path, lines%text, error)
+    call lines%open(path, error)
     if (allocated(error)) return
     call count_lines(lines%text, counts)
     allocate (points(3, counts(1)), first(counts(2) + 1), corner(counts(3)))

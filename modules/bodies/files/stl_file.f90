@@ -5,7 +5,7 @@ module gravier_stl_file
   use gravier_narrow, only: narrow
   use gravier_number_text, only: read_real, size_usual, size_tiny
   use gravier_text, only: lower, to_text
-  use gravier_whole_file, only: lines_t, read_whole_file
+  use gravier_file_lines, only: lines_t
   use, intrinsic :: iso_fortran_env, only: real32
   implicit none
   private
@@ -29,7 +29,7 @@ contains
     integer :: n, k
 
     if (allocated(error)) return
-    call read_whole_file(path, lines%text, error)
+    call lines%open(path, error)
     if (allocated(error)) return
     n = 0
     if (is_binary(lines%text)) then

@@ -213,7 +213,7 @@ contains
     do trial = 1, 50
       turn = random_turn(draws)
       do k = 1, 20
-        turned(:, k) = matmul(turn%m, points(:, k)) + 10.0_dp
+        turned(:, k) = points(1, k)*turn%m(:, 1) + points(2, k)*turn%m(:, 2) + points(3, k)*turn%m(:, 3) + 10.0_dp
       end do
       call make_polyhedron("flat dodecahedron", turned, 0.01_dp, shape, error)
       right = right .and. .not. allocated(error)
@@ -357,6 +357,7 @@ contains
         end do
       end do
       call find_principal_axes(tensor, moment, axes)
+      call check(axes(1, 1) + axes(2, 2) + axes(3, 3) >= 1.0_dp, "axes of a small turn")
       do k = 1, 3
         left(:) = matmul(tensor, axes(:, k))
         call check_close(norm2(left - moment(k)*axes(:, k)), 0.0_dp, 1.0e-14_dp, "an axis is one")

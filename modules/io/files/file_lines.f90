@@ -1,12 +1,12 @@
-!> Files read at once: their text, its lines and words. Not collective.
-module gravier_whole_file
+!> Text files gone through by lines and words. Not collective.
+module gravier_file_lines
   use gravier_kinds, only: i8
   use gravier_narrow, only: take_count
   use gravier_errors, only: error_t, raise, status_input
   use gravier_file_system, only: check_readable
   implicit none
   private
-  public :: read_whole_file, lines_t
+  public :: lines_t
 
   !> A text that is gone through line by line.
   type :: lines_t
@@ -17,16 +17,17 @@ module gravier_whole_file
     !> where the next word is sought
     integer :: place = 1
   contains
+    procedure :: open => lines_open
     procedure :: next => lines_next
     procedure :: word => lines_word
   end type lines_t
 
 contains
 
-  !> The bytes of a file. Failure (status_input): no such file, not readable, more than 2^31 bytes.
-  subroutine read_whole_file(path, text, error)
+  !> Take the bytes of a file. Failure (status_input): no such file, not readable, more than 2^31 bytes.
+  subroutine lines_open(self, path, error)
+    class(lines_t), intent(out) :: self
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
     character(len=200) :: reason
     integer(i8) :: length
@@ -38,12 +39,12 @@ contains
     if (stat == 0) then
       inquire (unit=unit, size=length)
       call take_count(length, path//": bytes", n, error)
-      allocate (character(len=n) :: text)
-      if (n > 0) read (unit, iostat=stat, iomsg=reason) text
+      allocate (character(len=n) :: self%text)
+      if (n > 0) read (unit, iostat=stat, iomsg=reason) self%text
       close (unit)
     end if
     if (stat /= 0) call raise(error, status_input, path//": cannot read this file: "//trim(reason))
-  end subroutine read_whole_file
+  end subroutine lines_open
 
   !> Go to the next line; false behind the last one.
   logical function lines_next(self) result(found)
@@ -83,4 +84,4 @@ contains
     is_blank = letter == " " .or. letter == achar(9) .or. letter == achar(13)
   end function is_blank
 
-end module gravier_whole_file
+end module gravier_file_lines
