@@ -1,5 +1,5 @@
-"""Limit analysis of blocks with friction by linear programs: whether, or up to which load, impulses in the corners of the joints can
-hold each block. Blocks are rigid, joints bear no tension, and |r_t| <= mu r_n.
+"""Limit analysis of blocks with friction by linear programs: whether, or up to which load, impulses in the corners of joints can hold
+each block. Blocks are rigid, joints bear no tension, and |r_t| <= mu r_n.
 
 The program of each is the static theorem: unknown r_n and r_t of each contact, three equations of equilibrium a block."""
 import numpy as np
@@ -48,7 +48,8 @@ class Blocks:
         rows = np.concatenate([k, k, n + k, n + k])
         columns = np.concatenate([2 * k, 2 * k + 1, 2 * k, 2 * k + 1])
         ones = np.ones(n)
-        return coo_matrix((np.concatenate([-friction * ones, ones, -friction * ones, -ones]), (rows, columns)), shape=(2 * n, 2 * n))
+        values = np.concatenate([-friction * ones, ones, -friction * ones, -ones])
+        return coo_matrix((values, (rows, columns)), shape=(2 * n, 2 * n))
 
     def loads(self, direction):
         """The weights along a direction."""
@@ -63,7 +64,8 @@ class Blocks:
         mean = np.mean(self.weights)
         equal = hstack([self.matrix(), coo_matrix((3 * len(self.centres), 1))]).tocsr()
         cone = hstack([self.cone(friction), coo_matrix(-np.ones((2 * n, 1)))])
-        normal = coo_matrix((-np.ones(2 * n), (np.concatenate([np.arange(n)] * 2), np.concatenate([2 * np.arange(n), np.full(n, 2 * n)]))))
+        k = np.arange(n)
+        normal = coo_matrix((-np.ones(2 * n), (np.concatenate([k, k]), np.concatenate([2 * k, np.full(n, 2 * n)]))))
         below = coo_matrix(np.vstack([cone.toarray(), normal.toarray()]))
         cost = np.zeros(2 * n + 1)
         cost[-1] = 1.0
@@ -81,12 +83,13 @@ class Blocks:
         cost = np.zeros(2 * n + 1)
         cost[-1] = -1.0
         bounds = [(0.0, None), (None, None)] * n + [(0.0, None)]
-        found = linprog(cost, A_ub=below, b_ub=np.zeros(2 * n), A_eq=equal, b_eq=-self.loads(dead) / mean, bounds=bounds, method="highs")
+        found = linprog(cost, A_ub=below, b_ub=np.zeros(2 * n), A_eq=equal, b_eq=-self.loads(dead) / mean, bounds=bounds,
+                        method="highs")
         return found.x[-1] if found.status == 0 else np.nan
 
     def least_of_motion(self, friction, velocities, live, dead=(0.0, -1.0)):
-        """The least factor of the live load under which a motion can begin: joints that open bear nothing, joints that slide bear their
-        full friction against it. Friction does not lift blocks that slide, so that this may be below what the blocks could bear.
+        """The least factor of the live load under which a motion can begin: joints that open bear nothing, joints that slide bear
+        their full friction against it. Friction does not lift blocks that slide, so that this may be below what the blocks could bear.
         Velocities are vx, vy and spin of each block."""
         n = len(self.contacts)
         still = 1.0e-3 * np.abs(velocities).max()
@@ -106,8 +109,9 @@ class Blocks:
         slides = np.flatnonzero(full_friction)
         mean = np.mean(self.weights)
         equal = hstack([self.matrix(), coo_matrix((self.loads(live) / mean)[:, None])]).tocsr()
-        full = coo_matrix((np.concatenate([-friction * full_friction[slides], np.ones(len(slides))]),
-                           (np.tile(np.arange(len(slides)), 2), np.concatenate([2 * slides, 2 * slides + 1]))), shape=(len(slides), 2 * n + 1))
+        rows, columns = np.tile(np.arange(len(slides)), 2), np.concatenate([2 * slides, 2 * slides + 1])
+        values = np.concatenate([-friction * full_friction[slides], np.ones(len(slides))])
+        full = coo_matrix((values, (rows, columns)), shape=(len(slides), 2 * n + 1))
         below = hstack([self.cone(friction), coo_matrix((2 * n, 1))]).tocsr()
         bounds = [(0.0, None), (None, None)] * n + [(0.0, None)]
         for k in np.flatnonzero(opens):

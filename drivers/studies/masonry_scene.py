@@ -8,13 +8,14 @@ from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
-from study_support import BINARIES
+from study_support import BINARIES, states
 
 from gravier import Run, read_table
 from gravier.case import ENVIRONMENT, namelist
 
 #: of Open MPI for a rank without a launcher, in a sixth of the time
-ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1", "OMPI_MCA_coll": "basic,libnbc,self"}
+ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1",
+         "OMPI_MCA_coll": "basic,libnbc,self"}
 GRAVITY = 9.81  # m/s^2
 STEP = 1.0e-3  # s
 #: a solve that is as exact as rounding allows for some hundred contacts
@@ -68,7 +69,8 @@ class Scene:
         key = (rounding, *[piece.tobytes() for piece in pieces])
         if key not in self.shapes:
             areas, centres = zip(*map(area_and_centre, pieces))
-            self.shapes[key] = Shape(f"s{len(self.shapes)}", pieces, sum(areas), np.average(centres, axis=0, weights=areas), rounding)
+            centre = np.average(centres, axis=0, weights=areas)
+            self.shapes[key] = Shape(f"s{len(self.shapes)}", pieces, sum(areas), centre, rounding)
         return self.shapes[key]
 
     def prism(self, base, height, rounding=1.0e-3):
@@ -141,7 +143,8 @@ class Scene:
             done = subprocess.run([*command, "case.nml"], cwd=directory, env={**ENVIRONMENT, **own, **os.environ},
                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
             if done.returncode not in (0, 3):
-                raise RuntimeError(f"{directory}: gravier ended with status {done.returncode}: {done.stdout.decode(errors='replace')}")
+                said = done.stdout.decode(errors="replace")
+                raise RuntimeError(f"{directory}: gravier ended with status {done.returncode}: {said}")
             return Outcome(self, directory, done.returncode, step)
         finally:
             if keep is None:
@@ -149,14 +152,18 @@ class Scene:
 
 
 class Outcome:
-    """The last state of a run and its history; `states` if all states are wanted."""
+    """The last state of a run and its history."""
 
     def __init__(self, scene, directory, status, step):
         self.converged, self.step = status == 0, step
         self.gravity = np.linalg.norm(scene.gravity)
         self.history = read_table(directory / "history.csv")
         run = Run(directory)
-        self.states = [(t, run.bodies(s)) for s, t in zip(run.steps, run.times)] if len(run.steps) > 2 else []
+        # (time, orientations) of the states that are written besides the first and the last
+        self.turns = []
+        if len(run.steps) > 2:
+            for _, t, group in states(directory / "results.h5"):
+                self.turns.append((t, group["bodies/orientation"][:][np.argsort(group["bodies/id"][:])]))
         bodies = run.bodies()
         order = np.argsort(bodies.id)
         self.position, self.velocity = bodies.position[order], np.hstack([bodies.velocity, bodies.spin])[order]

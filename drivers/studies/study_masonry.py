@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Blocks, arches and walls against analytic values and linear programs: slopes, prisms, sliding and toppling, rocking, overhangs, wedges,
-arches, walls that lean, dominoes, long rests, and scenes turned and mirrored.
+"""Blocks, arches and walls against analytic values and linear programs.
 
     python3 drivers/studies/study_masonry.py [--quick] [--parts NAME...] [--out DIR]     15 minutes on one core, quick 1 minute
 
-prints a row an oracle with what was measured, expected and accepted, and ends with status 1 where one is out of its bounds. With --out it
-leaves DIR/masonry.md, the table, and DIR/masonry.csv."""
+The parts are slopes, prisms, sliding and toppling, rocking, overhangs, wedges, arches, walls that lean, dominoes, long rests, and
+scenes turned and mirrored. It prints a row an oracle with what was measured, expected and accepted, and ends with status 1 where one
+is out of its bounds. With --out it leaves DIR/masonry.md, the table, and DIR/masonry.csv."""
 import argparse
 import sys
 import time
@@ -17,9 +17,9 @@ import masonry_walls as walls
 from masonry_table import Table, say
 from study_support import write_measured
 
-PARTS = {"slope": blocks.slope, "prisms": blocks.prisms, "map": blocks.slide_topple, "rocking": blocks.rocking, "overhang": blocks.overhang,
-         "wedge": blocks.wedge, "arch": walls.arches, "tilt": walls.tilts, "dominoes": motion.dominoes, "rest": walls.rest,
-         "turned": motion.invariance}
+PARTS = {"slope": blocks.slope, "prisms": blocks.prisms, "map": blocks.slide_topple, "rocking": blocks.rocking,
+         "overhang": blocks.overhang, "wedge": blocks.wedge, "arch": walls.arches, "tilt": walls.tilts, "dominoes": motion.dominoes,
+         "rest": walls.rest, "turned": motion.invariance}
 
 
 def main():
