@@ -18,7 +18,7 @@ except ImportError as missing:
 matplotlib.use("Agg")
 import matplotlib.animation
 import matplotlib.pyplot as plt
-from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
 from one_line import OneLineParser
 from whole_file import save_figure, written
@@ -153,6 +153,30 @@ class Frame:
         self.low, self.high, self.limits, self.force = low, high, limits, force
 
 
+def shaped(bodies):
+    """Whether some body is neither a disk nor a sphere."""
+    return "shape" in bodies and "orientation" in bodies and bool(numpy.any(bodies.shape > 0))
+
+
+def visible_polygons(outlines, view, order):
+    """Polygons of bodies in the plane of the picture, in the order in which they are drawn, and the body of each: in 3D those that face
+    the eye, the nearest last."""
+    polygons, body = [], []
+    for k in order:
+        found = outlines[k]
+        if not view.flat:
+            found = [points for points in found if numpy.dot(newell(points), view.eye) > 0.0]
+            found.sort(key=lambda points: numpy.mean(points @ view.eye))
+        polygons += [view.place(points) for points in found]
+        body += [k] * len(found)
+    return polygons, numpy.array(body)
+
+
+def newell(points):
+    """Normal of a polygon in space, as long as twice its area."""
+    return numpy.cross(points, numpy.roll(points, -1, axis=0)).sum(axis=0)
+
+
 def draw_packing(run, step, options, frame=None):
     """A figure of one step: bodies by colour, boundaries, force chains by normal force."""
     frame = frame or Frame()
@@ -173,16 +197,20 @@ def draw_packing(run, step, options, frame=None):
     through = 0.25 if chains and not view.flat else 1.0
     # an outline would hide a body of a few points
     points = 72.0 * options.size / (high - low).max() * numpy.median(diameter)
-    disks = EllipseCollection(diameter[order], diameter[order], numpy.zeros_like(diameter), units="xy",
-                              offsets=view.place(bodies.position)[order], offset_transform=axes.transData,
-                              edgecolors="0.55" if view.flat else "0.25", linewidths=min(0.4, 0.06 * points), alpha=through, **how)
+    style = {"edgecolors": "0.55" if view.flat else "0.25", "linewidths": min(0.4, 0.06 * points), "alpha": through, **how}
+    if shaped(bodies):
+        polygons, order = visible_polygons(run.outlines(step), view, order)
+        disks = PolyCollection(polygons, **style)
+    else:
+        disks = EllipseCollection(diameter[order], diameter[order], numpy.zeros_like(diameter), units="xy",
+                                  offsets=view.place(bodies.position)[order], offset_transform=axes.transData, **style)
     if values is None:
         disks.set_facecolor("#dbe7f3")
     else:
         disks.set_array(values[order])
     axes.add_collection(disks)
     title = run.path.name if isinstance(run, gravier.BodiesFile) else f"step {step}, t = {run.time(step):.4g} s"
-    title += f": {len(bodies)} {'disks' if view.flat else 'spheres'}"
+    title += f": {len(bodies)} {'bodies' if shaped(bodies) else 'disks' if view.flat else 'spheres'}"
     if contacts is not None:
         title += f", {len(contacts)} contacts"
     if chains:

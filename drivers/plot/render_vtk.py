@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Read bodies.vtkhdf and contacts.vtkhdf of a run with VTK's own reader and render one step without a window: grains as spheres,
-contacts as tubes as thick as their normal force."""
+"""Read bodies.vtkhdf and contacts.vtkhdf of a run with VTK's own reader and render one step without a window: grains as spheres or,
+where bodies have shapes, as they are, contacts as tubes as thick as their normal force."""
 import argparse
 import sys
 from pathlib import Path
@@ -40,6 +40,22 @@ def spheres(bodies, colour, table):
     glyphs.SetScalarRange(bodies.GetPointData().GetArray(colour).GetRange(-1))
     actor = vtk.vtkActor()
     actor.SetMapper(glyphs)
+    return actor
+
+
+def surfaces(bodies, colour, table):
+    """Bodies with shapes, whose polygons the file has."""
+    mapper = vtk.vtkPolyDataMapper()
+    mapper.SetInputData(bodies)
+    mapper.SetScalarModeToUseCellFieldData()
+    mapper.SelectColorArray(colour)
+    table.SetVectorModeToMagnitude()
+    mapper.SetLookupTable(table)
+    mapper.SetScalarRange(bodies.GetCellData().GetArray(colour).GetRange(-1))
+    actor = vtk.vtkActor()
+    actor.SetMapper(mapper)
+    actor.GetProperty().EdgeVisibilityOn()
+    actor.GetProperty().SetEdgeColor(0.3, 0.3, 0.3)
     return actor
 
 
@@ -87,11 +103,13 @@ def main():
     table.Build()
     renderer = vtk.vtkRenderer()
     renderer.SetBackground(1.0, 1.0, 1.0)
-    grains = spheres(bodies, options.colour, table)
+    shaped = bodies.GetNumberOfPolys() > 0
+    grains = (surfaces if shaped else spheres)(bodies, options.colour, table)
     grains.GetProperty().SetOpacity(options.opacity)
     renderer.AddActor(grains)
+    fields = bodies.GetCellData() if shaped else bodies.GetPointData()
     if contacts.GetNumberOfCells() > 0:
-        renderer.AddActor(tubes(contacts, 0.5 * bodies.GetPointData().GetArray("radius").GetRange()[0]))
+        renderer.AddActor(tubes(contacts, (0.1 if shaped else 0.5) * fields.GetArray("radius").GetRange()[0]))
     low_x, high_x, low_y, high_y, low_z, high_z = bodies.GetBounds()
     if high_z > low_z:
         renderer.GetActiveCamera().SetPosition(-1.0, -2.0, 0.8)

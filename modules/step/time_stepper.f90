@@ -82,6 +82,8 @@ module gravier_time_stepper
     logical :: warm_start = .true.
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
+    !> what a projection leaves of it [m]
+    real(dp) :: overlap_left = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
     type(repartition_rule_t) :: division
     class(method_t), allocatable :: method
@@ -155,7 +157,7 @@ contains
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
     shifts = 0.0_dp
-    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_allowed, shifts)
+    if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_left, shifts)
     call note_step(self, figures, shifts)
     call self%diagnostics%measure(solved, self%written_steps%due(self%step))
     call check_numbers(self, figures, error)

@@ -150,7 +150,7 @@ module gravier_config_table
      key_t("scene", "skin", kind_real, "-1", ">= 0", "distance within which neighbour lists stay valid", &
            unit="m", note="0.2 of the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
-           unit="m", note="0.01 of the mean radius"), &
+           unit="m", note="0.01 of the mean radius, or the least rounding"), &
      key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take overlaps back by moving grains and free boundaries"), &
      key_t("scene", "start_overlap", kind_real, "0.5", ">= 0", &
            "largest overlap at the start: of two grains, as a share of the smaller radius; of a grain and a boundary, as a "// &

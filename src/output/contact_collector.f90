@@ -1,7 +1,7 @@
 !> The contacts of the last step of a simulation as a table of named fields, for whatever file is written of them.
 module gravier_contact_collector
   use gravier_kinds, only: dp, i8
-  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_kernels, only: contact_arms, lane_of, block_of
   use gravier_contact_law, only: unused
   use gravier_contact_problem, only: subproblem_t
   use gravier_field_list, only: field_list_t
@@ -17,11 +17,12 @@ contains
 
   !> Contacts of this rank: the table `contacts` with the keys `candidate` and `antagonist`, identifiers of bodies or boundaries.
   !> The fields are `normal` (nd), `gap` [m], `impulse` on the candidate (nd; n, t[, s]) [N s], `moment` on it (about n[, t, s])
-  !> [N m s], `normal_force` and `tangential_force` [N], `status`, and `points` (6) [m], the centre of the candidate and that of
-  !> the antagonist's nearest image, or the boundary, where the contact was detected.
+  !> [N m s], `point` where bodies have shapes (nd) [m], the place of the contact when it was detected, `normal_force` and
+  !> `tangential_force` [N], `status`, and `points` (6) [m], the centre of the candidate and that of the antagonist's nearest image,
+  !> or the boundary, at that time.
   subroutine collect_contacts(simulation, names, table)
     type(simulation_t), intent(in) :: simulation
-    !> of the fields, in their order; a moment is left out where the kernels have none
+    !> of the fields, in their order; a moment or a point is left out where the kernels have none
     character(len=*), intent(in) :: names(:)
     type(field_list_t), intent(out) :: table
     real(dp), allocatable :: value(:, :)
@@ -72,6 +73,8 @@ contains
       n = simulation%problem%kernels%nd
     case ("moment")
       n = merge(2*simulation%problem%kernels%nd - 3, 0, simulation%problem%kernels%rolling_row > 0)
+    case ("point")
+      n = merge(simulation%problem%kernels%nd, 0, simulation%problem%kernels%row%arm_i > 0)
     case ("points")
       n = 6
     case default
@@ -85,7 +88,7 @@ contains
     character(len=:), allocatable :: unit
 
     select case (name)
-    case ("gap", "points")
+    case ("gap", "point", "points")
       unit = "m"
     case ("impulse")
       unit = "N s"
@@ -161,8 +164,14 @@ contains
         do c = 1, sub%n_contacts
           values(1, c) = tangential_impulse(sub, nf, c)/h
         end do
+      case ("point")
+        call take_places(simulation, s, values)
       case ("points")
-        call take_points(simulation, s, values)
+        if (kernels%row%arm_i > 0) then
+          call take_ways(simulation, s, values)
+        else
+          call take_points(simulation, s, values)
+        end if
       end select
     end associate
   end subroutine take_field
@@ -219,6 +228,47 @@ contains
       end do
     end associate
   end subroutine take_points
+
+  !> Where bodies with shapes touch, by the arm of the candidate or, where it is glued, that of the antagonist.
+  subroutine take_places(simulation, s, place)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: s
+    !> (nd, contacts)
+    real(dp), intent(out) :: place(:, :)
+    real(dp) :: arm_i(simulation%problem%kernels%nd), arm_j(simulation%problem%kernels%nd)
+    integer :: c, i, j
+
+    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
+      do c = 1, sub%n_contacts
+        i = view%list%candidate(sub%source(c))
+        j = view%list%antagonist(sub%source(c))
+        call contact_arms(simulation%problem%kernels, sub%hot, c, arm_i, arm_j)
+        place(:, c) = view%bodies%position(:, i) + arm_i
+        if (view%bodies%glued(i) > 0 .and. j > 0) place(:, c) = view%bodies%position(:, max(j, 1)) + arm_j
+      end do
+    end associate
+  end subroutine take_places
+
+  !> The same ends as of take_points, of bodies with shapes: from the centre of the candidate to that of the antagonist, whose ways
+  !> to the contact are their arms, or to the contact with a boundary.
+  subroutine take_ways(simulation, s, point)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: s
+    !> (6, contacts)
+    real(dp), intent(out) :: point(:, :)
+    real(dp) :: arm_i(simulation%problem%kernels%nd), arm_j(simulation%problem%kernels%nd)
+    integer :: c, nd
+
+    nd = simulation%problem%kernels%nd
+    point(:, :) = 0.0_dp
+    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
+      do c = 1, sub%n_contacts
+        call contact_arms(simulation%problem%kernels, sub%hot, c, arm_i, arm_j)
+        point(1:nd, c) = view%bodies%position(:, view%list%candidate(sub%source(c)))
+        point(4:3 + nd, c) = point(1:nd, c) + arm_i - arm_j
+      end do
+    end associate
+  end subroutine take_ways
 
   !> How the contacts of a subdomain carry: idle, sticking or sliding.
   subroutine take_status(simulation, sub, status)

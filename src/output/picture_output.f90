@@ -1,4 +1,5 @@
-!> The files of a run for ParaView: bodies.vtkhdf, a point a grain, and contacts.vtkhdf, a line a contact.
+!> The files of a run for ParaView: bodies.vtkhdf, a point a grain or, where bodies have shapes, their polygons, and
+!> contacts.vtkhdf, a line a contact.
 module gravier_picture_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -8,6 +9,7 @@ module gravier_picture_output
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_body_collector, only: collect_bodies
+  use gravier_body_polygons, only: draw_polygons
   use gravier_contact_collector, only: collect_contacts
   use gravier_output, only: output_t, of_states
   implicit none
@@ -108,8 +110,22 @@ contains
     call self%contacts%close(error)
   end subroutine picture_output_finish
 
-  !> Grains of this rank as points, with vectors of three components; in 2D in the plane z = 0.
+  !> Bodies of this rank as points or polygons, with vectors of three components; in 2D in the plane z = 0.
   subroutine draw_bodies(simulation, table)
+    type(simulation_t), intent(in) :: simulation
+    type(field_list_t), intent(out) :: table
+    type(field_list_t) :: points
+
+    if (simulation%effects%shapes) then
+      call draw_points(simulation, points)
+      call draw_polygons(simulation, points, table)
+    else
+      call draw_points(simulation, table)
+    end if
+  end subroutine draw_bodies
+
+  !> Bodies as points.
+  subroutine draw_points(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table
     type(field_list_t) :: bodies
@@ -152,7 +168,7 @@ contains
         if (allocated(field%whole)) call table%add_whole(field%name, field%unit, field%whole)
       end associate
     end do
-  end subroutine draw_bodies
+  end subroutine draw_points
 
   !> The fields of contacts, without a contact: there is none before the first step.
   subroutine describe_contacts(table)

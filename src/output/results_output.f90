@@ -11,6 +11,7 @@ module gravier_results_output
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_body_collector, only: collect_bodies, collect_boundaries
+  use gravier_shape_tables, only: describe_shapes
   use gravier_contact_collector, only: collect_contacts
   use gravier_output, only: output_t, of_states
   implicit none
@@ -28,7 +29,7 @@ module gravier_results_output
   end type results_output_t
 
   !> of a contact; NaN is looked for in this order
-  character(len=7), parameter :: contact_fields(4) = [character(len=7) :: "normal", "impulse", "moment", "gap"]
+  character(len=7), parameter :: contact_fields(5) = [character(len=7) :: "normal", "impulse", "moment", "gap", "point"]
 
 contains
 
@@ -44,6 +45,7 @@ contains
     character(len=*), intent(in) :: directory, command
     type(error_t), allocatable, intent(inout) :: error
     type(field_list_t) :: boundaries
+    type(field_list_t), allocatable :: shapes(:)
 
     self%stage = of_states
     self%schedule = schedule_t(every=simulation%config%output%every, last=simulation%config%time%steps)
@@ -56,6 +58,9 @@ contains
       & simulation%config%scene%dimension, error)
     call describe_boundaries(simulation, boundaries)
     call self%file%write_table(boundaries, error)
+    if (.not. simulation%effects%shapes) return
+    call describe_shapes(simulation%decomposition%shapes, simulation%decomposition%nd, shapes)
+    call self%file%write_tables(shapes, error)
   end subroutine results_output_open
 
   !> What the boundaries are, once for the run.

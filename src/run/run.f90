@@ -10,7 +10,7 @@ module gravier_run
   use gravier_timers, only: reset_timers
   use gravier_body_store, only: body_set_t
   use gravier_file_system, only: make_directory
-  use gravier_whole_file, only: read_whole_file
+  use gravier_input_text, only: read_input_text
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_solve, only: solve_converged, solve_diverged
@@ -195,7 +195,7 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
 
-    call read_whole_file(comm, path, "a text file of namelist groups", text, error)
+    call read_input_text(comm, path, text, error)
   end subroutine read_input
 
   !> Make the output directory and take its lock, or say why it cannot be used. Collective.

@@ -24,6 +24,10 @@ module gravier_simulation
   private
   public :: simulation_t, step_figures_t
 
+  !> what a projection leaves of the overlap allowed where bodies have shapes: faces that rest on each other creep by the error of
+  !> solves, and would be projected again in every step
+  real(dp), parameter :: overlap_left_of_shapes = 0.75_dp
+
   type, extends(time_stepper_t) :: simulation_t
     type(config_t) :: config
     !> boundaries that came with the grains: the first ones
@@ -34,7 +38,8 @@ module gravier_simulation
     integer :: last_written = -1
     !> the state comes from a checkpoint
     logical :: restarted = .false.
-  contains
+
+contains
     procedure :: init => simulation_init
     procedure :: make => simulation_make
     procedure :: start => simulation_start
@@ -166,7 +171,9 @@ contains
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
-        & self%overlap_allowed = merge(config%overlap_allowed, 0.01_dp*scene%mean_radius, config%overlap_given)
+        & self%overlap_allowed = merge(config%overlap_allowed, min(0.01_dp*scene%mean_radius, scene%least_rounding), &
+        & config%overlap_given)
+      self%overlap_left = merge(overlap_left_of_shapes, 1.0_dp, scene%effects%shapes)*self%overlap_allowed
       rule%kind = merge(rule_primal, rule_dual, self%config%decomposition%kind == "primal")
     end associate
   end subroutine set_physics

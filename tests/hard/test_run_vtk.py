@@ -12,12 +12,13 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import SOURCE, RunTestCase, each, gravier, merged, run_case
+from gravier_runs import SOURCE, RunTestCase, each, gravier, merged, run_case, write
 from killed_runs import Going, compile_shim
 
 import gravier as package  # the runs above have put it on the path
 
 NAMES = ("bodies.vtkhdf", "contacts.vtkhdf")
+KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 # single precision, of coordinates and speeds of about 1
 SINGLE = 2e-7
 DISKS = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [8, 7], "radius_min": 0.008, "radius_max": 0.012,
@@ -27,6 +28,48 @@ DISKS = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [8, 7],
          "decomposition": {"subdomains": 4},
          "output": {"directory": "results", "every": 30, "vtk": True}}
 SPHERES = merged(DISKS, {"scene": {"dimension": 3, "lattice_count": [4, 4, 4], "gravity": [1.0, 0.0, -9.81]}})
+
+
+LIBRARY = {2: """shape tile
+polygon 0 0  0.03 0  0.03 0.02  0 0.02
+shape ell
+polygon 0 0  0.02 0  0.02 0.01  0 0.01
+polygon 0 0.01  0.01 0.01  0.01 0.03  0 0.03
+shape pill
+capsule -0.01 0  0.01 0  0.008
+""", 3: """shape block
+box 0.03 0.02 0.01
+shape tetra
+hull 0.01 0.01 0.01  0.01 -0.01 -0.01  -0.01 0.01 -0.01  -0.01 -0.01 0.01
+shape pill
+capsule 0 0 -0.01  0.002 0 0.01  0.008
+shape pair
+box 0.02 0.01 0.01
+box 0.01 0.01 0.02  0 0.01 0
+"""}
+TILES = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "bodies.csv", "shapes": "a.shapes", "friction": 0.3},
+         "time": {"step": 1e-3, "steps": 120},
+         "output": {"directory": "results", "every": 30, "vtk": True, "checkpoint_every": 10}}
+# without gravity nothing falls
+BLOCKS = merged(TILES, {"scene": {"dimension": 3, "gravity": [0.0, 0.0, 0.0]}})
+
+
+def write_shapes(directory, case):
+    """A library and twenty bodies in a row, which turn; every fifth is a disk or a sphere. Nothing is written for a lattice."""
+    os.makedirs(directory, exist_ok=True)
+    if case["scene"]["bodies"] != "file":
+        return
+    d = case["scene"]["dimension"]
+    names = [line.split()[1] for line in LIBRARY[d].splitlines() if line.startswith("shape")]
+    rows = ["id,shape,scale,radius," + ("x,y,angle,omega,nx,ny" if d == 2 else "x,y,z,qw,qx,qy,qz,wx,wy,wz,nx,ny,nz")]
+    for k in range(20):
+        what = ",,0.01" if k % 5 == 4 else f"{names[k % len(names)]},{1.0 + 0.02 * k},"
+        # in the plane every other one falls onto that before it
+        rows.append(f"{k + 1},{what}," + (f"{0.1 * (k // 2)},{0.035 + 0.065 * (k % 2)},{0.3 * k},{k % 3},," if d == 2
+                                          else f"{0.1 * k},0,0.1,1,{0.1 * k},0.2,{-0.05 * k},1,{k % 3},0.5,,,"))
+    rows.append("99,plane,,," + ("0,0,,,0,1" if d == 2 else "0,0,0,,,,,,,,0,0,1"))
+    write(os.path.join(directory, "bodies.csv"), "\n".join(rows) + "\n")
+    write(os.path.join(directory, "a.shapes"), LIBRARY[d])
 
 
 def vtk_python():
@@ -41,15 +84,22 @@ def vtk_python():
 
 
 def read(path):
-    """Steps of a file by their numbers: {"time", "points", fields}."""
+    """Steps of a file by their numbers: {"time", "points", "corners" (points of each cell), fields}."""
     steps = {}
     with h5py.File(path) as file:
         root, when = file["VTKHDF"], file["VTKHDF/Steps"]
         group = "PointData" if len(root["PointData"] if "PointData" in root else ()) else "CellData"
+        kind = next(k for k, name in enumerate(KINDS) if root[f"{name}/NumberOfCells"][:].any())
+        cells = root[KINDS[kind]]
         for k in range(int(when.attrs["NSteps"])):
             first, number = int(when["PointOffsets"][k]), int(root["NumberOfPoints"][k])
-            rows = number if group == "PointData" else number // 2
-            steps[int(file["step"][k])] = {"time": when["Values"][k], "points": root["Points"][first:first + number]}
+            rows, before = int(cells["NumberOfCells"][k]), int(when["CellOffsets"][k, kind])
+            offsets = cells["Offsets"][before + k:before + k + rows + 1]
+            assert (offsets[0], offsets[-1]) == (0, number) and int(cells["NumberOfConnectivityIds"][k]) == number
+            start = int(when["ConnectivityIdOffsets"][k, kind])
+            assert np.array_equal(cells["Connectivity"][start:start + number], np.arange(number))
+            steps[int(file["step"][k])] = {"time": when["Values"][k], "points": root["Points"][first:first + number],
+                                           "corners": np.diff(offsets)}
             for name, values in root[group].items():
                 offset = int(when[f"{group}Offsets/{name}"][k])
                 steps[int(file["step"][k])][name] = values[offset:offset + rows]
@@ -215,13 +265,73 @@ class Pictures(RunTestCase):
                     for field, values in step.items():
                         if field != "time":
                             self.assertTrue(np.array_equal(found[f"{k} {field}"], values), f"{path}: {field} of step {k}")
-                    cells = np.arange(len(step["points"])).reshape(-1, 1 if "radius" in step else 2)
-                    self.assertTrue(np.array_equal(found[f"{k} cells"].reshape(cells.shape), cells))
+                    self.assertTrue(np.array_equal(found[f"{k} cells"], np.arange(len(step["points"]))))
 
     def test_the_reader_of_vtk(self):
-        for title, case in (("2D", DISKS), ("3D", SPHERES)):
-            run = run_case(case, 2, self.here(f"read {title}"))
-            self.vtk_reads([run.path("results", name) for name in NAMES])
+        for title, case in (("2D", DISKS), ("3D", SPHERES), ("shapes in 2D", TILES), ("shapes in 3D", BLOCKS)):
+            directory = self.here(f"read {title}")
+            write_shapes(directory, case)
+            run = run_case(case, 2, directory)
+            self.assert_status(run, 0)
+            self.vtk_reads([run.path("results", name) for name in NAMES if os.path.exists(run.path("results", name))])
+
+    def test_polygons(self):
+        """Bodies with shapes: the polygons of the package, which come from results.h5, where they have sharp corners, and points of
+        circles and spheres; the same bytes on any number of ranks; a run that goes on from a checkpoint writes what it would have."""
+        for title, case in (("2D", TILES), ("3D", BLOCKS)):
+            runs = []
+            for ranks in (1, 2, 3):
+                directory = self.here(f"polygons {title} {ranks}")
+                write_shapes(directory, case)
+                if ranks == 3:
+                    half = merged(case, {"time": {"steps": case["time"]["steps"] // 2}})
+                    self.assert_status(run_case(half, 2, directory), 0)
+                runs.append(run_case(case, ranks, directory, ("--restart",)))
+                self.assert_status(runs[-1], 0)
+            self.check_polygons(runs[0].path("results"))
+            first, second, third = (run.path("results", NAMES[0]) for run in runs)
+            with open(first, "rb") as one, open(second, "rb") as other:
+                self.assertEqual(one.read(), other.read(), title)
+            straight = read(first)
+            for step, fields in read(third).items():
+                for field, values in fields.items():
+                    self.assertTrue(np.array_equal(values, straight[step][field]), f"{field} of step {step} after a restart")
+            self.assertEqual(list(read(third)), list(straight))
+
+    def check_polygons(self, directory):
+        run = package.Run(directory)
+        shapes = [None, *run.shapes()]
+        bodies = read(os.path.join(directory, NAMES[0]))
+        self.assertEqual(list(bodies), list(run.steps))
+        for step, found in bodies.items():
+            expected, outlines = run.bodies(step), run.outlines(step)
+            polygons = np.split(found["points"], np.cumsum(found["corners"])[:-1])
+            for k, number in enumerate(expected.id):
+                rows = np.flatnonzero(found["id"] == number)
+                self.assertTrue(np.array_equal(rows, np.arange(rows[0], rows[0] + len(rows))), "a body in one place")
+                for name in ("radius", "mass", "shape", "material"):
+                    self.assertLess(np.abs(found[name][rows] - expected[name][k]).max(), SINGLE * max(1.0, expected[name][k]))
+                own = [polygons[row][:, :run.dimension] for row in rows]
+                pieces = shapes[expected.shape[k]].pieces if expected.shape[k] else []
+                if pieces and all(len(piece.corner) > 2 for piece in pieces):
+                    self.assertEqual([len(points) for points in own], [len(points) for points in outlines[k]])
+                    self.assertLess(np.abs(np.concatenate(own) - np.concatenate(outlines[k])).max(), 4 * SINGLE)
+                elif not pieces:
+                    distance = np.linalg.norm(np.concatenate(own) - expected.position[k], axis=1)
+                    self.assertLess(np.abs(distance - expected.radius[k]).max(), 4 * SINGLE)
+                else:
+                    # between the same bounds along each axis, but for the sides of circles
+                    bounds = [np.array([np.concatenate(one).min(axis=0), np.concatenate(one).max(axis=0)]) for one in (own, outlines[k])]
+                    self.assertLess(np.abs(bounds[0] - bounds[1]).max(), 0.05 * expected.radius[k])
+            self.assertEqual(set(found["id"]), set(expected.id))
+        self.assertTrue(np.all(run.subdomain() == 1))
+        # contacts reach from centre to centre, or to the ground, in the middle of a step in which all are slow
+        for step, found in read(os.path.join(directory, NAMES[1])).items() if run.dimension == 2 else ():
+            bodies, contacts = run.bodies(step), run.contacts(step)
+            centre = {number: place for number, place in zip(bodies.id, bodies.position)}
+            for ends, one, other, point in zip(found["points"].reshape(-1, 2, 3), contacts.candidate, contacts.antagonist, contacts.point):
+                self.assertLess(np.abs(ends[0, :2] - centre[one]).max(), 1e-3)
+                self.assertLess(np.abs(ends[1, :2] - (centre[other] if other in centre else point)).max(), 1e-3)
 
 
 if __name__ == "__main__":

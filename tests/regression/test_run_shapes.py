@@ -2,12 +2,20 @@
 bit on any number of ranks, restarts of the same library only."""
 import os
 import shutil
+import sys
 import unittest
 
 import h5py
+import matplotlib.image
 import numpy as np
 
-from gravier_runs import RunTestCase, contents, differences, each, gravier, merged, namelist, run_case, write
+from gravier_runs import SOURCE, RunTestCase, contents, differences, each, gravier, merged, namelist, run_case, write
+
+import gravier as package
+from gravier.shapes import axes_of
+
+sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
+import gravier_plot  # noqa: E402
 
 SHAPES = """# bodies of the plane
 shape brick
@@ -32,6 +40,44 @@ CASE = {
     "time": {"step": 1e-3, "steps": 0},
     "output": {"directory": "results", "final_bodies": True},
 }
+# a tetrahedron that is written askew, a box, a cluster, a capsule
+SOLIDS = """shape askew
+hull 0 0 0  0.2 0.05 0  0.05 0.25 0.1
+     0.1 0.1 0.3
+shape box
+box 0.2 0.1 0.3
+shape cross
+box 0.3 0.1 0.1
+box 0.1 0.1 0.1  0 0.1 0
+box 0.1 0.1 0.1  0 -0.1 0
+shape pill
+capsule 0 0 -0.1  0 0 0.1  0.05
+"""
+CORNERS = np.array([[0.0, 0.0, 0.0], [0.2, 0.05, 0.0], [0.05, 0.25, 0.1], [0.1, 0.1, 0.3]])
+SOLID_BODIES = """id,x,y,z,shape,scale,radius,qw,qx,qy,qz
+1,0,0,0,askew,,,,,,
+2,1,0,0,askew,2,,0.5,0.5,0.5,0.5
+3,2,0,0,box,,,1,0.1,0.2,0.3
+4,3,0,0,cross,0.5,,0,1,0,0
+5,4,0,0,pill,,,3,0,-4,0
+6,5,0,0,,,0.1,1,0,0,1
+"""
+SOLID_CASE = merged(CASE, {"scene": {"dimension": 3, "gravity": [0.0, 0.0, 0.0]}})
+
+
+def turned(point, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return point @ np.array([[c, s], [-s, c]])
+
+
+def area(polygon):
+    x, y = np.asarray(polygon).T
+    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def volume(polygons):
+    """Within a closed surface."""
+    return sum(np.dot(points[0], np.cross(points[k], points[k + 1])) for points in polygons for k in range(1, len(points) - 1)) / 6.0
 
 
 def changed(text, old, new):
@@ -121,6 +167,143 @@ class Shapes(RunTestCase):
             run = run_case(merged(CASE, {"scene": {"bodies_file": "bodies.h5"}}), ranks, directory)
             self.assert_status(run, 0)
             self.assertEqual(differences(expected, contents(run.path("results", "final_bodies.h5"))), [])
+
+    def test_there_and_back_of_a_run(self):
+        """Bodies that have fallen onto each other: what two ranks leave is what one leaves, and is where the next run begins."""
+        rows = [f"{k + 1},{0.12 * (k % 4) + 0.07 * (k // 4 % 2)},{0.12 + 0.13 * (k // 4)},0,0,{('brick', 'ell', 'pill', '')[k % 4]},"
+                f"{'' if k % 4 == 3 else 0.2 + 0.003 * k},{0.7 * k},{0.04 if k % 4 == 3 else ''},," for k in range(16)]
+        bodies = "\n".join([BODIES.splitlines()[0], *rows, "99,0,0,,,plane,,,,0,1", ""])
+        case = merged(CASE, {"time": {"steps": 250}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2}})
+        runs = [run_case(case, ranks, self.prepare(f"fall {ranks}", bodies=bodies)) for ranks in (1, 2)]
+        for run in runs:
+            self.assert_status(run, 0)
+        self.assertGreater(runs[0].history()["contacts"][-1], 10)
+        first, second = (contents(run.path("results", "final_bodies.h5")) for run in runs)
+        self.assertEqual(differences(first, second), [])
+        found = runs[0].results()
+        for name in ("radius", "shape", "orientation", "position", "velocity", "mass"):
+            self.assertEqual(first[f"/bodies/{name}"].ravel().tolist(), found[f"/steps/250/bodies/{name}"].ravel().tolist(), name)
+        directory = self.prepare("rise")
+        shutil.copy(runs[0].path("results", "final_bodies.h5"), os.path.join(directory, "bodies.h5"))
+        again = run_case(merged(CASE, {"scene": {"bodies_file": "bodies.h5"}}), 2, directory)
+        self.assert_status(again, 0)
+        self.assertEqual(differences(first, contents(again.path("results", "final_bodies.h5"))), [])
+
+    def test_outlines(self):
+        """The package gives the polygons of the file of shapes, about the centre of mass, turned and scaled; their area gives the mass."""
+        run = run_case(CASE, 1, self.prepare("outlines"))
+        self.assert_status(run, 0)
+        results = package.Run(run.path("results"))
+        shapes, bodies, outlines = results.shapes(), results.bodies(), results.outlines()
+        self.assertEqual([shape.name for shape in shapes], ["brick", "ell", "pill"])
+        self.assertEqual([len(shape.pieces) for shape in shapes], [1, 2, 1])
+        self.assertAlmostEqual(shapes[1].pieces[0].rounding * shapes[1].size, 0.002, places=15)
+        np.testing.assert_allclose(shapes[0].inertia[0] * shapes[0].size**2, (0.4**2 + 0.2**2) / 12.0, rtol=1e-13)
+        brick = 0.7 * np.array([[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1], [-0.2, 0.1]])
+        np.testing.assert_allclose(outlines[0][0], [0.1, 1.0] + turned(brick, 0.5), atol=1e-14)
+        ell = np.array([[0.0, 0.1], [0.1, 0.1], [0.1, 0.2], [0.0, 0.2]]) - [0.25 / 3.0, 0.25 / 3.0]
+        np.testing.assert_allclose(outlines[1][1], [1.1, 1.0] + turned(ell, 1.5), atol=1e-14)
+        areas = np.array([sum(area(polygon) for polygon in polygons) for polygons in outlines])
+        # circles have 48 sides
+        np.testing.assert_allclose(2500.0 * areas, bodies.mass, rtol=4e-3)
+        np.testing.assert_allclose(2500.0 * areas[[0, 1, 4]], bodies.mass[[0, 1, 4]], rtol=1e-13)
+        for centre, radius, polygons in zip(bodies.position, bodies.radius, outlines):
+            self.assertLess(np.linalg.norm(np.concatenate(polygons) - centre, axis=1).max(), radius * (1.0 + 1e-14))
+
+    def test_solids(self):
+        """In space: corners are where the file of shapes has them, about the centre of mass, turned by the quaternion of the table; what
+        a run leaves is where the next one begins, to the bit; surfaces are closed and hold the volume of the mass."""
+        directory = self.prepare("solids", SOLIDS, SOLID_BODIES)
+        run = run_case(SOLID_CASE, 1, directory)
+        self.assert_status(run, 0)
+        results = package.Run(run.path("results"))
+        bodies, outlines = results.bodies(), results.outlines()
+        corners = CORNERS - CORNERS.mean(axis=0)
+        for k, expected in ((0, corners), (1, 2.0 * corners[:, [2, 0, 1]] + [1.0, 0.0, 0.0])):
+            found = np.unique(np.concatenate(outlines[k]).round(12), axis=0)
+            np.testing.assert_allclose(found, np.unique(expected.round(12), axis=0), atol=1e-11)
+        volumes = np.array([volume([points - centre for points in polygons]) for centre, polygons in zip(bodies.position, outlines)])
+        np.testing.assert_allclose(2500.0 * volumes[:4], bodies.mass[:4], rtol=1e-12)
+        np.testing.assert_allclose(2500.0 * volumes[4:], bodies.mass[4:], rtol=0.07)
+        np.testing.assert_allclose(np.linalg.norm(bodies.orientation, axis=1), 1.0, rtol=1e-15)
+        expected = contents(run.path("results", "final_bodies.h5"))
+        for ranks in (1, 2):
+            directory = self.prepare(f"solids back {ranks}", SOLIDS, SOLID_BODIES)
+            shutil.copy(run.path("results", "final_bodies.h5"), os.path.join(directory, "bodies.h5"))
+            again = run_case(merged(SOLID_CASE, {"scene": {"bodies_file": "bodies.h5"}}), ranks, directory)
+            self.assert_status(again, 0)
+            self.assertEqual(differences(expected, contents(again.path("results", "final_bodies.h5"))), [])
+        # by hand, in the axes of the file of shapes
+        with h5py.File(self.here("solids back 1", "bodies.h5"), "r+") as file:
+            file["bodies/orientation"].attrs["axes"] = "written"
+            file["bodies/orientation"].attrs.pop("checksum", None)
+            file["bodies/orientation"][1] = [0.5, 0.5, 0.5, 0.5]
+        again = run_case(merged(SOLID_CASE, {"scene": {"bodies_file": "bodies.h5"}}), 1, self.here("solids back 1"))
+        self.assert_status(again, 0)
+        np.testing.assert_allclose(package.Run(again.path("results")).bodies().orientation[1], bodies.orientation[1], atol=1e-15)
+
+    def test_pictures(self):
+        """gravier_plot fills what a body covers, and nothing beside it; pictures of both dimensions are drawn."""
+        run = run_case(merged(CASE, {"output": {"vtk": True}}), 1, self.prepare("pictures"))
+        self.assert_status(run, 0)
+        results = package.Run(run.path("results"))
+        for colour in ("speed", "radius", "subdomain", "none"):
+            options = gravier_plot.parse(["packing", run.path("results"), "--colour", colour])
+            options.chains = False
+            figure = gravier_plot.draw_packing(results, None, options)
+            drawn = next(one for one in figure.axes[0].collections if isinstance(one, gravier_plot.PolyCollection))
+            polygons = [path.vertices[:-1] for path in drawn.get_paths()]
+            expected = [points for outline in results.outlines() for points in outline]
+            self.assertEqual(len(polygons), len(expected))
+            for found, points in zip(polygons, expected):
+                np.testing.assert_array_equal(found, points)
+            if colour == "speed":
+                # a colour for each polygon: both pieces of body 2 have that of body 2
+                speeds = np.linalg.norm(results.bodies().velocity, axis=1)
+                values = np.asarray(drawn.get_array())
+                np.testing.assert_allclose(values / values[0], (speeds / speeds[0])[[0, 1, 1, 2, 3, 4]])
+            gravier_plot.plt.close(figure)
+        solid = run_case(SOLID_CASE, 1, self.prepare("solid pictures", SOLIDS, SOLID_BODIES))
+        for one in (run, solid):
+            gravier_plot.main(["packing", one.path("results"), "--out", one.path("picture.png")])
+            self.assertGreater(matplotlib.image.imread(one.path("picture.png"))[..., :3].std(), 0.01)
+            gravier_plot.main(["packing", one.path("results", "final_bodies.h5"), "--out", one.path("sample.png")])
+
+    def test_contact_points(self):
+        """Contacts of a brick at rest on the ground are at its lower corners, each with half its weight."""
+        bodies = "id,x,y,shape,nx,ny\n1,0,0.1,brick,,\n9,0,0,plane,0,1\n"
+        run = run_case(merged(CASE, {"time": {"steps": 30}}), 1, self.prepare("points", bodies=bodies))
+        self.assert_status(run, 0)
+        results = package.Run(run.path("results"))
+        contacts = results.contacts()
+        place = contacts.point[np.argsort(contacts.point[:, 0])]
+        np.testing.assert_allclose(place, [[-0.2, 0.0], [0.2, 0.0]], atol=1e-4)
+        segments, force = results.chains()
+        np.testing.assert_allclose(segments[:, 0], [[0.0, 0.1]] * 2, atol=1e-4)
+        weight = 2500.0 * 0.08 * 9.81
+        np.testing.assert_allclose(force, weight / 2.0, rtol=2e-2)
+        # sum of f l/(d V), by hand
+        np.testing.assert_allclose(results.pressure(), weight * 0.1 / (2.0 * 0.08), rtol=2e-2)
+
+    def test_inertia(self):
+        """The kinetic energy of bodies that fly and turn is that of their masses and moments of inertia, scaled as they are."""
+        bodies = "id,x,y,vx,omega,shape,scale\n1,0,0,0,3,brick,0.5\n2,1,0,2,0,pill,\n3,2,0,0,7,pill,2\n"
+        run = run_case(merged(CASE, {"scene": {"gravity": [0.0, 0.0, 0.0]}, "time": {"steps": 1}}), 1, self.prepare("inertia", bodies=bodies))
+        self.assert_status(run, 0)
+        mass = 2500.0 * np.array([0.2 * 0.1, 0.02 + np.pi * 0.05**2, 4.0 * (0.02 + np.pi * 0.05**2)])
+        # a rectangle and two half disks, whose centres of mass are 4 r/(3 pi) from their flat sides
+        r, length = 0.1, 0.4
+        pill = 2500.0 * (2.0 * r * length * (length**2 + 4.0 * r**2) / 12.0 + np.pi * r**4 / 2.0 + np.pi * r**2 * length**2 / 4.0
+                         + 4.0 * r**3 * length / 3.0)
+        expected = 0.5 * (mass[0] * (0.2**2 + 0.1**2) / 12.0 * 3.0**2 + mass[1] * 2.0**2 + pill * 7.0**2)
+        np.testing.assert_allclose(run.history()["kinetic_energy"], expected, rtol=1e-12)
+        # in space about each of the axes of a box, turned somehow
+        for axis, moment in enumerate((0.1**2 + 0.3**2, 0.2**2 + 0.3**2, 0.2**2 + 0.1**2)):
+            spin = axes_of(np.array([[0.5, 0.1, 0.7, 0.5]]))[0][:, axis]
+            bodies = f"id,x,y,z,shape,scale,qw,qx,qy,qz,wx,wy,wz\n1,0,0,0,box,2,0.5,0.1,0.7,0.5,{','.join(map(str, spin))}\n"
+            run = run_case(merged(SOLID_CASE, {"time": {"steps": 1}}), 1, self.prepare(f"inertia {axis}", SOLIDS, bodies))
+            self.assert_status(run, 0)
+            np.testing.assert_allclose(run.history()["kinetic_energy"], 0.5 * 2500.0 * 0.006 * 8.0 * moment * 4.0 / 12.0, rtol=1e-9)
 
     def test_restart_of_another_library(self):
         """A library that changed in one number is another scene; one that is written in another way is the same."""

@@ -54,7 +54,7 @@ contains
   pure type(vector_t) function on(turn, v) result(u)
     type(turn_t), intent(in) :: turn
     type(vector_t), intent(in) :: v
-    u%x(:) = matmul(turn%m, v%x)
+    u%x(:) = v%x(1)*turn%m(:, 1) + v%x(2)*turn%m(:, 2) + v%x(3)*turn%m(:, 3)
   end function on
 
   !> A vector turned back.

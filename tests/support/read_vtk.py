@@ -20,8 +20,9 @@ for path in sys.argv[1:]:
         if reader.GetErrorCode() or data.GetClassName() != "vtkPolyData":
             sys.exit(f"{path}: VTK cannot read the step of {time}")
         found[f"{k} points"] = vtk_to_numpy(data.GetPoints().GetData()) if data.GetNumberOfPoints() else np.zeros((0, 3))
-        found[f"{k} cells"] = np.array([[data.GetCell(c).GetPointId(p) for p in range(data.GetCell(c).GetNumberOfPoints())]
-                                        for c in range(data.GetNumberOfCells())])
+        cells = [[data.GetCell(c).GetPointId(p) for p in range(data.GetCell(c).GetNumberOfPoints())] for c in range(data.GetNumberOfCells())]
+        found[f"{k} cells"] = np.array([point for cell in cells for point in cell])
+        found[f"{k} corners"] = np.array([len(cell) for cell in cells])
         for fields in (data.GetPointData(), data.GetCellData()):
             for a in range(fields.GetNumberOfArrays()):
                 found[f"{k} {fields.GetArrayName(a)}"] = vtk_to_numpy(fields.GetArray(a))

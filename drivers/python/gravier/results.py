@@ -8,6 +8,7 @@ import numpy as np
 
 from .case import parse_namelist
 from .checksum import is_whole
+from .shapes import axes_of, ball, shapes_of
 
 
 class ResultsError(Exception):
@@ -164,7 +165,8 @@ class Run:
             return float(file[f"steps/{self.find_step(step)}"].attrs.get(name, np.nan))
 
     def bodies(self, step=None):
-        """id, position (n, d), velocity (n, d), spin (n, 1 or 3), radius, and image (n, d) in periodic scenes."""
+        """id, position (n, d), velocity (n, d), spin (n, 1 or 3), radius, image (n, d) in periodic scenes and, where bodies have shapes,
+        shape (n), 0 for a disk or a sphere, else a row of `shapes` from 1 on, and orientation (n, 1 or 4)."""
         return self._split(self._group(step, "bodies"))
 
     def boundaries(self, step=None):
@@ -172,12 +174,32 @@ class Run:
         rows = self._split(self._group(step, "boundaries"))
         with self._open() as file:
             for key in ("name", "shape"):
-                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])])
+                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
         return rows
 
     def contacts(self, step=None):
-        """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s]; None where none are written."""
+        """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s] and, where bodies have shapes, point (n, d), the place
+        of the contact; None where none are written."""
         return self._group(step, "contacts")
+
+    def shapes(self):
+        """Shapes of the bodies, a list: number k of a body is its item k - 1; empty where all are disks or spheres."""
+        with self._open() as file:
+            if "shapes" not in file:
+                return []
+            tables = {name: Table({key: self._values(value) for key, value in group.items() if isinstance(value, h5py.Dataset)})
+                      for name, group in [("shapes", file["shapes"]), *file["shapes"].items()] if isinstance(group, h5py.Group)}
+        tables["shapes"]["name"] = np.array([_text(value) for value in tables["shapes"].name])
+        return shapes_of(tables)
+
+    def outlines(self, step=None):
+        """Polygons of each body, a list of lists of arrays (points, d): outlines in 2D, surfaces in 3D, with sharp corners."""
+        bodies, shapes = self.bodies(step), [ball(self.dimension), *self.shapes()]
+        parts = [shape.polygons() for shape in shapes]
+        if len(shapes) == 1 or "shape" not in bodies:
+            return [[centre + radius * points for points in parts[0]] for centre, radius in zip(bodies.position, bodies.radius)]
+        return [[centre + radius * points @ axes.T for points in parts[number]] for centre, radius, number, axes in
+                zip(bodies.position, bodies.radius, bodies.shape, axes_of(bodies.orientation))]
 
     def diagnostics(self, step=None):
         """Figures of the step by name, as `&output` asked for; empty where none are written."""
@@ -209,19 +231,30 @@ class Run:
 
     def chains(self, step=None):
         """Contacts as segments (n, 2, d), from the centre of the candidate to that of the antagonist's nearest image, or to
-        the boundary, and their normal forces [N] (n)."""
+        the boundary, and their normal forces [N] (n). Where bodies have shapes: segments from each centre to the contact."""
         bodies, contacts = self.bodies(step), self._contacts_or_error(step)
         row, other = self._rows(bodies, contacts)
+        if "point" in contacts:
+            body, contact, arm = self._arms(bodies, contacts)
+            segments = np.stack([bodies.position[body], bodies.position[body] + arm], axis=1)
+            return segments, contacts.impulse[contact, 0] / self.time_step()
         reach = bodies.radius[row] + contacts.gap + np.where(other >= 0, bodies.radius[other], 0.0)
         start = bodies.position[row]
         segments = np.stack([start, start - reach[:, None] * contacts.normal], axis=1)
         return segments, contacts.impulse[:, 0] / self.time_step()
 
     def pressure(self, step=None):
-        """Mean pressure in each body [Pa, N/m in 2D] (n): R sum(normal forces)/(d V), with V its own volume or area."""
+        """Mean pressure of the normal forces in each body [Pa, N/m in 2D] (n): R sum(normal forces)/(d V), with V its own volume or
+        area; of bodies with shapes, the way from the centre to the contact along the normal in the place of R."""
         bodies, contacts = self.bodies(step), self._contacts_or_error(step)
         row, other = self._rows(bodies, contacts)
         force = contacts.impulse[:, 0] / self.time_step()
+        if "point" in contacts:
+            body, contact, arm = self._arms(bodies, contacts)
+            sign = np.where(bodies.id[body] == contacts.candidate[contact], -1.0, 1.0)
+            total = np.bincount(body, sign * force[contact] * (arm * contacts.normal[contact]).sum(axis=1), len(bodies))
+            volume = np.array([shape.volume for shape in [ball(self.dimension), *self.shapes()]])[bodies.shape]
+            return total / (self.dimension * volume * bodies.radius**self.dimension)
         total = np.bincount(row, force, len(bodies))
         total += np.bincount(other[other >= 0], force[other >= 0], len(bodies))
         volume = np.pi * bodies.radius**2 if self.dimension == 2 else 4.0 / 3.0 * np.pi * bodies.radius**3
@@ -237,6 +270,13 @@ class Run:
             place = np.flatnonzero(file["step"][:count] == step)
             if len(place) == 0:
                 raise ResultsError(f"{path}: no step {step}")
+            if "VTKHDF/CellData/subdomain" in file:
+                # polygons of bodies, one after the other
+                first = int(steps["CellOffsets"][place[0]][2])
+                number = int(file["VTKHDF/Polygons/NumberOfCells"][place[0]])
+                cells = file["VTKHDF/CellData"]
+                _, rows = np.unique(cells["id"][first:first + number], return_index=True)
+                return cells["subdomain"][first:first + number].astype(int)[rows]
             first = int(steps["PointOffsets"][place[0]])
             number = int(file["VTKHDF/NumberOfPoints"][place[0]])
             return file["VTKHDF/PointData/subdomain"][first:first + number].astype(int)
@@ -246,6 +286,15 @@ class Run:
         if contacts is None:
             raise ResultsError(f"{self.path}: no contacts in step {self.find_step(step)}; &output contacts = .true. writes them")
         return contacts
+
+    def _arms(self, bodies, contacts):
+        """Row of the body, row of the contact and way from the centre to the contact, of both bodies of all contacts. What lies outside
+        the body belongs to an image of it, and is left out."""
+        row, other = self._rows(bodies, contacts)
+        body, contact = np.concatenate([row, other]), np.tile(np.arange(len(contacts)), 2)
+        arm = contacts.point[contact] - bodies.position[body]
+        near = (body >= 0) & (np.linalg.norm(arm, axis=1) <= 1.1 * bodies.radius[body])
+        return body[near], contact[near], arm[near]
 
     @staticmethod
     def _rows(bodies, contacts):
@@ -257,7 +306,8 @@ class Run:
 
 class BodiesFile(Run):
     """A bodies file in HDF5, as gravier_sample and `final_bodies` leave it, read as a run of one step 0 without contacts: bodies, and
-    the walls as boundaries, which are planes. What is optional in the file is there only where the file has it."""
+    the walls as boundaries, which are planes. What is optional in the file is there only where the file has it. It names shapes but
+    does not hold them: outlines are those of the balls that hold the bodies."""
 
     _kind = "a bodies file"
     _columns = {"bodies": ("id", "position", "radius"), "walls": ("id", "point", "normal")}

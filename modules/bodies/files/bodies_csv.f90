@@ -8,7 +8,7 @@ module gravier_bodies_csv
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_names, only: shape_names
+  use gravier_shape_names, only: find_shape, shape_names
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, make_unit
   use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
   implicit none
@@ -229,7 +229,7 @@ contains
 
     what = is_grain
     if (table%is_empty(layout%shape)) return
-    what = shapes%find(table%get_text(layout%shape))
+    what = find_shape(shapes, table%get_text(layout%shape))
     if (what > 0) return
     select case (lower(table%get_text(layout%shape)))
     case ("plane")

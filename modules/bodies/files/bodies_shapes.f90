@@ -9,7 +9,7 @@ module gravier_bodies_shapes
   use gravier_communicator, only: communicator_t
   use gravier_hdf5_file, only: h5_file_t
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_names, only: shape_names
+  use gravier_shape_names, only: find_shape, shape_names
   use gravier_bodies_data, only: bodies_data_t
   use gravier_bodies_checks, only: check_numbers, quantity, extent
   use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
@@ -74,7 +74,7 @@ contains
     n = 0
     do while (at <= len_trim(names) .and. n < size(number))
       length = index(names(at:)//",", ",") - 1
-      k = shapes%find(trim(adjustl(names(at:at + length - 1))))
+      k = find_shape(shapes, trim(adjustl(names(at:at + length - 1))))
       if (k == 0) then
         call raise(error, status_input, path//": /bodies/shape: attribute names: "//trim(adjustl(names(at:at + length - 1)))// &
           & ": expected one of the shapes of the scene, "//shape_names(shapes, ", "))

@@ -2,15 +2,17 @@
 module gravier_shapes_file
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_text, only: to_text
-  use gravier_magnitude, only: is_size, size_text
+  use gravier_text, only: to_text, lower
+  use gravier_magnitude, only: is_size, is_bounded, size_text, bounded_text
   use gravier_communicator, only: communicator_t
-  use gravier_whole_file, only: read_whole_file
+  use gravier_input_text, only: read_input_text
   use gravier_shape_library, only: body_shape_t, shape_library_t
-  use gravier_shape_names, only: is_reserved_name
+  use gravier_shape_names, only: find_shape, is_reserved_name
   use gravier_convex_piece, only: convex_piece_t
   use gravier_mass_properties, only: mass_t, mass_of_sum, find_principal_axes
-  use gravier_polyhedron, only: make_piece, make_capsule_piece, make_shape
+  use gravier_polyhedron, only: make_piece, make_piece_of_faces, make_capsule_piece, make_shape
+  use gravier_stl_file, only: read_stl
+  use gravier_obj_file, only: read_obj
   use gravier_quaternion, only: find_quaternion
   use gravier_polygon, only: flat_piece_t, polygon_piece, round_piece, make_flat_shape
   use gravier_shapes_text, only: statement_t, split_statements
@@ -18,7 +20,7 @@ module gravier_shapes_file
   private
   public :: read_shapes, parse_shapes
 
-  !> rounding of a shape that says none, over its size, and one that is small beside any piece, with which the size is found
+  !> rounding of a shape that says none, over its size, and one over the extent of a piece with which the size is found first
   real(dp), parameter :: usual_rounding = 1.0e-3_dp, trial_rounding = 1.0e-9_dp
   integer, parameter :: longest_name = 64
 
@@ -35,7 +37,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
-    call read_whole_file(comm, path, "a text file of shapes", text, error)
+    call read_input_text(comm, path, text, error)
     call parse_shapes(path, text, dimension, library, error)
     call comm%agree(error)
   end subroutine read_shapes
@@ -88,7 +90,7 @@ contains
       else if (is_reserved_name(name)) then
         call refuse(path, statement, "shape "//name//": expected another name: grain, disk, sphere and plane stand for "// &
           & "themselves in bodies files", error)
-      else if (library%find(name) > 0) then
+      else if (find_shape(library, name) > 0) then
         call refuse(path, statement, "shape "//name//": expected a name that no shape above has", error)
       end if
     end associate
@@ -131,7 +133,7 @@ contains
     if (first == 3) then
       call make(statements(2)%number(1))
     else
-      call make(trial_rounding*least_extent(statements(first:), dimension))
+      call make(0.0_dp)
       if (.not. allocated(error)) call make(usual_rounding*shape%size)
     end if
     if (allocated(error)) return
@@ -142,7 +144,7 @@ contains
   contains
 
     subroutine make(rounding)
-      !> in the unit of the file
+      !> in the unit of the file; 0 for one that is small beside each piece
       real(dp), intent(in) :: rounding
 
       if (dimension == 2) then
@@ -154,37 +156,26 @@ contains
 
   end subroutine add_shape
 
-  !> Least extent of the pieces with corners, each along its longest axis; any number where there are none.
-  pure real(dp) function least_extent(pieces, dimension) result(extent)
-    type(statement_t), intent(in) :: pieces(:)
-    integer, intent(in) :: dimension
-    real(dp) :: longest
-    integer :: k, d, n
+  !> A rounding, or one that is small beside some points.
+  pure real(dp) function rounding_of(rounding, points)
+    !> 0 for none
+    real(dp), intent(in) :: rounding
+    !> (2 or 3, n)
+    real(dp), intent(in) :: points(:, :)
+    integer :: d
 
-    extent = huge(1.0_dp)
-    do k = 1, size(pieces)
-      longest = 0.0_dp
-      n = size(pieces(k)%number)
-      select case (pieces(k)%word)
-      case ("polygon", "hull")
-        do d = 1, min(dimension, n)
-          longest = max(longest, maxval(pieces(k)%number(d:n:dimension)) - minval(pieces(k)%number(d:n:dimension)))
-        end do
-      case ("box")
-        longest = maxval(pieces(k)%number(1:min(3, n)))
-      case default
-        cycle
-      end select
-      extent = min(extent, longest)
+    rounding_of = rounding
+    if (rounding > 0.0_dp) return
+    do d = 1, size(points, 1)
+      rounding_of = max(rounding_of, trial_rounding*(maxval(points(d, :)) - minval(points(d, :))))
     end do
-    if (extent >= huge(1.0_dp)) extent = 1.0_dp
-  end function least_extent
+  end function rounding_of
 
   !> Make a shape of the plane.
   subroutine make_flat(path, name, pieces, rounding, shape, error)
     character(len=*), intent(in) :: path, name
     type(statement_t), intent(in) :: pieces(:)
-    !> of polygons, in the unit of the file
+    !> of polygons, in the unit of the file; 0 for one that is small beside each
     real(dp), intent(in) :: rounding
     type(body_shape_t), intent(out) :: shape
     type(error_t), allocatable, intent(inout) :: error
@@ -203,7 +194,8 @@ contains
       select case (pieces(k)%word)
       case ("polygon")
         call check_count(path, pieces(k), mod(n, 2) == 0 .and. n >= 6, "x and y of three corners or more", error)
-        if (.not. allocated(error)) call polygon_piece(corner, rounding, made(k), message)
+        if (.not. allocated(error)) call polygon_piece(corner, rounding_of(rounding, corner), &
+          & made(k), message)
       case ("disk")
         call check_count(path, pieces(k), n == 3, "x, y and a radius", error)
         call check_radius(path, pieces(k), error)
@@ -225,7 +217,7 @@ contains
   subroutine make_solid(path, name, pieces, rounding, shape, error)
     character(len=*), intent(in) :: path, name
     type(statement_t), intent(in) :: pieces(:)
-    !> of pieces with corners, in the unit of the file
+    !> of pieces with corners, in the unit of the file; 0 for one that is small beside each
     real(dp), intent(in) :: rounding
     type(body_shape_t), intent(out) :: shape
     type(error_t), allocatable, intent(inout) :: error
@@ -262,14 +254,16 @@ contains
       call check_count(path, statement, mod(n, 3) == 0 .and. n >= 12, "x, y and z of four corners or more", error)
       if (allocated(error)) return
       call take_points(statement%number, point)
-      call make_piece(what, point, rounding, piece, mass, error)
+      call make_piece(what, point, rounding_of(rounding, point), piece, mass, error)
     case ("box")
       call check_count(path, statement, n == 3 .or. n == 6, "three lengths, and perhaps x, y and z of the centre", error)
       if (allocated(error)) return
       if (.not. all(is_size(statement%number(1:3)))) call refuse(path, statement, "box with a length of "// &
         & to_text(minval(statement%number(1:3)))//": expected "//size_text, error)
       call take_box(statement%number, point)
-      call make_piece(what, point, rounding, piece, mass, error)
+      call make_piece(what, point, rounding_of(rounding, point), piece, mass, error)
+    case ("file")
+      call make_piece_of_file(what, statement, rounding, piece, mass, error)
     case default
       if (statement%word == "sphere") then
         call check_count(path, statement, n == 4, "x, y, z and a radius", error)
@@ -286,6 +280,41 @@ contains
         & call refuse(path, statement, "shape "//name//": a capsule of length 0: expected two ends", error)
     end select
   end subroutine make_solid_piece
+
+  !> The piece that a file of a surface holds.
+  subroutine make_piece_of_file(what, statement, rounding, piece, mass, error)
+    !> it is, for messages
+    character(len=*), intent(in) :: what
+    type(statement_t), intent(in) :: statement
+    real(dp), intent(in) :: rounding
+    type(convex_piece_t), intent(out) :: piece
+    type(mass_t), intent(out) :: mass
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: point(:, :)
+    integer, allocatable :: first(:), corner(:)
+    integer :: n
+
+    associate (path => statement%text)
+      n = len(path)
+      select case (lower(path(max(1, n - 3):)))
+      case (".stl")
+        call read_stl(path, point, first, corner, error)
+      case (".obj")
+        call read_obj(path, point, first, corner, error)
+      case default
+        call raise(error, status_input, what//": file "//path//": expected a path that ends with .stl or .obj")
+      end select
+      if (allocated(error)) then
+        ! what is wrong with a file has its path; where it is asked for stands before
+        if (index(error%message, what) /= 1) error%message = what//": "//error%message
+        return
+      end if
+      if (.not. all(is_bounded(point))) call raise(error, status_input, what//": "//path//": a coordinate of "// &
+        & to_text(maxval(abs(point)))//" in size: expected "//bounded_text)
+      if (.not. allocated(error)) &
+        & call make_piece_of_faces(what//": "//path, point, first, corner, rounding_of(rounding, point), piece, mass, error)
+    end associate
+  end subroutine make_piece_of_file
 
   !> Points of their coordinates one after the other.
   pure subroutine take_points(number, point)

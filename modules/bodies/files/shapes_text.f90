@@ -49,8 +49,8 @@ contains
       allocate (words(5))
       words(:) = [character(len=8) :: "shape", "rounding", "polygon", "disk", "capsule"]
     else
-      allocate (words(6))
-      words(:) = [character(len=8) :: "shape", "rounding", "hull", "box", "sphere", "capsule"]
+      allocate (words(7))
+      words(:) = [character(len=8) :: "shape", "rounding", "hull", "box", "sphere", "capsule", "file"]
     end if
   end subroutine get_words
 

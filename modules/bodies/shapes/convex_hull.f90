@@ -20,6 +20,9 @@ module gravier_convex_hull
   !> the extent
   real(dp), parameter :: certain = 1.0e-14_dp*(2*half_extent)**3
 
+  !> part of the extent up to which points lie in a line or a plane
+  real(dp), parameter :: thin = 1.0e-9_dp
+
   !> A surface of triangles under way.
   type :: surface_t
     !> triangles in use or free, and those that are in use
@@ -116,7 +119,7 @@ contains
     start(1) = 1
     start(2) = size(grid, 2)
     message = "all points lie on a line"
-    largest = 0.0_dp
+    largest = thin*(2*half_extent)**2
     do k = 2, size(grid, 2) - 1
       call find_normal(grid(:, start(1)), grid(:, start(2)), grid(:, k), normal)
       found = norm2(normal)
@@ -126,7 +129,7 @@ contains
     end do
     if (start(3) == 0) return
     message = "all points lie in a plane"
-    largest = 0.0_dp
+    largest = thin*2*half_extent*largest
     do k = 1, size(grid, 2)
       if (any(start(1:3) == k)) cycle
       found = abs(side(grid, start(1), start(2), start(3), k))

@@ -37,7 +37,9 @@ contains
     integer :: k
 
     message = ""
-    offset(:) = sharp%face_offset - matmul(inside, sharp%face_normal)
+    do k = 1, size(offset)
+      offset(k) = sharp%face_offset(k) - dot_product(inside, sharp%face_normal(:, k))
+    end do
     if (.not. rounding > 0.0_dp) message = "a rounding above 0 is needed"
     if (rounding >= minval(offset)) message = "the rounding of "//to_text(rounding)//" is too large: a face is only "// &
       & to_text(minval(offset))//" from the centre"
@@ -83,7 +85,8 @@ contains
       do k = 1, size(meeting)
         meeting(k) = plane(dual%face_vertex(dual%face_first(v) + k - 1))
       end do
-      vertex(:, v) = inside + point_of_planes(sharp%face_normal, offset, meeting)
+      call meet_planes(sharp%face_normal, offset, meeting, vertex(:, v))
+      vertex(:, v) = inside + vertex(:, v)
       corner(v) = corner_behind(sharp, meeting, vertex(:, v))
       keys(v) = corner(v)
       deallocate (meeting)
@@ -114,11 +117,12 @@ contains
   end subroutine find_planes_of_poles
 
   !> The point where planes meet, by those three of them that are farthest from being parallel.
-  pure function point_of_planes(normal, offset, meeting) result(point)
+  pure subroutine meet_planes(normal, offset, meeting, point)
     real(dp), intent(in), contiguous :: normal(:, :)
     real(dp), intent(in) :: offset(:)
     integer, intent(in) :: meeting(:)
-    real(dp) :: point(3), largest, found, rows(3, 3), right(3)
+    real(dp), intent(out) :: point(3)
+    real(dp) :: largest, found, rows(3, 3), right(3)
     integer :: i, j, k, best(3)
 
     largest = 0.0_dp
@@ -146,7 +150,7 @@ contains
     point(1) = triple_product(right, rows(:, 2), rows(:, 3))/found
     point(2) = triple_product(rows(:, 1), right, rows(:, 3))/found
     point(3) = triple_product(rows(:, 1), rows(:, 2), right)/found
-  end function point_of_planes
+  end subroutine meet_planes
 
   !> The sharp corner in most of some planes; of several the nearest to a place, then the lowest.
   pure integer function corner_behind(sharp, meeting, place) result(corner)

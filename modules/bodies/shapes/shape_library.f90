@@ -4,13 +4,13 @@ module gravier_shape_library
   use gravier_convex_piece, only: convex_piece_t
   implicit none
   private
-  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number
+  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number, of_face
 
   !> stands for a boundary in the place of the number of a shape
   integer, parameter :: boundary_number = -1
   !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge, a face in the plane and in
   !> space
-  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 4
+  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 8
   !> pairs of pieces that two bodies touch with at most, besides as many as both have pieces
   integer, parameter :: more_pairs = 4
 

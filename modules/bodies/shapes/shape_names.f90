@@ -1,4 +1,4 @@
-!> Names of shapes, and what tells two libraries from each other.
+!> Shapes of a library by name, and what tells two libraries from each other.
 module gravier_shape_names
   use gravier_kinds, only: i8
   use gravier_text, only: lower
@@ -7,12 +7,23 @@ module gravier_shape_names
   use gravier_shape_library, only: body_shape_t, shape_library_t
   implicit none
   private
-  public :: shape_names, is_reserved_name, library_digest
+  public :: find_shape, shape_names, is_reserved_name, library_digest
 
   !> names that files of bodies have for what is not in a library
   character(len=*), parameter :: reserved(4) = [character(len=6) :: "grain", "disk", "sphere", "plane"]
 
 contains
+
+  !> Number of the shape with that name, 0 where there is none.
+  pure integer function find_shape(library, name) result(number)
+    type(shape_library_t), intent(in) :: library
+    character(len=*), intent(in) :: name
+
+    do number = 1, library%n
+      if (len(library%shape(number)%name) == len(name) .and. library%shape(number)%name == name) return
+    end do
+    number = 0
+  end function find_shape
 
   !> All names in the order of their numbers, with `between` between two.
   pure function shape_names(library, between) result(text)

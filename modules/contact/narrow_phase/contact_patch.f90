@@ -15,7 +15,7 @@ module gravier_contact_patch
     integer :: key
   end type patch_point_t
 
-  !> lengths and gaps that differ by less than this part of the size of the pair are equal, so that rounding does not decide
+  !> lengths that differ by less than this part of the size of the pair are equal, so that rounding does not decide
   real(dp), parameter :: equal = 1.0e-5_dp
 
 contains
@@ -49,9 +49,11 @@ contains
   end subroutine add_point
 
   !> The manifold of the points: at most `most` of them, in ascending order of their keys.
-  pure subroutine fill_manifold(frame, size_of_pair, most, n, point, manifold)
+  pure subroutine fill_manifold(frame, size_of_pair, same_gap, most, n, point, manifold)
     type(frame_t), intent(in) :: frame
     real(dp), intent(in) :: size_of_pair
+    !> points whose gaps differ by less are equally deep [m]
+    real(dp), intent(in) :: same_gap
     integer, intent(in) :: most
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
@@ -59,12 +61,13 @@ contains
     integer :: k
 
     call sort_points(n, point)
+    call join_keys(n, point)
     if (n > min(most, most_points)) then
       if (most <= 4) then
-        call keep_four(most, size_of_pair, n, point)
+        call keep_four(most, size_of_pair, same_gap, n, point)
       else
         do while (n > min(most, most_points))
-          call drop_one(size_of_pair, n, point)
+          call drop_one(size_of_pair, same_gap, n, point)
         end do
       end if
     end if
@@ -96,11 +99,29 @@ contains
     end do
   end subroutine sort_points
 
+  !> Of points in ascending order that have one key, as where one took the key of another at its place, keep the deepest.
+  pure subroutine join_keys(n, point)
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    integer :: k, m
+
+    m = min(n, 1)
+    do k = 2, n
+      if (point(k)%key /= point(m)%key) then
+        m = m + 1
+        if (m < k) point(m) = point(k)
+      else if (point(k)%gap < point(m)%gap) then
+        point(m) = point(k)
+      end if
+    end do
+    n = m
+  end subroutine join_keys
+
   !> Of more points keep the deepest, the one farthest from it, the one farthest from the line of both, and the one farthest from the
   !> line on its other side. Differences that rounding could make do not count: ties go to the lowest key.
-  pure subroutine keep_four(most, size_of_pair, n, point)
+  pure subroutine keep_four(most, size_of_pair, same_gap, n, point)
     integer, intent(in) :: most
-    real(dp), intent(in) :: size_of_pair
+    real(dp), intent(in) :: size_of_pair, same_gap
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
     real(dp) :: value(n), size_of(n), way(2), base(2), room
@@ -111,7 +132,7 @@ contains
     do k = 1, n
       value(k) = -point(k)%gap
     end do
-    chosen(1) = first_greatest(value, room)
+    chosen(1) = first_greatest(value, same_gap)
     base(:) = point(chosen(1))%place(1:2)
     do k = 1, n
       value(k) = norm2(point(k)%place(1:2) - base)
@@ -172,8 +193,8 @@ contains
   end function farthest_of
 
   !> Leave out the point that is nearest to another one, but never the deepest; of the two the one with the higher key.
-  pure subroutine drop_one(size_of_pair, n, point)
-    real(dp), intent(in) :: size_of_pair
+  pure subroutine drop_one(size_of_pair, same_gap, n, point)
+    real(dp), intent(in) :: size_of_pair, same_gap
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
     real(dp) :: depth(n), nearest, way(2)
@@ -182,7 +203,7 @@ contains
     do k = 1, n
       depth(k) = -point(k)%gap
     end do
-    deepest = first_greatest(depth, equal*size_of_pair)
+    deepest = first_greatest(depth, same_gap)
     nearest = huge(1.0_dp)
     out = n
     do k = 2, n

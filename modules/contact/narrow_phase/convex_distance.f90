@@ -41,7 +41,11 @@ module gravier_convex_distance
     integer :: steps = 0
   end type core_distance_t
 
-  !> more steps than a search takes; it ends with the best of them
+  !> squared sine of an angle of a triangle that is thin
+  real(dp), parameter :: thin = 1.0e-6_dp
+  !> steps of a search that may go back
+  integer, parameter :: most_back = 8
+  !> more steps than a search takes
   integer, parameter :: most_steps = 200
   !> from this number of vertices on, the farthest is searched along edges
   integer, parameter :: many_vertices = 48
@@ -60,7 +64,7 @@ contains
     real(dp), intent(in) :: beyond
     type(core_distance_t), intent(out) :: found
     real(dp) :: w(3, 4), x(3, 4), y(3), v(3), u(3), share(4), squared, along, size_squared
-    integer :: i, j, n
+    integer :: i, j, n, back
     logical :: walk, done
 
     v(:) = -pair%way
@@ -71,6 +75,8 @@ contains
     size_squared = 0.0_dp
     squared = huge(1.0_dp)
     along = 0.0_dp
+    back = 0
+    done = .false.
     walk = max(size(a%vertex, 2), size(b%vertex, 2)) >= many_vertices
     do while (found%steps < most_steps)
       found%steps = found%steps + 1
@@ -90,7 +96,9 @@ contains
       if (n > 0) done = done .or. squared - along <= 4*epsilon(1.0_dp)*sqrt(squared*size_squared)
       if (.not. done) then
         call find_nearest(w, n + 1, share, u)
-        done = n > 0 .and. dot_product(u, u) >= squared
+        ! a difference without a share changes nothing; some steps may seem to go back by rounding
+        if (n > 0 .and. dot_product(u, u) >= squared) back = back + 1
+        done = .not. share(n + 1) > 0.0_dp .or. back > most_back
       end if
       if (done) then
         ! walks end where rounding has bent a piece: all vertices have the last word
@@ -112,7 +120,7 @@ contains
       found%overlap = .true.
       return
     end if
-    call finish(w(:, 1:n), x(:, 1:n), found)
+    call finish(w(:, 1:n), x(:, 1:n), v, found)
   end subroutine find_core_distance
 
   !> Whether the difference of two vertices is in the simplex.
@@ -151,17 +159,15 @@ contains
 
   !> Nearest points, distance and normal from the vertices that take part. The way between the points is made normal to both features
   !> up to rounding, once as a whole and once more as a unit vector, which matters where it is short.
-  pure subroutine finish(w, x, found)
+  pure subroutine finish(w, x, v, found)
     !> differences and vertices of a (3, n)
     real(dp), intent(in) :: w(:, :), x(:, :)
+    !> the nearest difference
+    real(dp), intent(inout) :: v(3)
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: v(3), part(2)
+    real(dp) :: part(2)
     integer :: k
 
-    v(:) = w(:, 1)
-    do k = 2, found%n
-      v(:) = v + found%share(k)*(w(:, k) - w(:, 1))
-    end do
     if (found%n > 1) then
       call make_normal(w, found%n, v, part)
       found%share(2:found%n) = found%share(2:found%n) + part(1:found%n - 1)
@@ -204,7 +210,8 @@ contains
     ut = dot_product(u, t)
     tt = dot_product(t, t)
     det = uu*tt - ut*ut
-    if (det <= epsilon(1.0_dp)*uu*tt) return
+    ! of a thin triangle the search knows the normal better than squares of its sides
+    if (det <= thin*uu*tt) return
     part(1) = -(tt*dot_product(u, v) - ut*dot_product(t, v))/det
     part(2) = -(uu*dot_product(t, v) - ut*dot_product(u, v))/det
     v(:) = v + part(1)*u + part(2)*t

@@ -62,15 +62,22 @@ contains
     type(core_distance_t), intent(inout) :: found
     real(dp) :: x(3), y(3), separation
     integer :: i, j
+    logical :: walk
 
     i = 1
     j = 1
-    call support_a(a, n, .false., i)
-    call support_b(b, pair, n, .false., j)
-    call place_a(a, pair, i, x)
-    call place_b(b, pair, j, y)
-    separation = dot_product(n, x) - dot_product(n, y)
-    if (.not. separation > found%distance + better*(pair%radius_a + pair%radius_b)) return
+    ! walks are fast and bound the separation from above; all vertices tell it
+    walk = .true.
+    do
+      call support_a(a, n, walk, i)
+      call support_b(b, pair, n, walk, j)
+      call place_a(a, pair, i, x)
+      call place_b(b, pair, j, y)
+      separation = dot_product(n, x) - dot_product(n, y)
+      if (.not. separation > found%distance + better*(pair%radius_a + pair%radius_b)) return
+      if (.not. walk) exit
+      walk = .false.
+    end do
     found%distance = separation
     found%normal(:) = n
     ! half-way between the two vertices, across the axis
@@ -88,12 +95,13 @@ contains
     type(placed_pair_t), intent(in) :: pair
     type(edges_t), intent(in) :: edges_a, edges_b
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: along_a(3), along_b(3), side(3), n(3), normal_b(3, 2), length
+    real(dp) :: along_a(3), along_b(3), side(3), n(3), x(3), y(3), bound, normal_b(3, 2), length
     integer :: i, j
 
     do j = 1, edges_b%n
       side(:) = b%vertex(:, edges_b%vertex(2, j)) - b%vertex(:, edges_b%vertex(1, j))
       call turn(pair, side, along_b)
+      call place_b(b, pair, edges_b%vertex(1, j), y)
       call turn(pair, edges_b%normal(:, 1, j), normal_b(:, 1))
       call turn(pair, edges_b%normal(:, 2, j), normal_b(:, 2))
       do i = 1, edges_a%n
@@ -106,9 +114,12 @@ contains
         if (length <= 1.0e-9_dp*norm2(along_a)*norm2(along_b)) cycle
         n(:) = n/length
         if (dot_product(n, pair%way) > 0.0_dp) n(:) = -n
-        call try_axis(a, b, pair, n, found)
+        call place_a(a, pair, edges_a%vertex(1, i), x)
+        ! any two points bound the separation from above
+        bound = dot_product(n, x) - dot_product(n, y)
+        if (bound > found%distance) call try_axis(a, b, pair, n, found)
         n(:) = -n
-        call try_axis(a, b, pair, n, found)
+        if (-bound > found%distance) call try_axis(a, b, pair, n, found)
       end do
     end do
   end subroutine try_edges

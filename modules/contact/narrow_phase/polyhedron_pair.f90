@@ -23,6 +23,8 @@ module gravier_polyhedron_pair
   !> the exact point is kept beside a patch where it is deeper by this part of both roundings: blended corners make less of a
   !> difference
   real(dp), parameter :: deeper = 0.02_dp
+  !> points whose gaps differ by less than this part of the roundings are equally deep
+  real(dp), parameter :: same = 0.01_dp
 
 contains
 
@@ -100,7 +102,7 @@ contains
         exact%key = number_of(a, feature_a)*feature_base + number_of(b, feature_b)
         call add_point(exact, alert, scale, n, point)
       end if
-      call fill_manifold(frame, scale, most, n, point, manifold)
+      call fill_manifold(frame, scale, same*sum(rounding), most, n, point, manifold)
     end associate
   end subroutine find_patch
 
@@ -216,7 +218,7 @@ contains
     do k = 1, m
       call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
     end do
-    call fill_manifold(frame, radius, most, n, point, manifold)
+    call fill_manifold(frame, radius, same*radius*a%rounding, most, n, point, manifold)
     do k = 1, manifold%n
       manifold%cores_overlap = manifold%cores_overlap .or. manifold%gap(k) < -radius*a%rounding
     end do

@@ -58,6 +58,7 @@ module gravier_results_file
     procedure :: open => results_open
     procedure :: reopen => results_reopen
     procedure :: write_table => results_write_table
+    procedure :: write_tables => results_write_tables
     procedure :: write_step => results_write_step
     procedure :: close => results_close
   end type results_file_t
@@ -196,6 +197,34 @@ contains
     call write_fields(self, "/"//table%name, table, error)
     call finish(self, error)
   end subroutine results_write_table
+
+  !> Write tables that hold for the whole run and belong together, once: the first as /NAME, the others in this group by their
+  !> names. They are the same on all ranks. Failure: as of write_step. Collective.
+  subroutine results_write_tables(self, table, error)
+    class(results_file_t), intent(inout) :: self
+    type(field_list_t), intent(in) :: table(:)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: group
+    integer(i8) :: words
+    integer :: k
+
+    if (allocated(error)) return
+    group = "/"//table(1)%name
+    words = 0
+    do k = 1, size(table)
+      call check_table(self, group//"/"//table(k)%name, table(k), error)
+      words = words + int(table(k)%n_items(), i8)*table(k)%words()
+    end do
+    call self%comm%agree(error)
+    call self%file%reserve(bytes_of_headers + bytes_of_word*words, error)
+    call self%file%begin_group(group, error)
+    call write_fields(self, group, table(1), error)
+    do k = 2, size(table)
+      call self%file%make_group(group//"/"//table(k)%name, error)
+      call write_fields(self, group//"/"//table(k)%name, table(k), error)
+    end do
+    call finish(self, error)
+  end subroutine results_write_tables
 
   !> Write /steps/<step>. Nothing of the step is in the file when this fails, and what was there stays readable.
   !> Failure (status_failure): a number that is not finite, a disk that is full, a step written before. Collective.

@@ -1,10 +1,11 @@
-!> Points or lines that change from step to step, in the format VTKHDF of VTK and ParaView (a temporal PolyData).
+!> Points, lines or polygons that change from step to step, in the format VTKHDF of VTK and ParaView (a temporal PolyData).
 !> A step is written behind the others, all its tables first; then its time, and the number that says how many steps there are,
 !> since readers go by one or the other. A file takes its name with its second step, or when it is closed: of a file with one step
 !> VTK reads whatever there is. Whenever the program dies, a reader finds whole steps.
 !> Rows are in the order of their keys: nothing tells how many ranks wrote the file.
 module gravier_vtkhdf_file
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_room, only: room_for
   use gravier_text, only: to_text
@@ -12,12 +13,13 @@ module gravier_vtkhdf_file
   use gravier_file_system, only: remove_file
   use gravier_own_files, only: part_of
   use gravier_field_list, only: field_list_t
+  use gravier_table_growth, only: growth, chunks_in_block
   use gravier_hdf5_file, only: h5_file_t, table_integer, table_single, table_double
   implicit none
   private
-  public :: vtkhdf_file_t, points_name
+  public :: vtkhdf_file_t, points_name, corners_name
 
-  !> Numbers of each point, or of each line, as the file keeps them.
+  !> Numbers of each point, line or polygon, as the file keeps them.
   type :: vtk_field_t
     character(len=24) :: name = ""
     !> numbers of it; 1 makes a scalar
@@ -33,10 +35,10 @@ module gravier_vtkhdf_file
     type(h5_file_t) :: file
     character(len=:), allocatable :: path
     type(vtk_field_t), allocatable :: field(:)
-    !> of a row: 1 or 2
-    integer :: n_points = 1
+    !> place of its cells in the list of topologies, and points of a row, about
+    integer :: kind = 1, n_points = 1
     !> rows by which the file grows, and what is written
-    integer(i8) :: chunk = 1, steps = 0, rows = 0
+    integer(i8) :: chunk = 1, steps = 0, rows = 0, points = 0
     !> the file has its name
     logical :: shown = .false.
   contains
@@ -46,17 +48,23 @@ module gravier_vtkhdf_file
     procedure :: close => vtkhdf_close
   end type vtkhdf_file_t
 
-  !> field of a table that says where its items are (3 or 6, items) [m]: a point, or the two ends of a line
-  character(len=*), parameter :: points_name = "points"
+  !> Rows of a step on all ranks, and their points.
+  type :: extent_t
+    integer(i8) :: rows = 0, points = 0
+  end type extent_t
+
+  !> field of a table that says where its items are (3, 6 or more; items) [m]: a point, the two ends of a line, or the corners of a
+  !> polygon; and the field that then follows, the numbers of these corners
+  character(len=*), parameter :: points_name = "points", corners_name = "corners"
   character(len=*), parameter :: root = "/VTKHDF", steps_group = "/VTKHDF/Steps", step_table = "/step"
   !> kinds of cells of a PolyData, in the order of the columns of CellOffsets
   character(len=*), parameter :: topologies(4) = [character(len=8) :: "Vertices", "Lines", "Polygons", "Strips"]
-  !> chunks of a table for which the file has room in one block: up to there a program that dies leaves the file whole
-  integer, parameter :: chunks_in_block = 128
   !> rows of a chunk of short tables, and of the others at least and at most (4 GiB bound a chunk)
   integer(i8), parameter :: short_chunk = 512, least_chunk = 2048, greatest_chunk = 67108864
-  !> room for the headers of a step, and for the block that knows the chunks of a table
-  integer(i8), parameter :: bytes_of_headers = 65536, bytes_of_block = 6144
+  !> room for the headers of a step
+  integer(i8), parameter :: bytes_of_headers = 65536
+  !> topologies, and points of most polygons
+  integer, parameter :: vertices = 1, polygons = 3, usual_corners = 4
 
 contains
 
@@ -91,15 +99,22 @@ contains
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     type(field_list_t), intent(in) :: table
-    integer :: k
+    integer :: k, first
 
     self%comm = comm
     self%path = path
-    self%n_points = table%field(1)%components()/3
+    if (has_corners(table)) then
+      self%kind = polygons
+      self%n_points = usual_corners
+    else
+      self%n_points = table%field(1)%components()/3
+      self%kind = self%n_points
+    end if
+    first = first_field(table)
     if (allocated(self%field)) deallocate (self%field)
-    allocate (self%field(table%n_fields - 1))
+    allocate (self%field(table%n_fields - first + 1))
     do k = 1, size(self%field)
-      associate (field => table%field(k + 1))
+      associate (field => table%field(first + k - 1))
         self%field(k)%name = field%name
         self%field(k)%components = field%components()
         self%field(k)%whole = allocated(field%whole)
@@ -107,15 +122,30 @@ contains
     end do
     self%steps = 0
     self%rows = 0
+    self%points = 0
     self%shown = .false.
   end subroutine set_up
+
+  !> Whether the items of a table are polygons.
+  pure logical function has_corners(table)
+    type(field_list_t), intent(in) :: table
+
+    has_corners = .false.
+    if (table%n_fields > 1) has_corners = table%field(2)%name == corners_name
+  end function has_corners
+
+  !> Place of the first field that is not one of points.
+  pure integer function first_field(table) result(first)
+    type(field_list_t), intent(in) :: table
+    first = merge(3, 2, has_corners(table))
+  end function first_field
 
   !> Where the fields are.
   pure function data_group(self) result(group)
     type(vtkhdf_file_t), intent(in) :: self
     character(len=:), allocatable :: group
     group = "PointData"
-    if (self%n_points > 1) group = "CellData"
+    if (self%kind /= vertices) group = "CellData"
   end function data_group
 
   !> Make the tables of the file, or check those of a file to go on with.
@@ -127,13 +157,13 @@ contains
 
     np = self%n_points
     call table(root//"/NumberOfPoints", 0, table_integer, short_chunk, self%steps)
-    call table(root//"/Points", 3, table_single, np*self%chunk, np*self%rows)
+    call table(root//"/Points", 3, table_single, np*self%chunk, self%points)
     do k = 1, size(topologies)
-      associate (group => root//"/"//trim(topologies(k)), chunk => merge(self%chunk, short_chunk, k == np), &
-        & rows => merge(self%rows, 0_i8, k == np))
+      associate (group => root//"/"//trim(topologies(k)), chunk => merge(self%chunk, short_chunk, k == self%kind), &
+        & rows => merge(self%rows, 0_i8, k == self%kind), points => merge(self%points, 0_i8, k == self%kind))
         call table(group//"/NumberOfCells", 0, table_integer, short_chunk, self%steps)
         call table(group//"/NumberOfConnectivityIds", 0, table_integer, short_chunk, self%steps)
-        call table(group//"/Connectivity", 0, table_integer, merge(np*chunk, chunk, k == np), np*rows)
+        call table(group//"/Connectivity", 0, table_integer, merge(np*chunk, chunk, k == self%kind), points)
         call table(group//"/Offsets", 0, table_integer, chunk, rows + self%steps)
       end associate
     end do
@@ -260,14 +290,19 @@ contains
     type(vtkhdf_file_t), intent(inout) :: self
     integer(i8), intent(in) :: written
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: last(1)
+    integer(i8) :: last(1), cells(size(topologies), 1)
 
     self%rows = 0
+    self%points = 0
     if (allocated(error) .or. self%steps == 0 .or. self%steps > written) return
     call self%file%read_rows(steps_group//"/PointOffsets", self%steps - 1, last, error)
-    self%rows = last(1)
+    self%points = last(1)
     call self%file%read_rows(root//"/NumberOfPoints", self%steps - 1, last, error)
-    self%rows = (self%rows + last(1))/self%n_points
+    self%points = self%points + last(1)
+    call self%file%read_rows(steps_group//"/CellOffsets", self%steps - 1, cells, error)
+    self%rows = cells(self%kind, 1)
+    call self%file%read_rows(root//"/"//trim(topologies(self%kind))//"/NumberOfCells", self%steps - 1, last, error)
+    self%rows = self%rows + last(1)
   end subroutine find_rows
 
   !> Write a step behind the others. The first one has rows: before it, a step without rows is left out (VTK's reader looks for the
@@ -281,24 +316,23 @@ contains
     type(field_list_t), intent(in) :: table
     type(error_t), allocatable, intent(inout) :: error
     type(field_list_t) :: sorted
+    integer, allocatable :: corners(:)
     real(dp), allocatable :: part(:, :)
     real(dp) :: now(1, 1)
-    integer(i8) :: total
-    integer :: k, first
+    type(extent_t) :: total
+    integer :: k
 
     if (allocated(error)) return
-    total = self%comm%total(int(table%n_items(), i8))
-    if (self%rows + total == 0) return
+    total%rows = self%comm%total(int(table%n_items(), i8))
+    if (self%rows + total%rows == 0) return
     call table%order(self%comm, sorted)
+    call split_points(self, sorted, corners, part)
+    total%points = self%comm%total(size(part, 2, kind=i8))
     call self%file%reserve(bytes_of_headers + bytes_of_step(self, total), error)
-    allocate (part(3, self%n_points*sorted%n_items()))
-    do k = 1, size(part, 2)
-      first = 3*mod(k - 1, self%n_points)
-      part(:, k) = sorted%field(1)%value(first + 1:first + 3, (k - 1)/self%n_points + 1)
-    end do
-    call self%file%put_rows(root//"/Points", self%n_points*self%rows, part, error)
+    call self%file%put_rows(root//"/Points", self%points, part, error)
     do k = 1, size(self%field)
-      associate (name => root//"/"//data_group(self)//"/"//trim(self%field(k)%name), field => sorted%field(k + 1))
+      associate (name => root//"/"//data_group(self)//"/"//trim(self%field(k)%name), &
+        & field => sorted%field(first_field(sorted) + k - 1))
         if (self%field(k)%whole) then
           call self%file%put_rows(name, self%rows, field%whole, error)
         else
@@ -306,7 +340,7 @@ contains
         end if
       end associate
     end do
-    call write_cells(self, sorted%n_items(), total, error)
+    call write_cells(self, corners, total, error)
     call write_offsets(self, step, total, error)
     call self%file%flush(error)
     now = time
@@ -316,80 +350,87 @@ contains
     call self%file%flush(error)
     if (allocated(error)) return
     self%steps = self%steps + 1
-    self%rows = self%rows + total
+    self%rows = self%rows + total%rows
+    self%points = self%points + total%points
     if (self%shown .or. self%steps < 2) return
     call self%file%show(error)
     self%shown = .true.
   end subroutine vtkhdf_write_step
 
-  !> Bytes by which the tables grow with a step of `total` rows: whole chunks, and the blocks that know them.
+  !> How many points each item of a table has, and all of them one after the other.
+  pure subroutine split_points(self, table, corners, part)
+    type(vtkhdf_file_t), intent(in) :: self
+    type(field_list_t), intent(in) :: table
+    !> (items)
+    integer, allocatable, intent(out) :: corners(:)
+    !> (3, points)
+    real(dp), allocatable, intent(out) :: part(:, :)
+    integer :: i, k, n
+
+    allocate (corners(table%n_items()), source=self%n_points)
+    if (self%kind == polygons) corners(:) = narrow(table%field(2)%whole(1, :))
+    allocate (part(3, sum(corners)))
+    n = 0
+    do i = 1, size(corners)
+      do k = 1, corners(i)
+        n = n + 1
+        part(:, n) = table%field(1)%value(3*k - 2:3*k, i)
+      end do
+    end do
+  end subroutine split_points
+
+  !> Bytes by which the tables grow with a step of so many rows and points: whole chunks, and the blocks that know them.
   pure integer(i8) function bytes_of_step(self, total) result(bytes)
     type(vtkhdf_file_t), intent(in) :: self
-    integer(i8), intent(in) :: total
+    type(extent_t), intent(in) :: total
     integer :: k
 
     ! with one row a step: points, cells, connectivities and offsets of the topologies but one, six tables of the steps, step
     bytes = (3*size(topologies) + 5 + size(self%field))*growth(self%steps, 1_i8, short_chunk, 8) + &
       & 2*growth(self%steps, 1_i8, short_chunk, 8*size(topologies))
     associate (np => self%n_points)
-      bytes = bytes + growth(np*self%rows, np*total, np*self%chunk, 12) + growth(np*self%rows, np*total, np*self%chunk, 8) + &
-        & growth(self%rows + self%steps, total + 1, self%chunk, 8)
+      bytes = bytes + growth(self%points, total%points, np*self%chunk, 12) + growth(self%points, total%points, np*self%chunk, 8) + &
+        & growth(self%rows + self%steps, total%rows + 1, self%chunk, 8)
     end associate
     do k = 1, size(self%field)
-      bytes = bytes + growth(self%rows, total, self%chunk, self%field(k)%components*merge(8, 4, self%field(k)%whole))
+      bytes = bytes + growth(self%rows, total%rows, self%chunk, self%field(k)%components*merge(8, 4, self%field(k)%whole))
     end do
   end function bytes_of_step
 
-  !> Bytes by which a table grows from `before` rows by `more`.
-  pure integer(i8) function growth(before, more, chunk, width)
-    !> rows of a chunk
-    integer(i8), intent(in) :: before, more, chunk
-    !> bytes of a row
-    integer, intent(in) :: width
-    integer(i8) :: chunks, known, blocks
-
-    known = (before + chunk - 1)/chunk
-    chunks = (before + more + chunk - 1)/chunk - known
-    blocks = 0
-    if (known == 0) blocks = 1
-    ! a full block becomes two, and these want one above them
-    if (known + chunks > chunks_in_block) blocks = blocks + 2 + 2*chunks/chunks_in_block
-    growth = 0
-    if (chunks > 0) growth = chunks*chunk*width + blocks*bytes_of_block
-  end function growth
-
   !> One cell a row, of its points; no cell of the other kinds.
-  subroutine write_cells(self, n, total, error)
+  subroutine write_cells(self, corners, total, error)
     type(vtkhdf_file_t), intent(inout) :: self
-    !> rows of this rank, and of all
-    integer, intent(in) :: n
-    integer(i8), intent(in) :: total
+    !> points of the rows of this rank
+    integer, intent(in) :: corners(:)
+    !> of all ranks
+    type(extent_t), intent(in) :: total
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: connectivity(:, :), offsets(:, :)
     integer(i8) :: before
-    integer :: i, k, np, first
+    integer :: i, k, first
 
-    np = self%n_points
-    before = self%comm%offset(int(n, i8))
+    before = self%comm%offset(int(sum(corners), i8))
     ! rank 0 writes the 0 that offsets begin with
     first = merge(0, 1, self%comm%rank == 0)
-    allocate (connectivity(1, np*n), offsets(1, first:n))
-    do i = 1, np*n
-      connectivity(1, i) = np*before + i - 1
+    allocate (connectivity(1, sum(corners)), offsets(1, first:size(corners)))
+    do i = 1, size(connectivity, 2)
+      connectivity(1, i) = before + i - 1
     end do
-    do i = first, n
-      offsets(1, i) = np*(before + i)
+    if (first == 0) offsets(1, 0) = 0
+    do i = 1, size(corners)
+      before = before + corners(i)
+      offsets(1, i) = before
     end do
     do k = 1, size(topologies)
       associate (group => root//"/"//trim(topologies(k)))
-        if (k == np) then
-          call self%file%put_rows(group//"/Connectivity", np*self%rows, connectivity, error)
+        if (k == self%kind) then
+          call self%file%put_rows(group//"/Connectivity", self%points, connectivity, error)
           call self%file%put_rows(group//"/Offsets", self%rows + self%steps, offsets, error)
         else
           call put_number(self, group//"/Offsets", 0_i8, error)
         end if
-        call put_number(self, group//"/NumberOfCells", merge(total, 0_i8, k == np), error)
-        call put_number(self, group//"/NumberOfConnectivityIds", merge(np*total, 0_i8, k == np), error)
+        call put_number(self, group//"/NumberOfCells", merge(total%rows, 0_i8, k == self%kind), error)
+        call put_number(self, group//"/NumberOfConnectivityIds", merge(total%points, 0_i8, k == self%kind), error)
       end associate
     end do
   end subroutine write_cells
@@ -398,19 +439,20 @@ contains
   subroutine write_offsets(self, step, total, error)
     type(vtkhdf_file_t), intent(inout) :: self
     integer, intent(in) :: step
-    integer(i8), intent(in) :: total
+    type(extent_t), intent(in) :: total
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: cells(size(topologies), 1), connectivity(size(topologies), 1)
     integer :: k, n
 
     n = merge(1, 0, self%comm%rank == 0)
     cells = 0
-    cells(self%n_points, 1) = self%rows
-    connectivity = self%n_points*cells
-    call put_number(self, root//"/NumberOfPoints", self%n_points*total, error)
+    cells(self%kind, 1) = self%rows
+    connectivity = 0
+    connectivity(self%kind, 1) = self%points
+    call put_number(self, root//"/NumberOfPoints", total%points, error)
     call put_number(self, steps_group//"/PartOffsets", self%steps, error)
     call put_number(self, steps_group//"/NumberOfParts", 1_i8, error)
-    call put_number(self, steps_group//"/PointOffsets", self%n_points*self%rows, error)
+    call put_number(self, steps_group//"/PointOffsets", self%points, error)
     call self%file%put_rows(steps_group//"/CellOffsets", self%steps, cells(:, 1:n), error)
     call self%file%put_rows(steps_group//"/ConnectivityIdOffsets", self%steps, connectivity(:, 1:n), error)
     do k = 1, size(self%field)

@@ -4,7 +4,7 @@ module gravier_shape_contacts
   use gravier_periodic, only: period_t, shift_of_code
   use gravier_orientation, only: orientation_matrix
   use gravier_convex_piece, only: convex_piece_t
-  use gravier_shape_library, only: shape_library_t
+  use gravier_shape_library, only: shape_library_t, of_face
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
@@ -19,8 +19,6 @@ module gravier_shape_contacts
 
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
-  !> points of two pieces in space
-  integer, parameter :: of_face = 4
 
   !> A body, seen from the centre of the candidate.
   type :: seen_body_t

@@ -4,7 +4,7 @@ program test_shapes_file
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
   use gravier_shape_library, only: shape_library_t
-  use gravier_shape_names, only: shape_names, library_digest
+  use gravier_shape_names, only: find_shape, shape_names, library_digest
   use gravier_shapes_file, only: parse_shapes
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -24,6 +24,8 @@ program test_shapes_file
   call test_space()
   call test_principal_axes()
   call test_space_refused()
+  call test_surface_files()
+  call test_surface_files_refused()
   call finish_checks()
   call MPI_Finalize()
 
@@ -41,8 +43,8 @@ contains
     if (allocated(error)) return
     call check_equal(library%n, 4, "number of shapes")
     call check_equal(shape_names(library, " "), "brick two coin pill", "names")
-    call check_equal(library%find("coin"), 3, "a shape by its name")
-    call check_equal(library%find("coi"), 0, "no shape of that name")
+    call check_equal(find_shape(library, "coin"), 3, "a shape by its name")
+    call check_equal(find_shape(library, "coi"), 0, "no shape of that name")
     associate (brick => library%shape(1), two => library%shape(2), coin => library%shape(3), pill => library%shape(4))
       call check_close(brick%size, sqrt(5.0_dp), rounding_error, "size of a rectangle")
       call check_close(brick%volume*brick%size**2, 8.0_dp, 10*rounding_error, "area of a rectangle")
@@ -233,7 +235,7 @@ contains
 
   subroutine test_space_refused()
     call refuse("shape a"//lf//"polygon 0 0 1 0 0 1", 3, &
-      & 'line 2: "polygon": expected shape, rounding, hull, box, sphere or capsule')
+      & 'line 2: "polygon": expected shape, rounding, hull, box, sphere, capsule or file')
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0", 3, &
       & "line 2: hull with 9 numbers: expected x, y and z of four corners or more")
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 1", 3, "line 2: hull with 10 numbers: expected x, y and z of four corners")
@@ -249,6 +251,72 @@ contains
     call refuse("shape a"//lf//"rounding 0.6"//lf//"box 1 1 1", 3, "line 3: shape a: the rounding of ")
     call refuse("shape a"//lf//"sphere 0 0 0 1000"//lf//"box 1 1 1", 3, "line 3: shape a: the rounding of ")
   end subroutine test_space_refused
+
+  subroutine write_file(name, text)
+    character(len=*), intent(in) :: name, text
+    integer :: unit
+
+    open (newunit=unit, file=name, access="stream", form="unformatted", status="replace", action="write")
+    write (unit) text
+    close (unit)
+  end subroutine write_file
+
+  !> A tetrahedron with three edges along the axes, or one whose fourth point lies elsewhere, as the text of an OBJ file.
+  function tetrahedron(last, faces) result(text)
+    !> coordinates of the fourth point; lines of faces
+    character(len=*), intent(in) :: last, faces
+    character(len=:), allocatable :: text
+
+    text = "v 0 0 0"//lf//"v 1 0 0"//lf//"v 0 1 0"//lf//"v "//last//lf//faces
+  end function tetrahedron
+
+  !> A body of a file is that of the same points, and may be a piece of a cluster.
+  subroutine test_surface_files()
+    character(len=*), parameter :: outwards = "f 1 3 2"//lf//"f 1 2 4"//lf//"f 1 4 3"//lf//"f 2 3 4"//lf
+    type(shape_library_t) :: file, hull
+    type(error_t), allocatable :: error
+
+    call write_file("a surface.obj", tetrahedron("0 0 1", outwards))
+    call parse_shapes(path, "shape a"//lf//"file a surface.obj  # it is"//lf//"shape b"//lf//"rounding 0.01"//lf// &
+      & "file a surface.obj"//lf//"sphere 0 0 5 1", 3, file, error)
+    call check(.not. allocated(error), "a file of a surface")
+    if (allocated(error)) call check(.false., error%message)
+    if (allocated(error)) return
+    call parse_shapes(path, "shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 0 0 1", 3, hull, error)
+    associate (one => file%shape(1), other => hull%shape(1))
+      call check_close(one%size, other%size, rounding_error, "size of a surface")
+      call check_close(one%volume*one%size**3, 1.0_dp/6, rounding_error, "volume of a surface")
+      call check_close(one%piece(1)%rounding, 1.0e-3_dp, rounding_error, "the usual rounding of a surface")
+    end associate
+    call check_equal(size(file%shape(2)%piece), 2, "a surface as a piece of a cluster")
+    call check_close(file%shape(2)%piece(1)%rounding*file%shape(2)%size, 0.01_dp, rounding_error, "its rounding")
+  end subroutine test_surface_files
+
+  subroutine test_surface_files_refused()
+    character(len=*), parameter :: shape = "shape a"//lf//"file a.obj"
+    character(len=*), parameter :: outwards = "f 1 3 2"//lf//"f 1 2 4"//lf//"f 1 4 3"//lf//"f 2 3 4"//lf
+
+    call refuse("shape a"//lf//"file", 3, "line 2: shape a: file : expected a path that ends with .stl or .obj")
+    call refuse("shape a"//lf//"file a.ply", 3, "line 2: shape a: file a.ply: expected a path that ends with .stl or .obj")
+    call refuse("shape a"//lf//"file none.stl", 3, "line 2: shape a: none.stl: cannot read this file: No such file")
+    call refuse("shape a"//lf//"file a.obj"//lf//"1 2 3", 3, 'line 3: "1": expected shape, rounding, hull')
+    call write_file("a.obj", tetrahedron("0 0 x", outwards))
+    call refuse(shape, 3, 'line 2: shape a: a.obj: line 4: "x", but a number was expected')
+    call write_file("a.obj", tetrahedron("0 0 1e31", outwards))
+    call refuse(shape, 3, "line 2: shape a: a.obj: a coordinate of 1.00000000E+031 in size: expected a number of at most 1e30")
+    call write_file("a.obj", tetrahedron("0 0 1", "f 1 2 3"//lf//"f 1 4 2"//lf//"f 1 3 4"//lf//"f 2 4 3"//lf))
+    call refuse(shape, 3, "line 2: shape a: a.obj: the surface is inside out")
+    call write_file("a.obj", tetrahedron("0 0 1", "f 1 3 2"//lf//"f 1 2 4"//lf//"f 1 4 3"//lf))
+    call refuse(shape, 3, "line 2: shape a: a.obj: ")
+    call write_file("a.obj", tetrahedron("1 1 0", outwards))
+    call refuse(shape, 3, "line 2: shape a: a.obj: ")
+    call write_file("a.obj", tetrahedron("0 0 1", outwards))
+    call refuse("shape a"//lf//"rounding 0.3"//lf//"file a.obj", 3, "line 3: shape a: a.obj: the rounding of ")
+    ! an octahedron whose last point lies inside the hull of the others
+    call write_file("a.obj", "v 1 0 0"//lf//"v 0 1 0"//lf//"v -1 0 0"//lf//"v 0 -1 0"//lf//"v 0 0 1"//lf//"v 0 0 0.3"//lf// &
+      & "f 1 2 5"//lf//"f 2 3 5"//lf//"f 3 4 5"//lf//"f 4 1 5"//lf//"f 2 1 6"//lf//"f 3 2 6"//lf//"f 4 3 6"//lf//"f 1 4 6"//lf)
+    call refuse(shape, 3, "line 2: shape a: a.obj: the body is not convex")
+  end subroutine test_surface_files_refused
 
   subroutine refuse(text, dimension, part)
     character(len=*), intent(in) :: text

@@ -1,0 +1,31 @@
+!> Input files as text, the same on all ranks.
+module gravier_input_text
+  use gravier_errors, only: error_t
+  use gravier_communicator, only: communicator_t
+  use gravier_file_lines, only: lines_t
+  implicit none
+  private
+  public :: read_input_text
+
+contains
+
+  !> The whole of a file as text, on all ranks; rank 0 alone reads it. Failure: status_input. Errors are the same on all ranks.
+  !> Collective.
+  subroutine read_input_text(comm, path, text, error)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(inout) :: error
+
+    type(lines_t) :: file
+
+    if (allocated(error)) return
+    text = ""
+    if (comm%rank == 0) call file%open(path, error)
+    if (allocated(file%text)) call move_alloc(file%text, text)
+    call comm%agree(error)
+    if (allocated(error)) return
+    call comm%broadcast_text(text, 0)
+  end subroutine read_input_text
+
+end module gravier_input_text
