@@ -123,7 +123,8 @@ def slope_topples(table):
         runs = [rows_of_blocks(theta + way).run(solver={**EXACT, "method": "nscdd"}, ranks=ranks, decomposition={"subdomains": 2})
                 for way in (-1.0e-4, 1.0e-4)]
         right = [found.speed() < MOVES for found in runs] == [True, False]
-        table.add("slope", f"16 blocks stand 1e-4 below the angle, topple above: 2 subdomains, ranks {ranks}", int(right), 1, None, 0.0)
+        words = f"16 blocks stand 1e-4 below the angle, topple above: 2 subdomains, ranks {ranks}"
+        table.add("slope", words, int(right), 1, None, 0.0)
 
 
 def rows_of_blocks(angle):
@@ -183,6 +184,8 @@ def prisms(table, quick):
             name = f"{n} sides, {np.degrees(share * np.pi / n):.1f} degrees from a side"
             cases.append((name, regular(n), height, direction, tangent))
     cases.append(("cube", rectangle(2.0, 2.0), 2.0, 0.0, 1.0))
+    # a pair of pieces keeps 8 points: of more corners some are left out
+    cases.append(("12 sides, 8 points", regular(12), 3.0, -0.5 * np.pi, 2.0 / 3.0))
     exact = np.arctan([case[-1] for case in cases])
     places = spread(len(cases), 20.0)
 
@@ -198,11 +201,11 @@ def prisms(table, quick):
         found = scene.run()
         return [found.speed([2 * k + 1]) < MOVES for k in range(len(cases))]
 
-    # points that a face lacks make it topple early
+    # points that a face lacks make a prism topple early
     angles = bisect_all(on_ramps, 0.5 * exact, exact + 2.5e-3, 2.0e-5)
     for (name, *_), angle, expected in zip(cases, angles, exact):
-        table.add("prisms", f"toppling angle on a block, {name}", angle, expected, None, 1.0e-4)
-    for name, base, height, direction, tangent in cases[::2] if quick else cases:
+        table.add("prisms", f"toppling angle on a block, {name}", angle, expected, accepted=1.0e-4 if "points" not in name else None)
+    for name, base, height, direction, tangent in cases[:7:2] if quick else cases[:-1]:
         def stands(angle):
             scene = Scene(3, friction=3.0, gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]))
             scene.plane([0.0, 0.0, 1.0])

@@ -1,5 +1,5 @@
-"""Limit analysis of blocks with friction by linear programs: whether, or up to which load, impulses in the corners of joints can hold
-each block. Blocks are rigid, joints bear no tension, and |r_t| <= mu r_n.
+"""Limit analysis of blocks with friction by linear programs: whether, or up to which load, impulses in the corners of joints can
+hold each block. Blocks are rigid, joints bear no tension, and |r_t| <= mu r_n.
 
 The program of each is the static theorem: unknown r_n and r_t of each contact, three equations of equilibrium a block."""
 import numpy as np
@@ -89,8 +89,8 @@ class Blocks:
 
     def least_of_motion(self, friction, velocities, live, dead=(0.0, -1.0)):
         """The least factor of the live load under which a motion can begin: joints that open bear nothing, joints that slide bear
-        their full friction against it. Friction does not lift blocks that slide, so that this may be below what the blocks could bear.
-        Velocities are vx, vy and spin of each block."""
+        their full friction against it. Friction does not lift blocks that slide, so that this may be below what the blocks could
+        bear. Velocities are vx, vy and spin of each block."""
         n = len(self.contacts)
         still = 1.0e-3 * np.abs(velocities).max()
         # of r_t over mu r_n where a joint slides, else 0
