@@ -1,7 +1,8 @@
 !> The bodies of a simulation as tables of named fields, for whatever file is written of them.
 module gravier_body_collector
   use gravier_kinds, only: dp, i8
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_body_mass, only: invert_symmetric, multiply_symmetric
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_body_store, only: collect_fields
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
@@ -63,19 +64,20 @@ contains
   end subroutine collect_boundaries
 
   !> Bodies that the contacts of this rank's subdomains act on and that can move, boundaries included, one item a copy: the table
-  !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), `load`
-  !> f = M v_f and `velocity` of the last solve, each of nv components.
+  !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), the diagonal of
+  !> M, `load` f = M v_f and `velocity` of the last solve, each of nv components, and `inertia`, the entries xy, xz and yz of M among
+  !> spins in space, where bodies have shapes.
   subroutine collect_problem_bodies(problem, table)
     type(contact_problem_t), intent(in) :: problem
     type(field_list_t), intent(out) :: table
-    real(dp), allocatable :: mass(:, :), load(:, :), velocity(:, :)
+    real(dp), allocatable :: mass(:, :), load(:, :), velocity(:, :), inertia(:, :)
     integer(i8), allocatable :: place(:, :)
     integer :: s, b, d, n, nv
 
     nv = problem%kernels%nv
     n = sum(problem%sub%n_bodies)
     call table%init("bodies", "id", n)
-    allocate (place(3, n), mass(nv, n), load(nv, n), velocity(nv, n))
+    allocate (place(3, n), mass(nv, n), load(nv, n), velocity(nv, n), inertia(merge(3, 0, problem%kernels%nw == 9), n))
     n = 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -85,12 +87,13 @@ contains
           place(1, n) = problem%comm%rank
           place(2, n) = s
           place(3, n) = b
+          velocity(:, n) = sub%v_global(1:nv, b)
           do d = 1, nv
             mass(d, n) = 1.0_dp
             if (sub%moves(d, b)) mass(d, n) = 1.0_dp/sub%inverse_mass(min(d, problem%kernels%nw), b)
             load(d, n) = mass(d, n)*sub%v_free(d, b)
-            velocity(d, n) = sub%v_global(d, b)
           end do
+          if (size(inertia, 1) > 0) call take_inertia(sub, b, mass(4:6, n), inertia(:, n), load(4:6, n))
         end do
       end associate
     end do
@@ -98,6 +101,25 @@ contains
     call table%add_reals("mass", "kg, kg m^2", mass)
     call table%add_reals("load", "N s, N m s", load)
     call table%add_reals("velocity", "m/s, rad/s", velocity)
+    if (size(inertia, 1) > 0) call table%add_reals("inertia", "kg m^2", inertia)
   end subroutine collect_problem_bodies
+
+  !> The inertia of body `b` in space, which may have a shape, and the load on its spin; of one that cannot turn, what is there stays.
+  pure subroutine take_inertia(sub, b, diagonal, inertia, load)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: b
+    !> entries xx, yy and zz; xy, xz and yz [kg m^2]; [N m s]
+    real(dp), intent(inout) :: diagonal(3)
+    real(dp), intent(out) :: inertia(3)
+    real(dp), intent(inout) :: load(3)
+    real(dp) :: entries(6)
+
+    inertia(:) = 0.0_dp
+    if (.not. sub%moves(4, b)) return
+    call invert_symmetric(sub%inverse_mass(4:9, b), entries)
+    call multiply_symmetric(entries, sub%v_free(4:6, b), load)
+    diagonal(:) = entries(1:3)
+    inertia(:) = entries(4:6)
+  end subroutine take_inertia
 
 end module gravier_body_collector

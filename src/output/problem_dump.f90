@@ -69,24 +69,79 @@ contains
     type(fclib_rows_t), intent(inout) :: rows
     integer :: k, n, nv
 
-    associate (mass => bodies%field(bodies%place("mass"))%value, load => bodies%field(bodies%place("load"))%value, &
-        & velocity => bodies%field(bodies%place("velocity"))%value)
-      nv = size(mass, 1)
+    associate (load => bodies%field(bodies%place("load"))%value, velocity => bodies%field(bodies%place("velocity"))%value)
+      nv = size(load, 1)
       n = 0
       do k = 1, bodies%n_items()
         if (is_first(bodies, k)) n = n + 1
       end do
-      allocate (rows%mass(nv*n), rows%f(nv*n), rows%v(nv*n))
+      allocate (rows%f(nv*n), rows%v(nv*n))
       n = 0
       do k = 1, bodies%n_items()
         if (.not. is_first(bodies, k)) cycle
-        rows%mass(n + 1:n + nv) = mass(:, k)
         rows%f(n + 1:n + nv) = load(:, k)
         rows%v(n + 1:n + nv) = velocity(:, k)
         n = n + nv
       end do
     end associate
+    call take_masses(bodies, nv, rows)
   end subroutine take_bodies
+
+  !> Rows of the mass matrix of the bodies of this rank, each once: its diagonal, and what is not zero of the inertia beside it.
+  subroutine take_masses(bodies, nv, rows)
+    !> ordered; copies of a body stand together
+    type(field_list_t), intent(in) :: bodies
+    integer, intent(in) :: nv
+    type(fclib_rows_t), intent(inout) :: rows
+    real(dp) :: matrix(nv, nv)
+    integer :: k, d, e, n, row, round
+
+    allocate (rows%mass_entries(size(rows%f)))
+    do round = 1, 2
+      rows%mass_entries(:) = 0
+      n = 0
+      row = 0
+      do k = 1, bodies%n_items()
+        if (.not. is_first(bodies, k)) cycle
+        call mass_matrix(bodies, k, matrix)
+        do d = 1, nv
+          do e = 1, nv
+            if (d /= e .and. .not. abs(matrix(e, d)) > 0.0_dp) cycle
+            n = n + 1
+            rows%mass_entries(row + d) = rows%mass_entries(row + d) + 1
+            if (round == 1) cycle
+            rows%mass_column(n) = row + e
+            rows%mass(n) = matrix(e, d)
+          end do
+        end do
+        row = row + nv
+      end do
+      if (round == 1) allocate (rows%mass_column(n), rows%mass(n))
+    end do
+  end subroutine take_masses
+
+  !> The mass matrix of item `k` of the bodies.
+  subroutine mass_matrix(bodies, k, matrix)
+    type(field_list_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (nv, nv)
+    real(dp), intent(out) :: matrix(:, :)
+    integer :: d
+
+    matrix(:, :) = 0.0_dp
+    do d = 1, size(matrix, 1)
+      matrix(d, d) = bodies%field(bodies%place("mass"))%value(d, k)
+    end do
+    if (bodies%place("inertia") == 0) return
+    associate (inertia => bodies%field(bodies%place("inertia"))%value(:, k))
+      matrix(4, 5) = inertia(1)
+      matrix(4, 6) = inertia(2)
+      matrix(5, 6) = inertia(3)
+    end associate
+    matrix(5, 4) = matrix(4, 5)
+    matrix(6, 4) = matrix(4, 6)
+    matrix(6, 5) = matrix(5, 6)
+  end subroutine mass_matrix
 
   !> Number the bodies in the order of their identifiers, and tell all copies. Collective.
   subroutine number_bodies(problem, bodies, places)

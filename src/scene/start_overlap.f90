@@ -7,7 +7,7 @@ module gravier_start_overlap
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_pair_points, only: pair_points_t
-  use gravier_shape_contacts, only: find_points
+  use gravier_shape_contacts, only: shape_work_t, find_points
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -89,6 +89,7 @@ contains
     type(overlap_t), intent(out) :: overlap
     real(dp) :: branch(simulation%decomposition%nd), distance, smaller
     type(pair_points_t) :: points
+    type(shape_work_t) :: work
     integer :: i, j, shift(3)
 
     i = view%list%candidate(p)
@@ -99,7 +100,8 @@ contains
         if (j < 0) then
           if (decomposition%boundaries(-j)%remove_at <= simulation%time) return
         end if
-        call find_points(view, decomposition, p, points)
+        call work%init(decomposition%nd)
+        call find_points(view, decomposition, p, work, points)
         smaller = bodies%radius(i)
         if (j > 0) smaller = min(smaller, bodies%radius(j))
         if (points%n > 0) overlap%share = -minval(points%gap(1:points%n))/smaller

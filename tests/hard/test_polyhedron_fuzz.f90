@@ -33,7 +33,8 @@ program test_polyhedron_fuzz
   call MPI_Comm_rank(MPI_COMM_WORLD, rank)
   call MPI_Comm_size(MPI_COMM_WORLD, ranks)
   count = argument(1, 40000)
-  seed = argument(2, 1)
+  ! of this seed come two pairs that a search with less care for rounding gets wrong
+  seed = argument(2, 11)
   if (rank == 0) print "(2(a, i0))", "pairs ", count, ", seed ", seed
   draws%seed = seed
   call make_library(draws, library)
@@ -87,6 +88,9 @@ contains
     if (family /= 4 .and. family /= 5) call check(.not. core%overlap, trim(name)//": cores that are apart")
     if (core%overlap) found%overlaps = found%overlaps + 1
     alert = 10.0_dp**draws%between(-4.0_dp, -0.5_dp)
+    ! some are just within reach
+    if (modulo(k, 4) == 1 .and. .not. core%overlap) alert = core%distance - pair%radius_a*a%piece(1)%rounding - &
+      & pair%radius_b*b%piece(1)%rounding + 1.0e-6_dp
     call find_polyhedron_manifold(a%piece(1), b%piece(1), pair%radius_a, pair%radius_b, pair%rotation, pair%way, alert, &
       & merge(most_points, 4, modulo(k, 2) == 0), manifold)
     found%points = found%points + manifold%n
@@ -198,8 +202,8 @@ contains
       call expect(manifold%gap(k) < alert, name, "gap below the alert distance")
       call expect(all(manifold%key(1:k - 1) < manifold%key(k)), name, "ascending keys")
       if (core%overlap) cycle
-      call expect(norm2(manifold%point(:, k)) <= pair%radius_a + alert, name, "point in the ball of a")
-      call expect(norm2(manifold%point(:, k) - pair%way) <= pair%radius_b + alert, name, "point in the ball of b")
+      call expect(norm2(manifold%point(:, k)) <= pair%radius_a + abs(alert), name, "point in the ball of a")
+      call expect(norm2(manifold%point(:, k) - pair%way) <= pair%radius_b + abs(alert), name, "point in the ball of b")
     end do
     if (core%overlap) return
     call expect(norm2(manifold%normal - core%normal) <= exact, name, "normal of the nearest points")

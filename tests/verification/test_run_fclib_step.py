@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 
 from gravier_runs import RunTestCase, gravier, merged, run_case
+from shaped_scenes import box, lattice, prepare, shaped_case
 
 STEP = 60
 CASE = {
@@ -55,8 +56,8 @@ class FclibStep(RunTestCase):
         self.assert_status(run, 0)
         return Dump(run.path("results", f"step_{step}.hdf5"))
 
-    def check(self, case, name):
-        dump = self.dump(case, name)
+    def check(self, case, name, step=STEP):
+        dump = self.dump(case, name, step=step)
         self.assertGreater(len(dump.mu), 20)
         # the dynamics and the velocities of the contacts hold to rounding
         scale = np.abs(dump.m @ dump.v).max()
@@ -73,7 +74,7 @@ class FclibStep(RunTestCase):
         # gravier_fclib solves it, and finds these velocities; impulses of disks and spheres on each other are not unique
         run = gravier("--tolerance", "1e-9", "--write", "solved", dump.path, program="gravier_fclib", directory=self.here(name))
         self.assert_status(run, 0)
-        with h5py.File(run.path("solved", f"step_{STEP}.hdf5")) as file:
+        with h5py.File(run.path("solved", f"step_{step}.hdf5")) as file:
             found = file["solution/r"][:]
         # from the impulses in the file, which meet the tolerance, nothing is left to do
         run = gravier("--warm", "--tolerance", "1e-4", "--csv", "warm.csv", dump.path, program="gravier_fclib", directory=self.here(name))
@@ -101,18 +102,49 @@ class FclibStep(RunTestCase):
         dump = self.check(FRICTIONLESS, "frictionless")
         self.assertEqual(np.abs(dump.mu).max(), 0.0)
 
+    def shaped(self, dimension):
+        """A pour of bodies with shapes; its files must be where it runs."""
+        counts, spacing = ((6, 7), 0.17) if dimension == 2 else ((3, 3, 3), 0.19)
+        walls = box(counts, spacing)
+        walls[-1]["velocity"] = [0.3, 0.0, 0.0]
+        return shaped_case(dimension, walls, {
+            "scene": {"friction": 0.3}, "solver": merged(CASE, {"solver": {"method": "newton", "acceleration": None}})["solver"],
+            "output": {"final_bodies": True}}), lattice(counts, spacing=spacing)
+
+    def test_shapes(self):
+        """Bodies with shapes have an inertia that is a matrix, and pairs several points."""
+        for dimension in (2, 3):
+            case, rows = self.shaped(dimension)
+            prepare(self.here(f"shapes{dimension}"), dimension, rows)
+            dump = self.check(case, f"shapes{dimension}", 180)
+            off = dump.m - np.diag(np.diag(dump.m))
+            self.assertEqual(np.abs(off).max() > 0.0, dimension == 3)
+            np.testing.assert_array_equal(off, off.T)
+            self.assertGreater(np.linalg.eigvalsh(dump.m).min(), 0.0)
+
     def test_any_ranks_and_subdomains(self):
-        for case, name in ((DISKS, "disks"), (SPHERES, "spheres")):
+        for case, name in ((DISKS, "disks"), (SPHERES, "spheres"), (self.shaped(2), "shapes2"), (self.shaped(3), "shapes3")):
+            rows = None
+            if isinstance(case, tuple):
+                case, rows = case
+            dimension = case["scene"]["dimension"]
             case = merged(case, {"decomposition": {"subdomains": 4}})
-            first = self.dump(case, f"{name}1")
+            for number in (1, 2, 4):
+                if rows:
+                    prepare(self.here(f"{name}{number}"), dimension, rows)
+            step = 180 if rows else STEP
+            first = self.dump(case, f"{name}1", step=step)
             for ranks in (2, 4):
-                other = self.dump(case, f"{name}{ranks}", ranks=ranks)
+                other = self.dump(case, f"{name}{ranks}", ranks=ranks, step=step)
                 for values in "m h f w mu v r u".split():
                     np.testing.assert_array_equal(getattr(other, values), getattr(first, values), err_msg=values)
             # one step from the same state: bodies, contacts, masses, loads and H do not know the subdomains
             packing = self.here(f"{name}1", "results", "final_bodies.h5")
             case = merged(case, {"scene": {"bodies": "file", "bodies_file": packing, "lattice_count": None, "radius_min": None,
                                            "radius_max": None}})
+            for part in ("whole", "parts"):
+                if rows:
+                    prepare(self.here(f"{name}{part}"), dimension, rows)
             whole = self.dump(merged(case, {"decomposition": {"subdomains": 1}}), f"{name}whole", step=1)
             parts = self.dump(case, f"{name}parts", step=1)
             self.assertGreater(len(whole.mu), 20)

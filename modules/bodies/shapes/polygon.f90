@@ -178,14 +178,15 @@ contains
       message = "a polygon without area"
       return
     end if
+    do k = 1, n
+      if (norm2(corner(:, following(k, n)) - corner(:, k)) > least_side*extension) cycle
+      message = "corners "//to_text(k)//" and "//to_text(following(k, n))//" of a polygon in the same place"
+      return
+    end do
     angle = 0.0_dp
     do k = 1, n
       side(:) = corner(:, following(k, n)) - corner(:, k)
       next(:) = corner(:, following(following(k, n), n)) - corner(:, following(k, n))
-      if (.not. norm2(side) > least_side*extension) then
-        message = "corners "//to_text(k)//" and "//to_text(following(k, n))//" of a polygon in the same place"
-        return
-      end if
       turn = side(1)*next(2) - side(2)*next(1)
       if (.not. turn > least_turn*norm2(side)*norm2(next)) then
         message = "a polygon that is not convex, or straight, at corner "//to_text(following(k, n))//" in anticlockwise order"

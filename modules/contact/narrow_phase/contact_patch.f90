@@ -20,8 +20,8 @@ module gravier_contact_patch
 
 contains
 
-  !> Add a point, unless its gap is too large. Of two points at one place, or of one key, that of the lower key stays, with the
-  !> smaller gap.
+  !> Add a point, unless its gap is too large. Two points at one place, or of one key, become one with the smaller gap and the lower
+  !> key, unless a third has that key.
   pure subroutine add_point(new, alert, size_of_pair, n, point)
     type(patch_point_t), intent(in) :: new
     !> [m]
@@ -40,7 +40,7 @@ contains
         point(k)%place(:) = new%place
         point(k)%gap = new%gap
       end if
-      point(k)%key = min(point(k)%key, new%key)
+      if (all(point(1:n)%key /= new%key)) point(k)%key = min(point(k)%key, new%key)
       return
     end do
     if (n == size(point)) return
@@ -61,7 +61,6 @@ contains
     integer :: k
 
     call sort_points(n, point)
-    call join_keys(n, point)
     if (n > min(most, most_points)) then
       if (most <= 4) then
         call keep_four(most, size_of_pair, same_gap, n, point)
@@ -98,24 +97,6 @@ contains
       point(j) = moved
     end do
   end subroutine sort_points
-
-  !> Of points in ascending order that have one key, as where one took the key of another at its place, keep the deepest.
-  pure subroutine join_keys(n, point)
-    integer, intent(inout) :: n
-    type(patch_point_t), intent(inout) :: point(:)
-    integer :: k, m
-
-    m = min(n, 1)
-    do k = 2, n
-      if (point(k)%key /= point(m)%key) then
-        m = m + 1
-        if (m < k) point(m) = point(k)
-      else if (point(k)%gap < point(m)%gap) then
-        point(m) = point(k)
-      end if
-    end do
-    n = m
-  end subroutine join_keys
 
   !> Of more points keep the deepest, the one farthest from it, the one farthest from the line of both, and the one farthest from the
   !> line on its other side. Differences that rounding could make do not count: ties go to the lowest key.

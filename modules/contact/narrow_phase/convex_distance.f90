@@ -88,8 +88,11 @@ contains
       along = dot_product(v, w(:, n + 1))
       ! the difference that is farthest along -v bounds the distance from below
       if (along > 0.0_dp .and. along*along > min(beyond, endless)**2*dot_product(v, v)) then
-        found%beyond = .true.
-        return
+        found%beyond = .not. walk
+        if (found%beyond) return
+        ! a walk may have ended early, so that its bound is none: all vertices have the last word
+        walk = .false.
+        cycle
       end if
       size_squared = max(size_squared, dot_product(w(:, n + 1), w(:, n + 1)))
       done = is_known(found, n, i, j)
@@ -101,7 +104,7 @@ contains
         done = .not. share(n + 1) > 0.0_dp .or. back > most_back
       end if
       if (done) then
-        ! walks end where rounding has bent a piece: all vertices have the last word
+        ! the same holds for the end of the search
         if (.not. walk) exit
         walk = .false.
         cycle

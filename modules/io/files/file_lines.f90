@@ -1,4 +1,4 @@
-!> Text files gone through by lines and words. Not collective.
+!> Files read at once, and their text gone through by lines and words. Not collective.
 module gravier_file_lines
   use gravier_kinds, only: i8
   use gravier_narrow, only: take_count
@@ -6,7 +6,7 @@ module gravier_file_lines
   use gravier_file_system, only: check_readable
   implicit none
   private
-  public :: lines_t
+  public :: lines_t, read_whole_file
 
   !> A text that is gone through line by line.
   type :: lines_t
@@ -24,10 +24,18 @@ module gravier_file_lines
 
 contains
 
-  !> Take the bytes of a file. Failure (status_input): no such file, not readable, more than 2^31 bytes.
+  !> Take the text of a file. Failures as of read_whole_file.
   subroutine lines_open(self, path, error)
     class(lines_t), intent(out) :: self
     character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    call read_whole_file(path, self%text, error)
+  end subroutine lines_open
+
+  !> The bytes of a file. Failure (status_input): no such file, not readable, more than 2^31 bytes.
+  subroutine read_whole_file(path, text, error)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
     character(len=200) :: reason
     integer(i8) :: length
@@ -39,12 +47,12 @@ contains
     if (stat == 0) then
       inquire (unit=unit, size=length)
       call take_count(length, path//": bytes", n, error)
-      allocate (character(len=n) :: self%text)
-      if (n > 0) read (unit, iostat=stat, iomsg=reason) self%text
+      allocate (character(len=n) :: text)
+      if (n > 0) read (unit, iostat=stat, iomsg=reason) text
       close (unit)
     end if
     if (stat /= 0) call raise(error, status_input, path//": cannot read this file: "//trim(reason))
-  end subroutine lines_open
+  end subroutine read_whole_file
 
   !> Go to the next line; false behind the last one.
   logical function lines_next(self) result(found)

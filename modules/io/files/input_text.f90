@@ -2,7 +2,7 @@
 module gravier_input_text
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
-  use gravier_file_lines, only: lines_t
+  use gravier_file_lines, only: read_whole_file
   implicit none
   private
   public :: read_input_text
@@ -17,12 +17,12 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(inout) :: error
 
-    type(lines_t) :: file
-
     if (allocated(error)) return
-    text = ""
-    if (comm%rank == 0) call file%open(path, error)
-    if (allocated(file%text)) call move_alloc(file%text, text)
+    if (comm%rank == 0) then
+      call read_whole_file(path, text, error)
+    else
+      text = ""
+    end if
     call comm%agree(error)
     if (allocated(error)) return
     call comm%broadcast_text(text, 0)

@@ -51,8 +51,11 @@ module gravier_fclib_file
   !> What one rank holds of a global problem without G: a block of the unknowns and a block of the contacts, those of rank 0 first.
   type :: fclib_rows_t
     integer :: dimension = 0
-    !> the diagonal matrix M, f and the velocities of the solution (unknowns of this rank)
-    real(dp), allocatable :: mass(:), f(:), v(:)
+    !> f and the velocities of the solution (unknowns of this rank)
+    real(dp), allocatable :: f(:), v(:)
+    !> entries of each row of M (unknowns of this rank), their columns, 1 being the first unknown of this rank, their values
+    integer(i8), allocatable :: mass_entries(:), mass_column(:)
+    real(dp), allocatable :: mass(:)
     !> entries of each column of H (dimension*contacts of this rank), their rows from 1 on, their values
     integer(i8), allocatable :: entries(:), row(:)
     real(dp), allocatable :: h(:)

@@ -129,24 +129,18 @@ contains
     type(fclib_rows_t), intent(in) :: rows
     type(error_t), allocatable, intent(inout) :: error
     type(h5_file_t) :: file
-    integer(i8) :: n, columns, entries, before
-    integer(i8), allocatable :: one(:), place(:)
-    integer :: k
+    integer(i8) :: n, columns, entries
+    integer(i8), allocatable :: place(:)
 
     if (allocated(error)) return
-    n = comm%total(size(rows%mass, kind=i8))
-    before = comm%offset(size(rows%mass, kind=i8))
+    n = comm%total(size(rows%f, kind=i8))
     columns = comm%total(size(rows%w, kind=i8))
-    entries = comm%total(size(rows%h, kind=i8))
-    allocate (one(size(rows%mass)), source=1_i8)
-    allocate (place(size(rows%mass)))
-    do k = 1, size(place)
-      place(k) = before + k
-    end do
+    entries = comm%total(size(rows%h, kind=i8)) + comm%total(size(rows%mass, kind=i8))
+    place = comm%offset(size(rows%f, kind=i8)) + rows%mass_column
     call file%create(comm, path, error)
     call file%reserve(48_i8*(n + columns) + 16_i8*entries + 65536_i8, error)
     call write_integer("/fclib_global/spacedim", int(rows%dimension, i8))
-    call write_matrix("/fclib_global/M", by_rows, n, one, place, rows%mass)
+    call write_matrix("/fclib_global/M", by_rows, n, rows%mass_entries, place, rows%mass)
     call write_matrix("/fclib_global/H", by_columns, columns, rows%entries, rows%row, rows%h)
     call file%write_rows("/fclib_global/vectors/f", rows%f, error)
     call file%write_rows("/fclib_global/vectors/w", rows%w, error)

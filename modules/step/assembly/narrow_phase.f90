@@ -9,7 +9,7 @@ module gravier_narrow_phase
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, round_place
   use gravier_pair_points, only: pair_points_t, carry_memory
-  use gravier_shape_contacts, only: find_points
+  use gravier_shape_contacts, only: shape_work_t, find_points
   use gravier_pair_laws, only: law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none
@@ -102,13 +102,15 @@ contains
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
+    type(shape_work_t) :: work
     type(contact_place_t) :: place
     real(dp) :: normal(decomposition%nd)
     integer :: p, k
 
+    call work%init(decomposition%nd)
     p = 1
     do while (p <= view%list%n)
-      call find_points(view, decomposition, p, points)
+      call find_points(view, decomposition, p, work, points)
       call carry_memory(points, p, view%list)
       do k = 1, points%n
         normal(:) = points%normal(1:size(normal), k)

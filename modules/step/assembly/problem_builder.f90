@@ -371,7 +371,7 @@ contains
 
     if (kernels%row%arm_i > 0) then
       call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
-      call find_start_velocities(view, found, boundaries, this, vi, vj)
+      call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
       returned = sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj)
       if (returned <= 0.0_dp) return
       vi(:) = sub%v_free(:, sub%pair(1, this%c))
@@ -400,25 +400,34 @@ contains
     integer :: d
 
     call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
-    call find_start_velocities(view, found, boundaries, this, vi, vj)
+    call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
     do d = 2, kernels%nd
       sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
     end do
   end subroutine pack_tangential_shift
 
-  !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched.
-  subroutine find_start_velocities(view, found, boundaries, this, vi, vj)
+  !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched. Loads
+  !> give grains no spin, so that the spin without contacts is that of the start, which in space goes round with the body and has its
+  !> energy.
+  subroutine find_start_velocities(view, found, boundaries, this, sub, vi, vj)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(in) :: sub
     !> (nv) [m/s, rad/s]
     real(dp), intent(out) :: vi(:), vj(:)
     real(dp) :: points(size(found%normal, 1), 2)
+    integer :: nd
 
+    nd = size(points, 1)
     call find_touching_points(view, found, this, points)
     call find_start_velocity(view, boundaries, this%i, points(:, 1), vi)
     call find_start_velocity(view, boundaries, this%j, points(:, 2), vj)
+    associate (i => sub%pair(1, this%c), j => sub%pair(2, this%c))
+      if (i <= sub%n_grains) vi(nd + 1:) = sub%v_free(nd + 1:, i)
+      if (j <= sub%n_grains) vj(nd + 1:) = sub%v_free(nd + 1:, j)
+    end associate
   end subroutine find_start_velocities
 
   !> The arms of a contact between bodies with shapes (contact_rows_t); those of grains that are part of a boundary are 0.

@@ -15,7 +15,7 @@ module gravier_shape_contacts
   use gravier_pair_points, only: pair_points_t
   implicit none
   private
-  public :: find_points
+  public :: shape_work_t, find_points
 
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
@@ -32,14 +32,38 @@ module gravier_shape_contacts
     real(dp) :: angle = 0.0_dp, axes(3, 3) = 0.0_dp
   end type seen_body_t
 
+  !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, and room for two placed pieces of the plane.
+  type :: shape_work_t
+    private
+    type(convex_piece_t) :: ball
+    type(placed_piece_t) :: a, b
+  contains
+    procedure :: init => shape_work_init
+  end type shape_work_t
+
 contains
+
+  subroutine shape_work_init(self, nd)
+    class(shape_work_t), intent(inout) :: self
+    !> 2 or 3
+    integer, intent(in) :: nd
+
+    self%ball%rounding = 1.0_dp
+    if (allocated(self%ball%vertex)) deallocate (self%ball%vertex, self%ball%corner, self%ball%face_first, &
+      & self%ball%neighbour_first, self%ball%face_vertex, self%ball%neighbour, self%ball%face_normal)
+    allocate (self%ball%vertex(nd, 1), self%ball%corner(nd, 1), source=0.0_dp)
+    allocate (self%ball%face_first(1), self%ball%neighbour_first(2), source=1)
+    allocate (self%ball%face_vertex(0), self%ball%neighbour(0), self%ball%face_normal(3, 0))
+  end subroutine shape_work_init
 
   !> The points of pair `p` of a view whose gap is at most the alert distance; at most as many as the pair has places in the list,
   !> those with the smallest gaps.
-  subroutine find_points(view, decomposition, p, points)
+  subroutine find_points(view, decomposition, p, work, points)
     type(local_bodies_t), intent(in) :: view
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: p
+    !> initialised
+    type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
     type(seen_body_t) :: candidate, antagonist
     real(dp) :: way(decomposition%nd)
@@ -56,10 +80,11 @@ contains
         call see_body(bodies, i, candidate)
         call see_body(bodies, j, antagonist)
         antagonist%centre(1:decomposition%nd) = way
-        call touch_body(decomposition%shapes, candidate, antagonist, decomposition%nd, alert, points)
+        call touch_body(decomposition%shapes, candidate, antagonist, decomposition%nd, alert, work, points)
       else
         call see_body(bodies, i, candidate)
-        call touch_boundary(decomposition%shapes, candidate, bodies%position(:, i), decomposition%boundaries(-j), alert, points)
+        call touch_boundary(decomposition%shapes, candidate, bodies%position(:, i), decomposition%boundaries(-j), alert, work, &
+          & points)
       end if
       call points%merge_near(same*bodies%radius(i))
     end associate
@@ -87,27 +112,25 @@ contains
   end subroutine see_body
 
   !> The points of two bodies, piece by piece.
-  subroutine touch_body(shapes, a, b, nd, alert, points)
+  subroutine touch_body(shapes, a, b, nd, alert, work, points)
     type(shape_library_t), intent(in) :: shapes
     type(seen_body_t), intent(in) :: a, b
     integer, intent(in) :: nd
     !> [m]
     real(dp), intent(in) :: alert
+    type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
     type(manifold_t) :: manifold
-    type(placed_piece_t) :: placed_a, placed_b
-    type(convex_piece_t) :: ball
     integer :: k, l
 
-    call make_ball(nd, ball)
     do k = 1, n_pieces(shapes, a)
-      if (nd == 2) call place(shapes, ball, a, k, placed_a)
+      if (nd == 2) call place(shapes, work%ball, a, k, work%a)
       do l = 1, n_pieces(shapes, b)
         if (nd == 2) then
-          call place(shapes, ball, b, l, placed_b)
-          call find_polygon_manifold(placed_a, placed_b, alert, manifold)
+          call place(shapes, work%ball, b, l, work%b)
+          call find_polygon_manifold(work%a, work%b, alert, manifold)
         else if (a%shape == 0) then
-          call meet(ball, b)
+          call meet(work%ball, b)
         else
           call meet(shapes%shape(a%shape)%piece(k), b)
         end if
@@ -123,7 +146,7 @@ contains
       type(seen_body_t), intent(in) :: b
 
       if (b%shape == 0) then
-        call meet_in_space(piece, ball, a, b, alert, manifold)
+        call meet_in_space(piece, work%ball, a, b, alert, manifold)
       else
         call meet_in_space(piece, shapes%shape(b%shape)%piece(l), a, b, alert, manifold)
       end if
@@ -170,15 +193,16 @@ contains
   end subroutine turn_manifold
 
   !> The points with a boundary: a plane, a surface that ends at straight edges, or one that is round.
-  subroutine touch_boundary(shapes, a, centre, boundary, alert, points)
+  subroutine touch_boundary(shapes, a, centre, boundary, alert, work, points)
     type(shape_library_t), intent(in) :: shapes
     type(seen_body_t), intent(in) :: a
     !> of the body (nd) [m]
     real(dp), intent(in), contiguous :: centre(:)
     type(boundary_t), intent(in) :: boundary
     real(dp), intent(in) :: alert
+    type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
-    type(convex_piece_t) :: ball, sheet
+    type(convex_piece_t) :: sheet
     type(seen_body_t) :: seen_sheet
     real(dp) :: normal(size(centre)), distance, corners(3, 4)
     integer :: k, n
@@ -187,11 +211,10 @@ contains
     call boundary%locate(centre, distance, normal)
     if (distance - a%radius > alert) return
     call boundary%find_corners(centre, n, corners)
-    call make_ball(size(centre), ball)
     if (n > 0) call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
     do k = 1, n_pieces(shapes, a)
       if (a%shape == 0) then
-        call touch(ball)
+        call touch(work%ball)
       else
         call touch(shapes%shape(a%shape)%piece(k))
       end if
@@ -204,7 +227,7 @@ contains
       type(manifold_t) :: manifold
 
       if (boundary%is_plane()) then
-        call touch_plane(piece, a, normal, distance, alert, manifold)
+        call touch_plane(piece, a, normal, distance, alert, work%a, manifold)
         call points%add(manifold, k, 1)
       else if (n > 0) then
         call touch_sheet(piece, a, sheet, seen_sheet, size(centre), alert, manifold)
@@ -216,14 +239,14 @@ contains
 
   end subroutine touch_boundary
 
-  subroutine touch_plane(piece, a, normal, distance, alert, manifold)
+  subroutine touch_plane(piece, a, normal, distance, alert, placed, manifold)
     type(convex_piece_t), intent(in) :: piece
     type(seen_body_t), intent(in) :: a
     !> (nd), and distance of the centre of the body [m]
     real(dp), intent(in), contiguous :: normal(:)
     real(dp), intent(in) :: distance, alert
+    type(placed_piece_t), intent(inout) :: placed
     type(manifold_t), intent(inout) :: manifold
-    type(placed_piece_t) :: placed
     real(dp) :: turned(3)
     integer :: k
 
@@ -334,17 +357,6 @@ contains
     n = 1
     if (seen%shape > 0) n = size(shapes%shape(seen%shape)%piece)
   end function n_pieces
-
-  !> A disk or a sphere of radius 1 is the rounding of its centre.
-  pure subroutine make_ball(nd, ball)
-    integer, intent(in) :: nd
-    type(convex_piece_t), intent(out) :: ball
-
-    ball%rounding = 1.0_dp
-    allocate (ball%vertex(nd, 1), ball%corner(nd, 1), source=0.0_dp)
-    allocate (ball%face_first(1), ball%neighbour_first(2), source=1)
-    allocate (ball%face_vertex(0), ball%neighbour(0), ball%face_normal(3, 0))
-  end subroutine make_ball
 
   !> A segment or a rectangle as a piece without rounding, with one face to either side.
   pure subroutine make_sheet(nd, corners, sheet, seen)

@@ -4,6 +4,8 @@ module gravier_contact_structure
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_halo, only: halo_t
   use gravier_decomposition, only: decomposition_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t
   implicit none
@@ -16,7 +18,8 @@ module gravier_contact_structure
 
   !> The same on every rank. A contact carries where its bodies touch: where the normal impulse of its solve is not zero.
   type, extends(diagnostic_t) :: contact_structure_t
-    !> carrying contacts of a free grain on average: of all, and of those that two or more contacts hold
+    !> neighbours of a free grain that carry, on average: of all, and of those that two or more contacts hold. Bodies with shapes may
+    !> touch a neighbour in several contacts; else each carrying contact is a neighbour
     real(dp) :: coordination = 0.0_dp, mechanical_coordination = 0.0_dp
     !> free grains with less than two carrying contacts
     integer(i8) :: rattlers = 0
@@ -38,7 +41,7 @@ module gravier_contact_structure
     procedure :: get_histogram => structure_get_histogram
   end type contact_structure_t
 
-  !> Of a subdomain: numbers of carrying contacts of its bodies, in the first row (nv, n_columns).
+  !> Of a subdomain: numbers of carrying contacts of its bodies, in the first row, and of their neighbours, in the second (nv, n_columns).
   type :: tally_t
     real(dp), allocatable :: ends(:, :)
   end type tally_t
@@ -93,12 +96,13 @@ contains
   subroutine structure_measure(self, step)
     class(contact_structure_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
-    call measure_structure(self, step%problem, step%n_free, step%physics%h)
+    call measure_structure(self, step%problem, step%halo, step%n_free, step%physics%h)
   end subroutine structure_measure
 
-  subroutine measure_structure(self, problem, n_free, h)
+  subroutine measure_structure(self, problem, halo, n_free, h)
     type(contact_structure_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    type(halo_t), intent(in) :: halo
     !> free grains of the scene
     integer(i8), intent(in) :: n_free
     !> [s]
@@ -117,7 +121,7 @@ contains
         largest = max(largest, problem%sub(s)%normal_impulse(c))
       end do
     end do
-    call count_ends(problem, counts)
+    call count_ends(problem, halo, counts)
     call problem%comm%sum_counts(counts)
     call problem%comm%sum_parts(parts, sums)
     self%force_max = problem%comm%highest(largest)/h
@@ -182,27 +186,21 @@ contains
     end do
   end subroutine count_contacts
 
-  !> Count the ends of carrying contacts on free grains, and those on grains that two or more of them hold. A shared grain is
+  !> Count the neighbours of free grains that carry, and those of grains that two or more carrying contacts hold. A shared grain is
   !> counted in the first of its subdomains. Collective.
-  subroutine count_ends(problem, counts)
+  subroutine count_ends(problem, halo, counts)
     type(contact_problem_t), intent(inout) :: problem
+    type(halo_t), intent(in) :: halo
     integer(i8), intent(inout) :: counts(n_counts)
     logical, allocatable :: counted_elsewhere(:)
-    !> number of carrying contacts of each body in the first row: an exchange takes columns of nv
+    !> an exchange takes columns of nv
     type(tally_t) :: tally(size(problem%sub))
-    integer :: s, b, c, k, n
+    integer :: s, b, k, n, neighbours
 
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s))
-        allocate (tally(s)%ends(problem%kernels%nv, sub%n_columns), source=0.0_dp)
-        do c = 1, sub%n_contacts
-          if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
-          do k = 1, 2
-            tally(s)%ends(1, sub%pair(k, c)) = tally(s)%ends(1, sub%pair(k, c)) + 1.0_dp
-          end do
-        end do
-        call problem%shared%load(s, tally(s)%ends)
-      end associate
+      allocate (tally(s)%ends(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+      call tally_contacts(problem%sub(s), halo%view(s)%list, tally(s))
+      call problem%shared%load(s, tally(s)%ends)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
@@ -214,16 +212,47 @@ contains
         end do
         do b = 1, sub%n_grains
           n = nint(tally(s)%ends(1, b))
+          neighbours = nint(tally(s)%ends(2, b))
           if (counted_elsewhere(b)) cycle
-          counts(ends) = counts(ends) + n
+          counts(ends) = counts(ends) + neighbours
           if (n < 2) cycle
           counts(held) = counts(held) + 1
-          counts(held_ends) = counts(held_ends) + n
+          counts(held_ends) = counts(held_ends) + neighbours
         end do
         deallocate (counted_elsewhere)
       end associate
     end do
   end subroutine count_ends
+
+  !> Count the carrying contacts and the neighbours of the bodies of a subdomain: the contacts of one pair are one neighbour.
+  pure subroutine tally_contacts(sub, list, tally)
+    type(subproblem_t), intent(in) :: sub
+    type(neighbour_list_t), intent(in) :: list
+    type(tally_t), intent(inout) :: tally
+    !> of each place of the list, that where its pair begins
+    integer, allocatable :: first(:)
+    logical, allocatable :: met(:)
+    integer :: c, k, p
+
+    allocate (first(list%n))
+    allocate (met(list%n), source=.false.)
+    p = 1
+    do while (p <= list%n)
+      k = 1
+      if (list%memory%key_row > 0) k = list%points_of(p)
+      first(p:p + k - 1) = p
+      p = p + k
+    end do
+    do c = 1, sub%n_contacts
+      if (.not. sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) cycle
+      p = first(sub%source(c))
+      do k = 1, 2
+        tally%ends(1, sub%pair(k, c)) = tally%ends(1, sub%pair(k, c)) + 1.0_dp
+        if (.not. met(p)) tally%ends(2, sub%pair(k, c)) = tally%ends(2, sub%pair(k, c)) + 1.0_dp
+      end do
+      met(p) = .true.
+    end do
+  end subroutine tally_contacts
 
   !> Standard deviation and histogram of the normal forces over their mean. Collective.
   subroutine distribute(self, problem, n_carrying, h)

@@ -1,6 +1,9 @@
 !> The mean stress of a scene and the share of space that grains fill.
 module gravier_mean_stress
   use gravier_kinds, only: dp
+  use gravier_orientation, only: orientation_matrix
+  use gravier_shape_library, only: shape_library_t
+  use gravier_body_store, only: body_set_t
   use gravier_facing_planes, only: find_facing_planes
   use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -137,7 +140,7 @@ contains
   !> outermost points of the grains in the place of planes that are not there. Collective.
   real(dp) function volume_of(decomposition) result(volume)
     type(decomposition_t), intent(in) :: decomposition
-    real(dp) :: extremes(2*decomposition%nd), low, high
+    real(dp) :: extremes(2*decomposition%nd), reach(2*decomposition%nd), low, high
     integer :: s, k, d, nd
 
     nd = decomposition%nd
@@ -145,8 +148,9 @@ contains
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          extremes(1:nd) = max(extremes(1:nd), owned%radius(k) - owned%position(:, k))
-          extremes(nd + 1:) = max(extremes(nd + 1:), owned%radius(k) + owned%position(:, k))
+          call find_reach(decomposition%shapes, owned, k, reach)
+          extremes(1:nd) = max(extremes(1:nd), reach(1:nd) - owned%position(:, k))
+          extremes(nd + 1:) = max(extremes(nd + 1:), reach(nd + 1:) + owned%position(:, k))
         end do
       end associate
     end do
@@ -163,6 +167,43 @@ contains
       volume = volume*max(high - low, 0.0_dp)
     end do
   end function volume_of
+
+  !> How far body `k` reaches from its centre, against each axis and then along each [m].
+  pure subroutine find_reach(shapes, bodies, k, reach)
+    type(shape_library_t), intent(in) :: shapes
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (2 nd)
+    real(dp), intent(out) :: reach(:)
+    real(dp) :: axes(3, 3), at(bodies%nd)
+    integer :: p, v, d, nd
+
+    reach(:) = bodies%radius(k)
+    if (bodies%no == 0) return
+    if (bodies%shape(k) == 0) return
+    nd = bodies%nd
+    axes(:, :) = 0.0_dp
+    if (nd == 2) then
+      axes(1, 1) = cos(bodies%orientation(1, k))
+      axes(2, 1) = sin(bodies%orientation(1, k))
+      axes(1, 2) = -axes(2, 1)
+      axes(2, 2) = axes(1, 1)
+    else
+      call orientation_matrix(bodies%orientation(:, k), axes)
+    end if
+    reach(:) = -huge(1.0_dp)
+    associate (shape => shapes%shape(bodies%shape(k)))
+      do p = 1, size(shape%piece)
+        do v = 1, size(shape%piece(p)%vertex, 2)
+          do d = 1, nd
+            at(d) = sum(axes(d, 1:nd)*shape%piece(p)%vertex(:, v))
+          end do
+          reach(1:nd) = max(reach(1:nd), bodies%radius(k)*(shape%piece(p)%rounding - at))
+          reach(nd + 1:) = max(reach(nd + 1:), bodies%radius(k)*(shape%piece(p)%rounding + at))
+        end do
+      end do
+    end associate
+  end subroutine find_reach
 
   !> Mean of the diagonal [Pa, N/m in 2D].
   pure real(dp) function mean_stress_pressure(self) result(pressure)

@@ -1,9 +1,10 @@
 !> From the solved problem of a step back to the grains: velocities, and displacements of projections, to their owners.
 module gravier_velocity_return
   use gravier_kinds, only: dp, i8
-  use gravier_orientation, only: turn_orientation
+  use gravier_orientation, only: turn_orientation, orientation_matrix
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   implicit none
@@ -31,7 +32,8 @@ contains
     call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 
-  !> Move the grains in contact by what v_global holds in the place of velocities [m], and turn those with shapes [rad]. Collective.
+  !> Move the grains in contact by what v_global holds in the place of velocities [m], and turn those with shapes [rad], which takes and
+  !> gives no energy. Collective.
   subroutine take_displacements(decomposition, problem)
     type(decomposition_t), intent(inout) :: decomposition
     type(contact_problem_t), intent(in) :: problem
@@ -78,7 +80,7 @@ contains
       associate (owned => decomposition%owned(h))
         if (displace) then
           owned%position(:, place) = owned%position(:, place) + v(1:decomposition%nd)
-          if (owned%no > 0) call turn_orientation(owned%orientation(:, place), v(decomposition%nd + 1:), 1.0_dp)
+          if (owned%no > 0) call turn_body(owned, place, v(decomposition%nd + 1:))
         else
           owned%velocity(1:size(v), place) = v
         end if
@@ -86,6 +88,31 @@ contains
     end subroutine put
 
   end subroutine bring_home
+
+  !> Turn body `k` at once. In space its spin turns with it: in the axes of the body, and so in its energy, it stays what it is.
+  pure subroutine turn_body(bodies, k, angle)
+    type(body_set_t), intent(inout) :: bodies
+    integer, intent(in) :: k
+    !> (1 or 3) about the axes [rad]
+    real(dp), intent(in) :: angle(:)
+    real(dp) :: axes(3, 3), spin(3)
+    integer :: d
+
+    if (bodies%no < 4) then
+      call turn_orientation(bodies%orientation(:, k), angle, 1.0_dp)
+      return
+    end if
+    call orientation_matrix(bodies%orientation(:, k), axes)
+    do d = 1, 3
+      spin(d) = sum(axes(:, d)*bodies%velocity(4:6, k))
+    end do
+    call turn_orientation(bodies%orientation(:, k), angle, 1.0_dp)
+    if (bodies%shape(k) == 0) return
+    call orientation_matrix(bodies%orientation(:, k), axes)
+    do d = 1, 3
+      bodies%velocity(3 + d, k) = sum(axes(d, :)*spin)
+    end do
+  end subroutine turn_body
 
   !> Records (owner, grain, velocity) of the grains in contact that are owned by none of their sharers, from the first of
   !> them.

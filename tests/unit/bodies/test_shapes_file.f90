@@ -3,7 +3,8 @@ program test_shapes_file
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
-  use gravier_shape_library, only: shape_library_t
+  use gravier_shape_library, only: body_shape_t, shape_library_t
+  use gravier_polyhedron, only: make_polyhedron_of_faces
   use gravier_shape_names, only: find_shape, shape_names, library_digest
   use gravier_shapes_file, only: parse_shapes
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -26,6 +27,7 @@ program test_shapes_file
   call test_space_refused()
   call test_surface_files()
   call test_surface_files_refused()
+  call test_no_faces()
   call finish_checks()
   call MPI_Finalize()
 
@@ -312,11 +314,29 @@ contains
     call refuse(shape, 3, "line 2: shape a: a.obj: ")
     call write_file("a.obj", tetrahedron("0 0 1", outwards))
     call refuse("shape a"//lf//"rounding 0.3"//lf//"file a.obj", 3, "line 3: shape a: a.obj: the rounding of ")
+    call write_file("a.stl", "solid a"//lf//"facet"//lf//repeat("vertex 0 0 0"//lf, 2)//"endfacet"//lf//"facet"//lf// &
+      & repeat("vertex 0 0 0"//lf, 4)//"endfacet"//lf)
+    call refuse("shape a"//lf//"file a.stl", 3, "line 2: shape a: a.stl: line 5: a facet of 2 corners, but 3 were expected")
+    ! a binary file: a head, the number 1, three reals of a normal, nine of corners, the first not a number, two bytes
+    call write_file("a.stl", repeat(" ", 80)//achar(1)//repeat(achar(0), 3)//repeat(achar(0), 12)//achar(0)//achar(0)// &
+      & char(192)//achar(127)//repeat(achar(0), 32)//repeat(achar(0), 2))
+    call refuse("shape a"//lf//"file a.stl", 3, "line 2: shape a: a.stl: triangle 1: a coordinate that is not finite")
     ! an octahedron whose last point lies inside the hull of the others
     call write_file("a.obj", "v 1 0 0"//lf//"v 0 1 0"//lf//"v -1 0 0"//lf//"v 0 -1 0"//lf//"v 0 0 1"//lf//"v 0 0 0.3"//lf// &
       & "f 1 2 5"//lf//"f 2 3 5"//lf//"f 3 4 5"//lf//"f 4 1 5"//lf//"f 2 1 6"//lf//"f 3 2 6"//lf//"f 4 3 6"//lf//"f 1 4 6"//lf)
     call refuse(shape, 3, "line 2: shape a: a.obj: the body is not convex")
   end subroutine test_surface_files_refused
+
+  subroutine test_no_faces()
+    type(body_shape_t) :: shape
+    type(error_t), allocatable :: error
+    real(dp), parameter :: point(3, 1) = 0.0_dp
+    integer, parameter :: none(0) = 0
+
+    call make_polyhedron_of_faces("a", point, [1], none, 0.1_dp, shape, error)
+    call check(allocated(error), "a surface without faces")
+    if (allocated(error)) call check(index(error%message, ": no faces") > 0, "a surface without faces: "//error%message)
+  end subroutine test_no_faces
 
   subroutine refuse(text, dimension, part)
     character(len=*), intent(in) :: text
