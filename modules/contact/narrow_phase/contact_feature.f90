@@ -234,7 +234,12 @@ contains
   !> smaller angles, so that no corner is moved out of the plane by more than a two-hundredth of the rounding.
   pure real(dp) function share_of(sine, length, rounding)
     real(dp), intent(in) :: sine, length, rounding
-    share_of = max(0.0_dp, 1.0_dp - sine/blend_angle*max(1.0_dp, length/rounding))
+    real(dp) :: over
+
+    ! segments and rectangles have no rounding, and no way
+    over = 1.0_dp
+    if (length > rounding) over = length/rounding
+    share_of = max(0.0_dp, 1.0_dp - sine/blend_angle*over)
   end function share_of
 
   !> Number of an edge among the features of a piece: behind those of the vertices, by its place in the list of neighbours of its

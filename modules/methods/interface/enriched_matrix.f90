@@ -9,6 +9,7 @@ module gravier_enriched_matrix
   use gravier_timers, only: start_timer, stop_timer, phase_factorise
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: mass_column
+  use gravier_contact_operator, only: find_local_operator
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_method, only: method_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
@@ -149,7 +150,7 @@ contains
       g = block_of(c)
       direction(q, :, g) = share*rule%value
       if (rule%relative) then
-        call sub%local_operator(kernels, c, sub%inverse_mass, w)
+        call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
         direction(q, 1, g) = share*rule%value/w(1)
         direction(q, 2:, g) = share*rule%value/w(2)
       end if

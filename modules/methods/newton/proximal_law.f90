@@ -12,6 +12,7 @@ module gravier_proximal_law
   use gravier_friction_cone, only: project_by_parts, is_open, sticks, slides
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: subproblem_t
+  use gravier_contact_operator, only: find_local_operator
   implicit none
   private
   public :: proximal_law_t
@@ -51,7 +52,7 @@ contains
       & self%slope(nc, nc, n), self%softness(2, n), self%along(2, n), self%kept(n), source=0.0_dp)
     allocate (self%state(n), source=is_open)
     do c = 1, n
-      call sub%local_operator(kernels, c, sub%inverse_mass, w)
+      call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
       self%softness(:, c) = 1.0_dp/w
     end do
   end subroutine proximal_law_init

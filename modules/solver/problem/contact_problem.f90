@@ -5,9 +5,8 @@ module gravier_contact_problem
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_body_mass, only: add_inverse_mass, apply_inverse_mass, can_move, inverse_product, mass_product, multiply_mass, &
-    & velocities_under
-  use gravier_contact_kernels, only: kernels_t, local_operator, contact_jacobian, global_impulse, lanes, n_blocks, lane_of, block_of
+  use gravier_body_mass, only: add_inverse_mass, apply_inverse_mass, can_move, mass_product, multiply_mass, velocities_under
+  use gravier_contact_kernels, only: kernels_t, global_impulse, lanes, n_blocks, lane_of, block_of
   implicit none
   private
   public :: subproblem_t, contact_problem_t, n_residual_sums
@@ -33,6 +32,8 @@ module gravier_contact_problem
     integer :: n_grouped = 0
     !> contacts that do not sleep, the first ones: all, or whole blocks; of those that sleep, what n_grouped is of these
     integer :: n_awake = 0, n_grouped_asleep = 0
+    !> pairs of pieces of bodies with shapes whose cores overlap: by more than both roundings
+    integer :: overlapping_cores = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
@@ -77,7 +78,6 @@ module gravier_contact_problem
   contains
     procedure :: share_masses => subproblem_share_masses
     procedure :: update_local_operator => subproblem_update_local_operator
-    procedure :: local_operator => subproblem_local_operator
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
     procedure :: product_of => subproblem_product_of
@@ -168,65 +168,6 @@ contains
     ! contacts of no effect are all zero
     self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
   end subroutine subproblem_update_local_operator
-
-  !> W_nn and W_tt of contact `c` [1/kg], see gravier_contact_kernels; W_tt = W_nn without friction.
-  pure subroutine subproblem_local_operator(self, kernels, c, weight, w)
-    class(subproblem_t), intent(in) :: self
-    type(kernels_t), intent(in) :: kernels
-    integer, intent(in) :: c
-    !> (nw, n_columns)
-    real(dp), intent(in), contiguous :: weight(:, :)
-    real(dp), intent(out) :: w(2)
-    real(dp) :: normal(kernels%nd)
-    integer :: nd, i, j, q, g
-
-    if (kernels%row%arm_i > 0) then
-      call operator_between_shapes(self, kernels, c, weight, w)
-      return
-    end if
-    nd = kernels%nd
-    i = self%pair(1, c)
-    j = self%pair(2, c)
-    q = lane_of(c)
-    g = block_of(c)
-    normal(:) = self%hot(q, 1:nd, g)
-    call local_operator(normal, weight(:, i), weight(:, j), w(1), w(2))
-    if (kernels%nf > 1) then
-      w(2) = w(2) + self%hot(q, kernels%row%lever_i, g)**2*weight(nd + 1, i) &
-        & + self%hot(q, kernels%row%lever_j, g)**2*weight(nd + 1, j)
-    else
-      w(2) = w(1)
-    end if
-  end subroutine subproblem_local_operator
-
-  !> The same between bodies with shapes, by the rows of H^T, of which W = H^T M^-1 H is made; W_tt is the largest eigenvalue of its
-  !> tangential block.
-  pure subroutine operator_between_shapes(sub, kernels, c, weight, w)
-    type(subproblem_t), intent(in) :: sub
-    type(kernels_t), intent(in) :: kernels
-    integer, intent(in) :: c
-    !> (nw, n_columns)
-    real(dp), intent(in), contiguous :: weight(:, :)
-    real(dp), intent(out) :: w(2)
-    real(dp) :: jacobian(kernels%nc, kernels%nv, 2), entry(3, 3), a(kernels%nv), b(kernels%nv)
-    integer :: k, l, body
-
-    call contact_jacobian(kernels, sub%hot, c, jacobian(:, :, 1), jacobian(:, :, 2))
-    entry(:, :) = 0.0_dp
-    do body = 1, 2
-      do l = 1, kernels%nc
-        a(:) = jacobian(l, :, body)
-        do k = 1, l
-          b(:) = jacobian(k, :, body)
-          entry(k, l) = entry(k, l) + inverse_product(weight(:, sub%pair(body, c)), a, b)
-        end do
-      end do
-    end do
-    w(1) = entry(1, 1)
-    w(2) = entry(2, 2)
-    if (kernels%nc == 3) w(2) = 0.5_dp*(entry(2, 2) + entry(3, 3)) + sqrt((0.5_dp*(entry(2, 2) - entry(3, 3)))**2 &
-      & + entry(2, 3)**2)
-  end subroutine operator_between_shapes
 
   !> Whether degree of freedom `d` of body `b` can move.
   pure logical function subproblem_moves(self, d, b) result(moves)

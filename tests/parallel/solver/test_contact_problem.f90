@@ -14,6 +14,7 @@ program test_contact_problem
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_test_contact_columns, only: contact_column, put_contact_column, pack_columns, pack_pairs
   use gravier_check, only: check, check_close, check_equal, finish_checks
+  use gravier_contact_operator, only: find_local_operator
   implicit none
 
   !> Values of the bodies of a subdomain (nv, n_columns).
@@ -285,7 +286,7 @@ contains
             call sub%update_local_operator(sim%problem%kernels, share)
           end if
           do c = 1, sub%n_contacts
-            call sub%local_operator(sim%problem%kernels, c, sub%weight, w)
+            call find_local_operator(sim%problem%kernels, sub%pair, sub%hot, c, sub%weight, w)
             call compare_operator(sim%problem, s, c, w, right)
             right = right .and. abs(sub%hot(lane_of(c), dimension + 2, block_of(c))*w(1) - share(1)) <= 2*epsilon(1.0_dp)
             if (friction > 0.0_dp) right = right .and. &
