@@ -16,6 +16,7 @@ import numpy as np
 from study_support import gravier, run, write_csv
 
 from gravier.shapes import axes_of
+from one_line import OneLineParser
 
 #: solid: volume in a sphere of radius 1, solid fraction poured and shaken (Baker and Kudrolli), densest packing known
 SOLIDS = {
@@ -82,7 +83,7 @@ def solid_fraction(made, width, rng):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(prog="study_platonic", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
     parser.add_argument("--quick", action="store_true", help="200 of each in the place of 600")
     parser.add_argument("--count", type=int, metavar="N", help="solids of each kind")
@@ -91,6 +92,8 @@ def main():
     count = options.count or (200 if options.quick else 600)
     # as high as wide and a half: the floor and the top are left out
     width = np.cbrt(count / 0.55 / 1.6)
+    if count < 20:
+        parser.error(f"--count {count}: expected 20 or more")
     rows = []
     for solid in options.solids:
         _, loose, dense, densest = SOLIDS[solid]
@@ -101,11 +104,11 @@ def main():
         history = made.history()
         speed = np.sqrt(2.0 * float(history.kinetic_energy[-1]) / (count * 1000.0 * SIZE**3))
         accepted = loose - DIGIT <= measured <= dense + DIGIT and measured <= densest
-        rows.append((solid, count, measured, error, loose, dense, densest, height, float(history.max_overlap.max()) / SIZE, speed,
-                     "yes" if accepted else "NO"))
+        rows.append((solid, count, measured, error, loose, dense, densest, height, float(history.max_overlap.max()) / SIZE,
+                     float(history.max_overlap[-1]) / SIZE, speed, int(np.sum(history.converged == 0)), "yes" if accepted else "NO"))
         print(f"{solid:12s} solid fraction {measured:.3f} +- {error:.3f}, poured {loose:.2f}, shaken {dense:.2f}, densest {densest:.3f}: "
               f"{'within' if accepted else 'NOT WITHIN'}", flush=True)
-    names = "solid count measured error poured shaken densest height_in_sizes largest_overlap speed_at_end accepted".split()
+    names = "solid count measured error poured shaken densest height_in_sizes largest_overlap overlap_at_end speed_at_end failed_solves accepted".split()
     write_csv(options.out / "study_platonic.csv", {name: [row[k] for row in rows] for k, name in enumerate(names)})
     sys.exit(0 if all(row[-1] == "yes" for row in rows) else 1)
 
