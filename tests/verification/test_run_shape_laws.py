@@ -1,0 +1,226 @@
+"""Laws of contact and boundaries with shapes: rebounds, slopes, cohesion, bonds; segments, rectangles, drums, moving planes, glued bodies,
+outlets, periods; piles that sleep."""
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, differences, gravier, merged, namelist, run_case, write
+from shaped_scenes import body, lattice, prepare, shaped_case
+
+G = 9.81
+BLOCK = {2: "shape block\npolygon -0.1 -0.1  0.1 -0.1  0.1 0.1  -0.1 0.1\n", 3: "shape block\nbox 0.2 0.2 0.2\n"}
+STILL = {2: 0.0, 3: [1.0, 0.0, 0.0, 0.0]}
+EXACT = {"solver": {"method": "newton", "criterion": "residual", "tolerance": 1e-11, "max_iterations": 5000}, "output": {"every": 1}}
+
+
+def up(dimension, height, along=0.0):
+    return [along] + [0.0] * (dimension - 2) + [height]
+
+
+def plane(dimension, height=0.0, **more):
+    return {"shape": "plane", "point": up(dimension, height), "normal": up(dimension, 1.0), **more}
+
+
+class ShapeLaws(RunTestCase):
+
+    def play(self, title, dimension, rows, boundaries=(), *parts, ranks=1, library=None, status=0):
+        directory = prepare(self.here(title), dimension, rows, library or BLOCK[dimension])
+        run = run_case(shaped_case(dimension, boundaries, EXACT, *parts), ranks, directory)
+        self.assert_status(run, status)
+        return run
+
+    def track(self, run, name="position", place=0):
+        """Of a body, by its place in the order of identifiers, over all steps."""
+        results = run.results()
+        steps = sorted(int(key.split("/")[2]) for key in results if key.startswith("/steps/") and key.endswith(f"/bodies/{name}"))
+        return np.array([results[f"/steps/{step}/bodies/{name}"][place] for step in steps])
+
+    def test_rebound(self):
+        """A block that falls flat rebounds with e times its speed and without spin. One that falls on a corner keeps its angular momentum
+        about that corner, and leaves with e times the speed of the corner."""
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                run = self.play(f"flat {dimension}", dimension, [body("block", up(dimension, 0.102), STILL[dimension], up(dimension, -1.0))],
+                                [plane(dimension)], {"scene": {"restitution": 0.6, "gravity": [0.0] * dimension}, "time": {"steps": 10}})
+                velocity = self.track(run, "velocity")[-1]
+                np.testing.assert_allclose(velocity, up(dimension, 0.6) + [0.0] * (2 * dimension - 3), atol=1e-9)
+                turn = 0.4 if dimension == 2 else [np.cos(0.2), np.sin(0.2) * 0.6, np.sin(0.2) * 0.8, 0.0]
+                run = self.play(f"corner {dimension}", dimension, [body("block", up(dimension, 0.2), turn, up(dimension, -1.0), scale=1.0)],
+                                [plane(dimension)], {"scene": {"restitution": 0.5, "gravity": [0.0] * dimension}, "time": {"steps": 120}})
+                results, velocity = run.results(), self.track(run, "velocity")
+                hit = next(step for step in range(1, 121) if f"/steps/{step}/contacts/impulse" in results
+                           and np.any(results[f"/steps/{step}/contacts/impulse"] > 0.0))
+                point = results[f"/steps/{hit}/contacts/point"][0]
+                arm = point - (self.track(run)[hit - 1] + 0.5e-3 * velocity[hit - 1, :dimension])
+                mass, inertia = results["/steps/0/bodies/mass"][0], results["/steps/0/bodies/mass"][0] * 0.2**2 / 6.0
+                before, after = velocity[hit - 1], velocity[hit]
+                impulse = mass * (after - before)[:dimension]
+                np.testing.assert_allclose(impulse[:-1], 0.0, atol=1e-9 * mass)
+                if dimension == 2:
+                    self.assertAlmostEqual(inertia * (after - before)[2], arm[0] * impulse[1] - arm[1] * impulse[0], delta=1e-6 * mass)
+                    speeds = [state[1] + state[2] * arm[0] for state in (before, after)]
+                else:
+                    np.testing.assert_allclose(inertia * (after - before)[3:], np.cross(arm, impulse), atol=1e-6 * mass)
+                    speeds = [state[2] + np.cross(state[3:], arm)[2] for state in (before, after)]
+                self.assertAlmostEqual(speeds[1], -0.5 * speeds[0], delta=1e-6)
+
+    def test_slope(self):
+        """A block on a slope sticks below the angle of friction, and slides as Coulomb has it above; materials have friction of their own."""
+        slope, steps, h = 0.4, 50, 1e-3
+        for dimension in (2, 3):
+            gravity = up(dimension, -G * np.cos(slope), G * np.sin(slope))
+            for friction in (0.8 * np.tan(slope), 1.2 * np.tan(slope)):
+                for law in (False, True):
+                    scene = {"scene": {"gravity": gravity, "friction": float(friction)}, "time": {"steps": steps, "step": h}, "output": {"every": 50}}
+                    if law:
+                        scene = merged(scene, {"scene": {"friction": 0.0, "wall_material": "rock"}, "material": [{"name": "rock"}],
+                                               "law": [{"materials": "rock", "kind": "coulomb", "friction": float(friction)}]})
+                    run = self.play(f"slope {dimension} {friction} {law}", dimension, [body("block", up(dimension, 0.1), STILL[dimension])],
+                                    [plane(dimension)], scene)
+                    speed = max(0.0, G * (np.sin(slope) - friction * np.cos(slope))) * steps * h
+                    np.testing.assert_allclose(self.track(run, "velocity")[-1], up(dimension, 0.0, speed) + [0.0] * (2 * dimension - 3), atol=1e-7)
+
+    def test_sent_back(self):
+        """Tangential restitution sends the corner of a block back."""
+        run = self.play("sent back", 2, [body("block", [0.0, 0.142], np.pi / 4, [1.0, -1.0])], [plane(2)], {
+            "scene": {"restitution": 0.5, "tangential_restitution": 0.5, "friction": 10.0, "gravity": [0.0, 0.0]}, "time": {"steps": 10}})
+        velocity = self.track(run, "velocity")
+        hit = int(np.argmax(np.abs(np.diff(velocity[:, 1])) > 0.1)) + 1
+        point = run.results()[f"/steps/{hit}/contacts/point"][0]
+        arm = point - (self.track(run)[hit - 1] + 0.5e-3 * velocity[hit - 1, :2])
+        speeds = [np.array([v[0] - v[2] * arm[1], v[1] + v[2] * arm[0]]) for v in velocity[hit - 1:hit + 1]]
+        np.testing.assert_allclose(speeds[1], -0.5 * speeds[0], atol=1e-6)
+
+    def test_hanging(self):
+        """A block hangs on another, which is glued, by cohesion or by a bond, through lists made anew and a restart; each point has a bond of
+        its own. With less strength than its weight it falls."""
+        for dimension in (2, 3):
+            weight = 2500.0 * 0.2**dimension * G
+            points = 2 if dimension == 2 else 4
+            rows = [body("block", up(dimension, 0.3), STILL[dimension], group=1), body("block", up(dimension, 0.1), STILL[dimension], up(dimension, 0.5, 0.3), group=0)]
+            roof = [{"shape": "grains", "group": 1, "velocity": up(dimension, 0.5, 0.3)}]
+            for kind, part in (("adhesive", {"adhesion": 1.0, "adhesion_range": 1e-4}),
+                               ("bonded", {"bond_strength": 1.0, "bond_friction": 0.5, "bond_distance": 1e-4})):
+                for share in (1.3, 0.7):
+                    law = {"materials": "rock", "kind": kind, "friction": 0.5, **part}
+                    law["adhesion" if kind == "adhesive" else "bond_strength"] = share * weight / points
+                    scene = {"scene": {"wall_material": "rock", "skin": 0.01}, "material": [{"name": "rock"}], "law": [law],
+                             "time": {"steps": 60}, "output": {"checkpoint_every": 25, "every": 5}}
+                    title = f"hanging {dimension} {kind} {share}"
+                    run = self.play(title, dimension, rows, roof, scene)
+                    lag = self.track(run)[-1, -1] - self.track(run, place=1)[-1, -1] - 0.2
+                    if share < 1.0:
+                        self.assertGreater(lag, 1e-3, title)
+                        continue
+                    self.assertLess(abs(lag), 1e-8, title)
+                    self.assertGreater(run.history()["listed"].sum(), 1)
+                    stopped = self.play(title + " stopped", dimension, rows, roof, merged(scene, {"time": {"steps": 25}}))
+                    write(stopped.path("case.nml"), namelist(shaped_case(dimension, roof, EXACT, scene)))
+                    again = gravier("--restart", "case.nml", ranks=2, directory=stopped.directory)
+                    self.assert_status(again, 0)
+                    self.assertEqual(differences({key: value for key, value in run.results().items() if "run@" not in key},
+                                                 {key: value for key, value in again.results().items() if "run@" not in key}), [], title)
+
+    def test_edges(self):
+        """Blocks on both sides of a segment or a rectangle, across its end, and under its corner, rest or pass; one that lies beyond it falls."""
+        for dimension in (2, 3):
+            sheet = {"shape": "segment", "point": [-0.5, 0.0], "end": [0.5, 0.0]} if dimension == 2 else {
+                "shape": "rectangle", "point": [-0.5, -0.5, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 1.0, 0.0]}
+            for sign in (1.0, -1.0):
+                # on it, half across the end with its weight inside, half across with its weight outside, beyond
+                places = [up(dimension, 0.1 * sign, x) for x in (0.0, 0.45, -0.55, 0.75)]
+                run = self.play(f"edges {dimension} {sign}", dimension, [body("block", place, STILL[dimension]) for place in places], [sheet], {
+                    "scene": {"gravity": up(dimension, -G * sign), "friction": 0.3}, "time": {"steps": 100}, "output": {"every": 50}})
+                fall = [sign * (self.track(run, place=k)[-1, -1] - places[k][-1]) for k in range(4)]
+                spin = np.abs(self.track(run, "velocity", 2)[-1, dimension:]).max()
+                np.testing.assert_allclose(fall[:2], 0.0, atol=1e-8)
+                self.assertGreater(spin, 0.3)
+                self.assertTrue(-0.045 < fall[2] < -0.005, fall)
+                self.assertAlmostEqual(fall[3], -0.5 * G * 0.1**2, delta=2e-3)
+
+    def test_glued(self):
+        """Glued bodies turn with their boundary, whose orientation and place are those of a rigid motion; what lies on a turning table of
+        glued blocks turns with it."""
+        rate, steps, h = 2.0, 200, 1e-3
+        for dimension in (2, 3):
+            spin = [rate] if dimension == 2 else [0.0, 0.0, rate]
+            place = np.array([0.3, 0.0] + [0.0] * (dimension - 2))
+            rows = [body("block", place.tolist(), STILL[dimension], group=1)]
+            if dimension == 3:
+                rows.append(body("block", [0.3, 0.0, 0.2], STILL[dimension], [0.0, 0.6, 0.0], [0.0, 0.0, rate], group=0, scale=0.5))
+                rows[1]["z"] = 0.1 + 0.05
+                rows[1].update(scale=0.5 * np.sqrt(0.03))
+            table = [{"shape": "grains", "group": 1, "rotation": spin, "pivot": [0.0] * dimension, "velocity": [0.1] + [0.0] * (dimension - 1)}]
+            run = self.play(f"glued {dimension}", dimension, rows, table, {"scene": {"friction": 0.9, "gravity": [0.0, 0.0, -G][:dimension] if
+                            dimension == 3 else [0.0, 0.0]}, "time": {"steps": steps, "step": h}, "output": {"every": 50}})
+            angle = rate * steps * h
+            # the pivot moves with the boundary
+            there = np.array([0.1 * steps * h + 0.3 * np.cos(angle), 0.3 * np.sin(angle)] + [0.0] * (dimension - 2))
+            np.testing.assert_allclose(self.track(run)[-1], there, atol=1e-6)
+            turned = self.track(run, "orientation")[-1]
+            expected = [angle] if dimension == 2 else [np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)]
+            np.testing.assert_allclose(turned, expected, atol=1e-9)
+            if dimension == 3:
+                carried = self.track(run, "velocity", 1)[-1]
+                self.assertAlmostEqual(carried[5], rate, delta=1e-3)
+
+    def test_moving_planes(self):
+        """A plane that rises carries a block, a lid with a mass falls on it, and a periodic cell carries it round."""
+        for dimension in (2, 3):
+            floor = plane(dimension, velocity=up(dimension, 0.2, 0.5))
+            run = self.play(f"lift {dimension}", dimension, [body("block", up(dimension, 0.1, 0.6), STILL[dimension])], [floor], {
+                "scene": {"friction": 0.5, "period": [0.85] + [0.0] * (dimension - 1)}, "time": {"steps": 800}, "output": {"every": 100}})
+            np.testing.assert_allclose(self.track(run, "velocity")[-1], up(dimension, 0.2, 0.5) + [0.0] * (2 * dimension - 3), atol=1e-7)
+            self.assertEqual(run.results()["/steps/800/bodies/image"][0, 0], 1)
+            lid = plane(dimension, 0.25, mass=2.0, free=[False] * (dimension - 1) + [True], force=up(dimension, -2.0 * G))
+            lid["normal"] = up(dimension, -1.0)
+            run = self.play(f"lid {dimension}", dimension, [body("block", up(dimension, 0.1), STILL[dimension])], [plane(dimension), lid], {
+                "scene": {"friction": 0.5}, "time": {"steps": 200}, "output": {"every": 100}, "solver": {"tolerance": 1e-9}})
+            force = run.results()["/steps/200/boundaries/force"]
+            weight = 2500.0 * 0.2**dimension * G
+            np.testing.assert_allclose(force[:, -1], [-weight - 2.0 * G, 2.0 * G], rtol=1e-6)
+            self.assertAlmostEqual(run.results()["/steps/200/boundaries/position"][1, -1], 0.2, delta=1e-2)
+
+    def test_outlet(self):
+        """Bodies that fall through an outlet leave, on 1 and 3 ranks alike."""
+        for dimension in (2, 3):
+            rows = lattice((3, 2) if dimension == 2 else (2, 2, 2), spacing=0.2, height=0.5)
+            outlet = {"shape": "outlet", "point": up(dimension, 0.0), "normal": up(dimension, 1.0)}
+            for ranks in (1, 3):
+                directory = prepare(self.here(f"outlet {dimension} {ranks}"), dimension, rows)
+                run = run_case(shaped_case(dimension, [outlet], {"time": {"steps": 300, "step": 2e-3}, "solver": {"method": "nscdd"},
+                                                                 "decomposition": {"subdomains": 3}, "output": {"energy": True}}), ranks, directory)
+                self.assert_status(run, 0)
+                self.assertEqual(run.history()["left"].sum(), len(rows))
+                self.assertLess(abs(run.history()["energy_error"][-1]), 1e-10 * run.history()["load_work"][-1])
+
+    def test_sleeping(self):
+        """A stack of blocks falls asleep, stays where it is without sleep, and wakes where a disk strikes it."""
+        for dimension in (2, 3):
+            rows = [body("block", up(dimension, 0.2 * k + 0.1), STILL[dimension]) for k in range(3)]
+            rows.append(body("grain", up(dimension, 3.0, 0.155), radius=0.08))
+            lazy = {"sleeping": True, "sleep_after": 8, "criterion": "residual", "tolerance": 1e-6, "method": "nscdd", "sleep_speed": 1e-2}
+            runs = [self.play(f"asleep {dimension} {sleeping}", dimension, rows, [plane(dimension)], {
+                "scene": {"friction": 0.4}, "time": {"steps": 380, "step": 2e-3}, "output": {"every": 10},
+                "solver": merged({"solver": lazy}, {"solver": {"sleeping": sleeping}})["solver"]}) for sleeping in (True, False)]
+            sleeping = runs[0].history()["sleeping"]
+            # all of the points, of 2 or 4 each; the disk strikes in step 344
+            self.assertEqual(sleeping[300], 3 * (2 if dimension == 2 else 4))
+            self.assertEqual(sleeping[344:].min(), 0)
+            before = [self.track(run, "position", 2)[30] for run in runs]
+            np.testing.assert_allclose(before[0], before[1], atol=1e-6)
+            moved = [np.abs(self.track(run, "position", 2)[-1] - before[0]).max() for run in runs]
+            self.assertGreater(min(moved), 1e-4)
+            self.assertAlmostEqual(moved[0] / moved[1], 1.0, delta=0.05)
+
+    def test_rolling_refused(self):
+        for part in ({"scene": {"friction": 0.3, "rolling_friction": 0.1}, "boundary": [plane(2)]},
+                     {"scene": {"friction": 0.3, "wall_material": "rock"}, "material": [{"name": "rock"}],
+                      "law": [{"materials": "rock", "kind": "coulomb", "friction": 0.3}], "boundary": [plane(2, rolling_friction=0.1)]}):
+            run = self.play(f"rolling {len(part)}", 2, [body("block", [0.0, 0.1], 0.0)], (), merged(part, {"solver": {"method": "nlgs"}}), status=2)
+            self.assertEqual(run.stderr.count("\n"), 1)
+            self.assertIn("rolling or pivoting friction: expected 0 where bodies have shapes", run.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
