@@ -8,6 +8,8 @@ module gravier_sample_file
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_bodies_file, only: bodies_data_t, write_bodies
+  use gravier_shape_library, only: shape_library_t
+  use gravier_shapes_file, only: read_shapes
   use gravier_config, only: config_t
   use gravier_run, only: read_config
   use gravier_run_log, only: run_log_t
@@ -61,11 +63,14 @@ contains
     type(run_log_t), intent(inout) :: log
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
+    type(shape_library_t) :: shapes
 
-    call make_sample(comm, config, data, error)
+    if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, shapes, error)
+    if (allocated(error)) return
+    call make_sample(comm, config, shapes, data, error)
     if (allocated(error)) return
     call open_log(config, log, error)
-    call write_bodies(comm, trim(config%sample%file), data, error)
+    call write_bodies(comm, trim(config%sample%file), data, error, shapes)
     call check_own_files(error)
     call comm%agree(error)
     if (.not. allocated(error)) call log%line("finished    "//to_text(data%total)//" grains, "//to_text(data%n_walls)// &

@@ -332,7 +332,7 @@ contains
 
     if (.not. is_given(report, "boundary", "name")) boundary%name = "boundary "//to_text(report%instance)
     point = surface_value(boundary, "point")
-    where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries) boundary%pivot = point
+    where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries(:3)) boundary%pivot = point
     call apply_contact_defaults(boundary%contact_given, scene%wall_contact, boundary%contact)
     if (.not. boundary%material_given) boundary%material = scene%wall_material
     if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)

@@ -126,9 +126,9 @@ contains
 
     select case (key%kind)
     case (kind_integer)
-      text = number_text("an integer", "3 integers", key)
+      text = number_text("an integer", "integers", key)
     case (kind_real)
-      text = number_text("a finite real number", "3 finite real numbers", key)
+      text = number_text("a finite real number", "finite real numbers", key)
     case (kind_logical)
       text = ".true. or .false."
       if (key%count > 1) text = "at most "//to_text(key%count)//" of "//text
@@ -143,13 +143,13 @@ contains
   end function expected_text
 
   pure function number_text(one, several, key) result(text)
-    !> the kind in words, for a single value and for three
+    !> the kind in words, for a single value and for several
     character(len=*), intent(in) :: one, several
     type(key_t), intent(in) :: key
     character(len=:), allocatable :: text
 
     text = one
-    if (key%count > 1) text = "at most "//several
+    if (key%count > 1) text = "at most "//to_text(key%count)//" "//several
     if (key%allowed /= "") text = text//" "//trim(key%allowed)
     if (key%unit /= "") text = text//" ("//trim(key%unit)//")"
   end function number_text

@@ -11,7 +11,7 @@ module gravier_config_report
   !> Whether a key of the table is in a group of the file, and how.
   type :: given_t
     !> the entries that are set
-    logical :: entries(3) = .false.
+    logical :: entries(8) = .false.
     !> `key = value` as the file has it; several, separated by commas, when the entries were set one by one
     character(len=:), allocatable :: shown
     !> what stands after the equal sign, of the last entry given

@@ -209,6 +209,8 @@ contains
     case ("radius_mean"); slot%real => config%sample%radius_mean
     case ("radius_deviation"); slot%real => config%sample%radius_deviation
     case ("radius_table"); slot%text => config%sample%radius_table
+    case ("grain_shapes"); slot%text => config%sample%grain_shapes
+    case ("grain_shares"); slot%reals => config%sample%grain_shares
     case ("box"); slot%reals => config%sample%box
     case ("solid_fraction"); slot%real => config%sample%solid_fraction
     case ("seed"); slot%integer => config%sample%seed

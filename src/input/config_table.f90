@@ -101,8 +101,9 @@ module gravier_config_table
      key_t("scene", "bodies_file", kind_text, "''", "not empty", "path of the bodies file", &
            note="required", chooser="bodies", chosen="file"), &
      key_t("scene", "shapes", kind_text, "''", "", &
-           "path of a file of shapes, which bodies of the bodies file may have in the place of disks and spheres", &
-           chooser="bodies", chosen="file"), &
+           "path of a [file of shapes](shapes.md#2-the-file-of-shapes), which bodies of the bodies file or of the sample "// &
+           "may have in the place of disks and spheres", &
+           chooser="bodies", chosen="file sample"), &
      key_t("scene", "column_count", kind_integer, "3", ">= 1", "number of bodies in the column", &
            chooser="bodies", chosen="column"), &
      key_t("scene", "radius", kind_real, "1.0", "> 0", "radius of each body", unit="m", chooser="bodies", chosen="column"), &
@@ -228,13 +229,19 @@ module gravier_config_table
            note="required", chooser="radii", chosen="log_normal"), &
      key_t("sample", "radius_table", kind_text, "''", "not empty", "path of a CSV file with columns `radius,share`", &
            note="required", chooser="radii", chosen="table"), &
+     key_t("sample", "grain_shapes", kind_text, "''", "", &
+           "names of the shapes that grains have, of the file `shapes` of `&scene`, with commas between; `disk` in 2D and "// &
+           "`sphere` in 3D stand for themselves. Radii are those of the balls about the centres of mass that hold the grains", &
+           note="all shapes of the file"), &
+     key_t("sample", "grain_shares", kind_real, "8*0", "> 0", "shares by number of the first eight `grain_shapes`, to any scale", &
+           count=8, planar=8, note="equal shares"), &
      key_t("sample", "box", kind_real, "3*0", ">= 0", &
            "size of the box along each axis; the last may be 0: as high as the grains ask, for loose ones by `solid_fraction`; "// &
            "the third is 0 in 2D", &
            count=3, unit="m", note="the period, along an axis that is periodic"), &
      key_t("sample", "solid_fraction", kind_real, "0.35", "in (0, 0.6)", &
-           "share of the box that the grains fill, where its last size is 0; random places take up to about 0.53 in 2D and "// &
-           "0.35 in 3D of grains of one radius: what finds none is refused", &
+           "share of the box that the grains fill, or the balls that hold those with shapes, where its last size is 0; "// &
+           "random places take up to about 0.53 in 2D and 0.35 in 3D of grains of one radius: what finds none is refused", &
            note="`0.35` in 2D, `0.2` in 3D", chooser="arrangement", chosen="loose"), &
      key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii and places"), &
      key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &

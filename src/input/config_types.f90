@@ -225,6 +225,9 @@ module gravier_config_types
     real(dp) :: radius_mean, radius_deviation
     !> CSV table of the radii and their shares
     character(len=text_length) :: radius_table
+    !> names of shapes, with commas or blanks between; shares by number, all 0 for equal ones
+    character(len=text_length) :: grain_shapes
+    real(dp) :: grain_shares(8)
     !> m; the period along a periodic axis; the last may be 0: found from solid_fraction; the third is 0 in 2D
     real(dp) :: box(3)
     !> of a loose sample whose last size is 0

@@ -12,7 +12,9 @@ module gravier_config_value
   public :: read_value, most_entries
 
   !> entries of the longest key
-  integer, parameter :: most_entries = 3
+  integer, parameter :: most_entries = 8
+  !> of texts
+  integer, parameter :: most_texts = 3
   !> room for a text whose quotes are all doubled
   integer, parameter :: longest_text = 2*text_length + 2
 
@@ -189,14 +191,14 @@ contains
     type(slot_t), intent(inout) :: slot
     logical, intent(out) :: touched(most_entries)
     logical, intent(out) :: failed
-    character(len=longest_text) :: values(most_entries)
+    character(len=longest_text) :: values(most_texts)
     integer :: status, i
 
     touched = .false.
     failed = .not. is_quoted(value)
     if (failed) return
     call texts_of_record(index//" = "//value, values, status)
-    touched = values /= ""
+    touched(:most_texts) = values /= ""
     failed = status /= 0 .or. any(len_trim(values) > text_length) .or. .not. fits(touched, size(slot%texts))
     if (failed) return
     do i = 1, size(slot%texts)
@@ -272,7 +274,7 @@ contains
   subroutine texts_of_record(assignment, value, status)
     !> `(index) = values`
     character(len=*), intent(in) :: assignment
-    character(len=longest_text), intent(out) :: value(most_entries)
+    character(len=longest_text), intent(out) :: value(most_texts)
     !> not 0: it is not a list of texts
     integer, intent(out) :: status
     character(len=:), allocatable :: record

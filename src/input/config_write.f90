@@ -102,6 +102,8 @@ contains
     if (key%group == "scene" .and. key%name == "gravity") in_force = config%scene%gravity_table == ""
     if (key%group == "sample" .and. key%name == "solid_fraction") &
       in_force = in_force .and. config%sample%box(config%scene%dimension) <= 0.0_dp
+    if (key%group == "sample" .and. key%name == "grain_shapes") in_force = config%sample%grain_shapes /= ""
+    if (key%group == "sample" .and. key%name == "grain_shares") in_force = any(config%sample%grain_shares > 0.0_dp)
   end function in_force
 
   !> The value of a key as it would be typed after the equal sign; reading it back gives the same value.

@@ -87,6 +87,9 @@ contains
           & to_text(tally%path, 3)//" m"
         text = text//newline
       end if
+      if (tally%steps_with_cores > 0) text = text//indent//"in "//to_text(tally%steps_with_cores)//" of "//to_text(tally%steps)// &
+        & " steps bodies lay in each other by more than their roundings, at most "// &
+        & to_text(tally%most_cores)//" pairs in one"//newline
     end associate
   end function overlap_lines
 

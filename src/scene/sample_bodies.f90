@@ -13,6 +13,8 @@ module gravier_sample_bodies
   use gravier_loose_packing, only: place_loosely
   use gravier_config_types, only: config_t
   use gravier_config_laws, only: density_of
+  use gravier_shape_library, only: shape_library_t
+  use gravier_sample_shapes, only: draw_shapes
   implicit none
   private
   public :: make_lattice, make_sample, farthest_place
@@ -99,12 +101,14 @@ contains
   end function farthest_place
 
   !> The sample of &sample before any preparation: grains at rest with identifiers from 1, a plane on each side of the box
-  !> that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period. Failure
-  !> (status_input): a table of radii that cannot be read, grains that find no place in the box. Errors are the same on all
-  !> ranks. Collective.
-  subroutine make_sample(comm, config, data, error)
+  !> that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period. Grains with shapes
+  !> are placed by the balls that hold them. Failure (status_input): a table of radii that cannot be read, grains that find no
+  !> place in the box, shapes that the library does not have. Errors are the same on all ranks. Collective.
+  subroutine make_sample(comm, config, shapes, data, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
+    !> that grains may have; without any all are disks or spheres
+    type(shape_library_t), intent(in) :: shapes
     type(bodies_data_t), intent(out) :: data
     type(error_t), allocatable, intent(inout) :: error
     type(radius_distribution_t) :: radii
@@ -131,6 +135,7 @@ contains
       error%message = config%file//": &sample box: "//error%message
       return
     end if
+    if (shapes%n > 0) call draw_shapes(comm, config, shapes, data, error)
     call make_planes(box, config%sample%preparation == "compacted", data, error)
     data%has_box = any(box%periodic)
     data%origin(:) = config%scene%period_origin

@@ -64,15 +64,16 @@ contains
 
     call check_planned_grains(comm, config, error)
     if (allocated(error)) return
+    if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, scene%shapes, error)
+    if (allocated(error)) return
     select case (config%scene%bodies)
     case ("column")
       call make_column(comm, config%scene, data, error)
     case ("lattice")
       call make_lattice(comm, config, data, error)
     case ("sample")
-      call make_sample(comm, config, data, error)
+      call make_sample(comm, config, scene%shapes, data, error)
     case default
-      if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, scene%shapes, error)
       call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error, scene%shapes)
       call check_read_grains(comm, config, data%total, error)
     end select

@@ -15,7 +15,8 @@ module gravier_shapes_file
   use gravier_obj_file, only: read_obj
   use gravier_quaternion, only: find_quaternion
   use gravier_polygon, only: flat_piece_t, polygon_piece, round_piece, make_flat_shape
-  use gravier_shapes_text, only: statement_t, split_statements
+  use gravier_shapes_text, only: statement_t, split_statements, check_count, refuse => refuse_statement
+  use gravier_shapes_words, only: is_generated, generate_corners
   implicit none
   private
   public :: read_shapes, parse_shapes
@@ -182,20 +183,22 @@ contains
     type(flat_piece_t) :: made(size(pieces))
     character(len=:), allocatable :: message
     real(dp), allocatable :: corner(:, :)
-    integer :: k, n, c
+    integer :: k, n
 
     do k = 1, size(pieces)
       n = size(pieces(k)%number)
-      allocate (corner(2, n/2))
-      do c = 1, n/2
-        corner(:, c) = pieces(k)%number(2*c - 1:2*c)
-      end do
+      if (is_generated(pieces(k)%word)) then
+        call generate_corners(path, pieces(k), 2, corner, error)
+      else
+        call take_points(2, pieces(k)%number, corner)
+      end if
       message = ""
       select case (pieces(k)%word)
       case ("polygon")
         call check_count(path, pieces(k), mod(n, 2) == 0 .and. n >= 6, "x and y of three corners or more", error)
-        if (.not. allocated(error)) call polygon_piece(corner, rounding_of(rounding, corner), &
-          & made(k), message)
+        if (.not. allocated(error)) call polygon_piece(corner, rounding_of(rounding, corner), made(k), message)
+      case ("regular", "random_hull")
+        if (.not. allocated(error)) call polygon_piece(corner, rounding_of(rounding, corner), made(k), message)
       case ("disk")
         call check_count(path, pieces(k), n == 3, "x, y and a radius", error)
         call check_radius(path, pieces(k), error)
@@ -208,7 +211,6 @@ contains
       if (allocated(error)) return
       if (len(message) > 0) call refuse(path, pieces(k), "shape "//name//": "//message, error)
       if (allocated(error)) return
-      deallocate (corner)
     end do
     call make_flat_shape(name, made, shape)
   end subroutine make_flat
@@ -249,11 +251,17 @@ contains
 
     n = size(statement%number)
     what = path//": line "//to_text(statement%line)//": shape "//name
+    if (is_generated(statement%word)) then
+      call generate_corners(path, statement, 3, point, error)
+      if (allocated(error)) return
+      call make_piece(what, point, rounding_of(rounding, point), piece, mass, error)
+      return
+    end if
     select case (statement%word)
     case ("hull")
       call check_count(path, statement, mod(n, 3) == 0 .and. n >= 12, "x, y and z of four corners or more", error)
       if (allocated(error)) return
-      call take_points(statement%number, point)
+      call take_points(3, statement%number, point)
       call make_piece(what, point, rounding_of(rounding, point), piece, mass, error)
     case ("box")
       call check_count(path, statement, n == 3 .or. n == 6, "three lengths, and perhaps x, y and z of the centre", error)
@@ -317,14 +325,15 @@ contains
   end subroutine make_piece_of_file
 
   !> Points of their coordinates one after the other.
-  pure subroutine take_points(number, point)
+  pure subroutine take_points(dimension, number, point)
+    integer, intent(in) :: dimension
     real(dp), intent(in) :: number(:)
     real(dp), allocatable, intent(out) :: point(:, :)
     integer :: k
 
-    allocate (point(3, size(number)/3))
+    allocate (point(dimension, size(number)/dimension))
     do k = 1, size(point, 2)
-      point(:, k) = number(3*k - 2:3*k)
+      point(:, k) = number(dimension*(k - 1) + 1:dimension*k)
     end do
   end subroutine take_points
 
@@ -344,17 +353,6 @@ contains
     end do
   end subroutine take_box
 
-  subroutine check_count(path, statement, right, expected, error)
-    character(len=*), intent(in) :: path
-    type(statement_t), intent(in) :: statement
-    logical, intent(in) :: right
-    character(len=*), intent(in) :: expected
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (.not. right) call refuse(path, statement, statement%word//" with "//to_text(size(statement%number))// &
-      & " numbers: expected "//expected, error)
-  end subroutine check_count
-
   !> The last number of a round piece.
   subroutine check_radius(path, statement, error)
     character(len=*), intent(in) :: path
@@ -367,14 +365,5 @@ contains
         & ": expected "//size_text, error)
     end associate
   end subroutine check_radius
-
-  !> Raise an error about a statement.
-  subroutine refuse(path, statement, what, error)
-    character(len=*), intent(in) :: path
-    type(statement_t), intent(in) :: statement
-    character(len=*), intent(in) :: what
-    type(error_t), allocatable, intent(inout) :: error
-    call raise(error, status_input, path//": line "//to_text(statement%line)//": "//what)
-  end subroutine refuse
 
 end module gravier_shapes_file

@@ -10,7 +10,7 @@ module gravier_shapes_text
   use gravier_number_text, only: number_size, read_real, not_a_number, size_huge
   implicit none
   private
-  public :: statement_t, split_statements
+  public :: statement_t, split_statements, check_count, refuse_statement
 
   !> One statement of a file of shapes.
   type :: statement_t
@@ -43,14 +43,15 @@ contains
   pure subroutine get_words(dimension, words)
     !> 2 or 3
     integer, intent(in) :: dimension
-    character(len=8), allocatable, intent(out) :: words(:)
+    character(len=12), allocatable, intent(out) :: words(:)
 
     if (dimension == 2) then
-      allocate (words(5))
-      words(:) = [character(len=8) :: "shape", "rounding", "polygon", "disk", "capsule"]
-    else
       allocate (words(7))
-      words(:) = [character(len=8) :: "shape", "rounding", "hull", "box", "sphere", "capsule", "file"]
+      words(:) = [character(len=12) :: "shape", "rounding", "polygon", "disk", "capsule", "regular", "random_hull"]
+    else
+      allocate (words(13))
+      words(:) = [character(len=12) :: "shape", "rounding", "hull", "box", "sphere", "capsule", "file", "tetrahedron", "cube", &
+        & "octahedron", "dodecahedron", "icosahedron", "random_hull"]
     end if
   end subroutine get_words
 
@@ -63,7 +64,7 @@ contains
     type(statement_t), allocatable, intent(out) :: statements(:)
     type(error_t), allocatable, intent(inout) :: error
     type(reader_t) :: reader
-    character(len=8), allocatable :: words(:)
+    character(len=12), allocatable :: words(:)
     integer :: at, length, last
 
     call get_words(dimension, words)
@@ -196,5 +197,26 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     call raise(error, status_input, reader%path//": line "//to_text(reader%line)//": "//what)
   end subroutine refuse
+
+  !> Refuse a statement that has not as many numbers as it should.
+  subroutine check_count(path, statement, right, expected, error)
+    character(len=*), intent(in) :: path
+    type(statement_t), intent(in) :: statement
+    logical, intent(in) :: right
+    character(len=*), intent(in) :: expected
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. right) call refuse_statement(path, statement, statement%word//" with "//to_text(size(statement%number))// &
+      & " numbers: expected "//expected, error)
+  end subroutine check_count
+
+  !> Raise an error about a statement.
+  subroutine refuse_statement(path, statement, what, error)
+    character(len=*), intent(in) :: path
+    type(statement_t), intent(in) :: statement
+    character(len=*), intent(in) :: what
+    type(error_t), allocatable, intent(inout) :: error
+    call raise(error, status_input, path//": line "//to_text(statement%line)//": "//what)
+  end subroutine refuse_statement
 
 end module gravier_shapes_text

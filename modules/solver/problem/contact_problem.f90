@@ -33,6 +33,8 @@ module gravier_contact_problem
     integer :: n_grouped = 0
     !> contacts that do not sleep, the first ones: all, or whole blocks; of those that sleep, what n_grouped is of these
     integer :: n_awake = 0, n_grouped_asleep = 0
+    !> pairs of pieces of bodies with shapes whose cores overlap: by more than both roundings
+    integer :: overlapping_cores = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)

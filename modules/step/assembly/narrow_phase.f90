@@ -50,6 +50,7 @@ contains
     allocate (found%terms(merge(view%list%n, 0, physics%laws%varies)))
     allocate (found%place(merge(view%list%n, 0, decomposition%no > 0)))
     found%n = 0
+    found%overlapping_cores = 0
     if (decomposition%no > 0) then
       call find_contacts_of_shapes(view, decomposition, physics, found)
     else

@@ -102,6 +102,7 @@ contains
         if (boundaries(b)%turns()) n = n + 1
       end do
       sub%n_contacts = found%n
+      sub%overlapping_cores = found%overlapping_cores
       sub%n_bodies = sub%n_grains
       do b = 1, size(boundaries)
         if (numbers%of_boundary(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle

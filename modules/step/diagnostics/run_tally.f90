@@ -39,6 +39,8 @@ module gravier_run_tally
     real(dp) :: layered_sweeps = 0.0_dp
     !> of the last solve [m/s]
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
+    !> steps in which cores of bodies with shapes overlapped, and the most pairs of pieces in one
+    integer(i8) :: steps_with_cores = 0, most_cores = 0
   contains
     procedure :: add_solve => run_tally_add_solve
     procedure :: add_step => run_tally_add_step
@@ -105,10 +107,12 @@ contains
   end subroutine add_kind
 
   !> Add what moved in a step.
-  pure subroutine run_tally_add_step(self, overlap, mended, shift, path)
+  pure subroutine run_tally_add_step(self, overlap, overlapping_cores, mended, shift, path)
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
+    !> pairs of pieces whose cores overlap
+    integer(i8), intent(in) :: overlapping_cores
     !> a projection has shifted grains by more than rounding
     logical, intent(in) :: mended
     !> means over the free grains [m]
@@ -121,6 +125,8 @@ contains
       self%later_overlap = max(self%later_overlap, overlap)
     end if
     if (mended) self%projected = self%projected + 1
+    if (overlapping_cores > 0) self%steps_with_cores = self%steps_with_cores + 1
+    self%most_cores = max(self%most_cores, overlapping_cores)
     self%shift = self%shift + shift
     self%path = self%path + path
   end subroutine run_tally_add_step

@@ -1123,6 +1123,7 @@ contains
 
   subroutine test_sample()
     character(len=*), parameter :: shortest = "count = 10 radius = 0.5 box = 4 "
+    character(len=*), parameter :: grains = "count = 10 radius = 0.5 box = 4, 5 "
     type(config_t) :: config
 
     call accept(sample(shortest), "the shortest sample", config)
@@ -1158,6 +1159,9 @@ contains
     call accept(sample("count = 10 radii = 'table' radius_table = 'r.csv' box = 0, 5", "period(1) = 40"), "a table", config)
     call check_equal(config%sample%radius_table, "r.csv", "radius_table")
     call check_vector(config%sample%box, [40.0_dp, 5.0_dp, 0.0_dp], "a box with the period along one axis")
+    call accept(sample(grains // "grain_shapes = 'a, disk, b' grain_shares = 3, 1, 0.5", "shapes = 'a.shapes'"), "shapes", config)
+    call check_equal(config%sample%grain_shapes, "a, disk, b", "shapes of grains")
+    call check_close(config%sample%grain_shares(3), 0.5_dp, 0.0_dp, "a share of grains")
   end subroutine test_sample
 
   !> Keys that a choice needs, and keys that it does not have; the group itself.
@@ -1244,6 +1248,18 @@ contains
     call refuse(sample(made // "file = ''"), &
       "&sample file = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(sample(made // "file = 'a.csv'"), "&sample file = 'a.csv': expected a name with the ending .h5 or .hdf5")
+    call refuse(sample(made // "grain_shapes = 'a'"), &
+      "&sample grain_shapes = 'a': expected shapes of &scene, the path of the file that has them")
+    call refuse(sample(made // "grain_shares = 1", "shapes = 'b'"), &
+      "&sample grain_shares = 1: expected it where grain_shapes names one shape to 8")
+    call refuse(sample(made // "grain_shapes = 'a,b' grain_shares = 1", "shapes = 'b'"), &
+      "&sample grain_shares = 1: expected a share above 0 for each of the 2 grain_shapes")
+    call refuse(sample(made // "grain_shapes = 'a' grain_shares = 1, 1", "shapes = 'b'"), &
+      "&sample grain_shares = 1, 1: expected a share above 0 for each of the 1 grain_shapes")
+    call refuse(sample(made // "grain_shapes = 'a,b,c,d,e,f,g,h,i' grain_shares = 1", "shapes = 'b'"), &
+      "&sample grain_shares = 1: expected it where grain_shapes names one shape to 8")
+    call refuse(sample(made // "grain_shapes = 'a' grain_shares = 9*1", "shapes = 'b'"), &
+      "&sample grain_shares = 9*1: expected at most 8 finite real numbers > 0")
     call refuse(sample(made // "arrangement = 'dense'"), "&sample arrangement = 'dense': expected 'lattice' or 'loose'")
     call refuse(sample(made // "preparation = 'shaken'"), &
       "&sample preparation = 'shaken': expected 'none', 'settled' or 'compacted'")
@@ -1450,6 +1466,8 @@ contains
       // "&boundary shape = 'outlet' normal = 1 table = 't.csv' /", "boundaries")
     call check_round_trip(sample("count = 10 radius = 0.1 box = 4, 5"), "a sample in a full box")
     call check_round_trip(sample("count = 10 radius = 0.1 solid_fraction = 0.4", "period = 0.3"), "a periodic sample")
+    call check_round_trip(sample("count = 10 radius = 0.1 box = 4 grain_shapes = 'a b' grain_shares = 1, 2.5", "shapes = 'c'"), &
+      "a sample with shapes")
     call check_round_trip(sample("count = 10 radii = 'table' radius_table = 'a' box = 4 arrangement = 'lattice' " &
       // "preparation = 'compacted' pressure = 3"), "a compacted lattice")
   end subroutine test_round_trip

@@ -7,6 +7,7 @@ program test_shapes_file
   use gravier_polyhedron, only: make_polyhedron_of_faces
   use gravier_shape_names, only: find_shape, shape_names, library_digest
   use gravier_shapes_file, only: parse_shapes
+  use gravier_text, only: to_text
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: lf = new_line("a"), tab = achar(9), path = "a.shapes"
@@ -25,6 +26,10 @@ program test_shapes_file
   call test_space()
   call test_principal_axes()
   call test_space_refused()
+  call test_regular_polygons()
+  call test_platonic_solids()
+  call test_random_hulls()
+  call test_words_refused()
   call test_surface_files()
   call test_surface_files_refused()
   call test_no_faces()
@@ -117,9 +122,12 @@ contains
     call refuse("# nothing"//lf, 2, "a.shapes: no shapes")
     call refuse("polygon 0 0 1 0 0 1", 2, "line 1: polygon: expected shape and a name before it")
     call refuse("1 2 3", 2, 'line 1: "1": expected shape and a name before any number')
-    call refuse("shape a"//lf//"1 2 3", 2, 'line 2: "1": expected shape, rounding, polygon, disk or capsule')
-    call refuse("shape a"//lf//lf//"polygn 0 0 1 0 0 1", 2, 'line 3: "polygn": expected shape, rounding, polygon, disk or capsule')
-    call refuse("shape a"//lf//"hull 0 0 1 0 0 1", 2, 'line 2: "hull": expected shape, rounding, polygon, disk or capsule')
+    call refuse("shape a"//lf//"1 2 3", 2, &
+      & 'line 2: "1": expected shape, rounding, polygon, disk, capsule, regular or random_hull')
+    call refuse("shape a"//lf//lf//"polygn 0 0 1 0 0 1", 2, &
+      & 'line 3: "polygn": expected shape, rounding, polygon, disk, capsule, regular or random_hull')
+    call refuse("shape a"//lf//"hull 0 0 1 0 0 1", 2, &
+      & 'line 2: "hull": expected shape, rounding, polygon, disk, capsule, regular or random_hull')
     call refuse("shape a"//lf//"polygon 0 0 1 0 0 one", 2, 'line 2: "one": expected a finite number')
     call refuse("shape a"//lf//"polygon 0 0 1 0"//lf//"0 nan", 2, 'line 3: "nan": expected a finite number')
     call refuse("shape a"//lf//"polygon 0 0 1 0 0 1e400", 2, 'line 2: "1e400": expected a number of at most 1e30 in size')
@@ -129,7 +137,8 @@ contains
     call refuse("shape a"//lf//"disk 0 0 1"//lf//"rounding 0.1", 2, "line 3: rounding: expected once, before the pieces")
     call refuse("shape a"//lf//"rounding 0.1"//lf//"rounding 0.1"//lf//"disk 0 0 1", 2, "line 3: rounding: expected once")
     call refuse("shape a"//lf//"rounding"//lf//"disk 0 0 1", 2, "line 2: rounding with 0 numbers: expected one number")
-    call refuse("shape a"//lf//"rounding 0"//lf//"disk 0 0 1", 2, "line 2: rounding 0.00000000E+000: expected a number from 1e-30")
+    call refuse("shape a"//lf//"rounding 0"//lf//"disk 0 0 1", 2, &
+      & "line 2: rounding 0.00000000E+000: expected a number from 1e-30")
   end subroutine test_statements_refused
 
   subroutine test_names_refused()
@@ -237,14 +246,16 @@ contains
 
   subroutine test_space_refused()
     call refuse("shape a"//lf//"polygon 0 0 1 0 0 1", 3, &
-      & 'line 2: "polygon": expected shape, rounding, hull, box, sphere, capsule or file')
+      & 'line 2: "polygon": expected shape, rounding, hull, box, sphere, capsule, file, tetrahedron, cube, '// &
+      & 'octahedron, dodecahedron, icosahedron or random_hull')
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0", 3, &
       & "line 2: hull with 9 numbers: expected x, y and z of four corners or more")
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 1", 3, "line 2: hull with 10 numbers: expected x, y and z of four corners")
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 1 1 0", 3, "line 2: shape a: ")
     call refuse("shape a"//lf//"box 1 1", 3, &
       & "line 2: box with 2 numbers: expected three lengths, and perhaps x, y and z of the centre")
-    call refuse("shape a"//lf//"box 1 0 1", 3, "line 2: box with a length of 0.00000000E+000: expected a number from 1e-30 to 1e30")
+    call refuse("shape a"//lf//"box 1 0 1", 3, &
+      & "line 2: box with a length of 0.00000000E+000: expected a number from 1e-30 to 1e30")
     call refuse("shape a"//lf//"sphere 0 0 1", 3, "line 2: sphere with 3 numbers: expected x, y, z and a radius")
     call refuse("shape a"//lf//"sphere 0 0 0 0", 3, "line 2: sphere with a radius of 0.00000000E+000: expected a number")
     call refuse("shape a"//lf//"capsule 0 0 0 1 0 0", 3, &
@@ -271,6 +282,109 @@ contains
 
     text = "v 0 0 0"//lf//"v 1 0 0"//lf//"v 0 1 0"//lf//"v "//last//lf//faces
   end function tetrahedron
+
+  !> Areas, sides and places of regular polygons are those of geometry, and the lowest side lies along the first axis.
+  subroutine test_regular_polygons()
+    type(shape_library_t) :: library
+    type(error_t), allocatable :: error
+    integer :: n
+    real(dp) :: low
+
+    do n = 3, 12
+      call parse_shapes(path, "shape a"//lf//"regular "//to_text(n)//" 0.3"//lf//"shape b"//lf//"regular "//to_text(n)// &
+        & " 0.3 5 7", 2, library, error)
+      call check(.not. allocated(error), "a regular polygon")
+      if (allocated(error)) return
+      associate (one => library%shape(1), other => library%shape(2))
+        call check_equal(size(one%piece(1)%corner, 2), n, "corners of a regular polygon")
+        call check_close(one%size, 0.3_dp, rounding_error, "radius of a regular polygon")
+        call check_close(one%volume, 0.5_dp*n*sin(2*pi/n), 10*rounding_error, "area of a regular polygon")
+        low = minval(one%piece(1)%corner(2, :))
+        call check_close(low, -cos(pi/n), 10*rounding_error, "height of the lowest side")
+        call check_equal(count(abs(one%piece(1)%corner(2, :) - low) < 1.0e-12_dp), 2, "corners of the lowest side")
+        call check_close(other%size, one%size, 100*rounding_error, "a polygon about a point")
+      end associate
+    end do
+  end subroutine test_regular_polygons
+
+  !> Corners, faces and volumes of the Platonic solids in a sphere of radius 1.
+  subroutine test_platonic_solids()
+    character(len=12), parameter :: name(5) = [character(len=12) :: "tetrahedron", "cube", "octahedron", "dodecahedron", &
+      & "icosahedron"]
+    integer, parameter :: corners(5) = [4, 8, 6, 20, 12], faces(5) = [4, 6, 8, 12, 20]
+    real(dp), parameter :: volume(5) = [8*sqrt(3.0_dp)/27, 8*sqrt(3.0_dp)/9, 4.0_dp/3, &
+      & (15 + 7*sqrt(5.0_dp))/4*(4/(sqrt(3.0_dp)*(1 + sqrt(5.0_dp))))**3, 5*(3 + sqrt(5.0_dp))/12*(4/sqrt(10 + 2*sqrt(5.0_dp)))**3]
+    type(shape_library_t) :: library
+    type(error_t), allocatable :: error
+    integer :: k
+
+    do k = 1, 5
+      call parse_shapes(path, "shape a"//lf//trim(name(k))//" 0.2 1 2 3", 3, library, error)
+      call check(.not. allocated(error), name(k))
+      if (allocated(error)) return
+      associate (shape => library%shape(1))
+        call check_equal(size(shape%piece(1)%vertex, 2), corners(k), trim(name(k))//": corners")
+        call check_equal(size(shape%piece(1)%face_first) - 1, faces(k), trim(name(k))//": faces")
+        call check_close(shape%size, 0.2_dp, 100*rounding_error, trim(name(k))//": radius")
+        call check_close(shape%volume, volume(k), 100*rounding_error, trim(name(k))//": volume")
+        call check_close(shape%inertia(1), shape%inertia(3), 100*rounding_error, trim(name(k))//": equal moments")
+      end associate
+    end do
+  end subroutine test_platonic_solids
+
+  !> Stones of a hundred seeds: all corners on the ellipsoid, the same again for the same seed, another one for another.
+  subroutine test_random_hulls()
+    type(shape_library_t) :: library, again, planar
+    type(error_t), allocatable :: error
+    integer :: seed
+
+    do seed = 1, 100
+      call parse_shapes(path, "shape a"//lf//"random_hull "//to_text(seed)//" 12 1 1 1"//lf//"shape b"//lf//"random_hull "// &
+        & to_text(seed)//" 20 3 2 1 9 9 9", 3, library, error)
+      if (.not. allocated(error)) call parse_shapes(path, "shape a"//lf//"random_hull "//to_text(seed)//" 7 2 1", 2, planar, error)
+      if (allocated(error)) then
+        call check(.false., error%message)
+        return
+      end if
+      associate (ball => library%shape(1), flat => library%shape(2))
+        ! the smallest ball of 12 corners has about half its volume in their hull
+        call check(ball%volume*ball%size**3 > 1.5_dp .and. ball%volume*ball%size**3 < 4*pi/3, "volume of a stone")
+        call check(flat%volume*flat%size**3 > 10.0_dp .and. flat%volume*flat%size**3 < 8*pi, "volume of a flat stone")
+        call check(ball%size >= 1.0_dp - rounding_error .and. ball%size < 1.5_dp, "size of a stone")
+      end associate
+      call check_equal(size(planar%shape(1)%piece(1)%corner, 2), 7, "corners of a stone in the plane")
+    end do
+    call parse_shapes(path, "shape a"//lf//"random_hull 100 12 1 1 1"//lf//"shape b"//lf//"random_hull 100 20 3 2 1 9 9 9", 3, &
+      & again, error)
+    call check(library_digest(again) == library_digest(library), "the same seeds")
+    call parse_shapes(path, "shape a"//lf//"random_hull 101 12 1 1 1"//lf//"shape b"//lf//"random_hull 100 20 3 2 1 9 9 9", 3, &
+      & again, error)
+    call check(library_digest(again) /= library_digest(library), "other seeds")
+  end subroutine test_random_hulls
+
+  subroutine test_words_refused()
+    call refuse("shape a"//lf//"regular 5", 2, &
+      & "line 2: regular with 1 numbers: expected a number of corners and a radius, and perhaps")
+    call refuse("shape a"//lf//"regular 2 1", 2, &
+      & "line 2: regular with corners 2.00000E+000: expected a whole number from 3 to 1000")
+    call refuse("shape a"//lf//"regular 4.5 1", 2, &
+      & "line 2: regular with corners 4.50000E+000: expected a whole number from 3 to 1000")
+    call refuse("shape a"//lf//"regular 5 0", 2, "line 2: regular with a length of 0.00000000E+000: expected a number from 1e-30")
+    call refuse("shape a"//lf//"cube 1 2", 3, &
+      & "line 2: cube with 2 numbers: expected a radius, and perhaps x, y and z of the centre")
+    call refuse("shape a"//lf//"cube -1", 3, "line 2: cube with a length of -1.00000000E+000: expected a number from 1e-30")
+    call refuse("shape a"//lf//"cube 1", 2, 'line 2: "cube": expected shape')
+    call refuse("shape a"//lf//"random_hull 1 12 1 1", 3, &
+      & "line 2: random_hull with 4 numbers: expected a seed, a number of corners")
+    call refuse("shape a"//lf//"random_hull -1 12 1 1 1", 3, &
+      & "random_hull with a seed -1.00000E+000: expected a whole number from 0")
+    call refuse("shape a"//lf//"random_hull 1e12 12 1 1 1", 3, &
+      & "random_hull with a seed 1.00000E+012: expected a whole number from 0")
+    call refuse("shape a"//lf//"random_hull 1 3 1 1 1", 3, &
+      & "random_hull with corners 3.00000E+000: expected a whole number from 4")
+    call refuse("shape a"//lf//"random_hull 1 12 1 0 1", 3, "random_hull with a length of 0.00000000E+000: expected")
+    call refuse("shape a"//lf//"rounding 0.5"//lf//"cube 0.5", 3, "too large")
+  end subroutine test_words_refused
 
   !> A body of a file is that of the same points, and may be a piece of a cluster.
   subroutine test_surface_files()
