@@ -68,7 +68,7 @@ contains
     call check_whole("", "an empty file")
     call check_whole("one", "a file without the end of a line")
     call check_whole(lf//"  one "//return//lf//tab//lf//lf, "a file of blanks")
-    call check_whole(repeat("0123456789"//achar(0)//achar(255), 10000), "a long file")
+    call check_whole(repeat("0123456789"//char(0)//char(255), 10000), "a long file")
   end subroutine test_whole_files
 
   subroutine test_missing_files()
