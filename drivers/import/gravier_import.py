@@ -5,7 +5,8 @@
 
 --period takes two numbers in 2D and three in 3D, 0 along an axis that is not periodic.
 Reads BODIES.DAT, BULK_BEHAV.DAT and TACT_BEHAV.DAT and, where they are there, DRV_DOF.DAT, DOF.INI and Vloc_Rloc.INI; writes NAME.nml,
-NAME.h5 (bodies), NAME_drive_K.csv (drives that change in time) and NAME_contacts.csv (the contacts of Vloc_Rloc.INI).
+NAME.h5 (bodies), NAME.shapes (where bodies have shapes), NAME_drive_K.csv (drives that change in time) and NAME_contacts.csv (the contacts of
+Vloc_Rloc.INI).
 What has no counterpart is named, with file and line, and refused: status 2, nothing is written. So is a case that `gravier --check`
 refuses: the program of $GRAVIER_PROGRAM, or the one beside this script or in PATH, reads it before its files get their names."""
 import argparse
@@ -34,12 +35,19 @@ OLDER = {"dfric": "dyfr", "dfrc": "dyfr", "sfric": "stfr", "sfrc": "stfr", "cohe
          "restn": "rstn", "restt": "rstt"}
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
+HULLS = {"POLYG": 2, "POLYR": 3}
+#: what a body that moves freely may be made of
+PIECES = ("DISKx", "DISKb", "SPHER", "SPHEb", "POLYG", "POLYR", "JONCx")
 #: `name= number`; forces and gaps of contacts stand without the sign
 VALUE = re.compile(r"(?:([A-Za-z]\w*(?:\(\d\))?)\s*=|\b(rl[nts]/H|gapTT))\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[DdEe][-+]?\d+|[-+]\d{3})?)")
 #: relative error of radii of gyration and moments of inertia: files have them to four digits
 ROUND = 1e-3
 #: rows to a period of a drive that oscillates
 ROWS_PER_PERIOD = 200
+#: rounding of corners of polygons and polyhedra: over the size of the shape, and over the shortest side of a polygon at most
+ROUNDING, OF_SIDE = 1e-3, 0.1
+#: distance from a plane, over the extent of a polyhedron, within which files of single digits put a vertex
+FLAT = 1e-5
 
 
 class Refused(Exception):
@@ -56,11 +64,14 @@ class Entry:
 
     def __init__(self, path, line, words):
         self.path, self.line, self.words, self.values = path, line, words, {}
+        #: the values of each line by itself
+        self.rows = []
 
     def add(self, text):
         # ax1 is the older name of axe1
-        for name, bare, value in VALUE.findall(text):
-            self.values[OLDER.get(name, re.sub(r"^ax(?=\d$)", "axe", name or bare))] = number(value)
+        self.rows.append({OLDER.get(name, re.sub(r"^ax(?=\d$)", "axe", name or bare)): number(value)
+                          for name, bare, value in VALUE.findall(text)})
+        self.values.update(self.rows[-1])
 
     def get(self, name, default=None):
         if name in self.values:
@@ -74,6 +85,15 @@ class Entry:
         """The values name1, name2, ... or name(1), name(2), ..."""
         names = [f"{name}({k + 1})" if f"{name}({k + 1})" in self.values else f"{name}{k + 1}" for k in range(count)]
         return np.array([self.get(each, default) for each in names])
+
+    def table(self, prefix, counted, count):
+        """The values prefix1, prefix2, ... of as many lines as the value `counted` says."""
+        names = [f"{prefix}{k + 1}" for k in range(count)]
+        rows = [[row[name] for name in names] for row in self.rows if all(name in row for name in names)]
+        wanted = self.get(counted)
+        if len(rows) != wanted:
+            self.refuse(f"{self.words[0]} with {counted}= {wanted:g} and {len(rows)} lines of {names[0]}= to {names[-1]}=", "a line for each")
+        return np.array(rows)
 
     def refuse(self, found, expected):
         raise Refused(f"{self.path}: line {self.line}: {found}: expected {expected}")
@@ -156,8 +176,9 @@ def read_bodies(path):
             body.node = entry
         elif keyword == "$tacty":
             shape = entry.words[0]
-            if GRAINS.get(shape, WALLS.get(shape)) != body.dimension:
-                entry.refuse(f"a contactor {shape} of a body {body.kind}", "DISKx, JONCx or xKSID of RBDY2, SPHER, PLANx or DNLYC of RBDY3")
+            if {**GRAINS, **WALLS, **HULLS}.get(shape) != body.dimension:
+                entry.refuse(f"a contactor {shape} of a body {body.kind}",
+                             "DISKx, POLYG, JONCx or xKSID of RBDY2, SPHER, POLYR, PLANx or DNLYC of RBDY3")
             body.contactors.append(entry)
     for body in bodies:
         for what, there in (("$blmty", body.bulk), ("$nodty", body.node), ("$tacty", body.contactors)):
@@ -294,6 +315,142 @@ def read_contacts(path, bodies, laws):
     return rows
 
 
+# ---- shapes
+
+
+def moments_of_polygon(corner):
+    """Area, centroid and integral of (x - centroid)(x - centroid)^T of a polygon in anticlockwise order."""
+    a, b = corner[1:-1] - corner[0], corner[2:] - corner[0]
+    area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    centre = (area[:, None] * (a + b)).sum(axis=0) / 3.0 / area.sum()
+    # of a triangle from the origin: A/12 (a a + b b + (a + b)(a + b))
+    second = sum(np.einsum("k,ki,kj->ij", area, x, x) for x in (a, b, a + b)) / 12.0
+    return area.sum(), corner[0] + centre, second - area.sum() * np.outer(centre, centre)
+
+
+def moments_of_polyhedron(corner, faces):
+    """Volume, centroid and integral of (x - centroid)(x - centroid)^T of a polyhedron with triangular faces."""
+    point = corner[faces] - corner[0]
+    volume = np.linalg.det(point) / 6.0
+    total = point.sum(axis=1)
+    centre = (volume[:, None] * total).sum(axis=0) / 4.0 / volume.sum()
+    # of a tetrahedron from the origin: V/20 (sum of x x + total total)
+    second = (np.einsum("k,kvi,kvj->ij", volume, point, point) + np.einsum("k,ki,kj->ij", volume, total, total)) / 20.0
+    return volume.sum(), corner[0] + centre, second - volume.sum() * np.outer(centre, centre)
+
+
+def moments_of_round(ends, radius):
+    """The same of a disk, of a capsule in the plane, or of a sphere."""
+    d, way = len(ends[0]), ends[1] - ends[0]
+    length = np.linalg.norm(way)
+    if d == 3:
+        return 4.0 / 3.0 * math.pi * radius**3, ends[0], 4.0 / 15.0 * math.pi * radius**5 * np.eye(3)
+    along = np.outer(way, way) / length**2 if length > 0.0 else np.zeros((2, 2))
+    # a rectangle, and two half disks whose centres of mass are 4 r/(3 pi) beyond its ends
+    lengthwise = 2.0 * radius * length**3 / 12.0 + math.pi * radius**2 * length**2 / 4.0 + 4.0 * radius**3 * length / 3.0
+    second = math.pi * radius**4 / 4.0 * np.eye(2) + lengthwise * along + length * (2.0 * radius)**3 / 12.0 * (np.eye(2) - along)
+    return math.pi * radius**2 + 2.0 * radius * length, (ends[0] + ends[1]) / 2.0, second
+
+
+class Piece:
+    """A contactor as a piece of a shape, in the axes of its body: `kind`, corners or ends, radius of what is round, its moments."""
+
+    def __init__(self, contactor, dimension):
+        self.contactor, self.kind, self.radius = contactor, contactor.words[0], 0.0
+        if self.kind == "POLYG":
+            self.point = self.polygon()
+            self.moments = moments_of_polygon(self.point)
+        elif self.kind == "POLYR":
+            self.point = contactor.table("coo", "nb_vertex", 3)
+            self.moments = moments_of_polyhedron(self.point, self.faces())
+        else:
+            shift = contactor.vector("coo", dimension, 0.0)
+            half = np.array([contactor.get("axe1"), 0.0]) if self.kind == "JONCx" else np.zeros(dimension)
+            self.radius = contactor.get("axe2" if self.kind == "JONCx" else "byrd")
+            self.point = np.array([shift - half, shift + half])
+            self.moments = moments_of_round(self.point, self.radius)
+
+    def polygon(self):
+        corner = self.contactor.table("coo", "nb_vertex", 2)
+        if len(corner) < 3:
+            self.contactor.refuse(f"POLYG with {len(corner)} vertices", "three or more")
+        side = np.roll(corner, -1, axis=0) - corner
+        turn = side[:, 0] * np.roll(side, -1, axis=0)[:, 1] - side[:, 1] * np.roll(side, -1, axis=0)[:, 0]
+        if not (np.all(turn > 0.0) or np.all(turn < 0.0)):
+            self.contactor.refuse("POLYG that is not convex, or has three vertices in a line", "a convex polygon")
+        return corner if turn[0] > 0.0 else corner[::-1]
+
+    def faces(self):
+        """Triangles by rows of vertices, seen anticlockwise from outside."""
+        faces = self.contactor.table("ver", "nb_faces", 3).astype(int) - 1
+        if faces.size == 0 or faces.min() < 0 or faces.max() >= len(self.point):
+            self.contactor.refuse("POLYR with a face whose vertices there are not", f"vertices 1 to {len(self.point)}")
+        corner, inside = self.point[faces], self.point.mean(axis=0)
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        inwards = ((corner[:, 0] - inside) * normal).sum(axis=1) < 0.0
+        faces[inwards] = faces[inwards][:, ::-1]
+        normal[inwards] *= -1.0
+        height = np.einsum("fi,fvi->fv", normal, self.point[None] - corner[:, :1]) / np.linalg.norm(normal, axis=1)[:, None]
+        if not np.all(height <= FLAT * np.ptp(self.point, axis=0).max()):
+            self.contactor.refuse("POLYR that is not convex", "a convex polyhedron")
+        sides = [tuple(pair) for face in faces for pair in zip(face, np.roll(face, -1))]
+        if {pair[::-1] for pair in sides} != set(sides) or len(set(sides)) != len(sides):
+            self.contactor.refuse("POLYR whose faces leave a hole, or cover each other", "a closed surface")
+        return faces
+
+    def line(self, centre):
+        """Its line in a file of shapes, from the centre of mass on."""
+        word = {"POLYG": "polygon", "POLYR": "hull", "JONCx": "capsule"}.get(self.kind, "disk" if len(centre) == 2 else "sphere")
+        point = self.point[:1] if word in ("disk", "sphere") else self.point
+        numbers = [*(point - centre).ravel(), *([self.radius] if self.radius > 0.0 else [])]
+        return f"{word} {' '.join(repr(float(x) + 0.0) for x in numbers)}"
+
+    def size(self, centre):
+        return np.linalg.norm(self.point - centre, axis=1).max() + self.radius
+
+    def shortest(self):
+        return np.linalg.norm(self.point - np.roll(self.point, 1, axis=0), axis=1).min() if self.kind == "POLYG" else math.inf
+
+
+class ShapeOfBody:
+    """The shape that a body has: one piece or a cluster. What pieces have in common counts with each of them, as in the program."""
+
+    def __init__(self, body):
+        self.pieces = [Piece(contactor, body.dimension) for contactor in body.contactors]
+        moments = [piece.moments for piece in self.pieces]
+        self.volume = sum(volume for volume, _, _ in moments)
+        self.centre = sum(volume * centre for volume, centre, _ in moments) / self.volume
+        self.second = sum(second + volume * np.outer(centre - self.centre, centre - self.centre) for volume, centre, second in moments)
+        self.size = max(piece.size(self.centre) for piece in self.pieces)
+
+    def text(self):
+        rounding = min(ROUNDING * self.size, OF_SIDE * min(piece.shortest() for piece in self.pieces))
+        head = [f"rounding {float(rounding)!r}"] if any(piece.kind in HULLS for piece in self.pieces) else []
+        return "\n".join([*head, *(piece.line(self.centre) for piece in self.pieces)]) + "\n"
+
+    def gyration(self):
+        """Radius of gyration in the plane."""
+        return math.sqrt(np.trace(self.second) / self.volume)
+
+    def principal(self):
+        """Principal moments of inertia over the largest, in space, ascending."""
+        moments = np.linalg.eigvalsh(np.trace(self.second) * np.eye(3) - self.second)
+        return moments / moments[-1]
+
+
+def turn_of(frame):
+    """Angle, or unit quaternion with the real part first, of axes as columns."""
+    if len(frame) == 2:
+        return [math.atan2(frame[1, 0], frame[0, 0])]
+    # the eigenvector of the largest eigenvalue (Bar-Itzhack)
+    a = frame
+    form = np.array([[a[0, 0] + a[1, 1] + a[2, 2], a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]],
+                     [0.0, a[0, 0] - a[1, 1] - a[2, 2], a[1, 0] + a[0, 1], a[0, 2] + a[2, 0]],
+                     [0.0, 0.0, a[1, 1] - a[0, 0] - a[2, 2], a[2, 1] + a[1, 2]], [0.0, 0.0, 0.0, a[2, 2] - a[0, 0] - a[1, 1]]])
+    turn = np.linalg.eigh(form, UPLO="U")[1][:, -1]
+    return list(turn if turn[0] >= 0.0 else -turn)
+
+
 # ---- what it becomes
 
 
@@ -307,9 +464,11 @@ class Case:
         self.period = period
         self.dimension, self.slip = bodies[0].dimension, slip
         self.grains, self.boundaries, self.remarks, self.used, self.materials, self.met = [], [], [], [], [], {}
-        self.free = [body for body in bodies if not body.drives and body.contactors[0].words[0] in GRAINS]
+        #: lines of the file of shapes with their names, which bodies share
+        self.shapes = {}
+        self.free = [body for body in bodies if not body.drives and all(contactor.words[0] in PIECES for contactor in body.contactors)]
         if not self.free:
-            bodies[0].start.refuse("no grain moves freely", "a body with one contactor DISKx or SPHER that DRV_DOF.DAT does not drive")
+            bodies[0].start.refuse("no grain moves freely", "a body of DISKx, POLYG, JONCx, SPHER or POLYR that DRV_DOF.DAT does not drive")
         self.colours = {self.thing(body.contactors[0]) for body in self.free}
         #: radii by contactor and colour: none of flat walls
         self.radii = {}
@@ -376,7 +535,7 @@ class Case:
         """Keys of a bond. Cohesion is a stress in LMGC90, of a contact as large as R* = R_i R_j/(R_i + R_j) in 2D, pi R*^2 in 3D, with the
         radius of the grain against a flat wall."""
         if not {thing[0] for thing in pair} <= {"DISKx", "SPHER", "JONCx", "PLANx"}:
-            entry.refuse("law IQS_MOHR_DS_CLB of grains in a drum", "grains, JONCx and PLANx")
+            entry.refuse(f"law IQS_MOHR_DS_CLB of {' and '.join(sorted({thing[0] for thing in pair}))}", "disks or spheres, JONCx and PLANx")
         cohesion, shear = entry.get("cohn"), entry.get("coht")
         if not (cohesion > 0.0 and shear > 0.0):
             entry.refuse(f"law IQS_MOHR_DS_CLB with cohn= {cohesion:g} and coht= {shear:g}", "both > 0")
@@ -411,14 +570,52 @@ class Case:
         identifier = body.rank if contactor is body.contactors[0] else None
         velocity = body.velocity() if group == 0 else None
         self.grains.append([identifier, place, radius, self.mass(body, self.ball(radius)), velocity, group,
-                            self.material(self.thing(contactor))])
+                            self.material(self.thing(contactor)), "", None])
+
+    def is_ball(self, body):
+        """Is it one disk or sphere about its centre?"""
+        contactor = body.contactors[0]
+        return len(body.contactors) == 1 and contactor.words[0] in GRAINS and not np.any(contactor.vector("coo", self.dimension, 0.0) != 0.0)
+
+    def add_shaped(self, body, group):
+        """A body with a shape; its place is that of its centre of mass."""
+        things = sorted({self.thing(contactor) for contactor in body.contactors})
+        if len(things) > 1:
+            body.contactors[-1].refuse(f"body {body.rank} has contactors {' and '.join(' '.join(thing) for thing in things)}",
+                                       "contactors of one kind and one colour: a body has one material here")
+        shape = ShapeOfBody(body)
+        self.check_mass(body, shape)
+        frame = body.frame()
+        name = self.shapes.setdefault(shape.text(), f"{things[0][0]}_{len(self.shapes) + 1}")
+        velocity = body.velocity() if group == 0 else None
+        if things[0][0] == "JONCx":
+            self.remarks.append(f"body {body.rank} JONCx: nothing drives it, it moves freely")
+        if any(piece.kind in HULLS for piece in shape.pieces):
+            self.remarks.append(f"corners and edges of polygons and polyhedra are round here, with at most {ROUNDING:g} of their size")
+        self.grains.append([body.rank, body.place() + frame @ shape.centre, 0.0, self.mass(body, shape.volume), velocity, group,
+                            self.material(things[0]), name, turn_of(frame)])
+
+    def check_mass(self, body, shape):
+        """Refuse a centre of mass or an inertia that are given and are not those of the shape. The mass is as it is given."""
+        given = body.bulk.get("avrd", 0.0) > 0.0
+        beside = np.linalg.norm(shape.centre)
+        if beside > ROUND * shape.size:
+            if given and not body.drives:
+                body.bulk.refuse(f"body {body.rank} with avrd= {body.bulk.get('avrd'):g} and its centre of mass {beside:g} beside its node",
+                                 "contactors about their centre of mass, or avrd= 0")
+            self.remarks.append(f"body {body.rank}: its place is the centre of mass of its contactors, {beside:g} beside its node")
+        if body.drives:
+            return
+        gyration = body.bulk.get("gyrd", 0.0)
+        if self.dimension == 2 and gyration > 0.0 and abs(gyration - shape.gyration()) > ROUND * gyration:
+            body.bulk.refuse(f"gyrd= {gyration:g}", f"0 or {shape.gyration():g}, that of its contactors, homogeneous")
+        inertia = np.sort([body.bulk.get(name, 0.0) for name in ("I1", "I2", "I3")])
+        if self.dimension == 3 and inertia[-1] > 0.0 and np.abs(inertia / inertia[-1] - shape.principal()).max() > ROUND:
+            body.bulk.refuse(f"moments of inertia as {', '.join(f'{x:g}' for x in inertia / inertia[-1])}",
+                             f"as {', '.join(f'{x:g}' for x in shape.principal())}, those of its contactors, homogeneous")
 
     def check_free(self, body):
         contactor = body.contactors[0]
-        shift = contactor.vector("coo", self.dimension, 0.0)
-        if len(body.contactors) > 1 or np.any(shift != 0.0):
-            body.contactors[-1].refuse(f"body {body.rank} has several contactors or one beside its centre and is not driven",
-                                       "one disk or sphere: clusters have no counterpart")
         radius, gyration = contactor.get("byrd"), body.bulk.get("gyrd", 0.0)
         if self.dimension == 2 and gyration > 0.0 and abs(gyration - radius / math.sqrt(2.0)) > ROUND * radius:
             body.bulk.refuse(f"gyrd= {gyration:g}", f"0 or byrd/sqrt(2) = {radius / math.sqrt(2.0):g}, a homogeneous disk")
@@ -475,6 +672,8 @@ class Case:
         shape = contactor.words[0]
         if shape == "JONCx":
             return 4.0 * contactor.get("axe1") * contactor.get("axe2") + math.pi * contactor.get("axe2")**2
+        if shape in HULLS:
+            return Piece(contactor, self.dimension).moments[0]
         if shape == "PLANx":
             return 8.0 * contactor.get("axe1") * contactor.get("axe2") * contactor.get("axe3")
         return self.ball(contactor.get("byrd"))
@@ -546,20 +745,24 @@ class Case:
             if ends:
                 group = self.new_group()
                 for place, radius in ends:
-                    self.grains.append([None, place, radius, self.ball(radius), None, group, material])
+                    self.grains.append([None, place, radius, self.ball(radius), None, group, material, "", None])
                 self.boundaries.append(({"name": name + " ends", "shape": "grains", "group": group, **keys}, columns))
 
     def new_group(self):
         return 1 + max([grain[5] for grain in self.grains], default=0)
 
     def add_glued(self, body):
-        """A driven body of disks or spheres: grains glued to each other, each of its own material."""
+        """A driven body of disks or spheres, or of polygons or polyhedra: grains glued to each other, each of its own material, or one grain
+        with a shape."""
         for contactor in body.contactors:
             if not self.meet(self.thing(contactor), contactor):
                 contactor.refuse(f"no grain sees a contactor of body {body.rank}", "a contact law: $seety of TACT_BEHAV.DAT")
         group = self.new_group()
-        for contactor in body.contactors:
-            self.add_grain(body, contactor, self.axes_of(body, contactor)[0], group)
+        if any(contactor.words[0] in HULLS for contactor in body.contactors):
+            self.add_shaped(body, group)
+        else:
+            for contactor in body.contactors:
+                self.add_grain(body, contactor, self.axes_of(body, contactor)[0], group)
         keys, columns = self.motion(body, True)
         self.boundaries.append(({"name": f"body {body.rank}", "shape": "grains", "group": group, **keys}, columns))
 
@@ -569,12 +772,14 @@ class Case:
             if not self.meet(thing, first):
                 first.refuse(f"grains of colour {thing[1]} do not see each other", "a contact law: $seety of TACT_BEHAV.DAT")
         for body in self.bodies:
-            kinds = {contactor.words[0] in GRAINS for contactor in body.contactors}
-            if len(kinds) > 1:
+            kinds = {contactor.words[0] not in WALLS for contactor in body.contactors}
+            if len(kinds) > 1 and body not in self.free:
                 body.start.refuse(f"body {body.rank} has contactors of grains and of walls", "one kind")
-            if body in self.free:
+            if body in self.free and self.is_ball(body):
                 self.check_free(body)
                 self.add_grain(body, body.contactors[0], body.place(), 0)
+            elif body in self.free:
+                self.add_shaped(body, 0)
             elif kinds == {True}:
                 self.add_glued(body)
             else:
@@ -606,7 +811,7 @@ def write_bodies(case, path):
     for grain in case.grains:
         if grain[0] is None:
             grain[0], later = later, later + 1
-    spins = 3 * d - 3
+    spins, names = 3 * d - 3, list(case.shapes.values())
     with hdf5_file(path) as file:
         file["bodies/id"] = np.array([grain[0] for grain in case.grains], dtype=np.int64)
         file["bodies/position"] = np.array([grain[1] for grain in case.grains])
@@ -614,6 +819,11 @@ def write_bodies(case, path):
         file["bodies/mass"] = np.array([grain[3] for grain in case.grains])
         file["bodies/velocity"] = np.array([np.zeros(spins) if grain[4] is None else grain[4] for grain in case.grains])
         file["bodies/material"] = np.array([1 + case.materials.index(grain[6]) for grain in case.grains], dtype=np.int64)
+        if case.shapes:
+            file["bodies/shape"] = np.array([1 + names.index(grain[7]) if grain[7] else 0 for grain in case.grains], dtype=np.int64)
+            file["bodies/shape"].attrs["names"] = np.bytes_(",".join(names))
+            plain_turn = [0.0] if d == 2 else [1.0, 0.0, 0.0, 0.0]
+            file["bodies/orientation"] = np.array([plain_turn if grain[8] is None else grain[8] for grain in case.grains])
         if any(grain[5] for grain in case.grains):
             file["bodies/group"] = np.array([grain[5] for grain in case.grains], dtype=np.int64)
 
@@ -623,6 +833,9 @@ def texts_of(case, stem, options, contacts):
     d, made = case.dimension, {}
     scene = {"title": f"imported from {options.datbox}", "dimension": d, "gravity": list(case.gravity[:d]), "bodies": "file",
              "bodies_file": stem + ".h5", "alert_distance": max(case.used)}
+    if case.shapes:
+        scene["shapes"] = stem + ".shapes"
+        made[".shapes"] = "".join(f"shape {name}\n{text}" for text, name in case.shapes.items())
     if options.period:
         scene["period"] = options.period
     parts = [group_text("scene", scene), *(group_text("material", {"name": name}) for name in case.materials),

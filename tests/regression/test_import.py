@@ -72,6 +72,22 @@ LAW = "$behav  lawty\n iqsc0  IQS_CLB                         fric= 0.3000000D+0
 SEE = "$seety\n cdbdy  cdtac  cdcol  behav  anbdy  antac  ancol\n {0}  {1}  {2}  iqsc0  {0}  {3}  {4}       0.2000000D-02\n"
 
 
+#: corners of a cube of half a side 0.1, and the triangles of its faces, from 1
+CUBE = np.array([[(k & 1) - 0.5, (k >> 1 & 1) - 0.5, (k >> 2) - 0.5] for k in range(8)]) * 0.2
+TRIANGLES = [(1, 2, 4), (1, 4, 3), (5, 6, 8), (5, 8, 7), (1, 2, 6), (1, 6, 5), (3, 4, 8), (3, 8, 7), (1, 3, 7), (1, 7, 5), (2, 4, 8), (2, 8, 6)]
+
+
+def polyg(corners, colour="BLUEx"):
+    rows = "".join("\n" + " " * 29 + values(coo1=x, coo2=y) for x, y in corners)
+    return "POLYG", colour, f"nb_vertex={len(corners):7d}" + rows
+
+
+def polyr(corners, colour="BLUEx"):
+    rows = "".join("\n" + " " * 29 + values(coo1=x, coo2=y, coo3=z) for x, y, z in corners)
+    rows += "".join("\n" + " " * 29 + "  ".join(f"ver{k + 1}={vertex:7d}" for k, vertex in enumerate(face)) for face in TRIANGLES)
+    return "POLYR", colour, f"nb_vertex={len(corners):7d}    nb_faces={len(TRIANGLES):7d}" + rows
+
+
 class Import(RunTestCase):
 
     def box(self, dimension, bodies, laws, drives="", states=None, bulk=None, contacts=None):
@@ -265,6 +281,106 @@ class Import(RunTestCase):
     def law(self, name, kind, *lines):
         return f"$behav  lawty\n {name}  {kind:30s}  " + ("\n" + " " * 40).join(values(**line) for line in lines) + "\n"
 
+    def test_a_wall_of_polygons_stays(self):
+        """Bricks in running bond on a driven base that is a polygon too, all as POLYG with displacements: the wall stays, masses are those of
+        the bricks or of avrd, and equal bricks share a shape."""
+        brick, half = ([(x, y) for x, y in ((-a, -0.04), (a, -0.04), (a, 0.04), (-a, 0.04))] for a in (0.1, 0.05))
+        moved, rows = np.array([2e-3, -1e-3]), []
+        for course in range(4):
+            line = [(brick, 0.1 + 0.2 * k) for k in range(4)]
+            if course % 2:
+                line = [(half, 0.05), *((brick, 0.2 + 0.2 * k) for k in range(3)), (half, 0.75)]
+            rows += [(corner, np.array([x, 0.04 + 0.08 * course])) for corner, x in line]
+        bodies = "".join(body(2, k, place - moved, [polyg(corner)], avrd=0.1 if k == 1 else 0.0) for k, (corner, place) in enumerate(rows, 1))
+        n = len(rows)
+        bodies += body(2, n + 1, [0.4, -0.05], [polyg([(-0.6, -0.05), (0.6, -0.05), (0.6, 0.05), (-0.6, 0.05)])])
+        laws = LAW + SEE.format("RBDY2", "POLYG", "BLUEx", "POLYG", "BLUEx")
+        box = self.box(2, bodies, laws, still(2, n + 1), "".join(state(2, k + 1, moved, [0.0, 0.0]) for k in range(n)))
+        folder, notes = self.convert(box)
+        self.assertIn("corners and edges of polygons and polyhedra are round here", notes)
+        with open(os.path.join(folder, "case.shapes"), encoding="utf-8") as file:
+            self.assertEqual(file.read().count("shape POLYG_"), 3)
+        with h5py.File(os.path.join(folder, "case.h5")) as file:
+            areas = [0.2 * 0.08 if corner is brick else 0.1 * 0.08 for corner, _ in rows]
+            areas[0] = math.pi * 0.1**2
+            np.testing.assert_allclose(file["bodies/mass"][:n], 2500.0 * np.array(areas), rtol=1e-6)
+            np.testing.assert_allclose(file["bodies/position"][:n], [place for _, place in rows], atol=1e-8)
+        steps, _ = self.run_case(folder)
+        self.assertLess(np.abs(steps[-1]["position"] - steps[0]["position"]).max(), 2e-5)
+        self.assertLess(np.abs(steps[-1]["orientation"] - steps[0]["orientation"]).max(), 1e-4)
+
+    def test_polygons_and_clusters_fall_free(self):
+        """Places, turns and spins of bodies in the air; the place is that of the centre of mass. Shapes have the area of their contactors."""
+        wedge = [(0.0, 0.0), (0.0, 0.3), (0.6, 0.0)]
+        ell = [polyg([(0.0, 0.0), (0.3, 0.0), (0.3, 0.1), (0.0, 0.1)]), polyg([(0.0, 0.1), (0.1, 0.1), (0.1, 0.2), (0.0, 0.2)])]
+        bodies = body(2, 1, [0.0, 1.0, 0.5], [polyg(wedge)]) + body(2, 2, [2.0, 1.0], ell) + \
+            body(2, 3, [4.0, 1.0, 0.2], [("POLYG", "BLUEx", polyg([(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)])[2])]) + \
+            body(2, 4, [0.0, -1.0], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "POLYG", "BLUEx", "POLYG", "BLUEx") + SEE.format("RBDY2", "POLYG", "BLUEx", "JONCx", "WALLx")
+        folder, notes = self.convert(self.box(2, bodies, laws, still(2, 4), state(2, 3, [0.0, 0.0, 0.1], [1.0, 2.0, 3.0])), steps=20)
+        self.assertIn("body 1: its place is the centre of mass of its contactors", notes)
+        steps, _ = self.run_case(folder)
+        first, last = steps[0], steps[-1]
+        c, s = math.cos(0.5), math.sin(0.5)
+        centre = np.array([[0.2 * c - 0.1 * s, 1.0 + 0.2 * s + 0.1 * c], [2.0 + (0.03 * 0.15 + 0.01 * 0.05) / 0.04, 1.0 + (0.03 * 0.05 + 0.01 * 0.15) / 0.04],
+                           [4.0, 1.0]])
+        np.testing.assert_allclose(first["position"][:3], centre, atol=1e-9)
+        np.testing.assert_allclose(first["orientation"][:3, 0], [0.5, 0.0, 0.3], atol=1e-9)
+        np.testing.assert_allclose(first["mass"][:3], 2500.0 * np.array([0.09, 0.04, 0.04]), rtol=1e-9)
+        np.testing.assert_allclose(last["orientation"][2, 0], 0.3 + 3.0 * 0.02, atol=1e-9)
+        np.testing.assert_allclose(last["position"][2], [4.0 + 0.02, 1.0 + 2.0 * 0.02 - 0.5 * G * 0.02**2], atol=1e-6)
+
+    def test_disks_in_one_body(self):
+        """Two disks and a free JONCx on a ground: a dumb-bell keeps its length and comes to rest on both disks, a stadium on its side."""
+        pair = [("DISKx", "BLUEx", values(byrd=0.05) + "  " + values(coo1=x, coo2=0.0)) for x in (-0.06, 0.06)]
+        bodies = body(2, 1, [0.0, 0.06], pair) + body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=1.0, axe2=0.01))]) + \
+            body(2, 3, [0.5, 0.03], [("JONCx", "BLUEx", values(axe1=0.1, axe2=0.02))])
+        things = ("DISKx", "JONCx")
+        laws = LAW + "".join(SEE.format("RBDY2", one, "BLUEx", other, "BLUEx") for one, other in (("DISKx", "DISKx"), ("DISKx", "JONCx"),
+                                                                                                    ("JONCx", "JONCx")))
+        laws += "".join(SEE.format("RBDY2", one, "BLUEx", "JONCx", "WALLx") for one in things)
+        folder, notes = self.convert(self.box(2, bodies, laws, still(2, 2)), steps=200)
+        self.assertIn("body 3 JONCx: nothing drives it, it moves freely", notes)
+        steps, forces = self.run_case(folder)
+        np.testing.assert_allclose(steps[-1]["position"][:2, 1], [0.05, 0.02], atol=1e-4)
+        np.testing.assert_allclose(steps[-1]["orientation"][:2], 0.0, atol=1e-3)
+        masses = 2500.0 * np.array([2.0 * math.pi * 0.05**2, math.pi * 0.02**2 + 0.2 * 0.04])
+        np.testing.assert_allclose(steps[0]["mass"][:2], masses, rtol=1e-6)
+        self.assertLess(abs(forces[-1][:, 1].sum() + masses.sum() * G), 0.01 * masses.sum() * G)
+
+    def test_polyhedra(self):
+        """Two cubes of POLYR, one turned by its frame, on a driven one, and a cluster of spheres: they stay; a hull with a dent is refused."""
+        bodies = body(3, 1, [0.0, 0.0, 0.1], [polyr(CUBE)]) + body(3, 2, [0.0, 0.0, 0.3], [polyr(CUBE)]) + \
+            body(3, 3, [0.0, 0.0, -0.1], [polyr(CUBE * [5.0, 5.0, 1.0])])
+        laws = LAW + SEE.format("RBDY3", "POLYR", "BLUEx", "POLYR", "BLUEx")
+        turned = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
+        states = state(3, 2, [0.0, 0.0, 0.0], [0.0] * 6, turned)
+        folder, _ = self.convert(self.box(3, bodies, laws, still(3, 3), states), steps=100)
+        steps, _ = self.run_case(folder)
+        np.testing.assert_allclose(steps[0]["mass"][:2], 2500.0 * 0.008, rtol=1e-9)
+        np.testing.assert_allclose(steps[0]["orientation"][1], [math.sqrt(0.8), 0.0, 0.0, math.sqrt(0.2)], atol=1e-9)
+        self.assertLess(np.abs(steps[-1]["position"] - steps[0]["position"]).max(), 2e-5)
+        self.assertLess(np.abs(steps[-1]["orientation"] - steps[0]["orientation"]).max(), 1e-4)
+        balls = body(3, 1, [0.0, 0.0, 0.5], [("SPHER", "BLUEx", values(byrd=0.05) + "  " + values(coo1=x, coo2=0.0, coo3=0.0))
+                                             for x in (-0.05, 0.05)])
+        see = LAW + SEE.format("RBDY3", "SPHER", "BLUEx", "SPHER", "BLUEx")
+        folder, _ = self.convert(self.box(3, balls, see), steps=20)
+        steps, _ = self.run_case(folder)
+        self.assertLess(abs(steps[-1]["position"][0, 2] - (0.5 - 0.5 * G * 0.02**2)), 1e-6)
+        dented = CUBE.copy()
+        dented[7] *= 0.5
+        inertia = bodies.replace("gyrd= 0.0000000D+00", "gyrd= 0.0000000D+00\n" + " " * 29 + values(I1=1.0, I2=1.0, I3=2.0), 1)
+        hole = bodies.replace("nb_faces=     12", "nb_faces=     11", 1).replace("ver1=      1  ver2=      2  ver3=      4\n", "", 1)
+        for text, words in ((body(3, 1, [0.0] * 3, [polyr(dented)]), ("POLYR that is not convex",)),
+                            (inertia, ("moments of inertia as 0.5, 0.5, 1: expected as 1, 1, 1",)),
+                            (hole, ("leave a hole",)),
+                            (bodies.replace("ver3=      4", "ver3=      9", 1), ("a face whose vertices there are not",))):
+            folder, message = self.convert(self.box(3, text, laws, states=states if text is inertia else None), status=2)
+            self.assertEqual(message.count("\n"), 1)
+            for word in words:
+                self.assertIn(word, message)
+            self.assertEqual(os.listdir(folder), [])
+
     def test_materials_of_colours(self):
         """Two colours, laws by pairs: each slides by the friction of its pair on a driven body of both colours."""
         laws = self.law("iqsc1", "IQS_CLB", {"fric": 0.1}) + self.see("iqsc0") + self.see("iqsc1", "REDxx", "REDxx") + \
@@ -389,7 +505,7 @@ class Import(RunTestCase):
         bodies = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.0, 0.0], [("xKSID", "DRUMx", values(byrd=1.0))])
         laws = self.law("cohes", "IQS_MOHR_DS_CLB", cohesion, one) + LAW + self.see("iqsc0") + drum
         _, message = self.convert(self.box(2, bodies, laws, still(2, 2)), status=2)
-        self.assertIn("law IQS_MOHR_DS_CLB of grains in a drum: expected grains, JONCx and PLANx", message)
+        self.assertIn("law IQS_MOHR_DS_CLB of DISKx and xKSID: expected disks or spheres, JONCx and PLANx", message)
         glued = body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [1.0, 0.0], [("DISKx", "REDxx", values(byrd=0.05))])
         _, message = self.convert(self.box(2, glued, LAW + self.see("iqsc0"), still(2, 2)), status=2)
         self.assertIn("no grain sees a contactor of body 2", message)
@@ -454,12 +570,20 @@ class Import(RunTestCase):
         wall = body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
         laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
         polygon = body(2, 1, [0.0, 0.0], [("POLYG", "BLUEx", "nb_vertex=      4    byrd= 0.1000000D+00")])
-        cluster = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05)), ("DISKx", "BLUEx", values(byrd=0.05))])
+        arrow = body(2, 1, [0.0, 0.0], [polyg([(0.0, 0.0), (1.0, 1.0), (0.0, 0.2), (-1.0, 1.0)])])
+        beside = body(2, 1, [0.0, 0.5], [polyg([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])], avrd=0.4)
+        square = body(2, 1, [0.0, 0.5], [polyg([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])])
+        cluster = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05)), ("DISKx", "REDxx", values(byrd=0.05))])
+        flat = LAW + SEE.format("RBDY2", "POLYG", "BLUEx", "POLYG", "BLUEx") + SEE.format("RBDY2", "POLYG", "BLUEx", "JONCx", "WALLx")
         good = {"bodies": disk + wall, "laws": laws, "drives": still(2, 2)}
         cases = [
             ({"bodies": disk.replace("RBDY2", "MAILx")}, ("BODIES.DAT: line 3", "MAILx", "rigid bodies")),
-            ({"bodies": polygon + wall}, ("BODIES.DAT: line 9", "POLYG")),
-            ({"bodies": cluster + wall}, ("BODIES.DAT: line 10", "clusters have no counterpart")),
+            ({"bodies": polygon + wall, "laws": flat}, ("BODIES.DAT: line 9", "POLYG with nb_vertex= 4 and 0 lines of coo1= to coo2=")),
+            ({"bodies": arrow + wall, "laws": flat}, ("BODIES.DAT: line 9", "POLYG that is not convex")),
+            ({"bodies": beside + wall, "laws": flat}, ("BODIES.DAT: line 5", "its centre of mass", "expected contactors about their centre of mass")),
+            ({"bodies": square.replace("gyrd= 0.0000000D+00", "gyrd= 0.5000000D+00") + wall, "laws": flat}, ("line 5", "gyrd= 0.5: expected 0 or 0.408248")),
+            ({"bodies": cluster + wall}, ("BODIES.DAT: line 10", "DISKx BLUEx and DISKx REDxx: expected contactors of one kind and one colour")),
+            ({"bodies": disk.replace("DISKx", "PT2Dx") + wall}, ("BODIES.DAT: line 9", "a contactor PT2Dx of a body RBDY2")),
             ({"bodies": disk.replace("gyrd= 0.0000000D+00", "gyrd= 0.1000000D-01") + wall}, ("gyrd= 0.01", "homogeneous disk")),
             ({"bodies": disk.replace("stone", "brick") + wall}, ("material brick",)),
             ({"bodies": wall, "drives": still(2, 1)}, ("no grain moves freely",)),
@@ -468,7 +592,7 @@ class Import(RunTestCase):
             ({"laws": LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")}, ("do not see each other",)),
             ({"laws": laws.replace("0.2000000D-02", "")}, ("alert= is missing",)),
             ({"laws": LAW}, ("no table of visibility", "$seety")),
-            ({"drives": ""}, ("body 2 (JONCx) turns freely", "vlocy 3")),
+            ({"drives": still(2, 2)[:still(2, 2).index(" vlocy      3")]}, ("body 2 (JONCx) turns freely", "vlocy 3")),
             ({"drives": still(2, 7)}, ("DRV_DOF.DAT: line 3", "body RBDY2 7")),
             ({"drives": still(2, 2).replace("vlocy      1", "gravy      1")}, ("gravy", "vlocy or force")),
             # no word of a file steers the terminal

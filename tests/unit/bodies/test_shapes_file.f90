@@ -166,7 +166,7 @@ contains
     call refuse("shape a"//lf//"polygon 0 0 2 0 1 0.5 0 2", 2, "line 2: shape a: a polygon that is not convex")
     call refuse("shape a"//lf//"polygon 0 0 1 0 2 0", 2, "line 2: shape a: a polygon without area")
     call refuse("shape a"//lf//"polygon 0 0 0 0 0 0", 2, "line 2: shape a: a polygon without area")
-    call refuse("shape a"//lf//"polygon 0 0 1 0 1 0 0 1", 2, "line 2: shape a: a polygon that is not convex, or straight, at")
+    call refuse("shape a"//lf//"polygon 0 0 1 0 1 0 0 1", 2, "line 2: shape a: corners 2 and 3 of a polygon in the same place")
     call refuse("shape a"//lf//"rounding 0.6"//lf//"polygon 0 0 1 0 1 1 0 1", 2, "line 3: shape a: a rounding of")
     call refuse("shape a"//lf//"disk 0 0 1000"//lf//"polygon 0 0 1 0 1 1 0 1", 2, "line 3: shape a: a rounding of")
   end subroutine test_planar_refused
