@@ -2,13 +2,19 @@
 hold each block. Blocks are rigid, joints bear no tension, and |r_t| <= mu r_n.
 
 The program of each is the static theorem: unknown r_n and r_t of each contact, three equations of equilibrium a block."""
+import sys
+from pathlib import Path
+
 import numpy as np
 
 
 def least(cost, equal, right, below=None, bounds=(None, None)):
     """The least cost of x with equal x = right and below x <= 0; nan where there is none."""
     # who only runs the blocks needs no scipy
-    from scipy.optimize import linprog
+    try:
+        from scipy.optimize import linprog
+    except ImportError as missing:
+        sys.exit(f"{Path(sys.argv[0]).name}: {missing}; expected a python3 with scipy")
 
     found = linprog(cost, A_ub=below, b_ub=None if below is None else np.zeros(len(below)), A_eq=equal, b_eq=right, bounds=bounds,
                     method="highs")

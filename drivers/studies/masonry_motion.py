@@ -130,10 +130,12 @@ def invariance(table, quick):
         runs = [make(shape).run(200, solver=solver) for shape in pieces]
         off = max(np.abs(runs[0].velocity - runs[1].velocity).max(), np.abs(runs[0].position - runs[1].position).max())
         table.add("pieces", f"a square of 2 x 2 squares against one, {words}: velocity [m/s], place [m]", off, 0.0, None, 1.0e-12)
-    # one that falls and slides has met another one, with a gap and a tangential impulse, three steps ago
-    runs = [square(pieces[0], [0.3, -1.0, 0.5], 0.0, 0.8, True, swapped).run(42, solver=solver) for swapped in (False, True)]
-    off = np.abs(runs[0].velocity - runs[1].velocity[::-1]).max()
-    table.add("turned", "a square that falls on another one, in the other order: velocity [m/s]", off, 0.0, None, 1.0e-12)
+    # what falls and slides meets another one in the last steps, with a gap and a tangential impulse that turns it
+    for words, make in (("square that falls on its corner", lambda s: square(pieces[0], [0.3, -1.0, 0.5], 0.0, 0.8, True, s)),
+                        ("tall brick that falls upright", tall)):
+        runs = [make(swapped).run(42, solver=solver) for swapped in (False, True)]
+        off = np.abs(runs[0].velocity - runs[1].velocity[::-1]).max()
+        table.add("turned", f"a {words}, bodies in the other order: velocity [m/s]", off, 0.0, None, 1.0e-12)
 
 
 def square(pieces, velocity, angle, height, other=False, swapped=False):
@@ -143,6 +145,17 @@ def square(pieces, velocity, angle, height, other=False, swapped=False):
     if other:
         scene.put(scene.shape(pieces), [0.1, 0.25])
     scene.put(scene.shape(pieces), [0.0, height], angle, velocity)
+    if swapped:
+        scene.blocks.reverse()
+    return scene
+
+
+def tall(swapped):
+    """A tall brick that falls and slides on a wide one."""
+    scene = Scene(friction=0.4)
+    scene.plane([0.0, 1.0])
+    scene.brick(1.0, 0.5, [0.0, 0.25])
+    scene.brick(0.2, 1.0, [0.0, 1.0493], velocity=[3.0, -1.0, 0.0])
     if swapped:
         scene.blocks.reverse()
     return scene

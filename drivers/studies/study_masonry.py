@@ -4,8 +4,8 @@
     python3 drivers/studies/study_masonry.py [--quick] [--parts NAME...] [--out DIR]     15 minutes on one core, quick 1 minute
 
 The parts are slopes, prisms, sliding and toppling, rocking, overhangs, wedges, arches, walls that lean, dominoes, long rests,
-landings, and scenes turned and mirrored. It prints a row an oracle with what was measured, expected and accepted, and ends with status 1 where
-one is out of its bounds. With --out it leaves DIR/masonry.md, the table, and DIR/masonry.csv."""
+landings, and scenes turned and mirrored. It prints a row an oracle with what was measured, expected and accepted, and ends with
+status 1 where one is out of its bounds. With --out it leaves DIR/masonry.md, the table, and DIR/masonry.csv."""
 import argparse
 import sys
 import time

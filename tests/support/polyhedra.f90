@@ -54,7 +54,10 @@ contains
   pure type(vector_t) function on(turn, v) result(u)
     type(turn_t), intent(in) :: turn
     type(vector_t), intent(in) :: v
-    u%x(:) = v%x(1)*turn%m(:, 1) + v%x(2)*turn%m(:, 2) + v%x(3)*turn%m(:, 3)
+    integer :: k
+    do k = 1, 3
+      u%x(k) = v%x(1)*turn%m(k, 1) + v%x(2)*turn%m(k, 2) + v%x(3)*turn%m(k, 3)
+    end do
   end function on
 
   !> A vector turned back.

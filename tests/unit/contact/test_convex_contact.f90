@@ -1,0 +1,523 @@
+!> What contacts of convex pieces are made of: nearest points of simplices, distances and overlaps of cores, polygons cut out of
+!> each other, and the points of edges and faces that lie on each other.
+program test_convex_contact
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_nearest_simplex, only: find_nearest
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, find_support, support_a, support_b, &
+    & place_a, place_b
+  use gravier_core_overlap, only: find_least_separation
+  use gravier_polygon_clip, only: clip_polygon, room_for_clip
+  use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, edge_number
+  use gravier_contact_patch, only: patch_point_t
+  use gravier_edge_patch, only: add_edge_points
+  use gravier_face_patch, only: add_face_points
+  use gravier_manifold, only: feature_base, most_points
+  use gravier_polyhedron, only: make_box, make_capsule
+  use gravier_shape_library, only: body_shape_t
+  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec
+  use gravier_check, only: check, check_close, check_equal, finish_checks
+  implicit none
+  real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
+  !> of a cube of edge 2, and the half-edge of its core
+  real(dp), parameter :: rounding = 0.1_dp, half = 1.0_dp - rounding
+  real(dp), parameter :: straight(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
+  type(body_shape_t) :: box, rod, ball
+
+  call make_shapes()
+  call test_simplices()
+  call test_random_simplices()
+  call test_support()
+  call test_distance()
+  call test_turned_distance()
+  call test_beyond()
+  call test_overlap()
+  call test_overlap_of_rods()
+  call test_clip()
+  call test_clip_segment()
+  call test_faces()
+  call test_face_and_edge()
+  call test_edges()
+  call finish_checks()
+
+contains
+
+  !> A cube of edge 2, a capsule of length 2 and radius 0.25 along the third axis, a ball of radius 1.
+  subroutine make_shapes()
+    type(error_t), allocatable :: error
+
+    call make_box("box", [2.0_dp, 2.0_dp, 2.0_dp], rounding, box, error)
+    call make_capsule("rod", 2.0_dp, 0.25_dp, rod, error)
+    call make_capsule("ball", 0.0_dp, 1.0_dp, ball, error)
+    call check(.not. allocated(error), "shapes")
+  end subroutine make_shapes
+
+  !> Simplices whose nearest points are known.
+  subroutine test_simplices()
+    real(dp) :: w(3, 4), share(4), v(3)
+
+    w(:, :) = 0.0_dp
+    w(:, 1) = [3.0_dp, 4.0_dp, 0.0_dp]
+    call find_nearest(w, 1, share, v)
+    call check_close(norm2(v), 5.0_dp, 0.0_dp, "a point alone")
+    w(:, 1) = [-1.0_dp, 2.0_dp, 0.0_dp]
+    w(:, 2) = [3.0_dp, 2.0_dp, 0.0_dp]
+    call find_nearest(w, 2, share, v)
+    call check_close(share(1), 0.75_dp, tight, "within a segment: the share of the nearer end")
+    call check_close(share(2), 0.25_dp, tight, "within a segment: the share of the other")
+    call check_close(v(2), 2.0_dp, tight, "within a segment: its distance")
+    w(1, 1) = 1.0_dp
+    call find_nearest(w, 2, share, v)
+    call check_close(share(2), 0.0_dp, 0.0_dp, "beside a segment the far end has no share")
+    ! a triangle at height 1, whose first corner, first side and middle are nearest in turn
+    w(:, 1) = [1.0_dp, 1.0_dp, 1.0_dp]
+    w(:, 2) = [4.0_dp, 1.0_dp, 1.0_dp]
+    w(:, 3) = [1.0_dp, 4.0_dp, 1.0_dp]
+    call find_nearest(w, 3, share, v)
+    call check_close(share(1), 1.0_dp, 0.0_dp, "the corner of a triangle")
+    w(1, 1:3) = w(1, 1:3) - 2.0_dp
+    call find_nearest(w, 3, share, v)
+    call check_close(share(2), 1/3.0_dp, tight, "the side of a triangle")
+    call check_close(share(3), 0.0_dp, 0.0_dp, "which its third corner has no share in")
+    w(2, 1:3) = w(2, 1:3) - 2.0_dp
+    call find_nearest(w, 3, share, v)
+    call check_close(maxval(abs(share(1:3) - 1/3.0_dp)), 0.0_dp, tight, "the middle of a triangle")
+    call check_close(v(3), 1.0_dp, tight, "at its height")
+    w(:, 4) = [0.0_dp, 0.0_dp, 2.0_dp]
+    call find_nearest(w, 4, share, v)
+    call check_close(share(4), 0.0_dp, 0.0_dp, "a tetrahedron behind its face")
+    call check_close(v(3), 1.0_dp, tight, "the face is nearest")
+    w(3, 4) = -1.0_dp
+    call find_nearest(w, 4, share, v)
+    call check_close(norm2(v), 0.0_dp, 0.0_dp, "the origin within a tetrahedron")
+    call check_close(share(4), 0.5_dp, tight, "half-way between its top and its floor")
+    call check_close(sum(share), 1.0_dp, tight, "shares sum to 1")
+  end subroutine test_simplices
+
+  !> The nearest point is where all points of the simplex are behind the plane across it, and those with shares in it.
+  subroutine test_random_simplices()
+    type(draws_t) :: draws
+    real(dp) :: w(3, 4), share(4), v(3), u(3)
+    integer :: k, d, n, trial
+    logical :: nearest, sums
+
+    nearest = .true.
+    sums = .true.
+    do trial = 1, 3000
+      n = 1 + mod(trial, 4)
+      do k = 1, 4
+        do d = 1, 3
+          w(d, k) = draws%between(-1.0_dp, 1.0_dp)
+        end do
+        w(3, k) = w(3, k) + 0.5_dp
+      end do
+      call find_nearest(w, n, share, v)
+      u(:) = 0.0_dp
+      do k = 1, n
+        u(:) = u + share(k)*w(:, k)
+        nearest = nearest .and. dot_product(v, w(:, k)) - dot_product(v, v) >= -1.0e-9_dp
+      end do
+      sums = sums .and. norm2(u - v) <= 1.0e-9_dp .and. abs(sum(share(1:n)) - 1.0_dp) <= 1.0e-9_dp .and. minval(share) >= 0.0_dp
+    end do
+    call check(nearest, "no point of a simplex is nearer")
+    call check(sums, "the nearest point is the sum of its shares")
+  end subroutine test_random_simplices
+
+  !> The place of one shape beside another, their lengths being those that the shapes were made with.
+  subroutine put(shape_a, shape_b, way, turn, pair)
+    type(body_shape_t), intent(in) :: shape_a, shape_b
+    real(dp), intent(in) :: way(3)
+    type(turn_t), intent(in) :: turn
+    type(placed_pair_t), intent(out) :: pair
+
+    pair%radius_a = shape_a%size
+    pair%radius_b = shape_b%size
+    pair%rotation(:, :) = turn%m
+    pair%way(:) = way
+  end subroutine put
+
+  subroutine test_support()
+    type(draws_t) :: draws
+    type(vector_t) :: along
+    type(placed_pair_t) :: pair
+    real(dp) :: x(3), y(3), against(3)
+    integer :: best, walked, trial, d
+    logical :: farthest, same
+
+    farthest = .true.
+    same = .true.
+    call put(box, box, [3.0_dp, 1.0_dp, -2.0_dp], random_turn(draws), pair)
+    do trial = 1, 200
+      along = draws%direction()
+      best = 1
+      call find_support(box%piece(1), along%x, .false., best)
+      do d = 1, 3
+        farthest = farthest .and. box%piece(1)%vertex(d, best)*along%x(d) > 0.0_dp
+      end do
+      walked = 1 + mod(trial, 8)
+      call find_support(box%piece(1), along%x, .true., walked)
+      same = same .and. walked == best
+      against(:) = -along%x
+      call support_a(box%piece(1), against, .false., walked)
+      same = same .and. walked == best
+      call support_b(box%piece(1), pair, along%x, .false., best)
+      call place_b(box%piece(1), pair, best, y)
+      farthest = farthest .and. dot_product(along%x, y - pair%way) > 0.0_dp
+      do d = 1, 8
+        call place_b(box%piece(1), pair, d, x)
+        farthest = farthest .and. dot_product(along%x, x) <= dot_product(along%x, y) + tight
+      end do
+    end do
+    call check(farthest, "the vertex farthest along a direction")
+    call check(same, "a walk along edges finds it too")
+    call place_a(box%piece(1), pair, 1, x)
+    call check_close(norm2(x), sqrt(3.0_dp)*half, tight, "the corner of a core is where it was made")
+  end subroutine test_support
+
+  !> Cubes and balls beside each other: faces, edges, corners.
+  subroutine test_distance()
+    type(core_distance_t) :: found
+    type(placed_pair_t) :: pair
+
+    call put(box, box, [3.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call find_core_distance(box%piece(1), box%piece(1), pair, huge(1.0_dp), found)
+    call check(.not. (found%overlap .or. found%beyond), "two cubes are apart")
+    call check_close(found%distance, 3.0_dp - 2*half, tight, "from face to face")
+    call check_close(found%normal(1), -1.0_dp, tight, "the normal is from the second to the first")
+    call check_close(found%point_a(1), half, tight, "the nearest point of the first")
+    call check_close(found%point_b(1), 3.0_dp - half, tight, "the nearest point of the second")
+    call put(box, box, [3.0_dp, 3.0_dp, 0.0_dp], turn_t(straight), pair)
+    call find_core_distance(box%piece(1), box%piece(1), pair, huge(1.0_dp), found)
+    call check_close(found%distance, sqrt(2.0_dp)*(3.0_dp - 2*half), tight, "from edge to edge")
+    call put(box, box, [3.0_dp, 3.0_dp, 3.0_dp], turn_t(straight), pair)
+    call find_core_distance(box%piece(1), box%piece(1), pair, huge(1.0_dp), found)
+    call check_close(found%distance, sqrt(3.0_dp)*(3.0_dp - 2*half), tight, "from corner to corner")
+    call check_equal(found%n, 1, "of which each has one vertex")
+    call put(box, ball, [0.25_dp, 0.5_dp, 5.0_dp], turn_t(straight), pair)
+    call find_core_distance(box%piece(1), ball%piece(1), pair, huge(1.0_dp), found)
+    call check_close(found%distance, 5.0_dp - half, tight, "from a face to the centre of a ball")
+    call check_close(found%point_a(1), 0.25_dp, tight, "the nearest point is below it")
+    call check_close(sum(found%share(1:found%n)), 1.0_dp, tight, "shares of vertices sum to 1")
+    call put(rod, rod, [0.0_dp, 3.0_dp, 0.5_dp], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi), pair)
+    call find_core_distance(rod%piece(1), rod%piece(1), pair, huge(1.0_dp), found)
+    call check_close(found%distance, 3.0_dp, tight, "two rods across each other")
+    call check_close(found%point_b(3), 0.5_dp, tight, "the nearest point is where they cross")
+  end subroutine test_distance
+
+  !> Seen from the other piece, the distance is the same and the normal is turned.
+  subroutine test_turned_distance()
+    type(draws_t) :: draws
+    type(core_distance_t) :: found, other
+    type(placed_pair_t) :: pair, turned
+    type(turn_t) :: turn
+    type(vector_t) :: way
+    real(dp) :: u(3)
+    integer :: trial, k
+    logical :: same
+
+    same = .true.
+    do trial = 1, 300
+      way = draws%direction()
+      turn = random_turn(draws)
+      u(:) = 3.6_dp*way%x
+      call put(box, rod, u, turn, pair)
+      turned = pair
+      turned%radius_a = pair%radius_b
+      turned%radius_b = pair%radius_a
+      do k = 1, 3
+        turned%way(k) = -dot_product(turn%m(:, k), u)
+        turned%rotation(k, :) = turn%m(:, k)
+      end do
+      call find_core_distance(box%piece(1), rod%piece(1), pair, huge(1.0_dp), found)
+      call find_core_distance(rod%piece(1), box%piece(1), turned, huge(1.0_dp), other)
+      same = same .and. abs(found%distance - other%distance) <= 1.0e-12_dp
+      do k = 1, 3
+        same = same .and. abs(dot_product(turn%m(:, k), found%normal) + other%normal(k)) <= 1.0e-9_dp
+      end do
+    end do
+    call check(same, "the distance is the same from both sides")
+  end subroutine test_turned_distance
+
+  subroutine test_beyond()
+    type(core_distance_t) :: found
+    type(placed_pair_t) :: pair
+
+    call put(box, box, [5.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call find_core_distance(box%piece(1), box%piece(1), pair, 1.0_dp, found)
+    call check(found%beyond, "cubes farther than what was asked about")
+    call find_core_distance(box%piece(1), box%piece(1), pair, 4.0_dp, found)
+    call check(.not. found%beyond, "and within it")
+    call put(box, box, [1.0_dp, 0.5_dp, 0.0_dp], turn_t(straight), pair)
+    call find_core_distance(box%piece(1), box%piece(1), pair, 4.0_dp, found)
+    call check(found%overlap, "cubes that overlap")
+  end subroutine test_beyond
+
+  !> Cubes one within the other by a face, and by an edge on an edge.
+  subroutine test_overlap()
+    real(dp), parameter :: depth = 0.2_dp
+    type(core_distance_t) :: found
+    type(placed_pair_t) :: pair
+    type(turn_t) :: turn
+    real(dp) :: way(3)
+
+    way(:) = [0.3_dp, 2*half - depth, 0.1_dp]
+    call put(box, box, way, turn_t(straight), pair)
+    call find_least_separation(box%piece(1), box%piece(1), pair, found)
+    call check_close(found%distance, -depth, tight, "faces: the depth")
+    call check_close(found%normal(2), -1.0_dp, tight, "faces: the normal from the second to the first")
+    call check_close(found%point_a(2) - found%point_b(2), depth, tight, "faces: both ends of the overlap")
+    call check_close(0.5_dp*(found%point_a(2) + found%point_b(2)), half - 0.5_dp*depth, tight, "faces: their middle")
+    ! the second is turned so that an edge of it meets a face of the first
+    turn = about(vec(0.0_dp, 0.0_dp, 1.0_dp), 0.25_dp*pi)
+    call put(box, box, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    pair%rotation(:, :) = turn%m
+    way(:) = 0.0_dp
+    way(1) = half + sqrt(2.0_dp)*half - depth
+    pair%way(:) = way
+    call find_least_separation(box%piece(1), box%piece(1), pair, found)
+    call check_close(found%distance, -depth, tight, "an edge in a face: the depth")
+    call check_close(found%normal(1), -1.0_dp, tight, "an edge in a face: the normal")
+    ! edges across each other, each half-way between two faces
+    turn = about(vec(1.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi)
+    pair%rotation(:, :) = turn%m
+    pair%way(1:2) = 2*half - depth/sqrt(2.0_dp)
+    call find_least_separation(box%piece(1), box%piece(1), pair, found)
+    call check_close(found%distance, -depth, 10*tight, "edges: the depth")
+    call check_close(found%normal(1), -sqrt(0.5_dp), tight, "edges: the normal")
+    call check_close(found%normal(2), -sqrt(0.5_dp), tight, "edges: is between the faces")
+  end subroutine test_overlap
+
+  !> Cores without faces.
+  subroutine test_overlap_of_rods()
+    type(core_distance_t) :: found
+    type(placed_pair_t) :: pair
+
+    call put(rod, rod, [0.0_dp, 0.0_dp, 0.0_dp], about(vec(1.0_dp, 0.0_dp, 0.0_dp), 0.5_dp*pi), pair)
+    call find_least_separation(rod%piece(1), rod%piece(1), pair, found)
+    call check_close(found%distance, 0.0_dp, tight, "rods that cross")
+    call check_close(abs(found%normal(1)), 1.0_dp, tight, "are pushed across both")
+    call put(rod, ball, [0.0_dp, 0.0_dp, 0.5_dp], turn_t(straight), pair)
+    call find_least_separation(rod%piece(1), ball%piece(1), pair, found)
+    call check_close(norm2(found%normal), 1.0_dp, tight, "a ball on a rod has a normal")
+    call check_close(found%normal(3), 0.0_dp, tight, "across the rod")
+    call put(ball, ball, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call find_least_separation(ball%piece(1), ball%piece(1), pair, found)
+    call check_close(found%normal(3), 1.0_dp, tight, "balls at one place: the third axis")
+  end subroutine test_overlap_of_rods
+
+  !> Area of a polygon, above 0 where it is anticlockwise.
+  pure real(dp) function area_of(n, place) result(area)
+    integer, intent(in) :: n
+    real(dp), intent(in) :: place(:, :)
+    integer :: k, next
+
+    area = 0.0_dp
+    do k = 1, n
+      next = mod(k, n) + 1
+      area = area + 0.5_dp*(place(1, k)*place(2, next) - place(2, k)*place(1, next))
+    end do
+  end function area_of
+
+  !> Two squares of side 2, and polygons that have nothing or all in common.
+  subroutine test_clip()
+    real(dp), parameter :: c = sqrt(2.0_dp)
+    real(dp) :: square(3, 4), other(3, 4), turned(3, 4), place(2, 16)
+    integer :: n, label(16), k
+
+    call check_equal(room_for_clip(4, 4), 16, "room for the corners of two squares")
+    square(:, :) = 0.0_dp
+    square(1, :) = [-1.0_dp, 1.0_dp, 1.0_dp, -1.0_dp]
+    square(2, :) = [-1.0_dp, -1.0_dp, 1.0_dp, 1.0_dp]
+    other(:, :) = square
+    other(1, :) = square(1, :) + 1.5_dp
+    other(2, :) = square(2, :) + 1.0_dp
+    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call check_equal(n, 4, "the common part of two squares has four corners")
+    call check_close(area_of(n, place), 0.5_dp, tight, "its area")
+    call check_equal(count(label(1:4) > 0), 2, "two sides are those of the first")
+    call check_equal(count(label(1:4) < 0), 2, "two those of the second")
+    do k = 1, 4
+      turned(:, k) = other(:, 5 - k)
+    end do
+    call clip_polygon(square, turned, -1.0_dp, n, place, label)
+    call check_close(area_of(n, place), 0.5_dp, tight, "a square that is clockwise")
+    other(1, :) = [c, 0.0_dp, -c, 0.0_dp]
+    other(2, :) = [0.0_dp, c, 0.0_dp, -c]
+    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call check_equal(n, 8, "a square on its corner cuts all corners off")
+    call check_close(area_of(n, place), 8*(c - 1.0_dp), tight, "and leaves a regular octagon")
+    do k = 1, 8
+      call check(label(k)*label(mod(k, 8) + 1) < 0, "whose sides are of both in turn")
+    end do
+    turned(:, :) = 0.1_dp*square
+    call clip_polygon(turned, other, 1.0_dp, n, place, label)
+    call check_close(area_of(n, place), 0.04_dp, tight, "a square within is left as it is")
+    other(1, :) = other(1, :) + 4.0_dp
+    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call check_equal(n, 0, "squares apart have nothing in common")
+  end subroutine test_clip
+
+  subroutine test_clip_segment()
+    real(dp) :: square(3, 4), segment(3, 2), place(2, 12)
+    integer :: n, label(12)
+
+    square(:, :) = 0.0_dp
+    square(1, :) = [-1.0_dp, 1.0_dp, 1.0_dp, -1.0_dp]
+    square(2, :) = [-1.0_dp, -1.0_dp, 1.0_dp, 1.0_dp]
+    segment(:, :) = 0.0_dp
+    segment(1, :) = [-3.0_dp, 0.5_dp]
+    segment(2, :) = 0.25_dp
+    call clip_polygon(segment, square, 1.0_dp, n, place, label)
+    call check_equal(n, 3, "a segment is cut there and back")
+    call check_close(minval(place(1, 1:n)), -1.0_dp, tight, "at the border")
+    call check_close(maxval(place(1, 1:n)), 0.5_dp, tight, "its end within stays")
+    call check_close(maxval(abs(place(2, 1:n) - 0.25_dp)), 0.0_dp, tight, "in its line")
+    call check_close(area_of(n, place), 0.0_dp, tight, "without an area")
+  end subroutine test_clip_segment
+
+  !> Where two pieces are, and the frame between them at a height above the centre of b; a lies above b.
+  subroutine put_above(shape_a, shape_b, centre, turn, height, at_a, at_b, frame)
+    type(body_shape_t), intent(in) :: shape_a, shape_b
+    !> of a
+    real(dp), intent(in) :: centre(3)
+    !> of a
+    type(turn_t), intent(in) :: turn
+    real(dp), intent(in) :: height
+    type(placement_t), intent(out) :: at_a, at_b
+    type(frame_t), intent(out) :: frame
+
+    at_a%radius = shape_a%size
+    at_a%rotation(:, :) = turn%m
+    at_a%centre(:) = centre
+    at_b%radius = shape_b%size
+    at_b%rotation(:, :) = straight
+    at_b%centre(:) = 0.0_dp
+    frame%origin(:) = 0.0_dp
+    frame%origin(3) = height
+    frame%normal(:) = straight(:, 3)
+    frame%first(:) = straight(:, 1)
+    frame%second(:) = straight(:, 2)
+  end subroutine put_above
+
+  !> The vertex of a piece that lies farthest along a direction of its axes.
+  integer function farthest(piece, x, y, z) result(best)
+    type(convex_piece_t), intent(in) :: piece
+    real(dp), intent(in) :: x, y, z
+    type(vector_t) :: along
+
+    along = vec(x, y, z)
+    best = 1
+    call find_support(piece, along%x, .false., best)
+  end function farthest
+
+  !> A cube on a cube, shifted: the corners of their common part.
+  subroutine test_faces()
+    real(dp), parameter :: gap = 0.005_dp
+    type(placement_t) :: at_a, at_b
+    type(frame_t) :: frame
+    type(feature_t) :: feature_a, feature_b
+    type(patch_point_t) :: point(most_points)
+    real(dp) :: low(2), high(2), down(3)
+    integer :: n, k, known_a(1), known_b(1)
+
+    call put_above(box, box, [1.0_dp, 0.5_dp, 2.0_dp + gap], turn_t(straight), 1.0_dp, at_a, at_b, frame)
+    known_a(1) = farthest(box%piece(1), 0.1_dp, 0.1_dp, -1.0_dp)
+    known_b(1) = farthest(box%piece(1), 0.1_dp, 0.1_dp, 1.0_dp)
+    down(:) = -frame%normal
+    call find_feature(box%piece(1), down, known_a, feature_a)
+    call find_feature(box%piece(1), frame%normal, known_b, feature_b)
+    call check_equal(feature_a%n + feature_b%n, 8, "faces of cubes")
+    n = 0
+    call add_face_points(box%piece(1), box%piece(1), at_a, at_b, feature_a, feature_b, frame, 0.01_dp, n, point)
+    call check_equal(n, 4, "a cube on a cube: four points")
+    low(:) = huge(1.0_dp)
+    high(:) = -huge(1.0_dp)
+    do k = 1, n
+      low(:) = min(low, point(k)%place(1:2))
+      high(:) = max(high, point(k)%place(1:2))
+      call check_close(point(k)%gap, gap, tight, "a cube on a cube: the gap")
+      call check_close(point(k)%place(3), 0.5_dp*gap, tight, "a cube on a cube: points half-way between")
+      call check(all(point(1:k - 1)%key /= point(k)%key), "a cube on a cube: keys differ")
+    end do
+    ! flat sides reach as far as those of the sharp cubes
+    call check_close(low(1), 0.0_dp, tight, "the common part begins with the upper cube")
+    call check_close(low(2), -0.5_dp, tight, "in both directions")
+    call check_close(high(1), 1.0_dp, tight, "it ends with the lower cube")
+    call check_close(high(2), 1.0_dp, tight, "in both directions too")
+    n = 0
+    call add_face_points(box%piece(1), box%piece(1), at_a, at_b, feature_a, feature_b, frame, 0.5_dp*gap, n, point)
+    call check_equal(n, 0, "no points where the gap is too large")
+  end subroutine test_faces
+
+  !> A rod that lies on a cube, along the first axis, and hangs over.
+  subroutine test_face_and_edge()
+    real(dp), parameter :: gap = 0.003_dp
+    type(placement_t) :: at_a, at_b
+    type(frame_t) :: frame
+    type(feature_t) :: feature_a, feature_b
+    type(patch_point_t) :: point(most_points)
+    real(dp) :: down(3), along(3)
+    integer :: n, known_b(1)
+
+    call put_above(rod, box, [0.75_dp, 0.25_dp, 1.25_dp + gap], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi), 1.0_dp, at_a, at_b, &
+      & frame)
+    down(:) = -frame%normal
+    ! the direction down in the axes of the rod
+    along(:) = down(3)*at_a%rotation(3, :)
+    call find_feature(rod%piece(1), along, [1], feature_a)
+    known_b(1) = farthest(box%piece(1), 0.1_dp, 0.1_dp, 1.0_dp)
+    call find_feature(box%piece(1), frame%normal, known_b, feature_b)
+    call check_equal(feature_a%n, 2, "a rod has an edge")
+    n = 0
+    call add_face_points(rod%piece(1), box%piece(1), at_a, at_b, feature_a, feature_b, frame, 0.01_dp, n, point)
+    call check_equal(n, 2, "a rod on a cube: two points")
+    call check_close(minval(point(1:2)%place(1)), -0.25_dp, tight, "the end of the rod")
+    call check_close(maxval(point(1:2)%place(1)), 1.0_dp, tight, "the side of the cube")
+    call check_close(point(1)%place(2), 0.25_dp, tight, "below the rod")
+    call check_close(maxval(point(1:2)%gap), gap, tight, "a rod on a cube: the gap")
+    call check_close(minval(point(1:2)%gap), gap, tight, "a rod on a cube: at both ends")
+  end subroutine test_face_and_edge
+
+  !> Rods above each other: side by side, and across.
+  subroutine test_edges()
+    real(dp), parameter :: gap = 0.004_dp
+    type(placement_t) :: at_a, at_b
+    type(frame_t) :: frame
+    type(feature_t) :: feature
+    type(patch_point_t) :: point(most_points)
+    integer :: n, edge
+
+    feature%vertex = 1
+    feature%other = 2
+    feature%n = 2
+    edge = edge_number(rod%piece(1), 1, 2)
+    call check(edge > 1, "edges come behind vertices")
+    ! along the second axis for the normal, so that the third lies along the rods
+    call put_above(rod, rod, [0.0_dp, 0.5_dp + gap, 1.5_dp], turn_t(straight), 0.0_dp, at_a, at_b, frame)
+    frame%normal(:) = straight(:, 2)
+    frame%first(:) = straight(:, 3)
+    frame%second(:) = straight(:, 1)
+    frame%origin(2) = 0.25_dp
+    n = 0
+    call add_edge_points(rod%piece(1), rod%piece(1), at_a, at_b, feature, feature, frame, 0.01_dp, n, point)
+    call check_equal(n, 2, "rods side by side: two points")
+    call check_close(minval(point(1:2)%place(1)), 0.5_dp, tight, "where the upper one begins")
+    call check_close(maxval(point(1:2)%place(1)), 1.0_dp, tight, "where the lower one ends")
+    call check_close(maxval(abs(point(1:2)%gap - gap)), 0.0_dp, tight, "rods side by side: the gap")
+    call check_close(maxval(abs(point(1:2)%place(3) - 0.5_dp*gap)), 0.0_dp, tight, "half-way between")
+    call check(any(point(1:2)%key/feature_base == edge) .and. any(mod(point(1:2)%key, feature_base) == edge), &
+      & "each is an end of one on the edge of the other")
+    at_a%centre(3) = 2.5_dp
+    n = 0
+    call add_edge_points(rod%piece(1), rod%piece(1), at_a, at_b, feature, feature, frame, 0.01_dp, n, point)
+    call check_equal(n, 0, "rods one behind the other")
+    call put_above(rod, rod, [0.0_dp, 0.5_dp + gap, 0.0_dp], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp), 0.0_dp, at_a, at_b, frame)
+    frame%normal(:) = straight(:, 2)
+    frame%first(:) = straight(:, 3)
+    frame%second(:) = straight(:, 1)
+    call add_edge_points(rod%piece(1), rod%piece(1), at_a, at_b, feature, feature, frame, 0.01_dp, n, point)
+    call check_equal(n, 0, "rods across each other")
+  end subroutine test_edges
+
+end program test_convex_contact
