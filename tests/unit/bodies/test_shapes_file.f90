@@ -330,6 +330,12 @@ contains
         call check_close(shape%inertia(1), shape%inertia(3), 100*rounding_error, trim(name(k))//": equal moments")
       end associate
     end do
+    ! two cubes of edge 1 side by side
+    call parse_shapes(path, "shape a"//lf//"cube 0.86602540378443865"//lf//"cube 0.86602540378443865 1 0 0", 3, library, error)
+    call check(.not. allocated(error), "two cubes")
+    if (allocated(error)) return
+    call check_close(library%shape(1)%size, sqrt(1.5_dp), 100*rounding_error, "size of two cubes")
+    call check_close(library%shape(1)%volume*1.5_dp**1.5_dp, 2.0_dp, 100*rounding_error, "volume of two cubes")
   end subroutine test_platonic_solids
 
   !> Stones of a hundred seeds: all corners on the ellipsoid, the same again for the same seed, another one for another.
