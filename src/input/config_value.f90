@@ -76,7 +76,7 @@ contains
     failed = status /= 0 .or. .not. fits(touched, key%count)
     if (failed) return
     if (key%count == 1) slot%integer = values(1)
-    if (key%count > 1) where (touched) slot%integers = values
+    if (key%count > 1) where (touched(:key%count)) slot%integers = values(:key%count)
   end subroutine read_integer
 
   subroutine read_real(key, assignment, slot, touched, failed)
@@ -99,7 +99,7 @@ contains
     failed = .not. fits(touched, key%count)
     if (failed) return
     if (key%count == 1) slot%real = values(1)
-    if (key%count > 1) where (touched) slot%reals = values
+    if (key%count > 1) where (touched(:key%count)) slot%reals = values(:key%count)
   end subroutine read_real
 
   subroutine read_logical(key, index, value, slot, touched, failed)
@@ -121,7 +121,7 @@ contains
     failed = status /= 0 .or. .not. fits(touched, key%count)
     if (failed) return
     if (key%count == 1) slot%logical = values(1)
-    if (key%count > 1) where (touched) slot%logicals = values
+    if (key%count > 1) where (touched(:key%count)) slot%logicals = values(:key%count)
   end subroutine read_logical
 
   !> Are the entries of a list, each perhaps after a repeat count and a star, all written as values of a kind are? The intrinsic read
