@@ -13,6 +13,8 @@ EXCEPTIONS = {
     # gravier_hdf5_file is made of them, by extension of types
     **dict.fromkeys(("gravier_hdf5_tree", "gravier_hdf5_attributes", "gravier_hdf5_datasets", "gravier_hdf5_properties",
                      "gravier_hdf5_rows", "gravier_hdf5_storage", "gravier_hdf5_tables"), "parallel/io/test_io_hdf5_file.f90"),
+    # gravier_problem_builder is the one that packs contacts
+    "gravier_contact_packing": "parallel/step/test_problem_builder.f90",
     # gravier_bodies_file is the door to both formats
     **dict.fromkeys(("gravier_bodies_csv", "gravier_bodies_hdf5"), "parallel/bodies/test_io_bodies_file.f90"),
     # h5py reads what it writes
