@@ -1,6 +1,7 @@
 !> Orientations of bodies: an angle in the plane, a unit quaternion in space, whose real part comes first.
 module gravier_orientation
   use gravier_kinds, only: dp
+  use gravier_quaternion, only: multiply_quaternions
   implicit none
   private
   public :: turn_orientation, orientation_matrix
@@ -15,7 +16,7 @@ contains
     real(dp), intent(in) :: spin(:)
     !> [s]
     real(dp), intent(in) :: duration
-    real(dp) :: angle, q(4), turn(4)
+    real(dp) :: angle, q(4), turn(4), turned(4)
 
     if (size(spin) == 1) then
       orientation(1) = orientation(1) + duration*spin(1)
@@ -26,11 +27,8 @@ contains
     turn(1) = cos(0.5_dp*angle)
     turn(2:4) = sin(0.5_dp*angle)/norm2(spin)*spin
     q(:) = orientation
-    orientation(1) = turn(1)*q(1) - turn(2)*q(2) - turn(3)*q(3) - turn(4)*q(4)
-    orientation(2) = turn(1)*q(2) + turn(2)*q(1) + turn(3)*q(4) - turn(4)*q(3)
-    orientation(3) = turn(1)*q(3) - turn(2)*q(4) + turn(3)*q(1) + turn(4)*q(2)
-    orientation(4) = turn(1)*q(4) + turn(2)*q(3) - turn(3)*q(2) + turn(4)*q(1)
-    orientation(:) = orientation/norm2(orientation)
+    call multiply_quaternions(turn, q, turned)
+    orientation(:) = turned/norm2(turned)
   end subroutine turn_orientation
 
   !> The matrix whose columns are the axes of a body in global axes.

@@ -115,7 +115,7 @@ contains
       call carry_memory(points, p, view%list)
       do k = 1, points%n
         normal(:) = points%normal(1:size(normal), k)
-        place = place_of_point(view, decomposition, p, points, k)
+        place = place_of_point(view, decomposition%nd, p, points, k)
         call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found, place)
       end do
       p = p + view%list%points_of(p)
@@ -124,21 +124,15 @@ contains
   end subroutine find_contacts_of_shapes
 
   !> Where point `k` of pair `p` is.
-  pure type(contact_place_t) function place_of_point(view, decomposition, p, points, k) result(place)
+  pure type(contact_place_t) function place_of_point(view, nd, p, points, k) result(place)
     type(local_bodies_t), intent(in) :: view
-    type(decomposition_t), intent(in) :: decomposition
-    integer, intent(in) :: p, k
+    integer, intent(in) :: nd, p, k
     type(pair_points_t), intent(in) :: points
-    real(dp) :: way(decomposition%nd)
-    integer :: nd
 
-    nd = decomposition%nd
     place%arm_i(:) = points%point(:, k)
     associate (i => view%list%candidate(p), j => view%list%antagonist(p))
       if (j > 0) then
-        way(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
-        if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), way)
-        place%arm_j(1:nd) = way + points%point(1:nd, k)
+        place%arm_j(:) = points%point(:, k) - points%way
       else
         place%on_wall(1:nd) = view%bodies%position(:, i) + points%point(1:nd, k) - 0.5_dp*points%gap(k)*points%normal(1:nd, k)
       end if

@@ -13,6 +13,8 @@ module gravier_pair_points
   !> Points in ascending order of their keys.
   type :: pair_points_t
     integer :: n = 0
+    !> from the centre of the candidate to that of the antagonist, shifted to where they meet; 0 of a boundary [m]
+    real(dp) :: way(3) = 0.0_dp
     !> from the antagonist to the candidate (3, n)
     real(dp), allocatable :: normal(:, :)
     !> from the centre of the candidate, half-way between the surfaces (3, n) [m]

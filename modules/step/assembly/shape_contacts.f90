@@ -70,6 +70,7 @@ contains
     integer :: i, j
 
     points%n = 0
+    points%way(:) = 0.0_dp
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
@@ -80,6 +81,7 @@ contains
         call see_body(bodies, i, candidate)
         call see_body(bodies, j, antagonist)
         antagonist%centre(1:decomposition%nd) = way
+        points%way(:) = antagonist%centre
         call touch_body(decomposition%shapes, candidate, antagonist, decomposition%nd, alert, work, points)
       else
         call see_body(bodies, i, candidate)
