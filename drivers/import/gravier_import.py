@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make a case of Gravier from a DATBOX of LMGC90.
 
-    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V]
+    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V] [--homogeneous]
 
 --period takes two numbers in 2D and three in 3D, 0 along an axis that is not periodic.
 Reads BODIES.DAT, BULK_BEHAV.DAT and TACT_BEHAV.DAT and, where they are there, DRV_DOF.DAT, DOF.INI and Vloc_Rloc.INI; writes NAME.nml,
@@ -29,13 +29,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
 from one_line import OneLineParser, plain  # noqa: E402
 from whole_file import Locked, give_names, hdf5_file, output_lock  # noqa: E402
 
-LAWS = ("IQS_CLB", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
+LAWS = ("IQS_CLB", "IQS_CLB_g0", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
 #: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
 OLDER = {"dfric": "dyfr", "dfrc": "dyfr", "sfric": "stfr", "sfrc": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "Weth": "Wthk",
          "restn": "rstn", "restt": "rstt"}
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
 HULLS = {"POLYG": 2, "POLYR": 3}
+#: bulks that are rigid; what a conducting one conducts is left out
+BULKS = ("RIGID", "THERMO_RIGID", "ELECTRO_RIGID")
 #: what a body that moves freely may be made of
 PIECES = ("DISKx", "DISKb", "SPHER", "SPHEb", "POLYG", "POLYR", "JONCx")
 #: `name= number`; forces and gaps of contacts stand without the sign
@@ -73,6 +75,16 @@ class Entry:
                           for name, bare, value in VALUE.findall(text)})
         self.values.update(self.rows[-1])
 
+    def size(self, place, name):
+        """A size of a contactor: LMGC90 reads it by its place on the first line, whatever its name."""
+        row = list(self.rows[0].values())
+        return self.get(name) if name in self.values or len(row) < place else row[place - 1]
+
+    def shift(self, count):
+        """Place of a contactor in its body, (coo1, coo2, ...) on a line after the first; the node where there is none."""
+        row = next((row for row in self.rows[1:] if "coo1" in row), {})
+        return np.array(list(row.values())[:count] if row else [0.0] * count)
+
     def get(self, name, default=None):
         if name in self.values:
             return self.values[name]
@@ -87,12 +99,12 @@ class Entry:
         return np.array([self.get(each, default) for each in names])
 
     def table(self, prefix, counted, count):
-        """The values prefix1, prefix2, ... of as many lines as the value `counted` says."""
-        names = [f"{prefix}{k + 1}" for k in range(count)]
-        rows = [[row[name] for name in names] for row in self.rows if all(name in row for name in names)]
-        wanted = self.get(counted)
+        """The values of as many lines that begin with prefix1= as the value `counted`, or its singular, says. LMGC90 reads them by their
+        places: the third may have another name."""
+        rows = [list(row.values())[:count] for row in self.rows if next(iter(row), "") == f"{prefix}1" and len(row) >= count]
+        wanted = self.get(counted, self.values.get(counted.removesuffix("s")))
         if len(rows) != wanted:
-            self.refuse(f"{self.words[0]} with {counted}= {wanted:g} and {len(rows)} lines of {names[0]}= to {names[-1]}=", "a line for each")
+            self.refuse(f"{self.words[0]} with {counted}= {wanted:g} and {len(rows)} lines of {prefix}1= to {prefix}{count}=", "a line for each")
         return np.array(rows)
 
     def refuse(self, found, expected):
@@ -364,9 +376,9 @@ class Piece:
             self.point = contactor.table("coo", "nb_vertex", 3)
             self.moments = moments_of_polyhedron(self.point, self.faces())
         else:
-            shift = contactor.vector("coo", dimension, 0.0)
-            half = np.array([contactor.get("axe1"), 0.0]) if self.kind == "JONCx" else np.zeros(dimension)
-            self.radius = contactor.get("axe2" if self.kind == "JONCx" else "byrd")
+            shift = contactor.shift(dimension)
+            half = np.array([contactor.size(1, "axe1"), 0.0]) if self.kind == "JONCx" else np.zeros(dimension)
+            self.radius = contactor.size(2, "axe2") if self.kind == "JONCx" else contactor.get("byrd")
             self.point = np.array([shift - half, shift + half])
             self.moments = moments_of_round(self.point, self.radius)
 
@@ -459,16 +471,21 @@ class Case:
     visibility that grains have part in), remarks for the user. `slip` is the scale [m/s] of laws with static and dynamic friction, `period`
     has a length for each axis or is empty."""
 
-    def __init__(self, bodies, density, gravity, laws, sees, planes, slip, period):
-        self.bodies, self.density, self.gravity, self.laws, self.sees, self.planes = bodies, density, gravity, laws, sees, planes
-        self.period = period
-        self.dimension, self.slip = bodies[0].dimension, slip
+    def __init__(self, bodies, density, gravity, laws, sees, options):
+        self.bodies, self.density, self.gravity, self.laws, self.sees = bodies, density, gravity, laws, sees
+        self.planes, self.slip, self.homogeneous, self.period = options.planes, options.slip, options.homogeneous, options.period or []
+        self.dimension = bodies[0].dimension
+        #: contactor and colour: that which stands for it, since bodies have contactors of both
+        self.stands_for = {}
         self.grains, self.boundaries, self.remarks, self.used, self.materials, self.met = [], [], [], [], [], {}
+        #: bodies whose inertia or centre of mass their shape decides, by --homogeneous
+        self.replaced = 0
         #: lines of the file of shapes with their names, which bodies share
         self.shapes = {}
         self.free = [body for body in bodies if not body.drives and all(contactor.words[0] in PIECES for contactor in body.contactors)]
         if not self.free:
             bodies[0].start.refuse("no grain moves freely", "a body of DISKx, POLYG, JONCx, SPHER or POLYR that DRV_DOF.DAT does not drive")
+        self.merge_kinds()
         self.colours = {self.thing(body.contactors[0]) for body in self.free}
         #: radii by contactor and colour: none of flat walls
         self.radii = {}
@@ -477,9 +494,41 @@ class Case:
         self.centres = np.array([body.place() for body in self.free])
 
     @staticmethod
-    def thing(contactor):
+    def named(kind, colour):
         """Contactor and colour, by which the table of visibility names it."""
-        return {"DISKb": "DISKx", "SPHEb": "SPHER"}.get(contactor.words[0], contactor.words[0]), contactor.words[3]
+        return {"DISKb": "DISKx", "SPHEb": "SPHER"}.get(kind, kind), colour
+
+    def thing(self, contactor):
+        """Contactor and colour, or those that stand for them."""
+        thing = self.named(contactor.words[0], contactor.words[3])
+        return self.stands_for.get(thing, thing)
+
+    def merge_kinds(self):
+        """A body has one material: contactors of several kinds or colours that make up bodies become one thing, where what they see and
+        under which laws is the same for all of them."""
+        for body in self.free:
+            things = list(dict.fromkeys(self.thing(contactor) for contactor in body.contactors))
+            for other in things[1:]:
+                self.stands_for = {thing: things[0] if stands == other else stands for thing, stands in self.stands_for.items()}
+                self.stands_for[other] = things[0]
+        if not self.stands_for:
+            return
+        members = {}
+        for thing, stands in self.stands_for.items():
+            members.setdefault(stands, [stands]).append(thing)
+        lines = {}
+        for pair, law, alert, see in self.sees:
+            merged = frozenset(self.stands_for.get(thing, thing) for thing in pair)
+            lines.setdefault(merged, []).append((pair, law, alert, see))
+        self.sees = []
+        for merged, found in lines.items():
+            groups = [members.get(thing, [thing]) for thing in (min(merged), max(merged))]
+            wanted = {frozenset((one, other)) for one in groups[0] for other in groups[1]}
+            # pairs of which no body has both sides, and walls by themselves, need no line
+            if len(wanted) > 1 and ({frozenset(pair) for pair, *_ in found} != wanted or len({law for _, law, _, _ in found}) > 1):
+                found[0][3].refuse(f"contactors {' and '.join(' '.join(thing) for thing in groups[0])} of one body that do not see the same under "
+                                   "one law", "the same lines $seety for each of them: a body has one material here")
+            self.sees.append((set(merged), found[0][1], max(alert for _, _, alert, _ in found), found[0][3]))
 
     def material(self, thing):
         """Name of its material: the colour, where no other contactor has it."""
@@ -488,12 +537,16 @@ class Case:
             self.materials.append(name)
         return name
 
-    def meet(self, thing, entry):
-        """Take over the laws between the free grains and a contactor of a colour; False where no grain sees it."""
+    def meet(self, thing):
+        """Take over the laws between the free grains and a contactor of a colour; False where no grain sees it. Things that do not see each
+        other pass through each other."""
         lines = {grain: see for grain in sorted(self.colours) for see in self.sees if see[0] == {grain, thing}}
-        for grain in sorted(self.colours - lines.keys() if lines else ()):
-            entry.refuse(f"{grain[0]} of colour {grain[1]} does not see {thing[0]} of colour {thing[1]}, others do",
-                         "a contact law for all grains: $seety of TACT_BEHAV.DAT")
+        if not lines and thing not in self.colours:
+            return False
+        for grain in sorted(self.colours - lines.keys()):
+            self.met[tuple(sorted((self.material(grain), self.material(thing))))] = {"kind": "none"}
+            one, other = sorted((grain, thing))
+            self.remarks.append(f"{' '.join(one)} does not see {' '.join(other)}: they pass through each other")
         for pair, law, alert, see in lines.values():
             names = sorted(self.material(each) for each in pair)
             self.met[tuple(names)] = self.keys_of(law, alert, see, pair)
@@ -519,7 +572,9 @@ class Case:
 
     def friction_of(self, entry, name):
         """Keys of friction: one coefficient, or a static and a dynamic one where the law here has both."""
-        if name in ("IQS_CLB", "RST_CLB"):
+        if name == "IQS_CLB_g0":
+            self.remarks.append(f"law {entry.words[0]} IQS_CLB_g0: gaps count from contact here, not from those of the start")
+        if name in ("IQS_CLB", "IQS_CLB_g0", "RST_CLB"):
             return {"friction": entry.get("fric")}
         static, dynamic = entry.get("stfr"), entry.get("dyfr")
         if static == dynamic:
@@ -555,8 +610,11 @@ class Case:
         name = body.bulk.words[3] if len(body.bulk.words) > 3 else ""
         if name not in self.density:
             body.bulk.refuse(f"material {name}", "one of BULK_BEHAV.DAT")
-        if self.density[name].words[1] != "RIGID":
-            self.density[name].refuse(f"material {self.density[name].words[1]}", "RIGID")
+        kind = self.density[name].words[1]
+        if kind not in BULKS:
+            self.density[name].refuse(f"material {kind}", f"one of {', '.join(BULKS)}")
+        if kind != "RIGID":
+            self.remarks.append(f"material {name} {kind}: what it conducts is left out")
         average = body.bulk.get("avrd", 0.0)
         if average > 0.0:
             volume = self.ball(average)
@@ -575,14 +633,14 @@ class Case:
     def is_ball(self, body):
         """Is it one disk or sphere about its centre?"""
         contactor = body.contactors[0]
-        return len(body.contactors) == 1 and contactor.words[0] in GRAINS and not np.any(contactor.vector("coo", self.dimension, 0.0) != 0.0)
+        return len(body.contactors) == 1 and contactor.words[0] in GRAINS and not np.any(contactor.shift(self.dimension) != 0.0)
 
     def add_shaped(self, body, group):
         """A body with a shape; its place is that of its centre of mass."""
         things = sorted({self.thing(contactor) for contactor in body.contactors})
         if len(things) > 1:
-            body.contactors[-1].refuse(f"body {body.rank} has contactors {' and '.join(' '.join(thing) for thing in things)}",
-                                       "contactors of one kind and one colour: a body has one material here")
+            body.contactors[-1].refuse(f"driven body {body.rank} has contactors {' and '.join(' '.join(thing) for thing in things)}",
+                                       "contactors of one kind and one colour: a body with a shape has one material here")
         shape = ShapeOfBody(body)
         self.check_mass(body, shape)
         frame = body.frame()
@@ -601,18 +659,25 @@ class Case:
         beside = np.linalg.norm(shape.centre)
         if beside > ROUND * shape.size:
             if given and not body.drives:
-                body.bulk.refuse(f"body {body.rank} with avrd= {body.bulk.get('avrd'):g} and its centre of mass {beside:g} beside its node",
-                                 "contactors about their centre of mass, or avrd= 0")
-            self.remarks.append(f"body {body.rank}: its place is the centre of mass of its contactors, {beside:g} beside its node")
+                self.differs(body, f"body {body.rank} with avrd= {body.bulk.get('avrd'):g} and its centre of mass {beside:g} beside its node",
+                             "contactors about their centre of mass, or avrd= 0")
+            else:
+                self.remarks.append(f"body {body.rank}: its place is the centre of mass of its contactors, {beside:g} beside its node")
         if body.drives:
             return
         gyration = body.bulk.get("gyrd", 0.0)
         if self.dimension == 2 and gyration > 0.0 and abs(gyration - shape.gyration()) > ROUND * gyration:
-            body.bulk.refuse(f"gyrd= {gyration:g}", f"0 or {shape.gyration():g}, that of its contactors, homogeneous")
+            self.differs(body, f"gyrd= {gyration:g}", f"0 or {shape.gyration():g}, that of its contactors, homogeneous")
         inertia = np.sort([body.bulk.get(name, 0.0) for name in ("I1", "I2", "I3")])
         if self.dimension == 3 and inertia[-1] > 0.0 and np.abs(inertia / inertia[-1] - shape.principal()).max() > ROUND:
-            body.bulk.refuse(f"moments of inertia as {', '.join(f'{x:g}' for x in inertia / inertia[-1])}",
-                             f"as {', '.join(f'{x:g}' for x in shape.principal())}, those of its contactors, homogeneous")
+            self.differs(body, f"moments of inertia as {', '.join(f'{x:g}' for x in inertia / inertia[-1])}",
+                         f"as {', '.join(f'{x:g}' for x in shape.principal())}, those of its contactors, homogeneous")
+
+    def differs(self, body, found, expected):
+        """Inertia or centre of mass that are not those of the shape: refused, or replaced where --homogeneous says so."""
+        if not self.homogeneous:
+            body.bulk.refuse(found, f"{expected}; or --homogeneous, with which the shape decides and the mass stays")
+        self.replaced += 1
 
     def check_free(self, body):
         contactor = body.contactors[0]
@@ -671,17 +736,17 @@ class Case:
     def volume(self, contactor):
         shape = contactor.words[0]
         if shape == "JONCx":
-            return 4.0 * contactor.get("axe1") * contactor.get("axe2") + math.pi * contactor.get("axe2")**2
+            return 4.0 * contactor.size(1, "axe1") * contactor.size(2, "axe2") + math.pi * contactor.size(2, "axe2")**2
         if shape in HULLS:
             return Piece(contactor, self.dimension).moments[0]
         if shape == "PLANx":
-            return 8.0 * contactor.get("axe1") * contactor.get("axe2") * contactor.get("axe3")
+            return 8.0 * math.prod(contactor.size(k, f"axe{k}") for k in (1, 2, 3))
         return self.ball(contactor.get("byrd"))
 
     def axes_of(self, body, contactor):
         """Centre of a contactor and its axes as columns."""
         frame, d = body.frame(), self.dimension
-        place = body.place() + frame @ contactor.vector("coo", d, 0.0)
+        place = body.place() + frame @ contactor.shift(d)
         if d == 3 and "localframe" in contactor.words:
             frame = frame @ np.stack([contactor.vector(name, 3) for name in ("alp", "bet", "gam")], axis=1)
         return place, frame
@@ -697,11 +762,11 @@ class Case:
                 self.remarks.append(f"body {body.rank} DNLYC: the cylinder is endless here, its height "
                                     f"2 x {contactor.get('High'):g} m is not kept")
             return [("", keys)], []
-        half, thick = contactor.get("axe1"), contactor.get("axe2" if d == 2 else "axe3")
+        half, thick = contactor.size(1, "axe1"), contactor.size(d, f"axe{d}")
         normal, along = frame[:, -1], frame[:, 0] * half
         height = (self.centres - centre) @ normal
         sides = [side for side in (1.0, -1.0) if np.any(side * height > 0.0)]
-        across = frame[:, 1] * contactor.get("axe2") if d == 3 else 0.0 * along
+        across = frame[:, 1] * contactor.size(2, "axe2") if d == 3 else 0.0 * along
         spans = self.spans_period(normal, np.abs(along) + np.abs(across))
         if spans and not self.planes and len(sides) == 1:
             self.remarks.append(f"body {body.rank} {shape}: it is as wide as the period, and becomes an endless plane")
@@ -733,7 +798,7 @@ class Case:
 
     def add_wall(self, body):
         for number_of, contactor in enumerate(body.contactors, 1):
-            if not self.meet(self.thing(contactor), contactor):
+            if not self.meet(self.thing(contactor)):
                 self.remarks.append(f"body {body.rank} {contactor.words[0]}: no grain sees it, left out")
                 continue
             material = self.material(self.thing(contactor))
@@ -754,23 +819,23 @@ class Case:
     def add_glued(self, body):
         """A driven body of disks or spheres, or of polygons or polyhedra: grains glued to each other, each of its own material, or one grain
         with a shape."""
-        for contactor in body.contactors:
-            if not self.meet(self.thing(contactor), contactor):
-                contactor.refuse(f"no grain sees a contactor of body {body.rank}", "a contact law: $seety of TACT_BEHAV.DAT")
+        seen = [self.meet(self.thing(contactor)) for contactor in body.contactors]
+        if not any(seen):
+            self.remarks.append(f"body {body.rank} {body.contactors[0].words[0]}: no grain sees it, left out")
+            return
         group = self.new_group()
         if any(contactor.words[0] in HULLS for contactor in body.contactors):
             self.add_shaped(body, group)
         else:
-            for contactor in body.contactors:
-                self.add_grain(body, contactor, self.axes_of(body, contactor)[0], group)
+            for contactor, there in zip(body.contactors, seen):
+                if there:
+                    self.add_grain(body, contactor, self.axes_of(body, contactor)[0], group)
         keys, columns = self.motion(body, True)
         self.boundaries.append(({"name": f"body {body.rank}", "shape": "grains", "group": group, **keys}, columns))
 
     def build(self):
-        first = self.free[0].contactors[0]
         for thing in sorted(self.colours):
-            if not self.meet(thing, first):
-                first.refuse(f"grains of colour {thing[1]} do not see each other", "a contact law: $seety of TACT_BEHAV.DAT")
+            self.meet(thing)
         for body in self.bodies:
             kinds = {contactor.words[0] not in WALLS for contactor in body.contactors}
             if len(kinds) > 1 and body not in self.free:
@@ -784,6 +849,10 @@ class Case:
                 self.add_glued(body)
             else:
                 self.add_wall(body)
+        if not self.used:
+            self.free[0].start.refuse("the bodies that move freely see nothing", "a contact law: $seety of TACT_BEHAV.DAT")
+        if self.replaced:
+            self.remarks.append(f"{self.replaced} bodies have the inertia and the centre of mass of their shapes here, not those of BODIES.DAT")
 
 
 # ---- files
@@ -909,6 +978,8 @@ def parse():
     parser.add_argument("--planes", action="store_true", help="walls with all grains on one side become endless planes")
     parser.add_argument("--slip", type=float, metavar="V",
                         help="slip [m/s] over which friction falls from static to dynamic, for IQS_DS_CLB and RST_DS_CLB")
+    parser.add_argument("--homogeneous", action="store_true",
+                        help="bodies with shapes have the inertia and the centre of mass of these, where BODIES.DAT says otherwise")
     options = parser.parse_args()
     if not (math.isfinite(options.step) and options.step > 0.0) or options.steps < 0:
         parser.error("--step: expected a finite number > 0, and --steps at least 0")
@@ -936,7 +1007,7 @@ def main():
                           f"bodies {bodies[0].kind} in {bodies[0].dimension}D, 0 along an axis that is not periodic")
         if options.period and not all(math.isfinite(length) and length >= 0.0 for length in options.period):
             raise Refused(f"--period {' '.join(f'{length:g}' for length in options.period)}: expected finite numbers >= 0")
-        case = Case(bodies, density, gravity, laws, sees, options.planes, options.slip, options.period or [])
+        case = Case(bodies, density, gravity, laws, sees, options)
         case.build()
         with output_lock(options.out + ".nml", "gravier_import"):
             made = write_files(case, options.out, options, contacts)

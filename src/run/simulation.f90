@@ -168,6 +168,7 @@ contains
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
       rule%alert_distance = max(rule%alert_distance, scene%laws%range)
+      rule%filter = scene%laws%filter
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &

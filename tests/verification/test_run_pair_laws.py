@@ -48,6 +48,30 @@ class Materials(SmallScene):
                 self.verify("grains of three materials on a slope", f"way [m], mu = {friction}, {dimension}D",
                             record.position[:, k, 0] - 0.3 * k, wanted, self.rounding(record, 1.0))
 
+    def test_no_contact(self):
+        """Bodies of two materials whose law is none fly and fall through each other, from a start at which they overlap; others meet,
+        on 1 and 2 ranks and in subdomains."""
+        self.both(self.pass_through)
+
+    def pass_through(self, dimension):
+        along, up = unit(dimension, 0), unit(dimension, -1)
+        # 1 and 2 overlap by half of a radius and pass, 3 and 4 meet at rest of each other's centre of mass, 5 falls through the ground, 6 lies on it
+        grains = [Grain(0.0 * along, along, material=1), Grain(1.5 * RADIUS * along, -along, material=2),
+                  Grain(along, along, material=1), Grain(along + 2.2 * RADIUS * along, -along, material=1),
+                  Grain(2.0 * along + (RADIUS - 1.0) * up, material=2), Grain(3.0 * along + (RADIUS - 1.0) * up, material=1)]
+        for ranks, subdomains in ((1, 1), (2, 3)):
+            record = self.play(f"pass {dimension} {ranks}", grains, [plane(-1.0 * up, up, material="steel")], -G * up, ranks=ranks,
+                               decomposition={"subdomains": subdomains}, solver={"method": "nscdd"},
+                               material=named("glass", "air", "steel"), scene={"start_overlap": 0.1},
+                               law=[law(("air", "glass"), "none"), law(("steel", "air"), "none")])
+            time = record.time[-1]
+            self.verify("no contact between two materials", f"ways of bodies that pass [m], {dimension}D",
+                        record.position[-1, :2, 0], [time, 1.5 * RADIUS - time], self.rounding(record, 1.0))
+            self.verify("no contact between two materials", f"speeds of equal bodies that meet [m/s], {dimension}D",
+                        record.velocity[-1, 2:4, 0], 0.0, 1e-10)
+            self.verify("no contact between two materials", f"speed through the ground, and on it [m/s], {dimension}D",
+                        record.velocity[-1, 4:, -1], [-G * time, 0.0], 1e-10)
+
     def test_density(self):
         """Masses by the density of each material: two grains of one size that meet at equal speeds share their momentum."""
         text = "id,x,y,radius,vx,material\n1,0,0,0.05,1,1\n2,0.1,0,0.05,-1,2\n"

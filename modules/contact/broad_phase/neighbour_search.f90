@@ -8,6 +8,7 @@ module gravier_neighbour_search
   use gravier_body_store, only: body_set_t
   use gravier_shape_library, only: point_counts_t, boundary_number
   use gravier_boundary, only: boundary_t
+  use gravier_material_filter, only: material_filter_t
   use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_region, only: region_t
@@ -29,6 +30,8 @@ module gravier_neighbour_search
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
     !> rule_dual or rule_primal
     integer :: kind = rule_dual
+    !> pairs that are never contacts
+    type(material_filter_t) :: filter
   contains
     procedure :: range => rule_range
     procedure :: reach => rule_reach
@@ -224,7 +227,8 @@ contains
       do b = 1, size(self%boundaries)
         if (.not. self%boundaries(b)%touches()) cycle
         call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)
-        if (distance - bodies%radius(k) <= self%rule%range()) call list%add(k, -b, no_shift)
+        if (.not. distance - bodies%radius(k) <= self%rule%range()) cycle
+        if (.not. self%rule%filter%lets_pass(bodies, self%boundaries, k, -b)) call list%add(k, -b, no_shift)
       end do
     end do
   end subroutine search_boundaries
@@ -317,6 +321,7 @@ contains
     end do
     if (square > (bodies%radius(i) + bodies%radius(j) + self%rule%range())**2) return
     if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
+    if (self%rule%filter%lets_pass(bodies, self%boundaries, i, j)) return
     periodic = self%period%on()
     shift(:) = 0
     if (periodic) then

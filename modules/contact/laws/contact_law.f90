@@ -50,6 +50,8 @@ module gravier_contact_law
     logical :: attracts = .false., remembers = .false.
     !> all its pairs have the same terms, which are then found once a run and not once a step and pair
     logical :: is_constant = .false.
+    !> bodies of its two materials pass through each other: their pairs are never listed
+    logical :: passes = .false.
     !> the largest coefficients that it hands over; all but that of friction are the same for all its pairs
     type(coefficients_t) :: largest
     !> gap up to which bodies that have not been nearer act on each other [m]

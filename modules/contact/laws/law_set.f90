@@ -7,6 +7,7 @@ module gravier_law_set
   use gravier_declared_keys, only: declared_key_t
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_contact_law, only: contact_law_t, contact_pair_t, contact_terms_t
+  use gravier_material_filter, only: material_filter_t
   use gravier_law_registry, only: law_holder_t, registered_laws
   implicit none
   private
@@ -38,6 +39,8 @@ module gravier_law_set
     !> the largest of all laws; range in [m]
     type(coefficients_t) :: largest
     real(dp) :: range = 0.0_dp
+    !> of the pairs of materials whose law is no contact
+    type(material_filter_t) :: filter
   contains
     procedure :: init => law_set_init
     procedure :: add => law_set_add
@@ -142,6 +145,7 @@ contains
     associate (law => self%of(self%n)%law)
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
+      if (law%passes) call self%filter%add(a, b, size(self%of_pair, 1))
       self%varies = self%varies .or. .not. law%is_constant
       call self%largest%raise_to(law%largest)
       self%range = max(self%range, law%range)

@@ -5,6 +5,7 @@ module gravier_pair_laws
   use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_law_set, only: law_set_t
+  use gravier_material_filter, only: material_of
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_halo, only: local_bodies_t, halo_t
@@ -49,8 +50,8 @@ contains
     integer, intent(in) :: p
 
     l = 0
-    if (laws%n > 0) l = laws%number_of(material_of(view, boundaries, view%list%candidate(p)), &
-      & material_of(view, boundaries, view%list%antagonist(p)))
+    if (laws%n > 0) l = laws%number_of(material_of(view%bodies, boundaries, view%list%candidate(p)), &
+      & material_of(view%bodies, boundaries, view%list%antagonist(p)))
     if (l == 0) l = laws%default_of(boundary_of(view, p))
   end function law_of
 
@@ -65,23 +66,6 @@ contains
     if (allocated(laws%of)) terms = laws%of(l)%terms
     terms%free_gap = max(gap, 0.0_dp)
   end function terms_of
-
-  !> Number of the material of grain `k` of a view, or of boundary -k. Grains glued to a boundary that has one are of its material.
-  pure integer function material_of(view, boundaries, k) result(material)
-    type(local_bodies_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    integer, intent(in) :: k
-    integer :: b
-
-    if (k < 0) then
-      material = boundaries(-k)%material
-      return
-    end if
-    material = view%bodies%material(k)
-    b = view%bodies%glued(k)
-    if (b == 0) return
-    if (boundaries(b)%material > 0) material = boundaries(b)%material
-  end function material_of
 
   !> The terms of pair `p` over a step under law `l`, and its state.
   pure subroutine evaluate_pair(view, boundaries, laws, l, p, place, normal, pair)

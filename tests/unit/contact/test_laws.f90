@@ -6,6 +6,10 @@ program test_laws
   use gravier_contact_law, only: contact_law_t, contact_pair_t, unused
   use gravier_coulomb_law, only: coulomb_law_t
   use gravier_frictionless_law, only: frictionless_law_t
+  use gravier_none_law, only: none_law_t
+  use gravier_material_filter, only: material_filter_t, material_of
+  use gravier_body_store, only: body_set_t, body_layout_t
+  use gravier_boundary, only: boundary_t
   use gravier_velocity_law, only: velocity_law_t
   use gravier_adhesive_law, only: adhesive_law_t
   use gravier_capillary_law, only: capillary_law_t
@@ -28,6 +32,7 @@ program test_laws
   call check_bonded()
   call check_law_set()
   call check_defaults()
+  call check_none()
   call finish_checks()
 
 contains
@@ -70,7 +75,7 @@ contains
 
   !> Each law under its word, and every key once, with the laws that have it.
   subroutine check_registry()
-    character(len=*), parameter :: words = "coulomb frictionless velocity adhesive capillary bonded"
+    character(len=*), parameter :: words = "coulomb frictionless none velocity adhesive capillary bonded"
     type(law_holder_t), allocatable :: laws(:)
     type(collected_keys_t) :: collected
     type(declared_key_t), allocatable :: own(:)
@@ -79,7 +84,7 @@ contains
     call registered_laws(laws)
     call law_keys(collected)
     n = size(collected%keys)
-    call check_equal(size(laws), 6, "laws")
+    call check_equal(size(laws), 7, "laws")
     call check_equal(collected%kinds, words, "words of the laws, in the order of the registry")
     do i = 1, n
       call check_equal(count(collected%keys(1:n)%key%name == collected%keys(i)%key%name), 1, &
@@ -354,5 +359,58 @@ contains
       & [0.5_dp, 0.3_dp, 1.0_dp, 0.0_dp, 0.0_dp])
     call check(laws%varies .and. laws%varies_at(1) .and. .not. laws%varies_at(0), "a law whose terms depend on the pair")
   end subroutine check_defaults
+
+  !> Bodies of two materials whose law is no contact pass through each other, and others do not.
+  subroutine check_none()
+    type(law_set_t) :: laws
+    type(none_law_t) :: law
+    real(dp) :: nothing(0)
+    type(contact_pair_t) :: pair
+    type(body_set_t) :: bodies
+    type(boundary_t) :: boundaries(2)
+
+    call set_law(law, "", nothing)
+    call check(law%passes .and. law%is_constant .and. .not. law%remembers, "none: its bodies pass")
+    pair = pair_at(0.01_dp)
+    call law%evaluate(pair)
+    call check_terms(pair, 0.0_dp, 0.0_dp, 0.01_dp, "none: nothing is added to a pair")
+    call laws%init(3, 2)
+    call add_law(laws, 1, 1, "coulomb", "friction", [0.5_dp])
+    call check(.not. allocated(laws%filter%passes), "none: without it there is nothing to ask")
+    call add_law(laws, 3, 2, "none", "friction", [0.5_dp])
+    call check_close(laws%largest%friction, 0.5_dp, 0.0_dp, "none: it has no friction")
+    ! bodies of materials 1, 2, 3, none, and 2 glued to boundaries 1 (without a material) and 2 (of material 3)
+    call bodies%init(body_layout_t(2, 3, 0), 6)
+    bodies%material(1:6) = [1, 2, 3, 0, 2, 2]
+    bodies%glued(1:6) = [0, 0, 0, 0, 1, 2]
+    boundaries(2)%material = 3
+    call check_equal(material_of(bodies, boundaries, 5), 2, "a glued grain keeps its material where the boundary has none")
+    call check_equal(material_of(bodies, boundaries, 6), 3, "a glued grain is of the material of its boundary")
+    call check_equal(material_of(bodies, boundaries, -2), 3, "a boundary has its own")
+    associate (filter => laws%filter)
+      call check(filter%lets_pass(bodies, boundaries, 2, 3) .and. filter%lets_pass(bodies, boundaries, 3, 2), "none: either order")
+      call check(.not. filter%lets_pass(bodies, boundaries, 1, 2), "none: another pair meets")
+      call check(.not. filter%lets_pass(bodies, boundaries, 3, 3), "none: equal materials meet")
+      call check(.not. filter%lets_pass(bodies, boundaries, 4, 3), "none: what has no material meets all")
+      call check(filter%lets_pass(bodies, boundaries, 3, 5), "none: a glued grain")
+      call check(filter%lets_pass(bodies, boundaries, 2, -2), "none: a boundary")
+      call check(.not. filter%lets_pass(bodies, boundaries, 3, -2), "none: a boundary of an equal material")
+      call check(.not. filter%lets_pass(bodies, boundaries, 2, -1), "none: a boundary without a material")
+    end associate
+    call check_filter(bodies, boundaries)
+  end subroutine check_none
+
+  !> A filter by itself: nothing passes until a pair is added.
+  subroutine check_filter(bodies, boundaries)
+    type(body_set_t), intent(in) :: bodies
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(material_filter_t) :: filter
+
+    call check(.not. filter%lets_pass(bodies, boundaries, 1, 2), "a filter lets nothing pass at first")
+    call filter%add(1, 2, 3)
+    call check(filter%lets_pass(bodies, boundaries, 1, 2), "and what is added then")
+    call filter%add(3, 3, 3)
+    call check(filter%lets_pass(bodies, boundaries, 1, 2) .and. filter%lets_pass(bodies, boundaries, 3, 3), "and both of two")
+  end subroutine check_filter
 
 end program test_laws
