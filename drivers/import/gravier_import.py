@@ -81,9 +81,12 @@ class Entry:
         return self.get(name) if name in self.values or len(row) < place else row[place - 1]
 
     def shift(self, count):
-        """Place of a contactor in its body, (coo1, coo2, ...) on a line after the first; the node where there is none."""
-        row = next((row for row in self.rows[1:] if "coo1" in row), {})
-        return np.array(list(row.values())[:count] if row else [0.0] * count)
+        """Place of a contactor in its body: coo1, coo2, ... after its sizes, which may have these names too. The node where there is none."""
+        for k, row in enumerate(self.rows):
+            start = list(row).index("coo1") if "coo1" in row else len(row)
+            if len(row) - start >= count and k + start > 0:
+                return np.array(list(row.values())[start:start + count])
+        return np.zeros(count)
 
     def get(self, name, default=None):
         if name in self.values:

@@ -369,7 +369,7 @@ contains
     type(body_set_t) :: bodies
     type(boundary_t) :: boundaries(2)
 
-    call set_law(law, "", nothing)
+    call law%set(nothing)
     call check(law%passes .and. law%is_constant .and. .not. law%remembers, "none: its bodies pass")
     pair = pair_at(0.01_dp)
     call law%evaluate(pair)

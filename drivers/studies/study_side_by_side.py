@@ -1,0 +1,220 @@
+#!/usr/bin/env python3
+"""Examples of LMGC90 by LMGC90 itself and by Gravier, side by side: the same DATBOX, step, number of steps and law.
+
+    python3 drivers/studies/study_side_by_side.py EXAMPLE... --out DIR --pylmgc90 PATH [--steps N]
+
+EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
+LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. Displacements
+are compared body by body, over the radius of the ball of the area or volume of the body; kinetic energies are those of translation; seconds are
+those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. Exit status: 0; 2 LMGC90 is not there."""
+import os
+import re
+import resource
+import runpy
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from study_support import BINARIES, ENVIRONMENT, plt, read_history, states, write_csv
+
+import gravier
+from one_line import OneLineParser
+from study_lmgc90 import convert
+
+
+class Enough(Exception):
+    """The steps that were asked for are made."""
+
+
+def play_lmgc90(steps):
+    """In a copy of an example: run its command script for so many steps and leave record.npz."""
+    from pylmgc90 import chipy
+    record = {"place": [], "velocity": [], "reaction": [], "seconds": []}
+    clock = {"last": None}
+
+    def of_all(name):
+        kind = "RBDY2" if chipy.macro.DIMENSION == 2 else "RBDY3" if hasattr(chipy, "macro") else ""
+        get, count = getattr(chipy, f"{kind}_GetBodyVector"), getattr(chipy, f"{kind}_GetNb{kind}")()
+        return [get(name, k + 1) for k in range(count)]
+
+    def note(inner):
+        def step(*given):
+            inner(*given)
+            now = time.process_time()
+            record["seconds"].append(np.nan if clock["last"] is None else now - clock["last"])
+            for key, name in (("place", "Coor_"), ("velocity", "V____"), ("reaction", "Reac_")):
+                record[key].append(of_all(name))
+            if len(record["place"]) == steps:
+                raise Enough
+            clock["last"] = time.process_time()
+        return step
+
+    chipy.UpdateStep = note(chipy.UpdateStep)
+    for name in ("WriteOut", "WriteDisplayFiles", "WritePostproFiles", "OpenDisplayFiles", "OpenPostproFiles"):
+        setattr(chipy, name, lambda *given, **named: None)
+    chipy.utilities_DisableLogMes = lambda: None
+    script = next(iter(sorted(Path().glob("command*.py")) + sorted(Path().glob("run*.py"))))
+    try:
+        runpy.run_path(str(script), run_name="__main__")
+    except Enough:
+        pass
+    dimension = 2 if len(record["place"][0][0]) == 3 else 3
+    mass = chipy.RBDY2_GetAllMass() if dimension == 2 else chipy.RBDY3_GetAllMass()
+    np.savez("record.npz", mass=np.asarray(mass), dimension=dimension, **{key: np.array(value) for key, value in record.items()})
+    # its own end may leave with an error where files are closed that are not open
+    sys.stdout.flush()
+    os._exit(0)
+
+
+def by_lmgc90(example, place, options):
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(example, place)
+    with open(place / "said.txt", "w", encoding="utf-8") as said:
+        subprocess.run([sys.executable, str(Path(__file__).resolve()), "--play", str(options.steps)], cwd=place, stdout=said, stderr=said, check=False,
+                       stdin=subprocess.DEVNULL,
+                       env={**os.environ, "PYTHONPATH": str(options.pylmgc90.resolve()), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+    text = (place / "said.txt").read_text(encoding="latin-1")
+    if not (place / "record.npz").exists():
+        sys.exit(f"study_side_by_side: LMGC90 did not run {example.name}: {(text.strip().splitlines() or ['nothing said'])[-1]}")
+    record = dict(np.load(place / "record.npz"))
+    record["iterations"] = [int(number) for number in re.findall(r"NLGS(?:3D)? ITERATION\s*:\s*(\d+)", text)]
+    return record
+
+
+def by_gravier(example, place, options):
+    """Run with every step written, then once for the seconds."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
+    options.steps = int(options.steps)
+    _, _, _, refused, _ = convert(example, place, options)
+    if refused:
+        sys.exit(f"study_side_by_side: {example.name} does not import: {refused}")
+    text = (place / "case.nml").read_text(encoding="utf-8")
+    spent = []
+    for name, every, steps in (("start", 0, 0), ("bare", 0, options.steps), ("full", 1, options.steps)):
+        changed = re.sub(r"every = \d+", f"every = {every}", text).replace("'case_results'", f"'{name}'")
+        (place / f"{name}.nml").write_text(re.sub(r"steps = \d+", f"steps = {steps}", changed), encoding="utf-8")
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([str((BINARIES / "gravier").resolve()), f"{name}.nml"], cwd=place, check=False, stdin=subprocess.DEVNULL,
+                       stdout=subprocess.DEVNULL, env={**ENVIRONMENT, **os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return (spent[1] - spent[0]) / options.steps
+
+
+def compare(example, options):
+    name = example.name
+    ours, theirs = options.out / name / "gravier", options.out / name / "lmgc90"
+    record = by_lmgc90(example, theirs, options)
+    seconds = by_gravier(example, ours, options)
+    d = int(record["dimension"])
+    steps = [(number, time_of, {key: group[f"bodies/{key}"][:] for key in ("id", "position", "velocity", "mass")}, group["boundaries/force"][:]
+              if "boundaries" in group else np.zeros((1, d))) for number, time_of, group in states(ours / "full/results.h5")]
+    identifier = steps[0][2]["id"]
+    free = (identifier <= len(record["mass"])) & (steps[0][2]["mass"] > 0)
+    moved = np.array([body["position"] - steps[0][2]["position"] for _, _, body, _ in steps])
+    # the bodies of LMGC90 in the order of those here; what is glued to boundaries here is none of the free ones
+    walls = {int(word) for word in re.findall(r"name = 'body (\d+)", (ours / "case.nml").read_text(encoding="utf-8"))}
+    free &= ~np.isin(identifier, sorted(walls))
+    place = record["place"][:, identifier[free] - 1, :d]
+    # its states are those of the ends of steps 1, 2, ...
+    first = next(k for k, step in enumerate(steps) if step[0] == 1)
+    count = min(len(place), len(steps) - first)
+    drift = np.linalg.norm((place[:count] - place[0]) - (moved[first:first + count] - moved[first])[:, free], axis=2)
+    mass = steps[0][2]["mass"][free]
+    size = np.cbrt(mass / mass.max()) if d == 3 else np.sqrt(mass / mass.max())
+    extent = options.extent.get(name) or gravier_size(ours / "full", free)
+    size = extent * size / size.max()
+    ours_energy = [0.5 * (mass * (body["velocity"][free, :d]**2).sum(1)).sum() for _, _, body, _ in steps[first:first + count]]
+    theirs_mass = record["mass"][identifier[free] - 1]
+    theirs_energy = 0.5 * (theirs_mass * (record["velocity"][:count, identifier[free] - 1, :d]**2).sum(2)).sum(1)
+    up = d - 1
+    weight = mass.sum() * 9.81
+    ground = sorted(walls)
+    theirs_force = record["reaction"][count - 1, np.array(ground) - 1, up].sum()
+    ours_force = steps[first + count - 1][3][:, up].sum()
+    history = read_history(ours / "full")
+    row = {"example": name, "bodies": int(free.sum()), "steps": count, "largest_difference_over_size": float((drift[-1] / size).max()),
+           "median_difference_over_size": float(np.median(drift[-1] / size)),
+           "largest_way_over_size": float((np.linalg.norm(place[count - 1] - place[0], axis=1) / size).max()),
+           "mass_ratio": float((theirs_mass / mass).mean()),
+           "energy_lmgc90": float(theirs_energy[-1]), "energy_gravier": float(ours_energy[-1]),
+           "ground_over_weight_lmgc90": float(theirs_force / weight), "ground_over_weight_gravier": float(ours_force / weight),
+           "iterations_lmgc90": float(np.mean(record["iterations"])) if record["iterations"] else float("nan"),
+           "iterations_gravier": float(np.mean(history["iterations"])),
+           "seconds_lmgc90": float(np.nanmean(record["seconds"])), "seconds_gravier": float(seconds)}
+    return row, (d, theirs_energy, np.array(ours_energy), record, identifier, free, ours / "full", count, first, size)
+
+
+def gravier_size(folder, free):
+    """Radius of the disk or ball of the largest free body: of its radius where it is one."""
+    bodies = gravier.Run(folder).bodies(0)
+    return float(np.max(np.asarray(bodies.radius)[free]))
+
+
+def draw(rows, kept, path):
+    """Places of the last step by both, and the kinetic energies."""
+    figure, axes = plt.subplots(len(rows), 3, figsize=(12, 3.2 * len(rows)), squeeze=False)
+    for (row, (d, theirs, ours, record, identifier, free, folder, count, first, size)), line in zip(zip(rows, kept), axes):
+        run = gravier.Run(folder)
+        start, last = run.bodies(0), run.bodies(count)
+        outlines = run.outlines(count)
+        plane = [0, d - 1]
+        there = record["place"][count - 1, identifier[free] - 1][:, :d] - record["place"][0, identifier[free] - 1][:, :d] \
+            + np.asarray(run.bodies(1).position)[free]
+        for axis, title, places in ((line[0], "LMGC90", there), (line[1], "Gravier", np.asarray(last.position)[free])):
+            way = np.linalg.norm(places - np.asarray(start.position)[free], axis=1) / size
+            shown = axis.scatter(*places[:, plane].T, c=way, s=2)
+            for k, polygons in zip(np.flatnonzero(free), (outlines[k] for k in np.flatnonzero(free))):
+                shift = places[np.searchsorted(np.flatnonzero(free), k)] - np.asarray(last.position)[k]
+                for polygon in polygons:
+                    closed = (np.vstack([polygon, polygon[:1]]) + shift)[:, plane]
+                    axis.plot(*closed.T, lw=0.3, color="0.4")
+            axis.set_aspect("equal")
+            axis.set_title(f"{row['example']}, step {count}: {title}", fontsize=8)
+            figure.colorbar(shown, ax=axis, shrink=0.7).set_label("way / size", fontsize=7)
+            axis.tick_params(labelsize=6)
+        for values, title, style in ((theirs, "LMGC90", "-"), (ours, "Gravier", "--")):
+            line[2].semilogy(np.arange(1, len(values) + 1), np.maximum(values, 1e-30), style, label=title)
+        line[2].set_xlabel("step", fontsize=7)
+        line[2].set_ylabel("kinetic energy of translation [J]", fontsize=7)
+        line[2].tick_params(labelsize=6)
+        line[2].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=130)
+
+
+def main():
+    if sys.argv[1:2] == ["--play"]:
+        play_lmgc90(int(sys.argv[2]))
+    parser = OneLineParser(prog="study_side_by_side", description=__doc__.splitlines()[0])
+    parser.add_argument("examples", type=Path, nargs="+", help="directories with a DATBOX and a command script")
+    parser.add_argument("--out", type=Path, required=True, help="directory of the tables, the picture and the runs")
+    parser.add_argument("--pylmgc90", type=Path, required=True, help="directory that holds the Python package pylmgc90")
+    parser.add_argument("--steps", type=int, default=100, help="steps (100)")
+    options = parser.parse_args()
+    options.extent = {}
+    options.out = options.out.resolve()
+    there = subprocess.run([sys.executable, "-c", "from pylmgc90 import chipy; chipy.Initialize"], capture_output=True, text=True, check=False,
+                           env={**os.environ, "PYTHONPATH": str(options.pylmgc90.resolve())})
+    if there.returncode:
+        print(f"study_side_by_side: LMGC90 is not in {options.pylmgc90}: {(there.stderr.strip().splitlines() or ['?'])[-1]}: expected a directory with "
+              "pylmgc90 and its module chipy", file=sys.stderr)
+        return 2
+    results = [compare(example.resolve(), options) for example in options.examples]
+    rows, kept = [row for row, _ in results], [kept for _, kept in results]
+    write_csv(options.out / "study_side_by_side.csv", {name: [row[name] for row in rows] for name in rows[0]})
+    names = list(rows[0])
+    lines = ["| | " + " | ".join(row["example"] for row in rows) + " |", "|---|" + "---|" * len(rows)]
+    lines += [f"| {name.replace('_', ' ')} | " + " | ".join(f"{row[name]:.3g}" for row in rows) + " |" for name in names[1:]]
+    (options.out / "study_side_by_side.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print("\n".join(lines))
+    draw(rows, kept, options.out / "side_by_side.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
