@@ -482,7 +482,7 @@ class Case:
         self.stands_for = {}
         self.grains, self.boundaries, self.remarks, self.used, self.materials, self.met = [], [], [], [], [], {}
         #: bodies whose inertia or centre of mass their shape decides, by --homogeneous
-        self.replaced = 0
+        self.replaced = set()
         #: lines of the file of shapes with their names, which bodies share
         self.shapes = {}
         self.free = [body for body in bodies if not body.drives and all(contactor.words[0] in PIECES for contactor in body.contactors)]
@@ -529,7 +529,7 @@ class Case:
             wanted = {frozenset((one, other)) for one in groups[0] for other in groups[1]}
             # pairs of which no body has both sides, and walls by themselves, need no line
             if len(wanted) > 1 and ({frozenset(pair) for pair, *_ in found} != wanted or len({law for _, law, _, _ in found}) > 1):
-                found[0][3].refuse(f"contactors {' and '.join(' '.join(thing) for thing in groups[0])} of one body that do not see the same under "
+                found[0][3].refuse(f"contactors {' and '.join(' '.join(thing) for thing in max(groups, key=len))} of one body that do not see the same under "
                                    "one law", "the same lines $seety for each of them: a body has one material here")
             self.sees.append((set(merged), found[0][1], max(alert for _, _, alert, _ in found), found[0][3]))
 
@@ -680,7 +680,7 @@ class Case:
         """Inertia or centre of mass that are not those of the shape: refused, or replaced where --homogeneous says so."""
         if not self.homogeneous:
             body.bulk.refuse(found, f"{expected}; or --homogeneous, with which the shape decides and the mass stays")
-        self.replaced += 1
+        self.replaced.add(body.rank)
 
     def check_free(self, body):
         contactor = body.contactors[0]
@@ -855,7 +855,7 @@ class Case:
         if not self.used:
             self.free[0].start.refuse("the bodies that move freely see nothing", "a contact law: $seety of TACT_BEHAV.DAT")
         if self.replaced:
-            self.remarks.append(f"{self.replaced} bodies have the inertia and the centre of mass of their shapes here, not those of BODIES.DAT")
+            self.remarks.append(f"{len(self.replaced)} bodies have the inertia and the centre of mass of their shapes here, not those of BODIES.DAT")
 
 
 # ---- files

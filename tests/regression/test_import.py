@@ -638,7 +638,7 @@ class Import(RunTestCase):
             ({"bodies": arrow + wall, "laws": flat}, ("BODIES.DAT: line 9", "POLYG that is not convex")),
             ({"bodies": beside + wall, "laws": flat}, ("BODIES.DAT: line 5", "its centre of mass", "expected contactors about their centre of mass")),
             ({"bodies": square.replace("gyrd= 0.0000000D+00", "gyrd= 0.5000000D+00") + wall, "laws": flat}, ("line 5", "gyrd= 0.5: expected 0 or 0.408248")),
-            ({"bodies": cluster + wall}, ("TACT_BEHAV.DAT: line 3", "contactors DISKx BLUEx and DISKx REDxx of one body", "one law: expected the same lines $seety")),
+            ({"bodies": cluster + wall}, ("TACT_BEHAV.DAT: line 5", "contactors DISKx BLUEx and DISKx REDxx of one body", "one law: expected the same lines $seety")),
             ({"bodies": disk.replace("DISKx", "PT2Dx") + wall}, ("BODIES.DAT: line 9", "a contactor PT2Dx of a body RBDY2")),
             ({"bodies": disk.replace("gyrd= 0.0000000D+00", "gyrd= 0.1000000D-01") + wall}, ("gyrd= 0.01", "homogeneous disk")),
             ({"bodies": disk.replace("stone", "brick") + wall}, ("material brick",)),
