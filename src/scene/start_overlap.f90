@@ -4,7 +4,7 @@ module gravier_start_overlap
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_periodic, only: shift_of_code
-  use gravier_neighbour_search, only: neighbour_rule_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_pair_points, only: pair_points_t
   use gravier_shape_contacts, only: shape_work_t, find_points

@@ -138,7 +138,9 @@ class LastWords(RunTestCase):
         self.assertAlmostEqual(float(found[1]) / history["residual"].max(), 1.0, delta=6e-3)
         self.assertAlmostEqual(float(found[2]) / worst.max(), 1.0, delta=6e-3)
         self.assertNotRegex(line(run, "to halve it"), "ten times|longer")
-        right = run_case(merged(self.rest, {"solver": {"criterion": "residual", "tolerance": 1e-6}}), 1, self.here("right"))
+        # sweeps may wander above this tolerance for thousands of iterations
+        newton = {"method": "newton", "criterion": "residual", "tolerance": 1e-6, "acceleration": None}
+        right = run_case(merged(self.rest, {"solver": newton}), 1, self.here("right"))
         self.assertEqual(line(right, "finished"), "finished    all 5 steps reached the tolerance; results in results")
 
     def test_advice(self):

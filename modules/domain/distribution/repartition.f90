@@ -55,7 +55,7 @@ contains
     real(dp) :: lower(decomposition%nd), upper(decomposition%nd), edge
 
     call decomposition%bounding_box(bodies, lower, upper)
-    edge = 2.0_dp*decomposition%rule%largest_radius + decomposition%rule%range()
+    edge = decomposition%rule%cell_edge()
     ! without grains any edge serves
     if (.not. edge > 0.0_dp) edge = 1.0_dp
     call check_subdomains(lower, upper, edge, rule%subdomains, error)
