@@ -69,7 +69,7 @@ contains
     character(len=24) :: row(2)
 
     write (row, "(f0.3)") ranks, subdomains
-    text = "seconds in sweeps: slowest rank "//trim(row(1))//", slowest subdomain "//trim(row(2))
+    text = "time of sweeps over its mean: "//trim(row(1))//" on the slowest rank, "//trim(row(2))//" in the slowest subdomain"
   end function balance_text
 
   !> What went wrong in a step.
@@ -109,7 +109,7 @@ contains
         & " m/s,"
     else if (solve%velocity_error <= solver%accuracy*solve%velocity_scale) then
       ! what sinks, and what moves where the solution is at rest, counts more than in the estimate
-      text = "velocity error with its weights "//to_text(solve%figure, 3)//" of U above the accuracy "//to_text(solver%accuracy, 3)
+      text = "weighted velocity error "//to_text(solve%figure, 3)//" of U above the accuracy "//to_text(solver%accuracy, 3)
     else
       text = "velocity error "//to_text(solve%velocity_error, 3)//" m/s above "//to_text(solver%accuracy, 3)//" of "// &
         & to_text(solve%velocity_scale, 3)//" m/s"

@@ -88,7 +88,7 @@ contains
   pure function newton_features() result(features)
     type(method_features_t) :: features
     features = method_features_t(name="newton", &
-      & meaning="sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method", direct_interface_only=.true.)
+      & meaning="accelerated sweeps of NSCDD and, where they stagnate, a proximal Newton method", direct_interface_only=.true.)
   end function newton_features
 
   subroutine newton_set(self, options)

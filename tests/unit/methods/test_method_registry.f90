@@ -77,13 +77,13 @@ contains
     call make_method("nlgs", method_options_t(), method)
     call check_equal(method%direction_text, "", "no direction")
     call make_method("nscdd_ep", method_options_t(active_only=.true.), method)
-    call check_equal(method%direction_text, "l = 1.00E+002/W_aa (automatic), active contacts", "nscdd_ep on active contacts")
+    call check_equal(method%direction_text, "l = 1.00E+02/W_aa (automatic), active contacts", "nscdd_ep on active contacts")
     call make_method("nscdd_ep", method_options_t(), method)
-    call check_equal(method%direction_text, "l = 3.00E-001/W_aa (automatic), all contacts", "nscdd_ep on all contacts")
+    call check_equal(method%direction_text, "l = 3.00E-01/W_aa (automatic), all contacts", "nscdd_ep on all contacts")
     call make_method("schwarz_ec", method_options_t(), method)
-    call check_equal(method%direction_text, "l = 3.00E+000/W_aa (automatic), all contacts", "schwarz_ec")
+    call check_equal(method%direction_text, "l = 3.00E+00/W_aa (automatic), all contacts", "schwarz_ec")
     call make_method("schwarz_ec", method_options_t(direction_given=.true., direction=2.5_dp, direction_relative=.false.), method)
-    call check_equal(method%direction_text, "l = 2.50E+000 kg, all contacts", "a given direction")
+    call check_equal(method%direction_text, "l = 2.50E+00 kg, all contacts", "a given direction")
   end subroutine test_directions
 
   !> Momentum holds the impulses and velocities of one iteration, Newton's method more.
