@@ -92,8 +92,8 @@ contains
     logical :: accelerated
 
     associate (problem => simulation%problem, method => simulation%method)
-      accelerated = method%momentum%on
-      method%momentum%on = .false.
+      accelerated = method%acceleration%on
+      method%acceleration%on = .false.
       call method%start(problem, error)
       if (.not. allocated(error)) call velocity%start(problem, 0.1_dp*problem%error_scale)
       n = 0
@@ -110,7 +110,7 @@ contains
         end if
         call velocity%keep_copy(problem, method, k)
       end do
-      method%momentum%on = accelerated
+      method%acceleration%on = accelerated
       if (allocated(error)) return
       reference%residual = row%residual
       reference%estimate = row%estimate

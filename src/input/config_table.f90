@@ -8,7 +8,7 @@ module gravier_config_table
   use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
-    & with_momentum, with_momentum_on_active, with_sleeping
+    & accelerated, accelerated_on_active, with_sleeping
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   implicit none
   private
@@ -459,8 +459,8 @@ contains
       case ("relaxation")
         keys(k)%chosen = method_words(that_relax)
       case ("acceleration")
-        keys(k)%meaning = trim(keys(k)%meaning)//" "//quoted_names(with_momentum, "`", "and")//" and, on active contacts, "// &
-          & quoted_names(with_momentum_on_active, "`", "and")
+        keys(k)%meaning = trim(keys(k)%meaning)//" "//quoted_names(accelerated, "`", "and")//" and, on active contacts, "// &
+          & quoted_names(accelerated_on_active, "`", "and")
       case ("sleeping")
         keys(k)%meaning = trim(keys(k)%meaning)//" ("//quoted_names(with_sleeping, "`", "and")//" only)"
       end select

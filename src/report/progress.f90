@@ -7,9 +7,9 @@ module gravier_progress
   implicit none
   private
   public :: progress_t, duration_text
-  public :: warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, warn_partition, note_balance, note_scale
+  public :: warn_unconverged, warn_fast, warn_lowered, warn_acceleration, warn_relaxation, warn_partition, note_balance, note_scale
 
-  integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_momentum = 4, warn_relaxation = 5, &
+  integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_acceleration = 4, warn_relaxation = 5, &
     & warn_partition = 6, note_balance = 7, note_scale = 8
   integer, parameter :: n_kinds = 8
   !> what the closing line calls them; a note is not counted there

@@ -13,7 +13,7 @@ module gravier_run_log
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory
-  use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_momentum, &
+  use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_acceleration, &
     & warn_relaxation, warn_partition, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line
@@ -384,7 +384,7 @@ contains
     if (lowered > 0) call warn(self, warn_lowered, lowered, &
       & "warning     the changes of the impulses grow or oscillate: search direction l lowered "//times_text(lowered)// &
       & " in step "//to_text(step), error)
-    if (suspended > 0) call warn(self, warn_momentum, suspended, "warning     accelerated sweeps make no progress: "// &
+    if (suspended > 0) call warn(self, warn_acceleration, suspended, "warning     accelerated sweeps make no progress: "// &
       & "Nesterov momentum suspended "//times_text(suspended)//" in step "//to_text(step), error)
     if (relaxed > 0) call warn(self, warn_relaxation, relaxed, &
       & "warning     the changes of the neighbours' impulses alternate in sign and grow: relaxation factor lowered "// &
