@@ -50,7 +50,7 @@ def place_of(path):
     name = path.relative_to(ROOT).as_posix()
     if name in ROOT_PAGES:
         return ROOT_PAGES[name]
-    if name.startswith("doc/") and path.is_file():
+    if name.startswith("doc/") and not name.startswith("doc/site/") and path.is_file():
         return name[len("doc/"):]
     if path.is_dir():
         return f"tree/{name}/index.md"

@@ -61,7 +61,7 @@ class Site(unittest.TestCase):
             raise unittest.SkipTest(words)
         cls.place = Path(tempfile.mkdtemp(prefix="gravier-site-"))
         cls.addClassCleanup(shutil.rmtree, cls.place, ignore_errors=True)
-        done = subprocess.run([PYTHON, "-m", "mkdocs", "build", "--strict", "--quiet", "-f", str(SOURCE / "mkdocs.yml"), "-d", str(cls.place)],
+        done = subprocess.run([PYTHON, "-m", "mkdocs", "build", "--strict", "-f", str(SOURCE / "mkdocs.yml"), "-d", str(cls.place)],
                               capture_output=True, text=True, check=False, cwd=SOURCE)
         cls.said = done.stdout + done.stderr
         cls.status = done.returncode
@@ -103,6 +103,13 @@ class Site(unittest.TestCase):
         for name, page in self.pages.items():
             if not name.startswith("tree/"):
                 left = re.search(r"STANDSHERE|\$[^$\n]*\\[a-z]+", "".join(page.words))
+                self.assertIsNone(left, f"{name}: {left and left[0]}")
+
+    def test_no_markdown_is_left_in_a_text(self):
+        """Tables, lists, fences and bold words have become HTML."""
+        for name, page in self.pages.items():
+            if not name.startswith("tree/"):
+                left = re.search(r"^\s*\|.*\|\s*$|^```|\*\*\w", "".join(page.words), re.M)
                 self.assertIsNone(left, f"{name}: {left and left[0]}")
 
     def test_all_pages_of_the_sources_are_there(self):
