@@ -193,9 +193,9 @@ contains
         text = "twice the ranks, now "//to_text(simulation%comm%size)//", with as many &decomposition subdomains or more, now "// &
           & to_text(simulation%decomposition%n_subdomains)
       else if (may_loosen(simulation)) then
-        text = "no single key halves it; a longer &time step makes fewer steps, at the price of accuracy"
+        text = "no single key suffices; a longer &time step makes fewer steps, at the price of accuracy"
       else
-        text = "no single key halves it without making the results worse"
+        text = "no single key suffices without making the results worse"
       end if
     end associate
   end function halving_text
