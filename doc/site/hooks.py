@@ -69,6 +69,7 @@ def listing(folder):
 
 def on_config(config):
     config["mdx_configs"].setdefault("toc", {})["slugify"] = github_anchor
+    next(part["Development"] for part in config["nav"] if "Development" in part).append({"Interfaces of the modules": "api/index.html"})
     reference = next(part["Reference"] for part in config["nav"] if "Reference" in part)
     for kind in ("effect", "boundary", "law"):
         reference.append({f"{kind.capitalize()} pages": [f"reference/{path.name}" for path in sorted(ROOT.glob(f"doc/reference/{kind}_*.md"))]})
@@ -98,6 +99,8 @@ def on_files(files, config):
             # what a folder holds is not followed into its own folders
             if not (path.is_dir() and led_to.is_dir()):
                 waiting.append(led_to)
+    # FORD's pages take this place afterwards
+    files.append(File.generated(config, "api/index.html", content="<p>FORD has not made the pages of the modules: pip install ford pcpp.</p>"))
     files.append(File.generated(config, "site.css", content=(ROOT / "doc/site/site.css").read_text(encoding="utf-8")))
     return files
 
