@@ -93,7 +93,7 @@ contains
     end associate
   end function overlap_lines
 
-  !> A share as people write it; what is not 0 is not written as 0.
+  !> A fraction as people write it; what is not 0 is not written as 0.
   pure function percent(share) result(text)
     real(dp), intent(in) :: share
     character(len=:), allocatable :: text

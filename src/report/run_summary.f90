@@ -13,7 +13,7 @@ module gravier_run_summary
   private
   public :: converged_text, time_text, halving_text, verdict_text
 
-  !> phases that are named, the dearest first, and the least share that is [%]
+  !> phases that are named, the dearest first, and the least fraction that is [%]
   integer, parameter :: named = 4
   real(dp), parameter :: least_share = 3.0_dp
   !> contacts of rank 0 below which more ranks do not pay

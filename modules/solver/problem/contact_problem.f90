@@ -153,7 +153,7 @@ contains
     call self%update_local_operator(kernels)
   end subroutine subproblem_share_masses
 
-  !> Inverse diagonal of the local operators from `weight`, into `hot`.
+  !> Inverse diagonal of the local operators from `weight`, into the contact data.
   pure subroutine subproblem_update_local_operator(self, kernels, factors)
     class(subproblem_t), intent(inout) :: self
     type(kernels_t), intent(in) :: kernels
