@@ -30,7 +30,7 @@ module gravier_error_plan
     logical :: at_rest = .false.
     real(dp) :: tight = 1.0e-10_dp
     integer :: limit = 20000
-    !> sweeps without momentum after these, where the residual is not reached
+    !> plain sweeps after these, where the residual is not reached
     integer :: sweeps = 20000
     !> solve by the program's own control, too, from zero impulses
     logical :: by_program = .false.

@@ -77,7 +77,7 @@ contains
       & call sweep_on(plan, simulation, reference, error)
   end subroutine solve_tightly
 
-  !> Sweeps without momentum from where the problem is. How far velocities still go in the second half of them tells how well
+  !> Plain sweeps from where the problem is. How far velocities still go in the second half of them tells how well
   !> the solution is known, without the estimate that is judged by it. Collective.
   subroutine sweep_on(plan, simulation, reference, error)
     type(plan_t), intent(in) :: plan

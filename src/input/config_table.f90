@@ -206,7 +206,7 @@ module gravier_config_table
            note="the value of `wall_pivoting_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "material", kind_text, "''", "", "name of its `&material`, and of that of grains glued to it", &
            note="the value of `wall_material` of `&scene`", chooser="shape", chosen=solid_shapes), &
-     key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is taken away", &
+     key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is removed", &
            unit="s", note="never")]
 
   type(key_t), parameter :: sample_keys(*) = &
