@@ -18,22 +18,26 @@ contains
   function interface_lines(figures, subdomains) result(text)
     type(step_figures_t), intent(in) :: figures
     integer, intent(in) :: subdomains
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: text, bodies
     integer :: m
 
     associate (interface_statistics => figures%interface_statistics)
-      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(interface_statistics%least_contacts)//" to "// &
-        & to_text(interface_statistics%most_contacts)//" a subdomain); interface: "//to_text(interface_statistics%bodies)// &
-        & " bodies, "// &
-        & to_text(interface_statistics%interactions)//" interactions; multiplicity"
+      text = "contacts    "//to_text(figures%contacts)
+      if (subdomains == 1) then
+        text = text//" in one subdomain, no interface"//newline
+        return
+      end if
+      bodies = ""
       do m = 2, n_multiplicities
         if (interface_statistics%multiplicity(m) == 0) cycle
-        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "// &
+        bodies = bodies//", "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "// &
           & to_text(interface_statistics%multiplicity(m))
       end do
-      if (interface_statistics%bodies == 0) text = text//" 1 only"
+      if (interface_statistics%bodies == 0) bodies = ", 1: all"
+      text = text//", "//to_text(interface_statistics%least_contacts)//" to "// &
+        & to_text(interface_statistics%most_contacts)//" a subdomain; interface: "//to_text(interface_statistics%bodies)// &
+        & " bodies, "//to_text(interface_statistics%interactions)//" interactions; bodies by multiplicity "//bodies(3:)//newline
     end associate
-    text = text//newline
     if (figures%interface_statistics%neighbours > 0) text = text//"exchange    "//exchange_text(figures%interface_statistics, &
       & subdomains)//newline
   end function interface_lines
