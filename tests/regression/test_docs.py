@@ -256,6 +256,11 @@ class Words(unittest.TestCase):
             for word in re.findall(r"\./gravier ([a-z]+)", page.read_text(encoding="utf-8")):
                 self.assertIn(word, known, f"{page.name}: ./gravier {word}: no such command")
 
+    def test_citations_have_the_version(self):
+        version = re.search(r"project\(gravier VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+        for path, words in (("CITATION.cff", f"version: {version}\n"), ("doc/citing.md", f"version = {{{version}}}")):
+            self.assertIn(words, (SOURCE / path).read_text(encoding="utf-8"), path)
+
     def test_options_of_the_programs_exist(self):
         count = 0
         for program in ("gravier", "gravier_accuracy", "gravier_columns", "gravier_error", "gravier_fclib", "gravier_import", "gravier_sample"):
