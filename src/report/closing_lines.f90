@@ -89,7 +89,7 @@ contains
     real(dp) :: least, most
 
     associate (effort => simulation%effort)
-      text = "            "//energy_text(simulation)//newline// &
+      text = "energy      "//energy_text(simulation)//newline// &
         & "cost        "//to_text(comm%highest(effort%seconds), 3)//" s in "//counted(effort%solves, "solve")//" with "// &
         & counted(effort%iterations, "iteration")//" in all"//newline
       if (effort%iterations == 0) return
@@ -126,7 +126,7 @@ contains
         turnover = energy%turnover()
       end select
     end if
-    text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
+    text = "balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
   end function energy_text
 
   !> What so many iterations would have taken. Collective.
