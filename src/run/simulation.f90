@@ -54,7 +54,7 @@ contains
 
 contains
 
-  !> Make the scene of a configuration and share it out. Errors are the same on all ranks. Collective.
+  !> Make the scene of a configuration and distribute it. Errors are the same on all ranks. Collective.
   subroutine simulation_init(self, comm, config, error)
     class(simulation_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm

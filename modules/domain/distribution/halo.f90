@@ -35,7 +35,7 @@ module gravier_halo
     type(boundary_t), allocatable :: reference_boundaries(:)
     !> ghosts sent: subdomain of this rank and place among its owned bodies (2, n); subdomain that sees it, and its rank (n)
     integer, allocatable :: sent(:, :), recipient(:), destination(:)
-    !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
+    !> ghosts received, in the order of arrival: subdomain of this rank and place among its local bodies (2, n)
     integer, allocatable :: arrival(:, :)
     !> to be set before the first list
     type(pair_memory_t) :: memory
@@ -49,7 +49,7 @@ module gravier_halo
 
 contains
 
-  !> Make views and lists of the grains as they have settled. Collective.
+  !> Make the local bodies and lists from the grains as they have migrated. Collective.
   subroutine halo_build(self, decomposition)
     class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
@@ -237,7 +237,7 @@ contains
     end do
   end subroutine sort_views
 
-  !> Bring the places, velocities and what else changes in every step up to date in the views. Collective.
+  !> Bring the places, velocities and what else changes in every step up to date of the local bodies. Collective.
   subroutine halo_refresh(self, decomposition)
     class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition

@@ -13,7 +13,7 @@ module gravier_repartition
 
   !> How space is to be divided, and how often.
   type :: repartition_rule_t
-    !> cells with grains in them, shared out by METIS; else boxes
+    !> cells with grains in them, distributed by METIS; else boxes
     logical :: by_graph = .false.
     !> boxes along each axis; where some are 0, they are chosen by the number of subdomains
     integer :: grid(3) = 0
