@@ -90,13 +90,16 @@ contains
     real(dp) :: branch(simulation%decomposition%nd), distance, smaller
     type(pair_points_t) :: points
     type(shape_work_t) :: work
+    logical :: has_points
     integer :: i, j, shift(3)
 
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     associate (bodies => view%bodies, decomposition => simulation%decomposition)
       overlap%id(1) = bodies%id(i)
-      if (decomposition%no > 0) then
+      has_points = decomposition%no > 0
+      if (j < 0) has_points = has_points .or. decomposition%boundaries(-j)%is_faceted()
+      if (has_points) then
         if (j < 0) then
           if (decomposition%boundaries(-j)%remove_at <= simulation%time) return
         end if

@@ -6,10 +6,12 @@ module gravier_neighbour_search
   use gravier_sorting, only: argsort_rows
   use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
   use gravier_body_store, only: body_set_t
-  use gravier_shape_library, only: point_counts_t, boundary_number
+  use gravier_shape_library, only: point_counts_t
+  use gravier_facet, only: near_facets_t
   use gravier_boundary, only: boundary_t
   use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
+  use gravier_pair_places, only: has_facets, repeat_pairs
   use gravier_region, only: region_t
   implicit none
   private
@@ -218,11 +220,17 @@ contains
     type(neighbour_list_t), intent(inout) :: list
     integer :: k, b
     real(dp) :: distance, normal(bodies%nd)
+    type(near_facets_t) :: near
 
     do k = 1, bodies%n
       if (owned(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
       do b = 1, size(self%boundaries)
         if (.not. self%boundaries(b)%touches()) cycle
+        if (self%boundaries(b)%is_faceted()) then
+          call self%boundaries(b)%find_facets(bodies%position(:, k), bodies%radius(k) + self%rule%range(), near)
+          if (near%n > 0) call list%add(k, -b, no_shift)
+          cycle
+        end if
         call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)
         if (distance - bodies%radius(k) <= self%rule%range()) call list%add(k, -b, no_shift)
       end do
@@ -374,35 +382,10 @@ contains
     lower(:) = 0.0_dp
     if (list%n > 0) lower(:) = minval(point, dim=2)
     call sweep_order(point, lower, self%rule%sweep_edge(), id, order)
-    if (bodies%no > 0) call repeat_pairs(self%counts, bodies, list, order)
+    if (bodies%no > 0 .or. has_facets(self%boundaries)) call repeat_pairs(self%counts, self%boundaries, self%rule%range(), &
+      & bodies, list, order)
     call list%finish(order, memory)
   end subroutine sort_list
-
-  !> Let each pair stand in the order as often as its bodies may touch in points.
-  subroutine repeat_pairs(counts, bodies, list, order)
-    type(point_counts_t), intent(in) :: counts
-    type(body_set_t), intent(in) :: bodies
-    type(neighbour_list_t), intent(in) :: list
-    !> of the pairs
-    integer, allocatable, intent(inout) :: order(:)
-    integer, allocatable :: longer(:), points(:)
-    integer :: k, p, n, antagonist
-
-    allocate (points(list%n))
-    do p = 1, list%n
-      antagonist = boundary_number
-      if (list%antagonist(p) > 0) antagonist = bodies%shape(list%antagonist(p))
-      points(p) = counts%between(bodies%shape(list%candidate(p)), antagonist)
-    end do
-    allocate (longer(sum(points)))
-    n = 0
-    do k = 1, size(order)
-      p = order(k)
-      longer(n + 1:n + points(p)) = p
-      n = n + points(p)
-    end do
-    call move_alloc(longer, order)
-  end subroutine repeat_pairs
 
   !> Class of a radius: the grid whose cells are as large as its pairs need.
   pure integer function level_of(radius, largest) result(level)

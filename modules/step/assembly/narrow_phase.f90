@@ -59,17 +59,19 @@ contains
     found%n_awake = found%n
   end subroutine find_contacts
 
-  !> The contacts of disks or spheres: one a pair.
+  !> The contacts of disks or spheres: one a pair, but for boundaries of facets, of which a grain may touch several.
   subroutine find_round_contacts(view, decomposition, physics, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
+    type(shape_work_t) :: work
     integer :: p, i, j, nd
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
+    call work%init(nd)
     do p = 1, view%list%n
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
@@ -88,6 +90,10 @@ contains
         end if
       else
         if (.not. decomposition%boundaries(-j)%present) cycle
+        if (decomposition%boundaries(-j)%is_faceted()) then
+          if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, work, found)
+          cycle
+        end if
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
         gap = distance - view%bodies%radius(i)
         if (is_far(view%list, p, gap, alert)) cycle
@@ -95,6 +101,27 @@ contains
       call add_contact(view, decomposition, physics, p, gap, normal, found)
     end do
   end subroutine find_round_contacts
+
+  !> The contacts of a disk or a sphere with a boundary of facets, whose pair begins at place `p`.
+  subroutine find_facet_contacts(view, decomposition, physics, p, work, found)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    type(shape_work_t), intent(inout) :: work
+    type(contact_list_t), intent(inout) :: found
+    type(pair_points_t) :: points
+    real(dp) :: normal(decomposition%nd)
+    integer :: k
+
+    call find_points(view, decomposition, p, work, points)
+    call carry_memory(points, p, view%list)
+    do k = 1, points%n
+      normal(:) = points%normal(1:size(normal), k)
+      call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found)
+    end do
+    found%overlapping_cores = found%overlapping_cores + points%overlapping_cores
+  end subroutine find_facet_contacts
 
   !> The contacts of bodies with shapes: a pair has as many places in the list as it may have points.
   subroutine find_contacts_of_shapes(view, decomposition, physics, found)

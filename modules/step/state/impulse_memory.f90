@@ -23,15 +23,15 @@ module gravier_impulse_memory
 contains
 
   !> What pairs have to keep.
-  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest) result(memory)
+  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest, has_points) result(memory)
     type(kernels_t), intent(in) :: kernels
-    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted
-    logical, intent(in) :: warm_start, remembers, counts_rest
+    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted; pairs may touch in several points
+    logical, intent(in) :: warm_start, remembers, counts_rest, has_points
 
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
     memory%law_row = merge(1, 0, remembers)
     if (counts_rest) memory%rest_row = memory%law_row + 1
-    if (kernels%row%arm_i > 0) memory%key_row = memory%n_states() + 1
+    if (has_points) memory%key_row = memory%n_states() + 1
   end function memory_of
 
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
