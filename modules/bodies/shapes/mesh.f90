@@ -49,6 +49,7 @@ module gravier_mesh
     procedure :: level => mesh_level
     procedure :: support => mesh_support
     procedure :: n_facets => mesh_n_facets
+    procedure :: get_facet => mesh_get_facet
     procedure :: far_off => mesh_far_off
     procedure :: digest => mesh_digest
     procedure :: find_axes => mesh_find_axes
@@ -322,6 +323,20 @@ contains
     class(mesh_t), intent(in) :: self
     n = size(self%data%corner, 3)
   end function mesh_n_facets
+
+  pure subroutine mesh_get_facet(self, k, corner)
+    class(mesh_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(dp), intent(inout) :: corner(:, :)
+    real(dp) :: axes(3, 3), place(3)
+    integer :: c
+
+    call self%find_axes(axes)
+    do c = 1, size(corner, 2)
+      call turn(axes, self%data%corner(:, c, k), place)
+      corner(:, c) = self%point + place
+    end do
+  end subroutine mesh_get_facet
 
   pure real(dp) function mesh_far_off(self) result(far_off)
     class(mesh_t), intent(in) :: self

@@ -57,6 +57,8 @@ module gravier_surface
     procedure :: find_facets => surface_find_facets
     procedure :: find_box => surface_find_box
     procedure :: n_facets => surface_n_facets
+    procedure :: get_facet => surface_get_facet
+    procedure :: find_axes => surface_find_axes
     procedure :: far_off => surface_far_off
     procedure :: digest => surface_digest
     procedure :: find_middle => surface_find_middle
@@ -150,6 +152,31 @@ contains
     end associate
     n = 0
   end function surface_n_facets
+
+  !> Where the corners of facet `k` are; without effect on a shape that is not faceted.
+  pure subroutine surface_get_facet(self, k, corner)
+    class(surface_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> (3, 2 or 3) [m]
+    real(dp), intent(inout) :: corner(:, :)
+
+    associate (unused_self => self, unused_k => k, unused => corner)
+    end associate
+  end subroutine surface_get_facet
+
+  !> The axes of the file of a faceted shape as they lie now, one a column; the global ones for other shapes.
+  pure subroutine surface_find_axes(self, axes)
+    class(surface_t), intent(in) :: self
+    real(dp), intent(out) :: axes(3, 3)
+    integer :: d
+
+    associate (unused => self)
+    end associate
+    axes(:, :) = 0.0_dp
+    do d = 1, 3
+      axes(d, d) = 1.0_dp
+    end do
+  end subroutine surface_find_axes
 
   !> Largest coordinate or length of the surface [m].
   pure real(dp) function surface_far_off(self) result(far_off)

@@ -9,7 +9,7 @@ module gravier_facet_candidates
   use gravier_facet, only: near_facets_t, find_foot, longest_side
   implicit none
   private
-  public :: facet_candidate_t, facet_candidates_t, tolerance_for
+  public :: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
 
   !> places nearer to each other than this part of the rounding, with normals that differ by less, are one
   real(dp), parameter :: same = 1.0e-6_dp
@@ -141,20 +141,34 @@ contains
     real(dp), intent(in), contiguous :: corner(:, :)
     type(facet_candidate_t), intent(in) :: item
     real(dp), intent(in) :: tolerance, slack
-    real(dp) :: from(3, size(corner, 2)), height, foot(3)
-    integer :: c, where_foot_is
+    real(dp) :: height
+    integer :: c
 
     height = -huge(1.0_dp)
     do c = 1, size(corner, 2)
-      from(:, c) = corner(:, c) - item%foot
-      height = max(height, dot_product(item%normal, from(:, c)))
+      height = max(height, dot_product(item%normal, corner(:, c) - item%foot))
     end do
     rises = .false.
     if (height <= tiny(1.0_dp)) return
-    if (height <= slack*longest_side(corner)) return
-    call find_foot(from, foot, where_foot_is)
-    rises = dot_product(foot, foot) <= tolerance**2
+    if (height > slack*longest_side(corner)) rises = has_point(corner, item%foot, tolerance)
   end function rises
+
+  !> Whether a facet has a point.
+  pure logical function has_point(corner, point, tolerance)
+    !> (3, 2 or 3) [m]
+    real(dp), intent(in), contiguous :: corner(:, :)
+    real(dp), intent(in) :: point(3)
+    !> distance below which the point is on the facet [m]
+    real(dp), intent(in) :: tolerance
+    real(dp) :: from(3, size(corner, 2)), foot(3)
+    integer :: c, where_foot_is
+
+    do c = 1, size(corner, 2)
+      from(:, c) = corner(:, c) - point
+    end do
+    call find_foot(from, foot, where_foot_is)
+    has_point = dot_product(foot, foot) <= tolerance**2
+  end function has_point
 
   !> Drop candidates that are one with another: a point of a side or corner that several facets have.
   pure subroutine facet_candidates_drop_repeated(self, rounding)

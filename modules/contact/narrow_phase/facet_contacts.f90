@@ -9,7 +9,7 @@ module gravier_facet_contacts
   use gravier_polygon_pair, only: placed_piece_t, find_polygon_manifold
   use gravier_polyhedron_pair, only: find_patch
   use gravier_flat_patch, only: make_facet_piece, set_facet_piece, lies_flat, find_flat_patch
-  use gravier_facet_candidates, only: facet_candidate_t, facet_candidates_t, tolerance_for
+  use gravier_facet_candidates, only: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
   use gravier_manifold, only: manifold_t
   implicit none
   private
@@ -166,7 +166,7 @@ contains
     type(placed_pair_t) :: pair
     type(manifold_t) :: manifold
     real(dp) :: corner(3, 3, near%n)
-    integer :: k, n
+    integer :: k, n, pass
 
     found%n = 0
     if (.not. allocated(found%sheet%vertex)) call make_facet_piece(found%sheet)
@@ -178,21 +178,25 @@ contains
     call find_candidates(piece, pair, near, alert, distance, found)
     call found%candidates%sort(near, radius*piece%rounding)
     call found%candidates%drop_hidden(near, tolerance_for(near, radius*piece%rounding), slack_of_pieces)
-    do k = 1, found%candidates%n
-      associate (item => found%candidates%item(found%candidates%order(k)))
-        if (item%dropped) cycle
-        call set_facet_piece(near%corner(:, :, item%place), radius, found%sheet)
-        manifold%n = 0
-        manifold%normal(:) = distance(item%place)%normal
-        manifold%cores_overlap = distance(item%place)%overlap
-        if (lies_flat(found%sheet, distance(item%place))) then
-          call take_plane(near, k, radius*piece%rounding, found, n, corner)
-          call find_flat_patch(piece, radius, distance(item%place), corner(:, :, 1:n), alert, most, manifold)
-        else
-          call find_patch(piece, found%sheet, pair, distance(item%place), alert, most, manifold)
-        end if
-        call found%add(near%number(item%place), manifold)
-      end associate
+    ! planes first: they have the sides that they end at
+    do pass = 1, 2
+      do k = 1, found%candidates%n
+        associate (item => found%candidates%item(found%candidates%order(k)))
+          if (item%dropped) cycle
+          call set_facet_piece(near%corner(:, :, item%place), radius, found%sheet)
+          if (lies_flat(found%sheet, distance(item%place)) .neqv. pass == 1) cycle
+          manifold%n = 0
+          manifold%normal(:) = distance(item%place)%normal
+          manifold%cores_overlap = distance(item%place)%overlap
+          if (pass == 1) then
+            call take_plane(near, k, radius*piece%rounding, found, n, corner)
+            call find_flat_patch(piece, radius, distance(item%place), corner(:, :, 1:n), alert, most, manifold)
+          else
+            call find_patch(piece, found%sheet, pair, distance(item%place), alert, most, manifold)
+          end if
+          call found%add(near%number(item%place), manifold)
+        end associate
+      end do
     end do
   end subroutine find_polyhedron_contacts
 
@@ -227,7 +231,8 @@ contains
     end do
   end subroutine find_candidates
 
-  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side.
+  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side, and nor have
+  !> others at points of theirs.
   pure subroutine take_plane(near, first, rounding, found, n, corner)
     type(near_facets_t), intent(in) :: near
     !> place of the candidate in the order
@@ -237,7 +242,7 @@ contains
     type(facet_contacts_t), intent(inout) :: found
     integer, intent(out) :: n
     !> the first n [m]
-    real(dp), intent(out) :: corner(:, :, :)
+    real(dp), intent(out), contiguous :: corner(:, :, :)
     real(dp) :: normal(3), height, room
     logical :: is_in_plane(near%n)
     integer :: k, c, lead
@@ -257,12 +262,18 @@ contains
       n = n + 1
       corner(:, :, n) = near%corner(:, :, k)
     end do
-    do k = first + 1, found%candidates%n
-      associate (item => found%candidates%item(found%candidates%order(k)), &
-          & chosen => found%candidates%item(found%candidates%order(first)))
-        if (is_in_plane(item%place) .and. dot_product(item%normal, chosen%normal) > one_side) item%dropped = .true.
-      end associate
-    end do
+    associate (chosen => found%candidates%item(found%candidates%order(first)))
+      do k = 1, found%candidates%n
+        associate (item => found%candidates%item(k))
+          if (item%dropped .or. item%place == lead .or. dot_product(item%normal, chosen%normal) <= one_side) cycle
+          item%dropped = is_in_plane(item%place)
+          do c = 1, n
+            if (item%dropped) exit
+            item%dropped = has_point(corner(:, :, c), item%foot, tolerance_for(near, rounding))
+          end do
+        end associate
+      end do
+    end associate
   end subroutine take_plane
 
 end module gravier_facet_contacts
