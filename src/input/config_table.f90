@@ -1,6 +1,6 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the shapes
-!> of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
+!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the
+!> shapes of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
 module gravier_config_table
   use gravier_declared_keys, only: collected_key_t, collected_keys_t, kind_length
   use gravier_law_registry, only: collect_law_keys => law_keys

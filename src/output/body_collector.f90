@@ -77,9 +77,9 @@ contains
   end subroutine collect_boundaries
 
   !> Bodies that the contacts of this rank's subdomains act on and that can move, boundaries included, one item a copy: the table
-  !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), the diagonal of
-  !> M, `load` f = M v_f and `velocity` of the last solve, each of nv components, and `inertia`, the entries xy, xz and yz of M among
-  !> spins in space, where bodies have shapes.
+  !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), the diagonal
+  !> of M, `load` f = M v_f and `velocity` of the last solve, each of nv components, and `inertia`, the entries xy, xz and yz of M
+  !> among spins in space, where bodies have shapes.
   subroutine collect_problem_bodies(problem, table)
     type(contact_problem_t), intent(in) :: problem
     type(field_list_t), intent(out) :: table
@@ -117,7 +117,8 @@ contains
     if (size(inertia, 1) > 0) call table%add_reals("inertia", "kg m^2", inertia)
   end subroutine collect_problem_bodies
 
-  !> The inertia of body `b` in space, which may have a shape, and the load on its spin; of one that cannot turn, what is there stays.
+  !> The inertia of body `b` in space, which may have a shape, and the load on its spin; of one that cannot turn, what is there
+  !> stays.
   pure subroutine take_inertia(sub, b, diagonal, inertia, load)
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: b

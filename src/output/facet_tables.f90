@@ -11,8 +11,8 @@ module gravier_facet_tables
 
 contains
 
-  !> The table `facets`, numbered from 1: the identifier of the `boundary`, and its `corners`, the coordinates of one after the other, in
-  !> the axes of the boundary and from its position. The same on all ranks.
+  !> The table `facets`, numbered from 1: the identifier of the `boundary`, and its `corners`, the coordinates of one after the
+  !> other, in the axes of the boundary and from its position. The same on all ranks.
   subroutine describe_facets(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table

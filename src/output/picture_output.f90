@@ -1,5 +1,5 @@
-!> The files of a run for ParaView: bodies.vtkhdf, a point a grain or, where bodies have shapes, their polygons; contacts.vtkhdf, a line
-!> a contact; and, where boundaries have facets, boundaries.vtkhdf, a triangle or line a facet, once where none of them moves.
+!> The files of a run for ParaView: bodies.vtkhdf, a point a grain or, where bodies have shapes, their polygons; contacts.vtkhdf, a
+!> line a contact; and, where boundaries have facets, boundaries.vtkhdf, a triangle or line a facet, once where none of them moves.
 module gravier_picture_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t

@@ -236,8 +236,8 @@ contains
     normal(:) = away(1:size(x))
   end subroutine boundary_locate
 
-  !> The facets within `reach` of a point, seen from there; none of a surface that is not faceted. One that does not turn may be as wide
-  !> as the period, so that its images are looked at as well. In 2D facets that continue each other are one.
+  !> The facets within `reach` of a point, seen from there; none of a surface that is not faceted. One that does not turn may be as
+  !> wide as the period, so that its images are looked at as well. In 2D facets that continue each other are one.
   pure subroutine boundary_find_facets(self, x, reach, near)
     class(boundary_t), intent(in) :: self
     !> (nd) [m]
@@ -266,8 +266,8 @@ contains
     if (size(x) == 2) call near%join_lines()
   end subroutine boundary_find_facets
 
-  !> The corners of a surface that ends, in order around it, from a point: two of a segment, four of a rectangle; none of what goes on
-  !> for ever, is round or has facets.
+  !> The corners of a surface that ends, in order around it, from a point: two of a segment, four of a rectangle; none of what goes
+  !> on for ever, is round or has facets.
   pure subroutine boundary_find_corners(self, x, n, corners)
     class(boundary_t), intent(in) :: self
     !> (nd) [m]

@@ -8,9 +8,9 @@ module gravier_ear_clipping
 
 contains
 
-  !> The triangles of a simple polygon, which need not be convex and may be a little out of its plane: corners that stick out and have no
-  !> other corner in their triangle are cut off one after the other (G. H. Meisters, Amer. Math. Monthly 82 (1975) 648). Where none is
-  !> left, as in a polygon that crosses itself, the next corner goes.
+  !> The triangles of a simple polygon, which need not be convex and may be a little out of its plane: corners that stick out and
+  !> have no other corner in their triangle are cut off one after the other (G. H. Meisters, Amer. Math. Monthly 82 (1975) 648).
+  !> Where none is left, as in a polygon that crosses itself, the next corner goes.
   pure subroutine clip_ears(point, triangle)
     !> corners, in order around it (3, n), n >= 3
     real(dp), intent(in) :: point(:, :)

@@ -1,5 +1,5 @@
-!> Surfaces of polygons as OBJ files hold them: lines "v x y z" and "f i j k ..."; and lines through points, "l i j k ...". Textures,
-!> normals, names and groups are passed over.
+!> Surfaces of polygons as OBJ files hold them: lines "v x y z" and "f i j k ..."; and lines through points, "l i j k ...".
+!> Textures, normals, names and groups are passed over.
 module gravier_obj_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
@@ -13,8 +13,8 @@ module gravier_obj_file
 
 contains
 
-  !> Points and faces of a file. Failures (status_input): no such file, something that is no number, a face of fewer than three corners
-  !> or of a point that there is not, no face.
+  !> Points and faces of a file. Failures (status_input): no such file, something that is no number, a face of fewer than three
+  !> corners or of a point that there is not, no face.
   subroutine read_obj(path, points, first, corner, error)
     character(len=*), intent(in) :: path
     !> (3, n)
@@ -28,8 +28,8 @@ contains
     if (size(first) == 1) call raise(error, status_input, path//": no line of a face, ""f i j k"", was found")
   end subroutine read_obj
 
-  !> Points of a file and lines through them. Failures (status_input): no such file, something that is no number, a line of fewer than
-  !> two points or of one that there is not, no line.
+  !> Points of a file and lines through them. Failures (status_input): no such file, something that is no number, a line of fewer
+  !> than two points or of one that there is not, no line.
   subroutine read_obj_lines(path, points, first, corner, error)
     character(len=*), intent(in) :: path
     !> (3, n)

@@ -1,4 +1,5 @@
-!> Facets, the pieces that mesh walls are made of: segments in the plane, triangles in space; and those of a wall that are near a point.
+!> Facets, the pieces that mesh walls are made of: segments in the plane, triangles in space; and those of a wall that are near a
+!> point.
 module gravier_facet
   use gravier_kinds, only: dp
   use gravier_rotation, only: cross

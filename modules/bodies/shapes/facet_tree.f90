@@ -82,8 +82,8 @@ contains
     end do
   end subroutine enclose
 
-  !> Put a list into such an order that the value at `place` is no less than those before it and no more than those behind it (Hoare's
-  !> selection; of equal values the number decides, so that the order is one).
+  !> Put a list into such an order that the value at `place` is no less than those before it and no more than those behind it
+  !> (Hoare's selection; of equal values the number decides, so that the order is one).
   pure subroutine put_median(list, value, place)
     integer, intent(inout), contiguous :: list(:)
     !> by the numbers of the list

@@ -15,7 +15,8 @@ module gravier_mesh
   !> of files of single precision, which does not tell points apart.
   real(dp), parameter :: flattest = 1.0e-8_dp, single_rounding = 2.0e-7_dp
 
-  !> The facets of a mesh in the axes of its file, from the origin of that. They never change, and all copies of a boundary share them.
+  !> The facets of a mesh in the axes of its file, from the origin of that. They never change, and all copies of a boundary share
+  !> them.
   type :: mesh_data_t
     !> (3, dimension, facets) [m]
     real(dp), allocatable :: corner(:, :, :)

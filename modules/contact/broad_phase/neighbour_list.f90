@@ -11,16 +11,16 @@ module gravier_neighbour_list
     integer :: n_impulse = 0
     !> rows of the states that laws with a memory give pairs, and of the steps at rest, where contacts may sleep; 0 for none
     integer :: law_row = 0, rest_row = 0
-    !> where bodies have shapes or boundaries facets: the first of two rows of the key that tells a point of a pair from its others, 0
-    !> for no point
+    !> where bodies have shapes or boundaries facets: the first of two rows of the key that tells a point of a pair from its others,
+    !> 0 for no point
     integer :: key_row = 0
   contains
     procedure :: n_states => pair_memory_n_states
     procedure :: words => pair_memory_words
   end type pair_memory_t
 
-  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. A pair of bodies that may touch
-  !> in several points stands there as often, one time after the other.
+  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. A pair of bodies that may
+  !> touch in several points stands there as often, one time after the other.
   !> The impulses of the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
   !> global axes.
   type :: neighbour_list_t

@@ -26,8 +26,8 @@ contains
     end do
   end function has_facets
 
-  !> Let each pair stand in the order as often as its bodies may touch in points. With a boundary of facets that depends on how many of
-  !> these are in range.
+  !> Let each pair stand in the order as often as its bodies may touch in points. With a boundary of facets that depends on how many
+  !> of these are in range.
   pure subroutine repeat_pairs(counts, boundaries, range, bodies, list, order)
     !> of the shapes, where bodies have some
     type(point_counts_t), intent(in) :: counts

@@ -1,9 +1,10 @@
 !> Which facets of a wall a convex piece touches, among those that it is near to.
 !>
-!> A piece touches a wall where its core is locally nearest to the union of the facets. The point of a facet that is nearest to the core is
-!> such a place if no other facet that has the point rises from it along the normal: the normal then lies in the normal cone of each of
-!> them (R. T. Rockafellar, Convex Analysis, 1970, theorem 27.4, for each pair of convex sets). A side or a corner inside a flat part
-!> of the wall, or in a hollow, is therefore no place of contact, and one that sticks out is one place, however many facets have it.
+!> A piece touches a wall where its core is locally nearest to the union of the facets. The point of a facet that is nearest to the
+!> core is such a place if no other facet that has the point rises from it along the normal: the normal then lies in the normal cone
+!> of each of them (R. T. Rockafellar, Convex Analysis, 1970, theorem 27.4, for each pair of convex sets). A side or a corner inside
+!> a flat part of the wall, or in a hollow, is therefore no place of contact, and one that sticks out is one place, however many
+!> facets have it.
 module gravier_facet_candidates
   use gravier_kinds, only: dp
   use gravier_facet, only: near_facets_t, find_foot, longest_side
@@ -13,7 +14,8 @@ module gravier_facet_candidates
 
   !> places nearer to each other than this part of the rounding, with normals that differ by less, are one
   real(dp), parameter :: same = 1.0e-6_dp
-  !> distances that differ by less than this part of the rounding may be equal: facets that lie along the plane of contact come first
+  !> distances that differ by less than this part of the rounding may be equal: facets that lie along the plane of contact come
+  !> first
   real(dp), parameter :: equal = 1.0e-9_dp
   !> gaps between facets are rounding of the file where they are less than this part of the rounding of a piece
   real(dp), parameter :: narrow_gap = 1.0e-3_dp

@@ -15,8 +15,8 @@ module gravier_facet_contacts
   private
   public :: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
 
-  !> Rise of a facet, in parts of its length, at and below which it does not hide a point: rounding for balls. Pieces with sides also
-  !> keep points that they reach by a small turn.
+  !> Rise of a facet, in parts of its length, at and below which it does not hide a point: rounding for balls. Pieces with sides
+  !> also keep points that they reach by a small turn.
   real(dp), parameter :: slack_of_balls = 1.0e-10_dp, slack_of_pieces = 1.0e-3_dp
   !> sine of the angle between the normals of a contact and of a facet within which they are one
   real(dp), parameter :: aligned = 1.0e-8_dp
@@ -231,8 +231,8 @@ contains
     end do
   end subroutine find_candidates
 
-  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side, and nor have
-  !> others at points of theirs.
+  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side,
+  !> and nor have others at points of theirs.
   pure subroutine take_plane(near, first, rounding, found, n, corner)
     type(near_facets_t), intent(in) :: near
     !> place of the candidate in the order

@@ -133,8 +133,8 @@ contains
     if (feature < first_face) name_of = mod(features_of_facet*f + feature, feature_base)
   end function name_of
 
-  !> Keep those points that the convex hull of all has as corners (A. M. Andrew, Inf. Process. Lett. 9 (1979) 216): forces there can be
-  !> any that forces at all points can.
+  !> Keep those points that the convex hull of all has as corners (A. M. Andrew, Inf. Process. Lett. 9 (1979) 216): forces there can
+  !> be any that forces at all points can.
   pure subroutine keep_outline(near, n, point)
     !> points this near to the line of two others lie on it [m]
     real(dp), intent(in) :: near

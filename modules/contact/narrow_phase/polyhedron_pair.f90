@@ -1,8 +1,8 @@
 !> Contacts of two rounded convex pieces in space, and of a piece and a half-space.
 !>
-!> The normal is the direction of the shortest way between the cores, which is continuous in their places. Where both pieces lie along
-!> the plane of contact with a face or an edge, the contact is a patch: the common part of both, seen along the normal. Neither face is
-!> the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
+!> The normal is the direction of the shortest way between the cores, which is continuous in their places. Where both pieces lie
+!> along the plane of contact with a face or an edge, the contact is a patch: the common part of both, seen along the normal.
+!> Neither face is the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
 module gravier_polyhedron_pair
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
@@ -169,8 +169,8 @@ contains
     end associate
   end subroutine find_tangents
 
-  !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the plane,
-  !> and all other vertices that are near enough. Keys are those of the piece's vertices.
+  !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the
+  !> plane, and all other vertices that are near enough. Keys are those of the piece's vertices.
   pure subroutine find_halfspace_manifold(a, radius, normal, distance, alert, most, manifold)
     type(convex_piece_t), intent(in) :: a
     !> what the lengths of the piece are multiplied by [m]

@@ -25,7 +25,8 @@ contains
   !> What pairs have to keep.
   pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest, has_points) result(memory)
     type(kernels_t), intent(in) :: kernels
-    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted; pairs may touch in several points
+    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted; pairs may touch in several
+    !> points
     logical, intent(in) :: warm_start, remembers, counts_rest, has_points
 
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
