@@ -18,7 +18,7 @@ BASE = {
     "output": {"every": 20, "energy": True, "structure": True, "stress": True, "boundary_forces": True, "final_bodies": True},
 }
 SWING = "time,vx,omega\n0,0,0\n0.1,0.3,0.4\n0.2,-0.3,-0.4\n0.3,0.2,0.3\n"
-SLEEP = {"time": {"step": 4e-3, "steps": 220}, "output": {"every": 55},
+SLEEP = {"time": {"step": 4e-3, "steps": 300}, "output": {"every": 55},
          "solver": {"sleeping": True, "sleep_after": 6, "sleep_speed": 3.0, "criterion": "residual", "tolerance": 1e-3}}
 
 
@@ -33,7 +33,8 @@ class MeshRanks(RunTestCase):
 
     def lay_out(self, title, dimension, shapes, *parts):
         """A directory with bodies and a mesh, and the case."""
-        rows = lattice(COUNTS[dimension], spacing=0.19)
+        periodic = any("period" in part.get("scene", {}) for part in parts)
+        rows = lattice(COUNTS[dimension], spacing=0.19, height=0.1 if periodic else 0.3)
         if not shapes:
             rows = [body("grain", [row[axis] for axis in "xyz"[:dimension]], velocity=[0.1] * dimension, radius=0.05 + 0.003 * (k % 7))
                     for k, row in enumerate(rows)]
@@ -44,7 +45,6 @@ class MeshRanks(RunTestCase):
             write(os.path.join(directory, "swing.csv"), SWING)
             moving = {"table": "swing.csv", "pivot": [0.5, 0.5]}
         else:
-            periodic = any("period" in part.get("scene", {}) for part in parts)
             mesh = floor(6, 0.57, 3, shift=(0.57, 0.57, 0.0)) if periodic else bowl()
             write(os.path.join(directory, "wall.stl"), stl_text(mesh))
             moving = {} if periodic else {"rotation": [0.0, 0.0, 2.0], "pivot": [0.3, 0.3, 0.0]}
@@ -84,7 +84,7 @@ class MeshRanks(RunTestCase):
                     self.compare("ranks", dimension, shapes)
 
     def test_periodic(self):
-        run = self.compare("periodic", 3, True, {"scene": {"period": [1.14, 1.14, 0.0], "gravity": [2.0, 1.0, -9.0]},
+        run = self.compare("periodic", 3, True, {"scene": {"period": [1.14, 1.14, 0.0], "gravity": [-6.0, -3.0, -9.0]},
                                                  "decomposition": {"partition": "grid"}})
         self.assertTrue(np.any(run.results()["/steps/160/bodies/image"] != 0))
 
@@ -92,7 +92,7 @@ class MeshRanks(RunTestCase):
         """Contacts on a mesh at rest sleep."""
         for shapes in (False, True):
             with self.subTest(shapes=shapes):
-                directory, case = self.lay_out(f"asleep {shapes}", 3, shapes, SLEEP, {"decomposition": {"subdomains": 2}, "scene": {"friction": 0.6}})
+                directory, case = self.lay_out(f"asleep {shapes}", 3, shapes, SLEEP, {"decomposition": {"subdomains": 2}, "scene": {"friction": 0.6, "rolling_friction": None if shapes else 0.3}})
                 for key in ("rotation", "pivot"):
                     del case["boundary"][0][key]
                 runs = []
@@ -115,6 +115,9 @@ class MeshRanks(RunTestCase):
                 again = gravier("--restart", "case.nml", ranks=4, directory=directory)
                 self.assertIn(again.status, (0, 3), str(again))
                 there, here = self.state(straight), self.state(again)
+                for found in (there, here):
+                    # the least scale is by the duration of the run, which the stopped one had shorter
+                    del found["velocity_scale"]
                 here = {name: value for name, value in here.items() if not name.startswith(f"/steps/{stop}/") and name.split("@")[0] != f"/steps/{stop}"}
                 self.assertEqual(differences(there, here), [])
                 pictures = [contents(run.path("results", "boundaries.vtkhdf")) for run in (straight, again)]
