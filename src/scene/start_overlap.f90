@@ -3,7 +3,6 @@ module gravier_start_overlap
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_periodic, only: shift_of_code
   use gravier_neighbour_search, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_pair_points, only: pair_points_t
@@ -91,7 +90,7 @@ contains
     type(pair_points_t) :: points
     type(shape_work_t) :: work
     logical :: has_points
-    integer :: i, j, shift(3)
+    integer :: i, j
 
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
@@ -122,10 +121,7 @@ contains
         return
       end if
       branch(:) = bodies%position(:, i) - bodies%position(:, j)
-      if (size(view%list%shift) > 0) then
-        shift(:) = shift_of_code(view%list%shift(p))
-        branch(:) = branch - shift(1:size(branch))*decomposition%period%length(1:size(branch))
-      end if
+      if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
       overlap%share = (bodies%radius(i) + bodies%radius(j) - norm2(branch))/min(bodies%radius(i), bodies%radius(j))
       overlap%id(2) = bodies%id(j)
       overlap%boundary = max(bodies%glued(i), bodies%glued(j))

@@ -212,6 +212,24 @@ class MeshWalls(RunTestCase):
         axes = found.all("boundaries/axes")[:, 0].reshape(-1, 3, 3)
         np.testing.assert_allclose(axes @ np.transpose(axes, (0, 2, 1)), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)
 
+    def test_laws(self):
+        """Bounces, rolling resistance, liquid bridges and bonds act as on a plane, while a ball goes from facet to facet."""
+        material = {"material": [{"name": "stone"}], "scene": {"wall_material": "stone"}}
+        laws = {
+            "bounce": ([0.0, 0.0, 0.2], [0.7, 0.4, 0.0], {"scene": {"restitution": 0.6, "tangential_restitution": 0.3}}),
+            "rolling": ([0.0, 0.0, RADIUS], [0.7, 0.4, 0.0], {"scene": {"rolling_friction": 0.1}}),
+            "wet": ([0.0, 0.0, RADIUS], [0.7, 0.4, 0.4], {**material, "law": [{"materials": ["stone"], "kind": "capillary", "friction": 0.3,
+                                                                             "capillarity": 20.0, "decay_length": 0.004, "debonding_distance": 0.01}]}),
+            "bond": ([0.0, 0.0, RADIUS], [0.0, 0.0, 0.0], {**material, "scene": {"wall_material": "stone", "gravity": [20.0, 0.0, 5.0]}, "law": [
+                {"materials": ["stone"], "kind": "bonded", "friction": 0.3, "bond_strength": 100.0, "bond_friction": 0.5, "bond_distance": 1e-3}]}),
+        }
+        for title, (place, velocity, part) in laws.items():
+            with self.subTest(title):
+                rows = [self.ball(place, velocity)]
+                part = merged(part, {"time": {"steps": 150}, "solver": {"tolerance": 1e-10}})
+                wanted = self.play(f"{title} on a plane", 3, rows, [{"name": "wall", "shape": "plane", "normal": [0.0, 0.0, 1.0]}], part)
+                self.same(wanted, self.play(f"{title} on a mesh", 3, rows, [MESH], part, mesh=floor(30, 1.0, 6)), 1e-10)
+
     def test_period(self):
         """A floor as wide as the period has no seam: balls and cubes cross it as on a plane."""
         scene = {"scene": {"period": [1.2, 0.0, 0.0], "period_origin": [-0.6, 0.0, 0.0]}, "time": {"steps": 150}}
@@ -248,7 +266,7 @@ class MeshWalls(RunTestCase):
         for title, keys, text, wanted in (
                 ("no file", {"file": "other.stl"}, plain, "boundary 'wall': file: other.stl"),
                 ("no key", {"file": None}, plain, "file"),
-                ("ending", {"file": "bodies.csv"}, plain, "expected a path that ends with .stl or .obj where dimension = 3"),
+                ("ending", {"file": "bodies.csv"}, plain, "expected a path that ends with .stl or .obj in 3D"),
                 ("no area", {}, flat, "expected a facet with an area"),
                 ("scale", {"scale": 0.0}, plain, "scale"),
                 ("number", {}, plain.replace("vertex 1.0", "vertex one", 1), "\"one\", but a number was expected"),

@@ -42,9 +42,9 @@ contains
     else if (dimension == 2 .and. ending == csv) then
       call read_points(path, point, first, corner, error)
     else if (dimension == 2) then
-      call raise(error, status_input, path//": expected a path that ends with .csv or .obj where dimension = 2")
+      call raise(error, status_input, path//": expected a path that ends with .csv or .obj in 2D")
     else
-      call raise(error, status_input, path//": expected a path that ends with .stl or .obj where dimension = 3")
+      call raise(error, status_input, path//": expected a path that ends with .stl or .obj in 3D")
     end if
     if (allocated(error)) return
     call check_points(path, dimension, point, error)
@@ -70,7 +70,7 @@ contains
           & " in size: expected "//bounded_text)
       else if (dimension == 2 .and. abs(point(3, k)) > 0.0_dp) then
         call raise(error, status_input, path//": point "//to_text(k)//": z = "//to_text(point(3, k))// &
-          & ": expected 0 where dimension = 2")
+          & ": expected 0 in 2D")
       end if
       if (allocated(error)) return
     end do

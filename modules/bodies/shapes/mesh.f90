@@ -50,6 +50,7 @@ module gravier_mesh
     procedure :: level => mesh_level
     procedure :: support => mesh_support
     procedure :: n_facets => mesh_n_facets
+    procedure :: n_left_out => mesh_n_left_out
     procedure :: get_facet => mesh_get_facet
     procedure :: far_off => mesh_far_off
     procedure :: digest => mesh_digest
@@ -324,6 +325,11 @@ contains
     class(mesh_t), intent(in) :: self
     n = size(self%data%corner, 3)
   end function mesh_n_facets
+
+  pure integer function mesh_n_left_out(self) result(n)
+    class(mesh_t), intent(in) :: self
+    n = self%data%without_area
+  end function mesh_n_left_out
 
   pure subroutine mesh_get_facet(self, k, corner)
     class(mesh_t), intent(in) :: self

@@ -57,6 +57,7 @@ module gravier_surface
     procedure :: find_facets => surface_find_facets
     procedure :: find_box => surface_find_box
     procedure :: n_facets => surface_n_facets
+    procedure :: n_left_out => surface_n_left_out
     procedure :: get_facet => surface_get_facet
     procedure :: find_axes => surface_find_axes
     procedure :: far_off => surface_far_off
@@ -152,6 +153,15 @@ contains
     end associate
     n = 0
   end function surface_n_facets
+
+  !> Facets of the file that the surface does not have, since they have no area or, in 2D, no length.
+  pure integer function surface_n_left_out(self) result(n)
+    class(surface_t), intent(in) :: self
+
+    associate (unused => self)
+    end associate
+    n = 0
+  end function surface_n_left_out
 
   !> Where the corners of facet `k` are; without effect on a shape that is not faceted.
   pure subroutine surface_get_facet(self, k, corner)

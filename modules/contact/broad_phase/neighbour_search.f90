@@ -4,7 +4,7 @@ module gravier_neighbour_search
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
-  use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
+  use gravier_periodic, only: period_t, no_shift, shift_code
   use gravier_body_store, only: body_set_t
   use gravier_shape_library, only: point_counts_t
   use gravier_facet, only: near_facets_t
@@ -360,7 +360,7 @@ contains
     real(dp), allocatable :: point(:, :)
     integer, allocatable :: order(:)
     real(dp) :: antagonist(bodies%nd), lower(bodies%nd)
-    integer :: p, nd, shift(3)
+    integer :: p, nd
 
     nd = bodies%nd
     allocate (id(2, list%n), point(nd, list%n), order(list%n))
@@ -372,10 +372,7 @@ contains
       else
         id(2, p) = bodies%id(list%antagonist(p))
         antagonist(:) = bodies%position(:, list%antagonist(p))
-        if (self%period%on()) then
-          shift(:) = shift_of_code(list%shift(p))
-          antagonist(:) = antagonist + shift(1:nd)*self%period%length(1:nd)
-        end if
+        if (self%period%on()) call self%period%add_shift(list%shift(p), 1, antagonist)
         point(:, p) = owner_point(self%rule%kind, bodies%position(:, list%candidate(p)), antagonist)
       end if
     end do

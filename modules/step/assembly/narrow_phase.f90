@@ -2,7 +2,6 @@
 !> their laws.
 module gravier_narrow_phase
   use gravier_kinds, only: dp
-  use gravier_periodic, only: period_t, shift_of_code
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: neighbour_list_t
@@ -77,7 +76,7 @@ contains
       j = view%list%antagonist(p)
       if (j > 0) then
         branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
-        if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
+        if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
         if (is_far(view%list, p, gap, alert)) cycle
@@ -245,19 +244,5 @@ contains
       place = round_place(view, found%source(f), found%gap(f), found%normal(:, f))
     end if
   end function place_of
-
-  !> Take the shift of the antagonist into account in the way from it to the candidate.
-  pure subroutine shift_back(period, code, branch)
-    type(period_t), intent(in) :: period
-    integer, intent(in) :: code
-    !> (nd) [m]
-    real(dp), intent(inout) :: branch(:)
-    integer :: shift(3), d
-
-    shift(:) = shift_of_code(code)
-    do d = 1, size(branch)
-      branch(d) = branch(d) - shift(d)*period%length(d)
-    end do
-  end subroutine shift_back
 
 end module gravier_narrow_phase

@@ -1,7 +1,6 @@
 !> The points in which two bodies touch, or a body and a boundary, where bodies have shapes.
 module gravier_shape_contacts
   use gravier_kinds, only: dp
-  use gravier_periodic, only: period_t, shift_of_code
   use gravier_convex_piece, only: convex_piece_t
   use gravier_shape_library, only: shape_library_t, of_face
   use gravier_boundary, only: boundary_t
@@ -68,7 +67,7 @@ contains
     associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
       if (j > 0) then
         way(:) = bodies%position(:, j) - bodies%position(:, i)
-        if (size(view%list%shift) > 0) call add_shift(decomposition%period, view%list%shift(p), way)
+        if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), 1, way)
         if (norm2(way) > bodies%radius(i) + bodies%radius(j) + alert) return
         call see_body(bodies, i, candidate)
         call see_body(bodies, j, antagonist)
@@ -397,19 +396,5 @@ contains
       end associate
     end if
   end subroutine place
-
-  !> Take the shift of the antagonist into account in the way from the candidate to it.
-  pure subroutine add_shift(period, code, way)
-    type(period_t), intent(in) :: period
-    integer, intent(in) :: code
-    !> (nd) [m]
-    real(dp), intent(inout) :: way(:)
-    integer :: shift(3), d
-
-    shift(:) = shift_of_code(code)
-    do d = 1, size(way)
-      way(d) = way(d) + shift(d)*period%length(d)
-    end do
-  end subroutine add_shift
 
 end module gravier_shape_contacts

@@ -4,7 +4,6 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
-  use gravier_periodic, only: shift_of_code
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
@@ -176,7 +175,7 @@ contains
     type(local_bodies_t), intent(in) :: view
     integer(i8), intent(inout), contiguous :: records(:, :)
     real(dp) :: point(decomposition%nd), candidate(decomposition%nd), antagonist(decomposition%nd)
-    integer :: p, n, d, shift(3)
+    integer :: p, n, d
 
     n = 0
     associate (list => view%list, position => view%bodies%position)
@@ -186,12 +185,7 @@ contains
         point(:) = position(:, list%candidate(p))
         if (list%antagonist(p) > 0) then
           antagonist(:) = position(:, list%antagonist(p))
-          if (size(list%shift) > 0) then
-            shift(:) = shift_of_code(list%shift(p))
-            do d = 1, decomposition%nd
-              antagonist(d) = antagonist(d) + shift(d)*decomposition%period%length(d)
-            end do
-          end if
+          if (size(list%shift) > 0) call decomposition%period%add_shift(list%shift(p), 1, antagonist)
           candidate(:) = point
           point(:) = owner_point(decomposition%rule%kind, candidate, antagonist)
         end if

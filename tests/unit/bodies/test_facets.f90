@@ -242,7 +242,7 @@ contains
     call check(wrong == "scale", "a scale of 0")
     call make_wave(mesh, facet)
     call check_equal(mesh%n_facets(), 200, "facets without area are left out")
-    call check_equal(mesh%data%without_area, 2, "and counted")
+    call check_equal(mesh%n_left_out(), 2, "and counted")
     ! turned by a right angle about z
     mesh%edge(:, 1) = [0.0_dp, 1.0_dp, 0.0_dp]
     mesh%edge(:, 2) = [-1.0_dp, 0.0_dp, 0.0_dp]
@@ -379,11 +379,11 @@ contains
 
     call refuse("a.txt", "", 3, ".stl or .obj")
     call refuse("a.stl", "solid", 2, ".csv or .obj")
-    call refuse("a.csv", "x,y"//n//"0,0"//n, 2, "two points")
+    call refuse("a.csv", "x,y"//n//"0,0"//n, 2, "two points or more were expected")
     call refuse("b.csv", "x,z"//n//"0,0"//n, 2, "columns x and y")
     call refuse("c.csv", "x,y"//n//"0,0"//n//"1e40,0"//n, 2, "1e30")
     call refuse("d.obj", points//"l 1 2 3", 2, "z = ")
-    call refuse("e.obj", points//"f 1 2 3", 2, "l i j")
+    call refuse("e.obj", points//"f 1 2 3", 2, "e.obj: no line through points, ""l i j"", was found")
     call refuse("f.obj", points//"l 1", 2, "a line of 1 corners, but 2")
     call refuse("g.obj", points//"f 1 2", 3, "a face of 2 corners, but 3")
     call refuse("none.stl", "", 3, "none.stl")
