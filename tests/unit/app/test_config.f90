@@ -18,7 +18,7 @@ program test_config
   character(len=*), parameter :: positive = "expected a finite real number > 0"
   character(len=*), parameter :: third = "expected a third component of 0 where dimension = 2"
   character(len=*), parameter :: plane_keys = " shape = 'plane' normal = 0, 1 "
-  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder' or 'grains'"
+  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder', 'mesh' or 'grains'"
 
   call MPI_Init()
   call test_whole_file()

@@ -382,7 +382,7 @@ contains
     call refuse("a.csv", "x,y"//n//"0,0"//n, 2, "two points or more were expected")
     call refuse("b.csv", "x,z"//n//"0,0"//n, 2, "columns x and y")
     call refuse("c.csv", "x,y"//n//"0,0"//n//"1e40,0"//n, 2, "1e30")
-    call refuse("d.obj", points//"l 1 2 3", 2, "z = ")
+    call refuse("d.obj", points//"l 1 2 3", 2, ": expected 0 in 2D")
     call refuse("e.obj", points//"f 1 2 3", 2, "e.obj: no line through points, ""l i j"", was found")
     call refuse("f.obj", points//"l 1", 2, "a line of 1 corners, but 2")
     call refuse("g.obj", points//"f 1 2", 3, "a face of 2 corners, but 3")
