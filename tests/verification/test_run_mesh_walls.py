@@ -6,6 +6,7 @@ import unittest
 import numpy as np
 
 from gravier_runs import RunTestCase, each, merged, run_case, write
+import gravier
 from mesh_scenes import box, floor, quadrangles, stl_bytes, stl_text, write_line
 from shaped_scenes import body, prepare, shaped_case
 
@@ -29,7 +30,7 @@ class Motion:
     """What a run left of all bodies and of the contacts; arrays by written state."""
 
     def __init__(self, run):
-        self.found = run.results()
+        self.found, self.directory = run.results(), run.path("results")
         self.steps = sorted({int(name.split("/")[2]) for name in self.found if name.startswith("/steps/") and name.count("/") > 2})
         self.position = self.all("bodies/position")
         self.velocity = self.all("bodies/velocity")
@@ -209,6 +210,8 @@ class MeshWalls(RunTestCase):
                 self.same(wanted, found)
                 np.testing.assert_allclose(found.all("boundaries/force"), wanted.all("boundaries/force"), rtol=0, atol=1e-6)
                 np.testing.assert_allclose(found.all("boundaries/velocity"), wanted.all("boundaries/velocity"), rtol=0, atol=1e-9)
+                if title == "rotation":
+                    self.has_turned(found.directory, np.array(grid), np.array(keys["rotation"]) * 110 / 512, np.array(keys["pivot"]))
         axes = found.all("boundaries/axes")[:, 0].reshape(-1, 3, 3)
         np.testing.assert_allclose(axes @ np.transpose(axes, (0, 2, 1)), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)
 
@@ -229,6 +232,15 @@ class MeshWalls(RunTestCase):
                 part = merged(part, {"time": {"steps": 150}, "solver": {"tolerance": 1e-10}})
                 wanted = self.play(f"{title} on a plane", 3, rows, [{"name": "wall", "shape": "plane", "normal": [0.0, 0.0, 1.0]}], part)
                 self.same(wanted, self.play(f"{title} on a mesh", 3, rows, [MESH], part, mesh=floor(30, 1.0, 6)), 1e-10)
+
+    def has_turned(self, directory, grid, vector, pivot):
+        """The facets that Python shows are where a rotation by a vector brings them."""
+        facets = gravier.Run(directory).facets()
+        angle = np.linalg.norm(vector)
+        u = vector / angle
+        cross = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+        turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+        np.testing.assert_allclose(facets.corners, (quadrangles(grid) - pivot) @ turn.T + pivot, rtol=0, atol=1e-9)
 
     def test_period(self):
         """A floor as wide as the period has no seam: balls and cubes cross it as on a plane."""
