@@ -6,6 +6,7 @@ module gravier_pair_places
   use gravier_facet, only: near_facets_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   implicit none
   private
   public :: has_facets, repeat_pairs
@@ -28,18 +29,19 @@ contains
 
   !> Let each pair stand in the order as often as its bodies may touch in points. With a boundary of facets that depends on how many
   !> of these are in range.
-  pure subroutine repeat_pairs(counts, boundaries, range, bodies, list, order)
+  pure subroutine repeat_pairs(counts, boundaries, rule, bodies, list, order)
     !> of the shapes, where bodies have some
     type(point_counts_t), intent(in) :: counts
     type(boundary_t), intent(in) :: boundaries(:)
-    !> gap up to which pairs are listed [m]
-    real(dp), intent(in) :: range
+    !> by which pairs are listed
+    type(neighbour_rule_t), intent(in) :: rule
     type(body_set_t), intent(in) :: bodies
     type(neighbour_list_t), intent(in) :: list
     !> of the pairs
     integer, allocatable, intent(inout) :: order(:)
     integer, allocatable :: longer(:), points(:)
     type(near_facets_t) :: near
+    real(dp) :: reach
     integer :: k, p, n, b, antagonist
 
     allocate (points(list%n), source=1)
@@ -53,7 +55,9 @@ contains
         if (list%antagonist(p) > 0) cycle
         b = -list%antagonist(p)
         if (.not. boundaries(b)%is_faceted()) cycle
-        call boundaries(b)%find_facets(bodies%position(:, i), bodies%radius(i) + range, near)
+        reach = bodies%radius(i) + rule%margin(norm2(bodies%velocity(1:bodies%nd, i))) + rule%alert_distance + &
+          & rule%margin(norm2(boundaries(b)%velocity))
+        call boundaries(b)%find_facets(bodies%position(:, i), reach, near)
         points(p) = points(p)*min(near%n, merge(facets_of_shape, facets_of_ball, bodies%no > 0))
       end associate
     end do

@@ -18,6 +18,7 @@ program test_facet_contacts
   use gravier_boundary, only: boundary_t
   use gravier_surface_registry, only: make_surface
   use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_pair_places, only: has_facets, repeat_pairs
   use gravier_errors, only: error_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -440,6 +441,7 @@ contains
     type(body_set_t) :: bodies
     type(neighbour_list_t) :: list
     type(point_counts_t) :: counts
+    type(neighbour_rule_t) :: rule
     real(dp) :: values(3, 2), line(3, 2, 20)
     character(len=:), allocatable :: wrong, expected
     integer, allocatable :: order(:)
@@ -463,13 +465,16 @@ contains
     bodies%n = 2
     allocate (bodies%position(2, 2), source=reshape([5.5_dp, 0.5_dp, 5.5_dp, 3.0_dp], [2, 2]))
     allocate (bodies%radius(2), source=[0.5_dp, 20.0_dp])
+    allocate (bodies%velocity(3, 2), source=0.0_dp)
+    rule%alert_distance = 0.05_dp
+    rule%skin = 0.2_dp
     call list%init(.false., 4)
     call list%add(1, 2, 0)
     call list%add(1, -1, 0)
     call list%add(1, -2, 0)
     call list%add(2, -2, 0)
     order = [4, 2, 3, 1]
-    call repeat_pairs(counts, boundaries, 0.25_dp, bodies, list, order)
+    call repeat_pairs(counts, boundaries, rule, bodies, list, order)
     call check_equal(count(order == 1), 1, "a pair of disks")
     call check_equal(count(order == 2), 1, "with a plane")
     call check_equal(count(order == 3), 3, "with the segments near")
