@@ -71,7 +71,7 @@ module gravier_config_types
     !> false: the allowed overlap is 0.01 of the mean radius
     logical :: overlap_given = .false.
     logical :: overlap_projection
-    !> largest overlap at the start, as a share of the smaller radius
+    !> largest overlap at the start, as a fraction of the smaller radius
     real(dp) :: start_overlap
   end type scene_config_t
 
@@ -181,6 +181,8 @@ module gravier_config_types
     real(dp), allocatable :: value(:, :)
     !> grains: the group of the bodies file
     integer :: group
+    !> mesh: the file of its facets; blank for other shapes
+    character(len=text_length) :: file
     !> m/s
     real(dp) :: velocity(3)
     !> rad/s; in 2D the first entry is the rate about z and the others are 0

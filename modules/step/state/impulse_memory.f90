@@ -4,12 +4,11 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
-  use gravier_periodic, only: shift_of_code
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_list, only: pair_memory_t
-  use gravier_neighbour_search, only: owner_point
+  use gravier_neighbour_rule, only: owner_point
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
   implicit none
@@ -23,15 +22,16 @@ module gravier_impulse_memory
 contains
 
   !> What pairs have to keep.
-  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest) result(memory)
+  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest, has_points) result(memory)
     type(kernels_t), intent(in) :: kernels
-    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted
-    logical, intent(in) :: warm_start, remembers, counts_rest
+    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted; pairs may touch in several
+    !> points
+    logical, intent(in) :: warm_start, remembers, counts_rest, has_points
 
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
     memory%law_row = merge(1, 0, remembers)
     if (counts_rest) memory%rest_row = memory%law_row + 1
-    if (kernels%row%arm_i > 0) memory%key_row = memory%n_states() + 1
+    if (has_points) memory%key_row = memory%n_states() + 1
   end function memory_of
 
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
@@ -175,7 +175,7 @@ contains
     type(local_bodies_t), intent(in) :: view
     integer(i8), intent(inout), contiguous :: records(:, :)
     real(dp) :: point(decomposition%nd), candidate(decomposition%nd), antagonist(decomposition%nd)
-    integer :: p, n, d, shift(3)
+    integer :: p, n, d
 
     n = 0
     associate (list => view%list, position => view%bodies%position)
@@ -185,12 +185,7 @@ contains
         point(:) = position(:, list%candidate(p))
         if (list%antagonist(p) > 0) then
           antagonist(:) = position(:, list%antagonist(p))
-          if (size(list%shift) > 0) then
-            shift(:) = shift_of_code(list%shift(p))
-            do d = 1, decomposition%nd
-              antagonist(d) = antagonist(d) + shift(d)*decomposition%period%length(d)
-            end do
-          end if
+          if (size(list%shift) > 0) call decomposition%period%add_shift(list%shift(p), 1, antagonist)
           candidate(:) = point
           point(:) = owner_point(decomposition%rule%kind, candidate, antagonist)
         end if
