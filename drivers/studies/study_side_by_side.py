@@ -5,7 +5,7 @@
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
 LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. Displacements
-are compared body by body, over the radius of the ball of the area or volume of the body; kinetic energies are those of translation; seconds are
+are compared body by body, over the radius of the ball that holds the body; kinetic energies are those of translation; seconds are
 those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. Exit status: 0; 2 LMGC90 is not there."""
 import os
 import re
@@ -32,11 +32,11 @@ class Enough(Exception):
 def play_lmgc90(steps):
     """In a copy of an example: run its command script for so many steps and leave record.npz."""
     from pylmgc90 import chipy
-    record = {"place": [], "velocity": [], "reaction": [], "seconds": []}
+    record = {"mass": [], "place": [], "velocity": [], "reaction": [], "seconds": []}
     clock = {"last": None}
 
     def of_all(name):
-        kind = "RBDY2" if chipy.macro.DIMENSION == 2 else "RBDY3" if hasattr(chipy, "macro") else ""
+        kind = "RBDY2" if chipy.RBDY2_GetNbRBDY2() > 0 else "RBDY3"
         get, count = getattr(chipy, f"{kind}_GetBodyVector"), getattr(chipy, f"{kind}_GetNb{kind}")()
         return [get(name, k + 1) for k in range(count)]
 
@@ -44,6 +44,9 @@ def play_lmgc90(steps):
         def step(*given):
             inner(*given)
             now = time.process_time()
+            if not record["mass"]:
+                two = chipy.RBDY2_GetNbRBDY2() > 0
+                record["mass"] = list(chipy.RBDY2_GetAllMass() if two else chipy.RBDY3_GetAllMass())
             record["seconds"].append(np.nan if clock["last"] is None else now - clock["last"])
             for key, name in (("place", "Coor_"), ("velocity", "V____"), ("reaction", "Reac_")):
                 record[key].append(of_all(name))
@@ -53,7 +56,8 @@ def play_lmgc90(steps):
         return step
 
     chipy.UpdateStep = note(chipy.UpdateStep)
-    for name in ("WriteOut", "WriteDisplayFiles", "WritePostproFiles", "OpenDisplayFiles", "OpenPostproFiles"):
+    for name in ("WriteOut", "WriteDisplayFiles", "WritePostproFiles", "OpenDisplayFiles", "OpenPostproFiles", "CloseDisplayFiles",
+                 "ClosePostproFiles"):
         setattr(chipy, name, lambda *given, **named: None)
     chipy.utilities_DisableLogMes = lambda: None
     script = next(iter(sorted(Path().glob("command*.py")) + sorted(Path().glob("run*.py"))))
@@ -62,8 +66,7 @@ def play_lmgc90(steps):
     except Enough:
         pass
     dimension = 2 if len(record["place"][0][0]) == 3 else 3
-    mass = chipy.RBDY2_GetAllMass() if dimension == 2 else chipy.RBDY3_GetAllMass()
-    np.savez("record.npz", mass=np.asarray(mass), dimension=dimension, **{key: np.array(value) for key, value in record.items()})
+    np.savez("record.npz", dimension=dimension, **{key: np.array(value) for key, value in record.items()})
     # its own end may leave with an error where files are closed that are not open
     sys.stdout.flush()
     os._exit(0)
@@ -88,7 +91,6 @@ def by_gravier(example, place, options):
     """Run with every step written, then once for the seconds."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    options.steps = int(options.steps)
     _, _, _, refused, _ = convert(example, place, options)
     if refused:
         sys.exit(f"study_side_by_side: {example.name} does not import: {refused}")
@@ -125,9 +127,7 @@ def compare(example, options):
     count = min(len(place), len(steps) - first)
     drift = np.linalg.norm((place[:count] - place[0]) - (moved[first:first + count] - moved[first])[:, free], axis=2)
     mass = steps[0][2]["mass"][free]
-    size = np.cbrt(mass / mass.max()) if d == 3 else np.sqrt(mass / mass.max())
-    extent = options.extent.get(name) or gravier_size(ours / "full", free)
-    size = extent * size / size.max()
+    size = np.asarray(gravier.Run(ours / "full").bodies(0).radius)[free]
     ours_energy = [0.5 * (mass * (body["velocity"][free, :d]**2).sum(1)).sum() for _, _, body, _ in steps[first:first + count]]
     theirs_mass = record["mass"][identifier[free] - 1]
     theirs_energy = 0.5 * (theirs_mass * (record["velocity"][:count, identifier[free] - 1, :d]**2).sum(2)).sum(1)
@@ -147,12 +147,6 @@ def compare(example, options):
            "iterations_gravier": float(np.mean(history["iterations"])),
            "seconds_lmgc90": float(np.nanmean(record["seconds"])), "seconds_gravier": float(seconds)}
     return row, (d, theirs_energy, np.array(ours_energy), record, identifier, free, ours / "full", count, first, size)
-
-
-def gravier_size(folder, free):
-    """Radius of the disk or ball of the largest free body: of its radius where it is one."""
-    bodies = gravier.Run(folder).bodies(0)
-    return float(np.max(np.asarray(bodies.radius)[free]))
 
 
 def draw(rows, kept, path):
@@ -196,7 +190,6 @@ def main():
     parser.add_argument("--pylmgc90", type=Path, required=True, help="directory that holds the Python package pylmgc90")
     parser.add_argument("--steps", type=int, default=100, help="steps (100)")
     options = parser.parse_args()
-    options.extent = {}
     options.out = options.out.resolve()
     there = subprocess.run([sys.executable, "-c", "from pylmgc90 import chipy; chipy.Initialize"], capture_output=True, text=True, check=False,
                            env={**os.environ, "PYTHONPATH": str(options.pylmgc90.resolve())})

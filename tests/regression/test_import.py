@@ -585,7 +585,7 @@ class Import(RunTestCase):
             below = body(dimension, 3, [*up, -0.07], [(shape, "BLUEx", values(byrd=0.05))])
             folder, message = self.convert(self.box(dimension, grain + ground + below, laws, still(dimension, 2)), *period, status=2)
             self.assertRegex(message, r"^gravier_import: error: case.nml: gravier --check refuses the case that was made: case.nml: boundary "
-                                      r"'body 2 above': expected a width, .* at most the period of 1.000E\+000 m, .*\n$")
+                                      r"'body 2 above': expected a width, .* at most the period of 1.000E\+00 m, .*\n$")
             self.assertEqual(os.listdir(folder), [])
             # a wall narrower than the period stays what it is
             half["axe1"] = 0.3
