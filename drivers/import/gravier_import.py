@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Make a case of Gravier from a DATBOX of LMGC90.
 
-    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V] [--homogeneous]
+    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V] [--homogeneous] [--drop-g0]
 
 --period takes two numbers in 2D and three in 3D, 0 along an axis that is not periodic.
 Reads BODIES.DAT, BULK_BEHAV.DAT and TACT_BEHAV.DAT and, where they are there, DRV_DOF.DAT, DOF.INI and Vloc_Rloc.INI; writes NAME.nml,
@@ -477,7 +477,7 @@ class Case:
     def __init__(self, bodies, density, gravity, laws, sees, options):
         self.bodies, self.density, self.gravity, self.laws, self.sees = bodies, density, gravity, laws, sees
         self.planes, self.slip, self.homogeneous, self.period = options.planes, options.slip, options.homogeneous, options.period or []
-        self.dimension = bodies[0].dimension
+        self.drop_g0, self.dimension = options.drop_g0, bodies[0].dimension
         #: contactor and colour: that which stands for it, since bodies have contactors of both
         self.stands_for = {}
         self.grains, self.boundaries, self.remarks, self.used, self.materials, self.met = [], [], [], [], [], {}
@@ -575,6 +575,8 @@ class Case:
 
     def friction_of(self, entry, name):
         """Keys of friction: one coefficient, or a static and a dynamic one where the law here has both."""
+        if name == "IQS_CLB_g0" and not self.drop_g0:
+            entry.refuse("law IQS_CLB_g0, whose gaps count from those of the start", "--drop-g0, with which they count from contact")
         if name == "IQS_CLB_g0":
             self.remarks.append(f"law {entry.words[0]} IQS_CLB_g0: gaps count from contact here, not from those of the start")
         if name in ("IQS_CLB", "IQS_CLB_g0", "RST_CLB"):
@@ -983,6 +985,7 @@ def parse():
                         help="slip [m/s] over which friction falls from static to dynamic, for IQS_DS_CLB and RST_DS_CLB")
     parser.add_argument("--homogeneous", action="store_true",
                         help="bodies with shapes have the inertia and the centre of mass of these, where BODIES.DAT says otherwise")
+    parser.add_argument("--drop-g0", action="store_true", help="take IQS_CLB_g0 for IQS_CLB: gaps that are open at the start may close")
     options = parser.parse_args()
     if not (math.isfinite(options.step) and options.step > 0.0) or options.steps < 0:
         parser.error("--step: expected a finite number > 0, and --steps at least 0")

@@ -6,7 +6,7 @@ the periods of the command script beside it.
 
 EXAMPLES is a directory such as examples/RIGID_2D of the sources of LMGC90. Each run makes at most N steps (200) in at most S seconds (120). Where an
 example has a script gen_sample.py in the place of a DATBOX, the pre-processor of LMGC90 makes one in DIR: PATH is the directory that holds
-pylmgc90. Imports are made with --homogeneous and --slip 1e-4. Leaves DIR/study_lmgc90.csv, the table DIR/study_lmgc90.md, cases and runs.
+pylmgc90. Imports are made with --homogeneous, --drop-g0 and --slip 1e-4. Leaves DIR/study_lmgc90.csv, the table DIR/study_lmgc90.md, cases and runs.
 Exit status: 0 all examples that import have run; 1 one has not."""
 import csv
 import os
@@ -20,7 +20,7 @@ from study_support import BINARIES, ENVIRONMENT, SOURCE, write_csv
 
 from one_line import OneLineParser
 
-OPTIONS = ["--homogeneous", "--slip", "1e-4"]
+OPTIONS = ["--homogeneous", "--drop-g0", "--slip", "1e-4"]
 #: assignments of command scripts
 NUMBER = r"^\s*(?:{})\s*=\s*([-+\d.eEdD/* ]+)"
 

@@ -5,7 +5,7 @@
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
 LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. Displacements
-are compared body by body, over the radius of the ball that holds the body; kinetic energies are those of translation; seconds are
+are compared body by body in the last step, over the radius of the ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
 those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. Exit status: 0; 2 LMGC90 is not there."""
 import os
 import re
@@ -134,15 +134,15 @@ def compare(example, options):
     up = d - 1
     weight = mass.sum() * 9.81
     ground = sorted(walls)
-    theirs_force = record["reaction"][count - 1, np.array(ground) - 1, up].sum()
-    ours_force = steps[first + count - 1][3][:, up].sum()
+    theirs_force = record["reaction"][:count, np.array(ground) - 1, up].sum(1).mean()
+    ours_force = np.mean([step[3][:, up].sum() for step in steps[first:first + count]])
     history = read_history(ours / "full")
     row = {"example": name, "bodies": int(free.sum()), "steps": count, "largest_difference_over_size": float((drift[-1] / size).max()),
            "median_difference_over_size": float(np.median(drift[-1] / size)),
            "largest_way_over_size": float((np.linalg.norm(place[count - 1] - place[0], axis=1) / size).max()),
            "mass_ratio": float((theirs_mass / mass).mean()),
            "energy_lmgc90": float(theirs_energy[-1]), "energy_gravier": float(ours_energy[-1]),
-           "ground_over_weight_lmgc90": float(theirs_force / weight), "ground_over_weight_gravier": float(ours_force / weight),
+           "mean_force_on_ground_over_weight_lmgc90": float(theirs_force / weight), "mean_force_on_ground_over_weight_gravier": float(ours_force / weight),
            "iterations_lmgc90": float(np.mean(record["iterations"])) if record["iterations"] else float("nan"),
            "iterations_gravier": float(np.mean(history["iterations"])),
            "seconds_lmgc90": float(np.nanmean(record["seconds"])), "seconds_gravier": float(seconds)}

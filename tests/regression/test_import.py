@@ -430,8 +430,9 @@ class Import(RunTestCase):
         """Disks of a colour that no line pairs with itself fall through each other and lie on the ground that they see."""
         bodies = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.0, 0.16], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
             body(2, 3, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=1.0, axe2=0.01))])
-        folder, notes = self.convert(self.box(2, bodies, LAW.replace("IQS_CLB   ", "IQS_CLB_g0") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx"),
-                                              still(2, 3)), steps=200)
+        box = self.box(2, bodies, LAW.replace("IQS_CLB   ", "IQS_CLB_g0") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx"), still(2, 3))
+        self.assertIn("law IQS_CLB_g0, whose gaps count from those of the start: expected --drop-g0", self.convert(box, status=2)[1])
+        folder, notes = self.convert(box, "--drop-g0", steps=200)
         self.assertIn("DISKx BLUEx does not see DISKx BLUEx: they pass through each other", notes)
         self.assertIn("law iqsc0 IQS_CLB_g0: gaps count from contact here", notes)
         steps, _ = self.run_case(folder)
