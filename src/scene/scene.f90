@@ -290,12 +290,13 @@ contains
       if (scene%laws%n > 0) then
         call add_law(scene%laws%largest)
         effects%cohesion = scene%laws%attracts
+        effects%compliance = scene%laws%yields
       end if
       ! moments are in the kernels of friction
       effects%friction = effects%friction .or. effects%rolling
       turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. config%rotation
       if (allocated(data%shape)) effects%shapes = comm%any_true(any(data%shape > 0))
-      effects%rotation = effects%friction .or. turning .or. effects%shapes
+      effects%rotation = effects%friction .or. turning .or. effects%shapes .or. effects%compliance
       effects%periodic = scene%period%on()
       effects%glued = comm%any_true(any(data%group > 0))
       effects%gravity = any(abs(config%gravity) > 0.0_dp) .or. config%gravity_table /= ""

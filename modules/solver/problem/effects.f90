@@ -4,13 +4,13 @@ module gravier_effects
   private
   public :: effects_t, n_effects, effect_name_length
 
-  integer, parameter :: n_effects = 15, effect_name_length = 24
+  integer, parameter :: n_effects = 16, effect_name_length = 24
 
   !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
   type :: effects_t
     !> some contact has mu > 0; some frictional contact sends its tangential velocity back; some moment resists rolling, or pivoting
-    !> (of spheres); some body is neither a disk nor a sphere: these four choose the kernels
-    logical :: friction = .false., tangential_restitution = .false., rolling = .false., shapes = .false.
+    !> (of spheres); some body is neither a disk nor a sphere; some contact yields: these five choose the kernels
+    logical :: friction = .false., tangential_restitution = .false., rolling = .false., shapes = .false., compliance = .false.
     !> what else contacts do: pivoting (in the kernels of rolling), normal restitution, cohesion
     logical :: pivoting = .false., restitution = .false., cohesion = .false.
     !> some grain turns; some axis is periodic; some boundary moves as prescribed, or is moved by forces; some grain is glued
@@ -59,6 +59,8 @@ contains
     on(14) = self%body_force
     names(15) = "removal"
     on(15) = self%removal
+    names(16) = "compliance"
+    on(16) = self%compliance
   end subroutine effects_list
 
 end module gravier_effects
