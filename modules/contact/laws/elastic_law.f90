@@ -76,6 +76,7 @@ contains
     self%yields = .true.
     self%largest%friction = self%friction
     call self%set_resistance(values(10), values(11))
+    self%fault_key = ""
     if (self%stiffness > 0.0_dp .eqv. self%number > 0.0_dp) then
       self%fault_key = "normal_stiffness"
       self%fault_expected = "either a normal_stiffness or a stiffness_number greater than 0"
