@@ -96,9 +96,13 @@ contains
       report%instance = i
       associate (law => laws%of(i)%law)
         call expect(report, law%fault_key == "", "law", trim(law%fault_key), error, trim(law%fault_expected))
+        call expect(report, config%scene%dimension == 3 .or. .not. law%of_spheres, "law", "kind", error, &
+                    "a law that holds in 2D, as 'elastic': this one is of spheres")
       end associate
     end do
     report%instance = 1
+    call expect(report, config%output%fclib_step == 0 .or. .not. laws%yields, "output", "fclib_step", error, &
+                "none where contacts are compliant: problems of FCLIB have rigid ones")
     call expect(report, config%scene%alert_distance >= laws%range .or. .not. config%scene%alert_given, "scene", &
                 "alert_distance", error, "at least "//to_text(laws%range, 4)//" m, the largest range of a &law")
   end subroutine check_laws

@@ -92,7 +92,7 @@ contains
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
     call check_moments(config, scene%effects, error)
-    call check_shapes(config, scene%effects, error)
+    call check_shapes(config, scene, error)
     call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
@@ -213,16 +213,18 @@ contains
   end subroutine check_moments
 
   !> Bodies with shapes turn, and no moments resist that: the arms of their contacts do.
-  subroutine check_shapes(config, effects, error)
+  subroutine check_shapes(config, scene, error)
     type(config_t), intent(in) :: config
-    type(effects_t), intent(in) :: effects
+    type(scene_t), intent(in) :: scene
     type(error_t), allocatable, intent(inout) :: error
 
-    if (.not. effects%shapes) return
+    if (.not. scene%effects%shapes) return
     if (.not. config%scene%rotation) call raise(error, status_input, config%file// &
       & ": &scene rotation = .false.: expected .true. where bodies have shapes")
-    if (effects%rolling) call raise(error, status_input, config%file// &
+    if (scene%effects%rolling) call raise(error, status_input, config%file// &
       & ": rolling or pivoting friction: expected 0 where bodies have shapes")
+    if (scene%laws%of_spheres) call raise(error, status_input, config%file// &
+      & ": &law kind = 'hertz': expected another, as 'elastic', where bodies have shapes: this one is of spheres")
   end subroutine check_shapes
 
   !> The criterion 'error' knows the impulses of a column that gravity presses on the ground.

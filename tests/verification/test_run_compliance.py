@@ -4,7 +4,8 @@ import itertools
 
 import numpy as np
 
-from small_scenes import G, INERTIA, Grain, SmallScene, plane
+from gravier_runs import each, merged, run_case
+from small_scenes import EPS, G, Grain, SmallScene, plane
 
 RADIUS, MASS, STIFFNESS = 0.05, 0.7, 7000.0
 #: time and step of a half period of a ball on the plane
@@ -159,11 +160,58 @@ class Energies(ComplianceScene):
                 self.assertGreater(np.diff(history[name]).min(), -1e-3 * start)
 
 
+class Input(ComplianceScene):
+
+    def refused(self, title, **law):
+        more = law.pop("more", {})
+        run = run_case(merged({"scene": {"bodies": "lattice", "lattice_count": [2, 2], "radius_min": 0.05, "radius_max": 0.05},
+                               "material": MATERIAL, "law": [{"materials": ["m"], **law}], "time": {"step": 1e-3, "steps": 1}}, more),
+                       directory=self.here(title))
+        self.assert_status(run, 2)
+        self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
+        return run.stderr
+
+    def test_bad_values(self):
+        for key, value, expected in (("normal_stiffness", -1.0, ">= 0"), ("spring_restitution", 0.0, "in (0, 1]"),
+                                     ("spring_restitution", 1.5, "in (0, 1]"), ("spring_theta", 0.4, "in [0.5, 1]"),
+                                     ("stiffness_ratio", 0.0, "> 0"), ("pull_off_force", -1.0, ">= 0")):
+            text = self.refused(f"{key} {value}", **{"kind": "elastic", "normal_stiffness": 1e4, key: value})
+            self.assertIn(f"&law (the 1st) {key} = {value}: expected a finite real number {expected}", text)
+        text = self.refused("poisson", kind="hertz", young_modulus=1e7, poisson_ratio=0.6, more={"scene": {"dimension": 3, "lattice_count": [2, 2, 2]}})
+        self.assertIn("poisson_ratio = 0.6: expected a finite real number in [0, 0.5]", text)
+
+    def test_values_that_do_not_go_together(self):
+        either = "expected either a normal_stiffness or a stiffness_number greater than 0"
+        self.assertIn(f"&law (the 1st) normal_stiffness: {either}", self.refused("none", kind="elastic"))
+        self.assertIn(either, self.refused("both", kind="elastic", normal_stiffness=1.0, stiffness_number=1.0, stiffness_pressure=1.0))
+        self.assertIn("stiffness_pressure: expected a pressure greater than 0",
+                      self.refused("no pressure", kind="elastic", stiffness_number=1e4))
+        self.assertIn("kind = 'hertz': expected a law that holds in 2D", self.refused("disks", kind="hertz", young_modulus=1e7))
+        self.assertIn("fclib_step = 1: expected none where contacts are compliant",
+                      self.refused("fclib", kind="elastic", normal_stiffness=1e4, more={"output": {"fclib_step": 1}}))
+
+    def test_stiffness_that_the_step_does_not_resolve(self):
+        """The log names h sqrt(k/m) and the step that would do, in a run and in --check, and is silent where the step is fine."""
+        self.step = 0.02 / FREQUENCY
+        n = up(3)
+        grain = Grain((RADIUS - 1e-6) * n, radius=RADIUS, mass=MASS)
+        for factor, warned in ((1.0, False), (50.0, True)):
+            stiffness = STIFFNESS * factor**2
+            record = self.play(f"warning {factor}", [grain], [plane(0 * n, n, material="m")], -G * n, steps=3, material=MATERIAL,
+                               law=[elastic(normal_stiffness=stiffness)])
+            lines = [line for line in record.run.stdout.splitlines() if "h sqrt(k/m)" in line]
+            self.assertEqual(sum("warning" in line for line in lines), warned, lines)
+            self.assertIn("compliant contacts are deformed by at most", lines[-1])
+            if warned:
+                self.assertIn("h sqrt(k/m) = 1.00E+000", lines[0])
+                self.assertIn(f"at most {0.5 * self.step:.2E}".replace("E-0", "E-00"), lines[0])
+
+
 class Tangential(ComplianceScene):
 
     def test_slope(self):
-        """On a slope below the angle of friction a ball that cannot turn comes to rest where m g sin a = k_t x, at both ends of its
-        spring; beyond it slides with g (sin a - mu cos a)."""
+        """On a slope below the angle of friction a ball that cannot turn comes to rest where m g sin a = k_t x; beyond it slides with
+        g (sin a - mu cos a)."""
         ratio, friction = 0.4, 0.5
         self.step = 0.05 / FREQUENCY
         for dimension, angle in itertools.product((2, 3), (0.3, 0.8)):
@@ -183,21 +231,191 @@ class Tangential(ComplianceScene):
                             (record.velocity[-1, 0, 0] - record.velocity[-2, 0, 0]) / (1000 * self.step),
                             G * (pull - friction * np.cos(angle)), 1e-9)
 
+    def test_loop(self):
+        """Mindlin's loading and unloading with linear springs: a ball pressed between two planes that are driven to and fro against each
+        other stays where it is. The tangential force follows the displacement with the stiffness k_t between the bounds of friction: a
+        loop of hysteresis, to rounding."""
+        ratio, friction, depth, speed = 0.4, 0.5, 1e-3, 0.01
+        self.step = 1.0 / 1024
+        # amplitudes over the displacement at which sliding begins
+        yields = friction * depth / ratio
+        turns = np.cumsum([0, 1.5, 2.5, 1.5, 2.7, 0.4]) * yields / speed
+        turns = np.round(turns / self.step) * self.step
+        tables = {}
+        for name, sign in (("up.csv", -1), ("down.csv", 1)):
+            rows = ["time,vx"]
+            for begin, end in zip(turns[:-1], turns[1:]):
+                rows += [f"{begin + (begin > 0) * self.step / 2!r},{sign * speed!r}", f"{end - self.step / 2!r},{sign * speed!r}"]
+                sign = -sign
+            tables[name] = "\n".join(rows) + "\n"
+        for dimension, theta in itertools.product((2, 3), (0.5, 1.0)):
+            n = up(dimension)
+            record = self.play(f"loop {dimension} {theta}", [Grain(0 * n, radius=RADIUS, mass=MASS)],
+                               [plane(-(RADIUS - depth) * n, n, material="m", table="down.csv"),
+                                plane((RADIUS - depth) * n, -n, material="m", table="up.csv")], steps=int(turns[-1] / self.step) - 1,
+                               files=tables, material=MATERIAL, output={"every": 1, "contacts": True},
+                               law=[elastic(normal_stiffness=STIFFNESS, friction=friction, stiffness_ratio=ratio,
+                                            spring_theta=theta)],
+                               scene={"rotation": False, "start_overlap": 0.1})
+            states = record.contacts[1:]
+            normal = np.array([state["impulse"][0, 0] for state in states]) / self.step
+            found = np.array([state["impulse"][0, 1] for state in states]) / self.step
+            # t = -x on the lower plane, x in space; the force on the ball follows the plane
+            found *= -1 if dimension == 2 else 1
+            self.verify(f"ball between planes driven to and fro, {dimension}D", "place [m]", record.position, 0, 1e-15)
+            self.verify(f"ball between planes driven to and fro, {dimension}D", "normal force [N]", normal, STIFFNESS * depth, 1e-10)
+            v = record.boundary["velocity"][:, 0, 0]
+            v[0] = speed
+            # displacement at the instant of the spring, from that of the middle of each step
+            x = np.concatenate([[0], np.cumsum(0.5 * self.step * (v[:-1] + v[1:]))])
+            middle = x[:-1] + 0.5 * self.step * v[:-1]
+            at = middle - (1 - theta)**2 * self.step * v[:-1] + theta**2 * self.step * v[1:]
+            # the spring begins at the middle of the first step
+            force, kept = [], 0.0
+            for k, here in enumerate(at):
+                elongation = np.clip(kept + here - middle[k], -yields, yields)
+                force.append(ratio * STIFFNESS * elongation)
+                # at the middle of the next step
+                if k + 1 < len(at):
+                    kept = elongation + middle[k + 1] - here
+            bound = friction * STIFFNESS * depth
+            self.verify(f"ball between planes driven to and fro, {dimension}D", f"tangential force [N], theta = {theta}", found, force,
+                        1e-11 * bound)
+            self.assertGreater(np.max(force), 0.999 * bound)
+            self.assertLess(np.min(force), -0.999 * bound)
 
-class Input(ComplianceScene):
 
-    def refused(self, title, **law):
-        from gravier_runs import run_case
-        run = run_case({"scene": {"bodies": "lattice", "lattice_count": [2, 2], "radius_min": 0.05, "radius_max": 0.05},
-                        "material": MATERIAL, "law": [{"materials": ["m"], **law}], "time": {"step": 1e-3, "steps": 1}},
-                       directory=self.here(title))
-        self.assert_status(run, 2)
-        self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
-        return run.stderr
+class Attraction(ComplianceScene):
 
-    def test_bad_values(self):
-        for key, value, expected in (("normal_stiffness", -1.0, "at least 0"), ("spring_restitution", 0.0, "in (0, 1]"),
-                                     ("spring_restitution", 1.5, "in (0, 1]"), ("spring_theta", 0.4, "in [0.5, 1]"),
-                                     ("stiffness_ratio", 0.0, "greater than 0"), ("pull_off_force", -1.0, "at least 0")):
-            text = self.refused(f"{key} {value}", **{"kind": "elastic", "normal_stiffness": 1e4, key: value})
-            self.assertIn(key, text)
+    def test_pull_off(self):
+        """A ball that hangs under a plane by the attraction of bodies that touch, k x = F - m g; a stronger pull tears it off."""
+        for dimension, pull in itertools.product((2, 3), (0.9, 1.1)):
+            n = up(dimension)
+            force = 20.0
+            weight = pull * force / MASS
+            self.step = 0.05 / FREQUENCY
+            depth = (force - MASS * weight) / STIFFNESS
+            record = self.play(f"hangs {dimension} {pull}", [Grain(-(RADIUS - max(depth, 1e-5)) * n, radius=RADIUS, mass=MASS)],
+                               [plane(0 * n, -n, material="m")], -weight * n, steps=2000, material=MATERIAL,
+                               law=[elastic(normal_stiffness=STIFFNESS, pull_off_force=force, spring_restitution=0.3)])
+            place = record.position[-1, 0, -1]
+            if pull < 1:
+                self.verify(f"ball that hangs on a plane, {dimension}D", "place [m]", place, -RADIUS + depth, 1e-12)
+            else:
+                self.assertLess(place, -RADIUS - 0.5 * (weight - force / MASS) * (0.5 * record.time[-1])**2)
+
+
+class RigidLimit(ComplianceScene):
+
+    def test_column_and_block(self):
+        """One step of a column at rest that gravity presses, and of one that slides on a slope: velocities tend to those of rigid
+        contacts with the first order of 1/k."""
+        for friction, pull in ((0.0, 0.0), (0.3, 0.5), (0.8, 0.5)):
+            found, stiffnesses = [], [1e9, 1e10, 1e11]
+            grains = [Grain([0, 0, (2 * k + 1) * RADIUS], radius=RADIUS, mass=MASS) for k in range(6)]
+            gravity = G * np.array([np.sin(pull), 0, -np.cos(pull)])
+            self.step = 1e-3
+            # friction on the ground alone: a column that slides or sticks as one
+            walls = [plane([0, 0, 0], [0, 0, 1], material="m")]
+            options = {"steps": 1, "material": MATERIAL, "scene": {"rotation": False}, "solver": {"tolerance": 1e-14}}
+            rigid = self.play(f"rigid {friction} {pull}", grains, walls, gravity,
+                              law=[{"materials": ["m"], "kind": "coulomb", "friction": friction}], **options)
+            for stiffness in stiffnesses:
+                record = self.play(f"column {friction} {pull} {stiffness}", grains, walls, gravity,
+                                   law=[elastic(normal_stiffness=stiffness, friction=friction)], **options)
+                found.append(np.abs(record.velocity[-1] - rigid.velocity[-1]).max())
+            order = np.log10(np.array(found[:-1]) / found[1:])
+            self.assertTrue(np.all(np.abs(order - 1) < 0.05), (friction, pull, found))
+            self.verify("column of six as stiffness grows", f"distance of the velocities from the rigid ones [m/s], friction {friction}",
+                        found[-1], 0, 1e-4)
+
+
+class Invariance(ComplianceScene):
+
+    def case(self, dimension, **law):
+        count = [5, 6] if dimension == 2 else [3, 3, 4]
+        return {"scene": {"dimension": dimension, "bodies": "lattice", "lattice_count": count, "radius_min": 0.04, "radius_max": 0.06,
+                          "wall_material": "m"},
+                "material": MATERIAL,
+                "law": [elastic(**{"normal_stiffness": 1e6, "friction": 0.5, "spring_restitution": 0.5, "tangential_damping": 0.5, **law})],
+                "time": {"step": 1e-3, "steps": 240}, "solver": {"criterion": "residual", "tolerance": 1e-6},
+                "decomposition": {"subdomains": 4}, "output": {"directory": "results", "every": 60, "contacts": True, "energy": True}}
+
+    @staticmethod
+    def states(run):
+        return {name: value.tobytes() for name, value in run.results().items() if hasattr(value, "tobytes") and "/bodies/" in name
+                or "/contacts/" in name}
+
+    def test_ranks_and_restart(self):
+        """The same bits on 1, 2 and 4 ranks and after a restart on another number, with elongations, moments and the attraction."""
+        for dimension, method, law in ((2, "nscdd", {"rolling_friction": 0.1}), (3, "nscdd_ep", {"pull_off_force": 0.2}),
+                                       (3, "schwarz", {"spring_theta": 0.6})):
+            with self.subTest(dimension=dimension, method=method):
+                case = merged(self.case(dimension, **law), {"solver": {"method": method}})
+                name = f"{dimension} {method}"
+                runs = each(lambda ranks: run_case(case, ranks, self.here(f"{name} {ranks}")), [(1,), (2,), (4,)])
+                stopped = merged(case, {"time": {"steps": 120}, "output": {"checkpoint_every": 120}})
+                self.assert_status(run_case(stopped, 2, self.here(f"{name} stopped")), 0)
+                runs.append(run_case(case, 1, self.here(f"{name} stopped"), options=["--restart"]))
+                for run in runs:
+                    self.assert_status(run, 0)
+                for run in runs[1:]:
+                    self.assertEqual(self.states(run), self.states(runs[0]))
+                history = runs[0].history()
+                self.assertGreater(history["contacts"][-1], 20)
+                scale = history["kinetic_translation"].max()
+                self.verify("balls that fall on each other, compliant", f"error of the energy balance over the energy, {name}",
+                            history["energy_error"] / scale, 0.0, 1e-10)
+                np.testing.assert_array_equal(runs[-1].history()["energy_error"][-1], history["energy_error"][-1])
+
+    def test_overlaps_are_deformation(self):
+        """Soft balls lie in each other by more than what rigid ones may, and nothing is projected."""
+        run = run_case(merged(self.case(3, normal_stiffness=2e3), {"scene": {"overlap_allowed": 1e-4},
+                                                                                 "decomposition": {"subdomains": 1}}), directory=self.here("soft"))
+        self.assert_status(run, 0)
+        self.assertIn("no step projected overlaps", run.stdout)
+        self.assertEqual(run.history()["max_overlap"].max(), 0)
+        gaps = np.concatenate([value.ravel() for name, value in run.results().items() if name.endswith("/contacts/gap")])
+        self.assertLess(gaps.min(), -1e-3)
+
+
+class Uniqueness(ComplianceScene):
+    kappa, pressure = 1e4, 2000.0
+
+    def test_forces_do_not_depend_on_the_way(self):
+        """Packings made at a friction of 0.3, solved anew at 0.5 to 1.0 with kappa = 1e4 and a step of h sqrt(k/m) = 3: methods and
+        subdomains find the same forces, within 2000 sweeps to 1e-10."""
+        made = {"scene": {"bodies": "lattice", "friction": 0.3}, "time": {"step": 1e-3, "steps": 350},
+                "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 20000},
+                "output": {"directory": ".", "every": 0, "final_bodies": True}}
+        packings = {"C": {"dimension": 3, "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012, "seed": 1},
+                    "G": {"dimension": 2, "lattice_count": [20, 30], "radius_min": 0.006, "radius_max": 0.014, "seed": 1}}
+        # of the stiffest contact, measured: h sqrt(k/m) = 3
+        steps = {"C": 2.8e-4, "G": 1.6e-4}
+        pressures = {"C": 2060.0, "G": 5900.0}
+        ways = [("nlgs", 1), ("nscdd", 8), ("nscdd", 64), ("nscdd_ep", 8), ("schwarz", 8), ("schwarz_ec", 8), ("newton", 8)]
+        for name, scene in packings.items():
+            packed = run_case(merged(made, {"scene": scene}), directory=self.here(f"packing {name}"))
+            self.assert_status(packed, 0)
+            for friction in (0.5, 0.8, 1.0):
+                case = {"scene": {"dimension": scene["dimension"], "bodies": "file", "bodies_file": packed.path("final_bodies.h5"),
+                                  "wall_material": "m", "start_overlap": 0.5},
+                        "material": MATERIAL, "law": [elastic(friction=friction, stiffness_number=self.kappa,
+                                                              stiffness_pressure=pressures[name])],
+                        "time": {"step": steps[name], "steps": 1},
+                        "solver": {"criterion": "residual", "tolerance": 1e-13, "max_iterations": 20000},
+                        "output": {"directory": "results", "every": 1, "contacts": True, "trace": True}}
+                runs = each(lambda method, subdomains: run_case(merged(case, {
+                    "solver": {"method": method}, "decomposition": {"subdomains": subdomains}}),
+                    directory=self.here(f"{name} {friction} {method} {subdomains}")), ways)
+                first = None
+                for (method, subdomains), run in zip(ways, runs):
+                    self.assert_status(run, 0)
+                    trace = run.trace()
+                    taken = trace["iteration"][np.nonzero(trace["residual"] <= 1e-10)[0][0]]
+                    self.assertLessEqual(taken, 2000, (name, friction, method, subdomains))
+                    impulse = run.results()["/steps/1/contacts/impulse"]
+                    first = impulse if first is None else first
+                    scale = np.sqrt(np.mean(np.sum(first**2, axis=1)))
+                    self.verify("forces of compliant contacts", f"{name}, friction {friction}, {method} in {subdomains}: impulses over "
+                                "their root mean square", impulse / scale, first / scale, 1e-8)

@@ -56,6 +56,8 @@ module gravier_contact_law
     logical :: attracts = .false., remembers = .false.
     !> pairs have springs, whose elongations stay with them
     logical :: yields = .false.
+    !> it has a meaning between spheres and planes alone
+    logical :: of_spheres = .false.
     !> all its pairs have the same terms, which are then found once a run and not once a step and pair
     logical :: is_constant = .false.
     !> the largest coefficients that it hands over; all but that of friction are the same for all its pairs

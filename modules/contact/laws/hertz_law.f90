@@ -64,6 +64,7 @@ contains
     self%pull_off = values(7)
     self%attracts = self%pull_off > 0.0_dp
     self%yields = .true.
+    self%of_spheres = .true.
     self%largest%friction = self%friction
     call self%set_resistance(values(8), values(9))
   end subroutine hertz_set

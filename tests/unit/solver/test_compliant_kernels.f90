@@ -1,5 +1,5 @@
-!> The loops over compliant contacts: without compliance they are those of rigid ones, with it they solve the law for v + s + a r, in
-!> blocks and one by one, with momentum, and with a record of the velocities.
+!> The loops over compliant contacts: without compliance they are those of rigid ones, with it they solve the law for v + s + a r,
+!> in blocks and one by one, with momentum, and with a record of the velocities.
 program test_compliant_kernels
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
@@ -64,7 +64,8 @@ contains
       allocate (problem%hot(lanes, kernels%nh, n_blocks(n)), problem%impulse(lanes, kernels%nc, n_blocks(n)), source=0.0_dp)
       allocate (problem%weight(kernels%nw, 2*n), problem%velocity(kernels%nv, 2*n), source=0.0_dp)
       do c = 1, n
-        problem%pair(:, c) = [c, n + c]
+        problem%pair(1, c) = c
+        problem%pair(2, c) = n + c
         problem%weight(1:dimension, c) = 1.5_dp + draw(c, 1)
         problem%weight(dimension + 1:min(kernels%nw, 2*dimension), c) = 2.5_dp + draw(c, 2)
         do d = 1, kernels%nv
@@ -186,8 +187,8 @@ contains
     end associate
   end subroutine test_law
 
-  !> The velocity that is recorded is that of the contact under the impulse that solves its law. Between bodies with shapes the parts
-  !> of an impulse change each other's velocities, and it is not.
+  !> The velocity that is recorded is that of the contact under the impulse that solves its law. Between bodies with shapes the
+  !> parts of an impulse change each other's velocities, and it is not.
   subroutine test_record()
     type(case_t) :: problem
     real(dp), allocatable :: recorded(:, :, :), v(:, :, :)
