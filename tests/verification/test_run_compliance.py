@@ -139,6 +139,28 @@ class Energies(ComplianceScene):
         self.verify("ball that swings on a plane", "energy over that of the start", total / total[0], 1, 1e-11)
         self.verify("ball that swings on a plane", "dissipated [J]", history["dissipated_normal"], 0, 1e-11 * abs(total[0]))
 
+    def test_chain(self):
+        """Compressed balls between two walls swing in their modes, omega = 2 sqrt(k/m) sin(j pi/(2 (n + 1))), as the step has it:
+        omega' = 2/h atan(h omega/2). Long waves run with the speed of sound d sqrt(k/m)."""
+        n, depth, small = 9, 1e-3, 1e-5
+        along = np.array([1.0, 0.0, 0.0])
+        self.step = 0.2 / FREQUENCY
+        pitch = 2 * RADIUS - depth
+        number = np.arange(1, n + 1)
+        for mode in (1, 2, 9):
+            shape = np.sin(mode * np.pi * number / (n + 1))
+            grains = [Grain((RADIUS - depth + (k - 1) * pitch) * along, small * shape[k - 1] * FREQUENCY * along, radius=RADIUS,
+                            mass=MASS) for k in number]
+            end = 2 * (RADIUS - depth) + (n - 1) * pitch
+            record = self.play(f"chain {mode}", grains,
+                               [plane(0 * along, along, material="m"), plane(end * along, -along, material="m")], steps=400, material=MATERIAL, law=[elastic(normal_stiffness=STIFFNESS, spring_theta=0.5)],
+                               output={"every": 50}, scene={"start_overlap": 0.1})
+            frequency = 2 * FREQUENCY * np.sin(mode * np.pi / (2 * (n + 1)))
+            turned = 2 / self.step * np.arctan(0.5 * self.step * frequency)
+            wanted = small * FREQUENCY * shape * np.cos(turned * record.time[:, None])
+            self.verify("chain of nine balls between walls", f"velocity of mode {mode} [m/s]", record.velocity[:, :, 0], wanted,
+                        1e-9 * small * FREQUENCY)
+
     def test_balance_of_damped_impacts(self):
         """Energies close to rounding with dashpots, friction and sliding springs, and what is lost is dissipated."""
         for dimension in (2, 3):
