@@ -1,10 +1,11 @@
 """Compliant contacts in whole runs against formulas: impacts on springs and dashpots, the force of Hertz, a tangential spring that
 slides, energy, equilibria; bad input."""
 import itertools
+import os
 
 import numpy as np
 
-from gravier_runs import each, merged, run_case
+from gravier_runs import each, merged, run_case, write
 from small_scenes import EPS, G, Grain, SmallScene, plane
 
 RADIUS, MASS, STIFFNESS = 0.05, 0.7, 7000.0
@@ -211,6 +212,18 @@ class Input(ComplianceScene):
         self.assertIn("kind = 'hertz': expected a law that holds in 2D", self.refused("disks", kind="hertz", young_modulus=1e7))
         self.assertIn("fclib_step = 1: expected none where contacts are compliant",
                       self.refused("fclib", kind="elastic", normal_stiffness=1e4, more={"output": {"fclib_step": 1}}))
+
+    def test_hertz_is_of_spheres(self):
+        directory = self.here("blocks")
+        os.makedirs(directory)
+        write(os.path.join(directory, "a.shapes"), "shape block\nrounding 0.002\nbox 0.1 0.1 0.1\n")
+        write(os.path.join(directory, "bodies.csv"), "id,x,y,z,shape,scale\n1,0,0,1,block,1\n2,0,0,2,block,1\n")
+        run = run_case({"scene": {"dimension": 3, "bodies": "file", "bodies_file": "bodies.csv", "shapes": "a.shapes"},
+                        "material": MATERIAL, "law": [{"materials": ["m"], "kind": "hertz", "young_modulus": 1e7}],
+                        "time": {"step": 1e-3, "steps": 1}}, directory=directory)
+        self.assert_status(run, 2)
+        self.assertIn("case.nml: &law kind = 'hertz': expected another, as 'elastic', where bodies have shapes: this one is of spheres",
+                      run.stderr)
 
     def test_stiffness_that_the_step_does_not_resolve(self):
         """The log names h sqrt(k/m) and the step that would do, in a run and in --check, and is silent where the step is fine."""

@@ -43,24 +43,24 @@ contains
     on(6) = self%pivoting
     names(7) = "cohesion"
     on(7) = self%cohesion
-    names(8) = "periodic images"
-    on(8) = self%periodic
-    names(9) = "drives"
-    on(9) = self%drives
-    names(10) = "driven by forces"
-    on(10) = self%forces
-    names(11) = "glued grains"
-    on(11) = self%glued
-    names(12) = "shapes"
-    on(12) = self%shapes
-    names(13) = "gravity"
-    on(13) = self%gravity
-    names(14) = "body force"
-    on(14) = self%body_force
-    names(15) = "removal"
-    on(15) = self%removal
-    names(16) = "compliance"
-    on(16) = self%compliance
+    names(8) = "compliance"
+    on(8) = self%compliance
+    names(9) = "periodic images"
+    on(9) = self%periodic
+    names(10) = "drives"
+    on(10) = self%drives
+    names(11) = "driven by forces"
+    on(11) = self%forces
+    names(12) = "glued grains"
+    on(12) = self%glued
+    names(13) = "shapes"
+    on(13) = self%shapes
+    names(14) = "gravity"
+    on(14) = self%gravity
+    names(15) = "body force"
+    on(15) = self%body_force
+    names(16) = "removal"
+    on(16) = self%removal
   end subroutine effects_list
 
 end module gravier_effects
