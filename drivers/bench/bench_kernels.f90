@@ -36,7 +36,7 @@ module gravier_bench_kernels
 
   !> contacts a grain in packings of some size, walls included
   real(dp), parameter :: contacts_2d = 1.95_dp, contacts_3d = 3.35_dp
-  !> contacts of a problem in the first caches of a core, and share of the last cache that one beyond them takes
+  !> contacts of a problem in the first caches of a core, and fraction of the last cache that one beyond them takes
   integer, parameter :: few_contacts = 2000
   real(dp), parameter :: share_of_cache = 0.1_dp
   !> coefficients of rolling and pivoting
@@ -81,7 +81,7 @@ contains
     end associate
   end subroutine sweep_once
 
-  !> Bytes that one sweep moves at least, each array once: of a contact pair and hot read, impulses read and written, law
+  !> Bytes that one sweep moves at least, each array once: of a contact pair and contact data read, impulses read and written, law
   !> velocities written, previous impulses read and written; of a body velocities read and written, weights read. Lanes of
   !> the last block that hold no contact count too.
   pure integer(i8) function streamed(self, version) result(bytes)

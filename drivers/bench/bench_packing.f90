@@ -20,7 +20,7 @@ module gravier_bench_packing
   real(dp), parameter :: radius = 0.01_dp, step = 1.0e-3_dp, smallest = 0.98_dp, jitter = 0.001_dp
   !> of the lattice, relative to the largest radius: no two grains overlap
   real(dp), parameter :: spacing = 2.0_dp + 2.0_dp*jitter
-  !> gap within which the share wanted of the nearest pairs lies: the sum of two radii has a triangular distribution
+  !> gap within which the fraction wanted of the nearest pairs lies: the sum of two radii has a triangular distribution
   real(dp), parameter :: alert_2d = spacing - 2.0_dp + (1.0_dp - smallest)*1.1835_dp
   real(dp), parameter :: alert_3d = spacing - 2.0_dp + (1.0_dp - smallest)*1.0871_dp
   !> velocities at the start: neighbours approach each other along every axis by so many alert distances a step, and each

@@ -14,7 +14,7 @@ module gravier_error_options
     & "  --out FILE          table, one row a state (error.csv)"//nl// &
     & "  --situations LIST   how solves start (cold):"//nl// &
     & "    cold              from zero impulses"//nl// &
-    & "    lost:SHARE        from converged impulses, a share of them set to zero"//nl// &
+    & "    lost:FRACTION     from converged impulses, a fraction of them set to zero"//nl// &
     & "    turned:DEGREES    from converged impulses, then gravity turns"//nl// &
     & "    loose:SPEED       from converged impulses, then the grains get random velocities, in g h"//nl// &
     & "    program           from zero impulses, by the program's own control"//nl// &
@@ -24,7 +24,7 @@ module gravier_error_options
     & "  --rest              the exact velocities are zero; otherwise each solve goes on to find them:"//nl// &
     & "  --tight RESIDUAL    until this residual (1e-10)"//nl// &
     & "  --limit N           or for so many iterations (20000),"//nl// &
-    & "  --sweeps N          and then for so many sweeps without momentum (20000)"//nl// &
+    & "  --sweeps N          and then for so many plain sweeps (20000)"//nl// &
     & "  --help"//nl// &
     & "exit status: 0 done; 2 bad input or usage; 4 anything else"
 

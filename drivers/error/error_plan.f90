@@ -7,7 +7,7 @@ module gravier_error_plan
   public :: plan_t, situation_t, reference_t, row_t
   public :: start_cold, start_lost, start_turned, start_loose
 
-  !> impulses at the start: zero; converged with a share of them set to zero; converged before gravity turned; converged, and
+  !> impulses at the start: zero; converged with a fraction of them set to zero; converged before gravity turned; converged, and
   !> velocities of the grains drawn at random
   integer, parameter :: start_cold = 1, start_lost = 2, start_turned = 3, start_loose = 4
 
@@ -30,7 +30,7 @@ module gravier_error_plan
     logical :: at_rest = .false.
     real(dp) :: tight = 1.0e-10_dp
     integer :: limit = 20000
-    !> sweeps without momentum after these, where the residual is not reached
+    !> plain sweeps after these, where the residual is not reached
     integer :: sweeps = 20000
     !> solve by the program's own control, too, from zero impulses
     logical :: by_program = .false.

@@ -77,7 +77,7 @@ contains
       & call sweep_on(plan, simulation, reference, error)
   end subroutine solve_tightly
 
-  !> Sweeps without momentum from where the problem is. How far velocities still go in the second half of them tells how well
+  !> Plain sweeps from where the problem is. How far velocities still go in the second half of them tells how well
   !> the solution is known, without the estimate that is judged by it. Collective.
   subroutine sweep_on(plan, simulation, reference, error)
     type(plan_t), intent(in) :: plan
@@ -92,8 +92,8 @@ contains
     logical :: accelerated
 
     associate (problem => simulation%problem, method => simulation%method)
-      accelerated = method%momentum%on
-      method%momentum%on = .false.
+      accelerated = method%acceleration%on
+      method%acceleration%on = .false.
       call method%start(problem, error)
       if (.not. allocated(error)) call velocity%start(problem, 0.1_dp*problem%error_scale)
       n = 0
@@ -110,7 +110,7 @@ contains
         end if
         call velocity%keep_copy(problem, method, k)
       end do
-      method%momentum%on = accelerated
+      method%acceleration%on = accelerated
       if (allocated(error)) return
       reference%residual = row%residual
       reference%estimate = row%estimate

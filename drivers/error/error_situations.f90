@@ -70,7 +70,7 @@ contains
     end select
   end subroutine prepare
 
-  !> Set a share of the impulses to zero, chosen by the names of the bodies.
+  !> Set a fraction of the impulses to zero, chosen by the names of the bodies.
   subroutine lose_impulses(problem, share)
     type(contact_problem_t), intent(inout) :: problem
     real(dp), intent(in) :: share

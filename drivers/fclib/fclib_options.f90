@@ -13,7 +13,7 @@ module gravier_fclib_options
   character(len=*), parameter :: usage = &
     & "usage: gravier_fclib [OPTION]... FILE|DIRECTORY..."//nl// &
     & "  solves frictional contact problems in the HDF5 format of FCLIB; of a directory all *.hdf5 and *.h5"//nl// &
-    & "  --method M           auto (default): sweeps with momentum and Newton's method in turn; nlgs; momentum; newton;"//nl// &
+    & "  --method M           auto (default): accelerated sweeps and Newton's method in turn; nlgs; momentum; newton;"//nl// &
     & "                       several with commas between, or all"//nl// &
     & "  --tolerance T        on es, the unit-consistent measure of the defect (1e-8)"//nl// &
     & "  --max-iterations N   sweeps and Newton steps of one solve (100000)"//nl// &

@@ -23,7 +23,7 @@ module gravier_sample_preparation
   integer, parameter :: steps_a_line = 100
   !> way of a plane that presses, in a step, relative to the mean radius
   real(dp), parameter :: way_of_plane = 0.05_dp
-  !> share of its velocity that everything keeps from one step of a compaction to the next once the loads are out of
+  !> fraction of its velocity that everything keeps from one step of a compaction to the next once the loads are out of
   !> balance by less than the second figure: nothing else would ever stop grains that touch no others. At rest it does
   !> nothing; a factor common to all does not push bodies into each other
   real(dp), parameter :: velocity_kept = 0.98_dp, imbalance_damped = 0.1_dp

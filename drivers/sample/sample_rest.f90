@@ -19,7 +19,7 @@ module gravier_sample_rest
   !> second condition grains that begin to fall, or wait for the planes to come, would be at rest. m and R are means.
   type :: rest_t
     logical :: compacted = .false.
-    !> of the last step: mean kinetic energy over its scale, share of the loads that is not balanced, largest overlap [m]
+    !> of the last step: mean kinetic energy over its scale, fraction of the loads that is not balanced, largest overlap [m]
     real(dp) :: energy = huge(1.0_dp), imbalance = 1.0_dp, overlap = 0.0_dp
     !> mean normal stress of the grains on each wall in the last step [Pa, N/m in 2D]
     real(dp), allocatable :: pressure(:)
@@ -107,7 +107,7 @@ contains
     end associate
   end function unbalanced_pressure
 
-  !> Load on all grains, and the share of it that boundaries do not bear. Collective.
+  !> Load on all grains, and the fraction of it that boundaries do not bear. Collective.
   subroutine weigh(simulation, weight, missing)
     type(simulation_t), intent(in) :: simulation
     !> [N]

@@ -3,7 +3,7 @@
 
     python3 drivers/studies/study_hard.py --out DIR [--cases REGEX] [--methods TITLE...] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
 
-leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page of the table. --short leaves out the long runs. With
+leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page with an overview of it. --short leaves out the long runs. With
 --cases and --methods the rows of others that DIR/hard_cases.csv has already stay."""
 import argparse
 import csv
@@ -75,24 +75,29 @@ def joined(path, rows):
 
 
 def page(rows):
-    """The table as Markdown: a line a case and method, ranks that agree in one line."""
-    text = ""
+    """The overview as Markdown: a line a case, with the methods of fewest and most iterations and how the others ended."""
+    text = "\n| case | why it is hard | runs that converged | fewest, most iterations of all steps | how the others ended |\n"
+    text += "|---|---|---:|---|---|\n"
     for name, case in cases().items():
         own = [r for r in rows if r["case"] == name]
         if not own:
             continue
-        text += f"\n### {name[0].upper() + name[1:]}\n\n{case.hard[0].upper() + case.hard[1:]}.\n\n"
-        text += "| method | ranks | subdomains | steps | iterations | residual | energy | overlap | status |\n"
-        text += "|---|---|---:|---:|---:|---:|---:|---:|---|\n"
-        merged = {}
+        converged = sorted((int(r["iterations"]), r["method"]) for r in own if r["status"] == "converged")
+        ends = {}
         for r in own:
-            key = tuple(r[k] for k in COLUMNS if k not in ("case", "ranks"))
-            merged.setdefault(key, []).append(str(r["ranks"]))
-        for key, ranks in merged.items():
-            r = dict(zip([k for k in COLUMNS if k not in ("case", "ranks")], key))
-            status = r["status"] + (f" **{r['wrong']}**" if r["wrong"] else "")
-            text += (f"| {r['method']} | {', '.join(ranks)} | {r['subdomains']} | {r['steps']} | {r['iterations']} | {r['residual']} | "
-                     f"{r['energy_change']} | {r['overlap']} | {status} |\n")
+            if r["status"] != "converged" or r["wrong"]:
+                words = r["status"] + (f" **{r['wrong']}**" if r["wrong"] else "")
+                methods = ends.setdefault(re.sub(r"\d+ of", "some of", words) if "steps" in words else words, [])
+                if r["method"] not in methods:
+                    methods.append(r["method"])
+        count = ""
+        if converged:
+            count = f"{converged[0][0]} ({converged[0][1]})"
+            if converged[-1][0] != converged[0][0]:
+                count += f", {converged[-1][0]} ({converged[-1][1]})"
+        others = "; ".join(f"{words}: {'; '.join(methods)}" if len(methods) < 5 else f"{words}: {len(methods)} methods"
+                           for words, methods in ends.items())
+        text += f"| {name} | {case.hard} | {len(converged)} of {len(own)} | {count} | {others} |\n"
     return text
 
 

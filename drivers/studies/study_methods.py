@@ -85,7 +85,7 @@ def solve(directory, bodies, case, iterations):
     log = (place / "results" / "run.log").read_text()
     row.update(phase_seconds(log))
     row["done"], row["residual"] = trace[-1]
-    lowered = re.search(r"lowered (\d+) times$", log, re.MULTILINE)
+    lowered = re.search(r"; (\d+) reductions? of l$", log, re.MULTILINE)
     row["lowered"] = int(lowered.group(1)) if lowered else 0
     return row
 

@@ -15,8 +15,8 @@ module gravier_timers
     & phase_reduction = 11, phase_projection = 12, phase_output = 13
   integer, parameter :: n_phases = 13
   !> what the log calls the phases
-  character(len=28), parameter :: phase_names(n_phases) = [character(len=28) :: "bodies: move, migrate", &
-    & "neighbour lists and ghosts", "detection of contacts", "interface: who shares whom", &
+  character(len=28), parameter :: phase_names(n_phases) = [character(len=28) :: "motion and migration", &
+    & "neighbour lists and ghosts", "detection of contacts", "interface: shared bodies", &
     & "set-up of the solve", "sweeps", "exchange", "factorisation", "interface solve", "residual checks", &
     & "reductions of the solve", &
     & "projection of overlaps", "output"]

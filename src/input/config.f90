@@ -308,7 +308,7 @@ contains
       if (.not. is_given(report, "enriched", "contacts")) config%enriched%contacts = "active"
     end if
     if (.not. is_given(report, "solver", "acceleration")) then
-      if (features%momentum_by_default == default_always .or. (features%momentum_by_default == default_on_active .and. &
+      if (features%accelerated_by_default == default_always .or. (features%accelerated_by_default == default_on_active .and. &
           config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
     end if
     if (.not. config%solver%tolerance_given .and. config%solver%criterion == "velocity_error") config%solver%tolerance = 1.0e-2_dp

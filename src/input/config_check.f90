@@ -228,7 +228,7 @@ contains
       call expect(report, solver%relaxation > 0.0_dp .and. solver%relaxation <= 1.0_dp, "solver", "relaxation", error)
       call expect(report, solver%acceleration == "none" .or. .not. features%relaxes .or. &
                   .not. solver%relaxation_given, "solver", "acceleration", error, &
-                  "'none' where relaxation is given: momentum needs a factor that adapts itself")
+                  "'none' where relaxation is given: acceleration needs a factor that adapts itself")
       call expect(report, solver%velocity_scale > 0.0_dp .or. .not. solver%velocity_scale_given, "solver", "velocity_scale", &
                   error)
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)

@@ -8,7 +8,7 @@ module gravier_config_table
   use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
-    & with_momentum, with_momentum_on_active, with_sleeping
+    & accelerated, accelerated_on_active, with_sleeping
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   implicit none
   private
@@ -148,14 +148,15 @@ module gravier_config_table
            "lower corner of the period, and of the box of a sample; its third component is 0 in 2D", count=3, unit="m"), &
      key_t("scene", "alert_distance", kind_real, "-1", ">= 0", "gap below which two bodies make a contact", &
            unit="m", note="0.1 of the largest radius"), &
-     key_t("scene", "skin", kind_real, "-1", ">= 0", "distance within which neighbour lists stay valid", &
+     key_t("scene", "skin", kind_real, "-1", ">= 0", &
+           "gap beyond the alert distance up to which pairs are listed, so that neighbour lists last for several steps", &
            unit="m", note="0.2 of the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
            unit="m", note="0.01 of the mean radius, or the least rounding"), &
-     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "take overlaps back by moving grains and free boundaries"), &
+     key_t("scene", "overlap_projection", kind_logical, ".true.", "", "remove overlaps by moving grains and free boundaries"), &
      key_t("scene", "start_overlap", kind_real, "0.5", ">= 0", &
-           "largest overlap at the start: of two grains, as a share of the smaller radius; of a grain and a boundary, as a "// &
-           "share of the grain's")]
+           "largest overlap at the start, as a fraction of the smaller radius of two grains, or of the radius of a grain at a "// &
+           "boundary")]
 
   type(key_t), parameter :: shape_keys(*) = &
     [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
@@ -205,14 +206,14 @@ module gravier_config_table
            note="the value of `wall_pivoting_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "material", kind_text, "''", "", "name of its `&material`, and of that of grains glued to it", &
            note="the value of `wall_material` of `&scene`", chooser="shape", chosen=solid_shapes), &
-     key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is taken away", &
+     key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is removed", &
            unit="s", note="never")]
 
   type(key_t), parameter :: sample_keys(*) = &
     [key_t("sample", "arrangement", kind_choice, "'loose'", "lattice loose", &
            "grains in the cells of a lattice, or at random without touching"), &
      key_t("sample", "preparation", kind_choice, "'none'", "none settled compacted", &
-           "what the program `gravier_sample` does with the grains: nothing, let gravity settle them, or press them together"), &
+           "what `gravier_sample` does with the grains: nothing, let gravity settle them, or compact them"), &
      key_t("sample", "count", kind_integer, "0", ">= 1", "number of grains", note="required", required=.true.), &
      key_t("sample", "radii", kind_choice, "'single'", "single uniform uniform_volume log_normal table", &
            "distribution of the radii: one radius, uniform by number, uniform by volume, log-normal, or from a table"), &
@@ -231,17 +232,18 @@ module gravier_config_table
            note="required", chooser="radii", chosen="table"), &
      key_t("sample", "grain_shapes", kind_text, "''", "", &
            "names of the shapes that grains have, of the file `shapes` of `&scene`, with commas between; `disk` in 2D and "// &
-           "`sphere` in 3D stand for themselves. Radii are those of the balls about the centres of mass that hold the grains", &
+           "`sphere` in 3D stand for themselves. Radii are those of the balls about the centres of mass that enclose the grains", &
            note="all shapes of the file"), &
-     key_t("sample", "grain_shares", kind_real, "8*0", "> 0", "shares by number of the first eight `grain_shapes`, to any scale", &
-           count=8, planar=8, note="equal shares"), &
+     key_t("sample", "grain_shares", kind_real, "8*0", "> 0", &
+           "fractions by number of the first eight `grain_shapes`, to any scale", &
+           count=8, planar=8, note="equal fractions"), &
      key_t("sample", "box", kind_real, "3*0", ">= 0", &
-           "size of the box along each axis; the last may be 0: as high as the grains ask, for loose ones by `solid_fraction`; "// &
+           "size of the box along each axis; if the last is 0, the lattice or `solid_fraction` determines it; "// &
            "the third is 0 in 2D", &
            count=3, unit="m", note="the period, along an axis that is periodic"), &
      key_t("sample", "solid_fraction", kind_real, "0.35", "in (0, 0.6)", &
-           "share of the box that the grains fill, or the balls that hold those with shapes, where its last size is 0; "// &
-           "random places take up to about 0.53 in 2D and 0.35 in 3D of grains of one radius: what finds none is refused", &
+           "fraction of the box that the grains fill, or the balls that enclose those with shapes, if its last size is 0; "// &
+           "random positions reach about 0.53 in 2D and 0.35 in 3D for grains of one radius; a larger fraction is refused", &
            note="`0.35` in 2D, `0.2` in 3D", chooser="arrangement", chosen="loose"), &
      key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii and places"), &
      key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &
@@ -262,14 +264,14 @@ module gravier_config_table
   !> those of all laws; `kind` comes with its words, and each law has its own
   type(key_t), parameter :: law_keys(*) = &
     [key_t("law", "materials", kind_text, "''", "", &
-           "names of the two materials; one name: of pairs of that material", count=2, note="required", required=.true.), &
+           "names of the two materials; one name stands for pairs of that material", count=2, note="required", required=.true.), &
      key_t("law", "kind", kind_choice, "''", "", "the law, see [laws](laws.md)", note="required", required=.true.)]
 
   type(key_t), parameter :: time_keys(*) = &
     [key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
      key_t("time", "steps", kind_integer, "0", ">= 0", "number of time steps", note="required", required=.true.), &
      key_t("time", "theta", kind_real, "0.5", "in [0.5, 1]", &
-           "weight of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
+           "factor of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
 
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &
@@ -284,22 +286,24 @@ module gravier_config_table
      key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
      key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &
-           "share of a change of the neighbours' impulses that is taken over", &
+           "relaxation factor: the fraction of a change of the neighbours' impulses that is applied", &
            note="found while iterating, from 1 down", chooser="method"), &
      key_t("solver", "acceleration", kind_choice, "'none'", "none momentum", &
-           "`momentum`: iterations start from impulses extrapolated from the last two; no given `relaxation` then. Default of", &
+           "`momentum`: accelerated sweeps, which start from impulses extrapolated from the last two iterations (Nesterov); "// &
+           "not with a given `relaxation`. Default of", &
            note="by the method"), &
      key_t("solver", "velocity_scale", kind_real, "-1", "> 0", "velocity against which errors of a solve are compared", &
            unit="m/s", note="by rule"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "layered_start", kind_logical, ".true.", "", &
-           "carry loads across in layers where a solve starts far from the solution (with `velocity_error` and gravity)"), &
+           "carry loads by layers to the supports if a solve starts far from the solution (with `velocity_error` and gravity)"), &
      key_t("solver", "sleeping", kind_logical, ".false.", "", &
            "contacts of bodies at rest leave the sweeps until these are disturbed"), &
      key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
      key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
-           "momentum of a body at rest, at most, over the root mean square of the impulses; and over a tenth of those on it", &
+           "largest mass times velocity of a body at rest, relative to the root mean square of the impulses; and at most a "// &
+           "tenth of the impulses on it", &
            note="100 times `tolerance`"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
            "after a solve that gave up: go on; write the step and stop; stop without it. "// &
@@ -307,7 +311,7 @@ module gravier_config_table
 
   type(key_t), parameter :: decomposition_keys(*) = &
     [key_t("decomposition", "partition", kind_choice, "'grid'", "grid metis", &
-           "equal boxes, or cells with grains in them shared out by METIS"), &
+           "equal boxes, or occupied cells distributed by METIS"), &
      key_t("decomposition", "kind", kind_choice, "'dual'", "dual primal", &
            "a contact belongs to the subdomain of its midpoint, or of the centre of its candidate"), &
      key_t("decomposition", "grid", kind_integer, "3*0", ">= 1", &
@@ -455,8 +459,8 @@ contains
       case ("relaxation")
         keys(k)%chosen = method_words(that_relax)
       case ("acceleration")
-        keys(k)%meaning = trim(keys(k)%meaning)//" "//quoted_names(with_momentum, "`", "and")//" and, on active contacts, "// &
-          & quoted_names(with_momentum_on_active, "`", "and")
+        keys(k)%meaning = trim(keys(k)%meaning)//" "//quoted_names(accelerated, "`", "and")//" and, on active contacts, "// &
+          & quoted_names(accelerated_on_active, "`", "and")
       case ("sleeping")
         keys(k)%meaning = trim(keys(k)%meaning)//" ("//quoted_names(with_sleeping, "`", "and")//" only)"
       end select

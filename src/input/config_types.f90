@@ -71,7 +71,7 @@ module gravier_config_types
     !> false: the allowed overlap is 0.01 of the mean radius
     logical :: overlap_given = .false.
     logical :: overlap_projection
-    !> largest overlap at the start, as a share of the smaller radius
+    !> largest overlap at the start, as a fraction of the smaller radius
     real(dp) :: start_overlap
   end type scene_config_t
 

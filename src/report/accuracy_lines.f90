@@ -1,7 +1,7 @@
 !> The closing lines of a run about its accuracy: errors of velocities, overlaps and what mended them, passes over layers.
 module gravier_accuracy_lines
-  use gravier_kinds, only: dp
-  use gravier_text, only: to_text
+  use gravier_kinds, only: dp, i8
+  use gravier_text, only: to_text, counted
   use gravier_run_tally, only: run_tally_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -61,7 +61,7 @@ contains
     text = indent//"U from "//to_text(tally%least_scale, 3)//" to "//to_text(tally%most_scale, 3)//" m/s: "
     do k = 1, tally%n_kinds
       if (k > 1) text = text//", "
-      text = text//trim(tally%kind(k))//" in "//to_text(tally%of_kind(k))//" solves"
+      text = text//trim(tally%kind(k))//" in "//counted(tally%of_kind(k), "solve")
     end do
     text = text//newline
   end function scale_range_line
@@ -107,7 +107,7 @@ contains
     end associate
   end function spring_line
 
-  !> A share as people write it; what is not 0 is not written as 0.
+  !> A fraction as people write it; what is not 0 is not written as 0.
   pure function percent(share) result(text)
     real(dp), intent(in) :: share
     character(len=:), allocatable :: text
@@ -136,8 +136,8 @@ contains
 
     text = ""
     if (tally%tried_layers == 0) return
-    text = "layers      "//to_text(tally%tried_layers)//" solves made a pass over layers, "//to_text(tally%took_layers)// &
-      & " of them went on from it; passes cost as much as "//to_text(nint(tally%layered_sweeps))//" sweeps"//newline
+    text = "layers      "//counted(tally%tried_layers, "solve")//" made a pass over layers, "//to_text(tally%took_layers)// &
+      & " of them continued from it; passes cost as much as "//counted(nint(tally%layered_sweeps, i8), "sweep")//newline
   end function layer_line
 
 end module gravier_accuracy_lines

@@ -1,7 +1,7 @@
 !> What the log of a run ends with: times by phase, the work of the solver, energies and costs, and a summary in words.
 module gravier_closing_lines
   use gravier_kinds, only: dp, i8
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, times_text, counted
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: gather_timers, phase_names, n_phases
   use gravier_method, only: work_t
@@ -33,7 +33,7 @@ contains
     integer :: p
 
     call gather_timers(comm, mean, least, most)
-    text = "phase                         mean [s]     min [s]     max [s]   share"//newline
+    text = "phase                         mean [s]     min [s]     max [s]  of run"//newline
     do p = 1, n_phases
       write (row, "(a28,3f12.4,f7.1,' %')") phase_names(p), mean(p), least(p), most(p), 100.0_dp*mean(p)/max(seconds, tiny(seconds))
       text = text//trim(row)//newline
@@ -58,24 +58,25 @@ contains
     counts(4) = simulation%messages
     counts(5) = simulation%values
     call comm%sum_counts(counts)
-    text = "solver      "//to_text(work%solves)//" solves, "//to_text(work%iterations)//" iterations, "// &
-      & to_text(work%sweeps)//" sweeps, "//to_text(counts(1))//" contact relaxations"//newline// &
-      & "interface   "//to_text(work%interface_solves)//" exchanges or solves, "//to_text(work%interface_iterations)// &
-      & " iterations in them; factors of subdomains: "//to_text(counts(2))//" analyses, "//to_text(counts(3))// &
-      & " factorisations"//newline
+    text = "solver      "//counted(work%solves, "solve")//", "//counted(work%iterations, "iteration")//", "// &
+      & counted(work%sweeps, "sweep")//", "//counted(counts(1), "contact relaxation")//newline// &
+      & "interface   "//to_text(work%interface_solves)//" exchanges or interface solves with "// &
+      & to_text(work%interface_iterations)//" iterations; subdomain matrices: "//to_text(counts(2))//" analyses, "// &
+      & to_text(counts(3))//" factorisations"//newline
     if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
-      & " contacts slept at the start of solves, of which "//to_text(simulation%woken)//" woke them to reach the tolerance"//newline
-    if (simulation%method%direction_text /= "") text = text//"direction   "//simulation%method%direction_text//"; lowered "// &
-      & to_text(work%lowered)//" times"//newline
-    if (work%restarted + work%suspended > 0) text = text//"momentum    restarted "//to_text(work%restarted)// &
-      & " times, suspended "//to_text(work%suspended)//" times"//newline
-    if (work%relaxed > 0) text = text//"relaxation  lowered "//to_text(work%relaxed)//" times, to "// &
-      & to_text(work%least_factor, 3)//" at least"//newline
+      & " contacts slept at the start of solves, summed over all solves; "//to_text(simulation%woken)// &
+      & " solves woke them to reach the tolerance"//newline
+    if (simulation%method%direction_text /= "") text = text//"direction   "//simulation%method%direction_text//"; "// &
+      & counted(work%lowered, "reduction")//" of l"//newline
+    if (work%restarted + work%suspended > 0) text = text//"nesterov    "// &
+      & counted(work%restarted, "restart")//" and "//counted(work%suspended, "suspension")//" of the momentum"//newline
+    if (work%relaxed > 0) text = text//"relaxation  factor lowered "//times_text(work%relaxed)//", to no less than "// &
+      & to_text(work%least_factor, 3)//newline
     if (simulation%decomposition%n_subdomains > 1) then
       call simulation%method%measure_balance(comm, simulation%decomposition%n_subdomains, ranks, subdomains)
-      text = text//"balance     "//balance_text(ranks, subdomains)//" of the mean since the last partition"//newline
+      text = text//"balance     "//balance_text(ranks, subdomains)//", since the last partition"//newline
     end if
-    text = text//"lists       made "//to_text(simulation%halo%builds)//" times"//newline// &
+    text = text//"lists       of neighbours built "//times_text(int(simulation%halo%builds, i8))//newline// &
       & "memory      at most "//to_text(nint(comm%highest(peak_memory())))//" MiB on a rank"//newline// &
       & "messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB"//newline
   end function work_lines
@@ -88,21 +89,21 @@ contains
     real(dp) :: least, most
 
     associate (effort => simulation%effort)
-      text = "            "//energy_text(simulation)//newline// &
-        & "cost        "//to_text(comm%highest(effort%seconds), 3)//" s in "//to_text(effort%solves)//" solves of "// &
-        & to_text(effort%iterations)//" iterations in all"//newline
+      text = "energy      "//energy_text(simulation)//newline// &
+        & "cost        "//to_text(comm%highest(effort%seconds), 3)//" s in "//counted(effort%solves, "solve")//" with "// &
+        & counted(effort%iterations, "iteration")//" in all"//newline
       if (effort%iterations == 0) return
       call effort%looser_range(least, most)
       text = text//"            at ten times the "//goal_name(simulation)//" "//estimate_text(comm, effort, least, most)
-      if (effort%unreached(tenfold) > 0) text = text//": "//to_text(effort%unreached(tenfold))//" solves did not reach that"
+      if (effort%unreached(tenfold) > 0) text = text//": "//counted(effort%unreached(tenfold), "solve")//" did not reach it"
       call effort%tighter_range(least, most)
       text = text//newline//"            at a tenth of the "//goal_name(simulation)//" "//estimate_text(comm, effort, least, most)
       if (simulation%failed > 0) then
-        text = text//": "//to_text(simulation%failed)//" solves did not reach the "//goal_name(simulation)//" itself"
+        text = text//": "//counted(int(simulation%failed, i8), "solve")//" did not reach the "//goal_name(simulation)//" itself"
       else if (least < 0.0_dp) then
-        text = text//": solves do not show how errors decay"
+        text = text//": the solves do not show how errors decay"
       else
-        text = text//", if solves get there"
+        text = text//", if solves reach it"
       end if
       text = text//newline
     end associate
@@ -125,7 +126,7 @@ contains
         turnover = energy%turnover()
       end select
     end if
-    text = "energy balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
+    text = "balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
   end function energy_text
 
   !> What so many iterations would have taken. Collective.

@@ -129,7 +129,7 @@ contains
     call items(4)%add("owner", 4, 2)
     items(5)%name = "grain owned"
     call add_grain(simulation, items(5))
-    call items(5)%add("reference", 8, simulation%decomposition%nd)
+    call items(5)%add("reference", 8, simulation%decomposition%nd + 1)
   end subroutine describe
 
   !> What is kept of a contact; `held` is what the method holds.

@@ -7,15 +7,15 @@ module gravier_progress
   implicit none
   private
   public :: progress_t, duration_text
-  public :: warn_unconverged, warn_fast, warn_lowered, warn_momentum, warn_relaxation, warn_partition, warn_springs
+  public :: warn_unconverged, warn_fast, warn_lowered, warn_acceleration, warn_relaxation, warn_partition, warn_springs
   public :: note_balance, note_scale
 
-  integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_momentum = 4, warn_relaxation = 5, &
+  integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_acceleration = 4, warn_relaxation = 5, &
     & warn_partition = 6, warn_springs = 7, note_balance = 8, note_scale = 9
   integer, parameter :: n_kinds = 9
   !> what the closing line calls them; a note is not counted there
   character(len=*), parameter :: kind_names(7) = [character(len=44) :: "solves above the tolerance", &
-    & "grains too fast for the step", "search directions lowered", "momentum suspended", "relaxation factors lowered", &
+    & "grains too fast for the step", "search directions lowered", "Nesterov momentum suspended", "relaxation factors lowered", &
     & "partitions refused", "springs too stiff for the step"]
   !> said in full, of each kind
   integer(i8), parameter :: first_ones = 5
@@ -43,7 +43,7 @@ module gravier_progress
     procedure :: line_due => progress_line_due
     procedure :: live_due => progress_live_due
     procedure :: solve_line_due => progress_solve_line_due
-    procedure :: left => progress_left
+    procedure :: remaining => progress_remaining
     procedure :: warn => progress_warn
     procedure :: warnings => progress_warnings
   end type progress_t
@@ -108,13 +108,13 @@ contains
     if (due) self%last_solve_line = now
   end function progress_solve_line_due
 
-  !> Time that so many more steps take, in words.
-  function progress_left(self, steps) result(text)
+  !> Wall time that so many more steps take, in words.
+  function progress_remaining(self, steps) result(text)
     class(progress_t), intent(in) :: self
     integer, intent(in) :: steps
     character(len=:), allocatable :: text
     text = duration_text(steps*self%seconds_a_step)
-  end function progress_left
+  end function progress_remaining
 
   !> A time in two units, as 2 h 05 min.
   pure function duration_text(seconds) result(text)
@@ -150,7 +150,10 @@ contains
     self%said(kind) = self%said(kind) + 1
     say = worth_saying(self%said(kind))
     addition = ""
-    if (self%said(kind) == first_ones) addition = "; others of this kind are said ever more rarely and counted at the end"
+    if (self%said(kind) == first_ones) then
+      addition = "; further notes of this kind appear ever more rarely"
+      if (kind <= size(kind_names)) addition = "; further warnings of this kind appear ever more rarely, the end counts all"
+    end if
     if (self%said(kind) > first_ones) addition = "; the "//to_text(self%said(kind))//"th of this kind"
   end subroutine progress_warn
 

@@ -3,7 +3,7 @@ module gravier_run_log
   use, intrinsic :: iso_fortran_env, only: output_unit
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text, growing_text_t
+  use gravier_text, only: to_text, times_text, growing_text_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: n_phases
   use gravier_file_system, only: terminal_width
@@ -13,7 +13,7 @@ module gravier_run_log
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory
-  use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_momentum, &
+  use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_acceleration, &
     & warn_relaxation, warn_partition, warn_springs, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
@@ -173,7 +173,7 @@ contains
 
     self%goal_name = goal_name(simulation)
     self%figure_name = trim(simulation%config%solver%criterion)
-    if (self%figure_name == "velocity_error") self%figure_name = "velocity error with its weights over U"
+    if (self%figure_name == "velocity_error") self%figure_name = "weighted velocity error over U"
     call write_lines(self, banner_text(), "", error)
     call write_lines(self, start_lines(simulation, self%comm%size), "", error)
     call write_active(options, simulation%config)
@@ -199,7 +199,7 @@ contains
     class(run_log_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
     call self%line("    step       time [s]    contacts  iterations   residual  error/scale    overlap [m]  "// &
-      & "energy [J]  wall [s]       left", error)
+      & "energy [J]  wall [s]  remaining", error)
   end subroutine run_log_write_head
 
   !> Contacts and interface as the partition makes them now.
@@ -270,7 +270,7 @@ contains
     if (self%progress%line_due(simulation%step == simulation%config%time%steps)) then
       write (row, "(i8,es15.6,i12,i12,es11.2,es13.2,es15.3,es12.3,f10.3,a11)") simulation%step, simulation%time, figures%contacts, &
         & figures%solve%iterations, figures%solve%residual, relative_error(figures%solve), figures%max_overlap, &
-        & figures%kinetic_energy, seconds, left_text(self, simulation)
+        & figures%kinetic_energy, seconds, remaining_text(self, simulation)
       if (self%live) then
         call note_line(self, trim(row), error)
       else
@@ -282,16 +282,16 @@ contains
     if (self%live) call write_live_line(self, simulation, figures)
   end subroutine run_log_write_step
 
-  !> Time left, where the number of steps is known.
-  function left_text(self, simulation) result(text)
+  !> Wall time that remains, where the number of steps is known.
+  function remaining_text(self, simulation) result(text)
     class(run_log_t), intent(in) :: self
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
     text = ""
     if (simulation%config%time%steps >= simulation%step) &
-      & text = self%progress%left(simulation%config%time%steps - simulation%step)
-  end function left_text
+      & text = self%progress%remaining(simulation%config%time%steps - simulation%step)
+  end function remaining_text
 
   !> A line within a long solve, where one is due; see solve_watch_t. On a terminal it takes the place of the live line.
   subroutine run_log_look(self, report)
@@ -330,7 +330,7 @@ contains
     if (simulation%config%time%steps >= simulation%step) text = text//"/"//to_text(simulation%config%time%steps)
     text = text//"  "//trim(adjustl(time))//" s  "//to_text(figures%contacts)//" contacts  "// &
       & to_text(figures%solve%iterations)//" iterations  "//trim(adjustl(residual))
-    if (left_text(self, simulation) /= "") text = text//"  "//left_text(self, simulation)//" left"
+    if (remaining_text(self, simulation) /= "") text = text//"  "//remaining_text(self, simulation)//" remaining"
     write (output_unit, "(2a)", advance="no") wipe, text(1:min(len(text), self%columns - 1))
     flush (output_unit)
     self%line_stands = .true.
@@ -358,7 +358,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     if (figures%divided) call warn(self, note_balance, 1_i8, "balance     "// &
-      & balance_text(figures%rank_balance, figures%subdomain_balance)//" of the mean until this partition", error)
+      & balance_text(figures%rank_balance, figures%subdomain_balance)//", until this partition", error)
     if (figures%refused) call warn(self, warn_partition, 1_i8, "warning     the grains fill fewer cells than there are "// &
       & "subdomains: the old partition stays", error)
     if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "//to_text(figures%fast)// &
@@ -372,7 +372,8 @@ contains
       & failure_text(simulation, figures)//" in step "//to_text(simulation%step), error)
   end subroutine write_warnings
 
-  !> By what means a solve got over growth or standstill: l lowered, momentum suspended, relaxation lowered.
+  !> What a solve did against growth or standstill: the search direction l was lowered, the Nesterov momentum suspended, the
+  !> relaxation factor lowered.
   subroutine write_recoveries(self, simulation, step, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -387,13 +388,13 @@ contains
       self%told = work
     end associate
     if (lowered > 0) call warn(self, warn_lowered, lowered, &
-      & "warning     changes grew or went round in circles under l: lowered "//to_text(lowered)//" times in step "// &
-      & to_text(step), error)
-    if (suspended > 0) call warn(self, warn_momentum, suspended, "warning     no progress with momentum: suspended "// &
-      & to_text(suspended)//" times in step "//to_text(step), error)
+      & "warning     the changes of the impulses grow or oscillate: search direction l lowered "//times_text(lowered)// &
+      & " in step "//to_text(step), error)
+    if (suspended > 0) call warn(self, warn_acceleration, suspended, "warning     accelerated sweeps make no progress: "// &
+      & "Nesterov momentum suspended "//times_text(suspended)//" in step "//to_text(step), error)
     if (relaxed > 0) call warn(self, warn_relaxation, relaxed, &
-      & "warning     changes of the neighbours' loads alternate and grow: relaxation lowered "//to_text(relaxed)// &
-      & " times in step "//to_text(step), error)
+      & "warning     the changes of the neighbours' impulses alternate in sign and grow: relaxation factor lowered "// &
+      & times_text(relaxed)//" in step "//to_text(step), error)
   end subroutine write_recoveries
 
   !> Closing table: time by phase over the ranks, the work of the solver and the memory over all ranks; then, in words for a person,

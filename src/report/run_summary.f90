@@ -13,7 +13,7 @@ module gravier_run_summary
   private
   public :: converged_text, time_text, halving_text, verdict_text
 
-  !> phases that are named, the dearest first, and the least share that is [%]
+  !> phases that are named, the dearest first, and the least fraction that is [%]
   integer, parameter :: named = 4
   real(dp), parameter :: least_share = 3.0_dp
   !> contacts of rank 0 below which more ranks do not pay
@@ -180,7 +180,7 @@ contains
         text = "solves that give up take most iterations: another &solver method or a smaller &time step may let them reach "// &
           & "the "//goal_name(simulation)
       else if (overlaps_grew(simulation)) then
-        text = "nothing yet: overlaps grow, and want a smaller &time step or &solver "//goal_name(simulation)//" first"
+        text = "nothing yet: overlaps grow, and need a smaller &time step or &solver "//goal_name(simulation)//" first"
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then
         text = "ten times the "//goal_name(simulation)//": "//duration_text(rest + looser_seconds(2))//" to "// &
           & duration_text(rest + looser_seconds(3))//" in all (estimated)"
@@ -193,9 +193,9 @@ contains
         text = "twice the ranks, now "//to_text(simulation%comm%size)//", with as many &decomposition subdomains or more, now "// &
           & to_text(simulation%decomposition%n_subdomains)
       else if (may_loosen(simulation)) then
-        text = "no single key does; a longer &time step makes fewer steps, at the price of accuracy"
+        text = "no single key suffices; a longer &time step makes fewer steps, at the price of accuracy"
       else
-        text = "no single key does without making the results worse"
+        text = "no single key suffices without making the results worse"
       end if
     end associate
   end function halving_text

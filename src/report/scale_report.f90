@@ -23,7 +23,7 @@ module gravier_scale_report
   real(dp), parameter :: most_by_spring = 0.5_dp
   !> h sqrt(P/rho)/d
   real(dp), parameter :: most_relative_step = 0.1_dp
-  !> share of the speed of a wall that errors may have in slow shear
+  !> fraction of the speed of a wall that errors may have in slow shear
   real(dp), parameter :: error_share = 0.05_dp
 
 contains

@@ -89,8 +89,8 @@ contains
     call item_bytes(simulation, contact, body, copy)
     associate (kernels => simulation%problem%kernels)
       text = to_text(kernels%nv)//" degrees of freedom a grain, "//to_text(kernels%nc)//" unknowns a contact, "// &
-        & to_text(contact)//" bytes a contact, "//to_text(body)//" a body in contact, "//to_text(copy)// &
-        & " an exchange and copy of a shared body"
+        & to_text(contact)//" bytes a contact, "//to_text(body)//" bytes a body in contact, "//to_text(copy)// &
+        & " bytes a copy of a shared body and exchange"
     end associate
   end function cost_text
 

@@ -18,22 +18,26 @@ contains
   function interface_lines(figures, subdomains) result(text)
     type(step_figures_t), intent(in) :: figures
     integer, intent(in) :: subdomains
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: text, bodies
     integer :: m
 
     associate (interface_statistics => figures%interface_statistics)
-      text = "contacts    "//to_text(figures%contacts)//" ("//to_text(interface_statistics%least_contacts)//" to "// &
-        & to_text(interface_statistics%most_contacts)//" a subdomain); interface: "//to_text(interface_statistics%bodies)// &
-        & " bodies, "// &
-        & to_text(interface_statistics%interactions)//" interactions; multiplicity"
+      text = "contacts    "//to_text(figures%contacts)
+      if (subdomains == 1) then
+        text = text//" in one subdomain, no interface"//newline
+        return
+      end if
+      bodies = ""
       do m = 2, n_multiplicities
         if (interface_statistics%multiplicity(m) == 0) cycle
-        text = text//" "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "// &
+        bodies = bodies//", "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "// &
           & to_text(interface_statistics%multiplicity(m))
       end do
-      if (interface_statistics%bodies == 0) text = text//" 1 only"
+      if (interface_statistics%bodies == 0) bodies = ", 1: all"
+      text = text//", "//to_text(interface_statistics%least_contacts)//" to "// &
+        & to_text(interface_statistics%most_contacts)//" a subdomain; interface: "//to_text(interface_statistics%bodies)// &
+        & " bodies, "//to_text(interface_statistics%interactions)//" interactions; bodies by multiplicity "//bodies(3:)//newline
     end associate
-    text = text//newline
     if (figures%interface_statistics%neighbours > 0) text = text//"exchange    "//exchange_text(figures%interface_statistics, &
       & subdomains)//newline
   end function interface_lines
@@ -69,7 +73,7 @@ contains
     character(len=24) :: row(2)
 
     write (row, "(f0.3)") ranks, subdomains
-    text = "seconds in sweeps: slowest rank "//trim(row(1))//", slowest subdomain "//trim(row(2))
+    text = "time of sweeps over its mean: "//trim(row(1))//" on the slowest rank, "//trim(row(2))//" in the slowest subdomain"
   end function balance_text
 
   !> What went wrong in a step.
@@ -109,7 +113,7 @@ contains
         & " m/s,"
     else if (solve%velocity_error <= solver%accuracy*solve%velocity_scale) then
       ! what sinks, and what moves where the solution is at rest, counts more than in the estimate
-      text = "velocity error with its weights "//to_text(solve%figure, 3)//" of U above the accuracy "//to_text(solver%accuracy, 3)
+      text = "weighted velocity error "//to_text(solve%figure, 3)//" of U above the accuracy "//to_text(solver%accuracy, 3)
     else
       text = "velocity error "//to_text(solve%velocity_error, 3)//" m/s above "//to_text(solver%accuracy, 3)//" of "// &
         & to_text(solve%velocity_scale, 3)//" m/s"

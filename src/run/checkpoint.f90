@@ -30,7 +30,7 @@ contains
     type(diagnostic_holder_t), allocatable :: diagnostics(:)
     integer :: k
 
-    text = "grain: "//body_record//" position_now"//newline//"pair: "//pair_record//newline// &
+    text = "grain: "//body_record//" position_now speed_when_listed"//newline//"pair: "//pair_record//newline// &
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)

@@ -87,7 +87,8 @@ contains
 
   subroutine pack_grains(simulation, records, counts)
     type(simulation_t), intent(in) :: simulation
-    !> (words of a grain + nd, grains): its place is that of the lists, the last words are its place now
+    !> (words of a grain + nd + 1, grains): its place is that of the lists; then its place now, and its speed when the lists were
+    !> made
     integer(i8), allocatable, intent(out) :: records(:, :)
     !> (subdomains of this rank)
     integer(i8), intent(out) :: counts(:)
@@ -101,7 +102,7 @@ contains
       do s = 1, size(owned)
         counts(s) = owned(s)%n
       end do
-      allocate (records(words + nd, sum(counts)))
+      allocate (records(words + nd + 1, sum(counts)))
       n = 0
       do s = 1, size(owned)
         do k = 1, owned(s)%n
@@ -112,6 +113,8 @@ contains
             if (simulation%halo%builds > 0) records(place_word - 1 + d, n) = &
               & transfer(simulation%halo%reference(s)%position(d, k), 0_i8)
           end do
+          records(words + nd + 1, n) = 0_i8
+          if (simulation%halo%builds > 0) records(words + nd + 1, n) = transfer(simulation%halo%reference(s)%speed(k), 0_i8)
         end do
       end do
     end associate
@@ -154,7 +157,7 @@ contains
       layout = decomposition%layout()
       n_words = layout%record_words()
       n_boundary = boundary_words*size(decomposition%boundaries)
-      call file%read_table("grains", decomposition%n_subdomains, n_words + nd, records, counts, error)
+      call file%read_table("grains", decomposition%n_subdomains, n_words + nd + 1, records, counts, error)
       if (builds > 0) call file%read_array("boundaries_when_listed", n_boundary, n_boundary, words, error)
       call file%read_array("boundaries", n_boundary, n_boundary, now, error)
       if (builds > 0 .and. .not. allocated(error)) call check_reals(path//": the array boundaries_when_listed", words, error)
@@ -167,6 +170,9 @@ contains
         call decomposition%owned(s)%init(decomposition%layout(), narrow(counts(s)))
         do k = 1, decomposition%owned(s)%n
           call decomposition%owned(s)%set_record(k, records(1:n_words, n + k))
+          ! lists ask for the speed that there was
+          decomposition%owned(s)%velocity(:, k) = 0.0_dp
+          decomposition%owned(s)%velocity(1, k) = transfer(records(n_words + nd + 1, n + k), 0.0_dp)
         end do
         n = n + decomposition%owned(s)%n
       end do
@@ -179,6 +185,7 @@ contains
       n = 0
       do s = 1, size(decomposition%owned)
         do k = 1, decomposition%owned(s)%n
+          call decomposition%owned(s)%set_record(k, records(1:n_words, n + k))
           do d = 1, nd
             decomposition%owned(s)%position(d, k) = transfer(records(n_words + d, n + k), 0.0_dp)
           end do
@@ -193,7 +200,7 @@ contains
   subroutine check_grains(simulation, path, records, error)
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: path
-    !> (words of a grain and its place now, grains of this rank)
+    !> (words of a grain, its place now and its speed when the lists were made; grains of this rank)
     integer(i8), intent(in), contiguous :: records(:, :)
     type(error_t), allocatable, intent(inout) :: error
     type(body_layout_t) :: layout

@@ -7,7 +7,7 @@ module gravier_simulation
   use gravier_communicator, only: communicator_t
   use gravier_schedule, only: schedule_t
   use gravier_time_table, only: time_table_t
-  use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_neighbour_rule, only: rule_dual, rule_primal
   use gravier_solve, only: by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
   use gravier_repartition, only: repartition_rule_t, divide
@@ -27,6 +27,10 @@ module gravier_simulation
   !> what a projection leaves of the overlap allowed where bodies have shapes: faces that rest on each other creep by the error of
   !> solves, and would be projected again in every step
   real(dp), parameter :: overlap_left_of_shapes = 0.75_dp
+
+  !> steps for which neighbour lists leave fast bodies a way to go, with a fifth more for what speeds them up; and the farthest way,
+  !> over the mean radius: beyond it more pairs cost more than fewer lists save
+  real(dp), parameter :: list_steps = 12.0_dp, most_travel = 0.5_dp
 
   type, extends(time_stepper_t) :: simulation_t
     type(config_t) :: config
@@ -50,7 +54,7 @@ contains
 
 contains
 
-  !> Make the scene of a configuration and share it out. Errors are the same on all ranks. Collective.
+  !> Make the scene of a configuration and distribute it. Errors are the same on all ranks. Collective.
   subroutine simulation_init(self, comm, config, error)
     class(simulation_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
@@ -73,6 +77,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(scene_t) :: scene
     type(time_table_t) :: none
+    type(error_t), allocatable :: narrow
 
     call keep_heap()
     call self%free()
@@ -90,10 +95,10 @@ contains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
     call set_physics(self, scene)
-    call check_period(self, scene, error)
-    if (.not. allocated(error)) call check_in_period(config, scene, 2.0_dp*scene%largest_radius + &
-      & self%decomposition%rule%range(), error)
-    call comm%agree(error)
+    call check_lists_in_period(self, scene, narrow)
+    ! lists that last less long have a shorter range
+    if (allocated(narrow)) self%decomposition%rule%most_travel = 0.0_dp
+    if (allocated(narrow)) call check_lists_in_period(self, scene, error)
     if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%method)
@@ -170,6 +175,8 @@ contains
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
       rule%alert_distance = max(rule%alert_distance, scene%laws%range)
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
+      rule%duration = list_steps*self%physics%h
+      rule%most_travel = most_travel*scene%mean_radius
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
         & self%overlap_allowed = merge(config%overlap_allowed, min(0.01_dp*scene%mean_radius, scene%least_rounding), &
@@ -178,6 +185,18 @@ contains
       rule%kind = merge(rule_primal, rule_dual, self%config%decomposition%kind == "primal")
     end associate
   end subroutine set_physics
+
+  !> Refuse periods that are too short for the range of the lists. Errors are the same on all ranks. Collective.
+  subroutine check_lists_in_period(self, scene, error)
+    type(simulation_t), intent(in) :: self
+    type(scene_t), intent(in) :: scene
+    type(error_t), allocatable, intent(inout) :: error
+
+    call check_period(self, scene, error)
+    if (.not. allocated(error)) call check_in_period(self%config, scene, 2.0_dp*scene%largest_radius + &
+      & self%decomposition%rule%range(), error)
+    call self%comm%agree(error)
+  end subroutine check_lists_in_period
 
   !> A pair of grains must not be listed across both sides of a period.
   subroutine check_period(self, scene, error)

@@ -18,7 +18,7 @@ contains
 
     associate (solver => config%solver, enriched => config%enriched)
       options%sweeps = solver%sweeps
-      options%momentum = solver%acceleration == "momentum"
+      options%acceleration = solver%acceleration == "momentum"
       options%relaxation_given = solver%relaxation_given
       options%relaxation = solver%relaxation
       options%active_only = enriched%contacts == "active"

@@ -200,7 +200,7 @@ contains
     if (.not. box%upper(box%nd) > box%lower(box%nd)) box%upper(box%nd) = box%lower(box%nd) + lattice%height()
   end subroutine place_in_lattice
 
-  !> The height at which the grains fill the share of the box that is asked for. Collective.
+  !> The height at which the grains fill the fraction of the box that is asked for. Collective.
   subroutine set_height(comm, config, data, box)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config

@@ -47,7 +47,7 @@ contains
     end do
   end subroutine draw_shapes
 
-  !> The shapes to draw from by their numbers in the library, 0 for a disk or a sphere, and the share of each with those before it.
+  !> The shapes to draw from by their numbers in the library, 0 for a disk or a sphere, and the cumulative fraction of each.
   subroutine choose_shapes(config, shapes, number, bound, error)
     type(config_t), intent(in) :: config
     type(shape_library_t), intent(in) :: shapes

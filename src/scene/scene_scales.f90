@@ -14,7 +14,7 @@ module gravier_scene_scales
   !> least component along an axis of the normal of a plane that faces along it, and of one that carries grains
   real(dp), parameter :: carrying = 0.1_dp
   real(dp), parameter :: pi = acos(-1.0_dp)
-  !> share of space that grains fill in a square or cubic lattice: a looser scene has room to fall into
+  !> fraction of space that grains fill in a square or cubic lattice: a looser scene has room to fall into
   real(dp), parameter :: loosest(2:3) = [pi/4.0_dp, pi/6.0_dp]
 
   !> The same on all ranks. What a scene does not have is 0.
@@ -57,7 +57,7 @@ module gravier_scene_scales
 
 contains
 
-  !> Find the scales of a scene that has been shared out. Collective.
+  !> Find the scales of a scene that has been distributed. Collective.
   subroutine scene_scales_find(self, simulation)
     class(scene_scales_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation

@@ -4,7 +4,7 @@ module gravier_start_overlap
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_periodic, only: shift_of_code
-  use gravier_neighbour_search, only: neighbour_rule_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_pair_points, only: pair_points_t
   use gravier_shape_contacts, only: shape_work_t, find_points
@@ -13,10 +13,10 @@ module gravier_start_overlap
   private
   public :: check_start_overlap
 
-  !> share of a radius that roundings of the places take
+  !> fraction of a radius that roundings of the places take
   real(dp), parameter :: rounding = 1.0e-6_dp
 
-  !> An overlap as a share of the smaller radius, or of the radius of a grain in a boundary.
+  !> An overlap as a fraction of the smaller radius, or of the radius of a grain in a boundary.
   type :: overlap_t
     real(dp) :: share = 0.0_dp
     !> identifiers; the second is 0 in a boundary
@@ -27,7 +27,7 @@ module gravier_start_overlap
 
 contains
 
-  !> Fail (status_input) where two bodies of a scene that has been shared out and has made no step yet overlap by more than
+  !> Fail (status_input) where two bodies of a scene that has been distributed and has made no step yet overlap by more than
   !> start_overlap allows. The error is that of the largest overlap, the same on all ranks. Collective.
   subroutine check_start_overlap(simulation, error)
     !> comes back as it was
@@ -61,7 +61,7 @@ contains
     call simulation%comm%agree(error)
   end subroutine check_start_overlap
 
-  !> Largest overlap in a view, if it exceeds that found so far, and the number of those above the limit.
+  !> Largest overlap in a subdomain, if it exceeds that found so far, and the number of those above the limit.
   subroutine find_worst(simulation, view, limit, worst, number)
     type(simulation_t), intent(in) :: simulation
     type(local_bodies_t), intent(in) :: view

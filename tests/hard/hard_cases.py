@@ -27,15 +27,15 @@ DEAR = {"nscdd_ep": ITERATIONS // 10, "schwarz_ec": ITERATIONS // 10, "newton": 
 #: title: input groups; a method that is 'nlgs' has one domain
 METHODS = {
     "nlgs": {"solver": {"method": "nlgs", "acceleration": "none"}},
-    "nlgs, momentum": {"solver": {"method": "nlgs", "acceleration": "momentum"}},
+    "nlgs, accelerated": {"solver": {"method": "nlgs", "acceleration": "momentum"}},
     "nscdd": {"solver": {"method": "nscdd", "acceleration": "none"}},
-    "nscdd, momentum": {"solver": {"method": "nscdd", "acceleration": "momentum"}},
+    "nscdd, accelerated": {"solver": {"method": "nscdd", "acceleration": "momentum"}},
     "nscdd_ep": {"solver": {"method": "nscdd_ep"}},
     "nscdd_ep, all": {"solver": {"method": "nscdd_ep"}, "enriched": {"direction": 0.3}},
     "nscdd_ep, active": {"solver": {"method": "nscdd_ep", "acceleration": "none"},
                          "enriched": {"direction": 10.0, "contacts": "active"}},
     "schwarz": {"solver": {"method": "schwarz"}},
-    "schwarz, momentum": {"solver": {"method": "schwarz", "acceleration": "momentum"}},
+    "schwarz, accelerated": {"solver": {"method": "schwarz", "acceleration": "momentum"}},
     "schwarz_ec": {"solver": {"method": "schwarz_ec"}},
     "newton": {"solver": {"method": "newton"}},
 }
@@ -625,7 +625,7 @@ def enrichments():
         Case("many sweeps", "50 sweeps between two exchanges", heap(), heap_box(), {"scene": {"friction": 0.3}}, may_fail=(
             "schwarz, 50 sweeps", "schwarz_ec, 50 sweeps"),
             methods={f"{title}, 50 sweeps": merged(METHODS[title], {"solver": {"sweeps": 50}})
-                     for title in ("nscdd", "nscdd, momentum", "nscdd_ep", "schwarz", "schwarz_ec")}),
+                     for title in ("nscdd", "nscdd, accelerated", "nscdd_ep", "schwarz", "schwarz_ec")}),
     ]
 
 

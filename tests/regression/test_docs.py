@@ -22,7 +22,8 @@ import h5py
 SOURCE = Path(os.environ.get("GRAVIER_SOURCE_DIR", Path(__file__).resolve().parents[2])).resolve()
 PROGRAMS = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin")).resolve()
 MPIEXEC = shutil.which(os.environ.get("MPIEXEC", "mpiexec")) or "mpiexec"
-PAGES = [SOURCE / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted((SOURCE / "doc").glob("*.md"))
+PAGES = [SOURCE / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
+    [*(SOURCE / "doc").glob("*.md"), *(SOURCE / "doc/reference").glob("*.md")])
 BANNED = ["TODO", "FIXME", "XXX", "coming soon", "not yet implemented"]
 # pages whose blocks need no line to say why they are not run
 UNMARKED = {"README.md": "builds the program, or installs packages"}
@@ -191,6 +192,54 @@ class Links(unittest.TestCase):
         self.assertGreater(count, 50)
 
 
+class Reference(unittest.TestCase):
+    """A page an effect, a boundary and a law, all of one pattern."""
+
+    DIRECTORY = SOURCE / "doc/reference"
+
+    def test_tables_and_index_are_those_of_the_program(self):
+        status, text = run([sys.executable, str(self.DIRECTORY / "write_keys.py"), "--check", str(PROGRAMS / "gravier")], ".")
+        self.assertEqual(status, 0, f"{text}\nrun python3 doc/reference/write_keys.py {PROGRAMS / 'gravier'}")
+
+    def test_pages_have_one_pattern(self):
+        """Title, summary, five sections in their order, none of them empty, and an example that is a whole case."""
+        pages = sorted(self.DIRECTORY.glob("*_*.md"))
+        self.assertGreater(len(pages), 20)
+        for page in pages:
+            with self.subTest(page=page.name):
+                text = page.read_text(encoding="utf-8")
+                parts = re.split(r"^## (.+)\n", text, flags=re.M)
+                self.assertEqual(parts[1::2], ["Syntax", "Example", "What it does", "Restrictions", "Related"])
+                self.assertTrue(re.fullmatch(r"# .+\n\n[^\n]+\.\n\n", parts[0]), "expected a title and a sentence")
+                for part in parts[2::2]:
+                    self.assertGreater(len(part.strip()), 20)
+                self.assertIn("<!-- keys of &", parts[2])
+                self.assertEqual(sum(block.is_case() for block in read(page)[0]), 1, "expected one whole case")
+                self.assertTrue(any(block.is_tested() for block in read(page)[0]), "expected a run of the case")
+
+    def test_every_law_shape_and_effect_has_a_page(self):
+        rows = rows_by_group(key_reference())
+        for group, key, kind in (("boundary", "shape", "boundary"), ("law", "kind", "law")):
+            words = re.findall(r"'(\w+)'", rows[group, key].split("|")[2])
+            self.assertGreater(len(words), 4)
+            self.assertEqual({path.stem.removeprefix(f"{kind}_") for path in self.DIRECTORY.glob(f"{kind}_*.md")}, set(words),
+                             f"doc/reference: expected a page {kind}_WORD.md for each {key} of &{group} and no other")
+        # the effects of the log, each in the page that explains it
+        pages = {"drives": "drives", "driven by forces": "forces_on_boundaries", "glued grains": None, "periodic images": "periodic_cells",
+                 "rolling resistance": "rolling_and_pivoting", "pivoting resistance": "rolling_and_pivoting", "body force": "gravity"}
+        with tempfile.TemporaryDirectory() as directory:
+            (Path(directory) / "case.nml").write_text("&scene bodies = 'column' /\n&time step = 0.01, steps = 1 /\n", encoding="ascii")
+            status, text = run([str(PROGRAMS / "gravier"), "--check", "case.nml"], directory)
+        self.assertEqual(status, 0, text)
+        on, off = re.search(r"^effects +\dD: (.+)$", text, re.M)[1], re.search(r"^off +(.+)$", text, re.M)[1]
+        effects = [name for name in f"{on}, {off}".split(", ") if name != "nothing"]
+        self.assertGreater(len(effects), 12)
+        for name in effects:
+            page = pages.get(name, name.replace(" ", "_"))
+            path = self.DIRECTORY / ("boundary_grains.md" if page is None else f"effect_{page}.md")
+            self.assertTrue(path.exists(), f"{path}: no page for the effect {name}")
+
+
 class Words(unittest.TestCase):
 
     def test_no_promises(self):
@@ -206,6 +255,11 @@ class Words(unittest.TestCase):
         for page in PAGES:
             for word in re.findall(r"\./gravier ([a-z]+)", page.read_text(encoding="utf-8")):
                 self.assertIn(word, known, f"{page.name}: ./gravier {word}: no such command")
+
+    def test_citations_have_the_version(self):
+        version = re.search(r"project\(gravier VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+        for path, words in (("CITATION.cff", f"version: {version}\n"), ("doc/citing.md", f"version = {{{version}}}")):
+            self.assertIn(words, (SOURCE / path).read_text(encoding="utf-8"), path)
 
     def test_options_of_the_programs_exist(self):
         count = 0

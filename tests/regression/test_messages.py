@@ -148,7 +148,7 @@ class Messages(RunTestCase):
         disk = "disk 0 0 1\n"
         for text, *words in (("", "no shapes: expected shape and a name, then its pieces"),
                              ("shape plane\n" + disk, "line 1: shape plane: expected another name", "stand for themselves in bodies files"),
-                             ("shape a\nrounding 0\n" + disk, "line 2: rounding 0.00000000E+000: expected a number from 1e-30"),
+                             ("shape a\nrounding 0\n" + disk, "line 2: rounding 0.00000000E+00: expected a number from 1e-30"),
                              ("shape a\npolygon 0 0 1 0 2 0\n", "line 2: shape a: a polygon without area")):
             write(self.here("a.shapes"), text)
             self.refuse("&scene bodies = 'file', bodies_file = 'bodies.csv', shapes = 'a.shapes' /\n&time step = 1e-3, steps = 1 /\n",

@@ -82,7 +82,7 @@ class LastWords(RunTestCase):
         write(self.here("flying.csv"), f"id,x,y,radius,vx,vy\n1,0,0,{RADIUS},3,4\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},3,4\n")
         run = run_case(merged(PAIR, {"scene": {"bodies_file": "../flying.csv"}}), 1, self.here("flying"))
         self.assert_status(run, 0)
-        self.assertRegex(run.stdout, r"shifts of a grain add up to 1\.75E-003 m on average, 1\.2E-001 of its path of 1\.50E-002 m\n")
+        self.assertRegex(run.stdout, r"shifts of a grain add up to 1\.75E-03 m on average, 1\.2E-01 of its path of 1\.50E-02 m\n")
 
     def test_seldom_mended(self):
         run = run_case(merged(PAIR, {"time": {"steps": 20}}), 1, self.here("seldom"))
@@ -132,13 +132,15 @@ class LastWords(RunTestCase):
         history = run.history()
         worst = (history["velocity_error"] / history["velocity_scale"])
         self.assertGreater(worst.max(), 0.5)
-        self.assertRegex(line(run, "finished"), r"^finished    every solve reached the residual 3\.0E-002, but velocities were wrong by up to "
+        self.assertRegex(line(run, "finished"), r"^finished    every solve reached the residual 3\.0E-02, but velocities were wrong by up to "
                          rf"{worst.max():.2f} of U in {(worst > 0.5).sum()} of them")
-        found = re.search(r"residual at most (\S+) at the end of a solve, tolerance 3\.00E-002; velocity error at most (\S+) of U", run.stdout)
+        found = re.search(r"residual at most (\S+) at the end of a solve, tolerance 3\.00E-02; velocity error at most (\S+) of U", run.stdout)
         self.assertAlmostEqual(float(found[1]) / history["residual"].max(), 1.0, delta=6e-3)
         self.assertAlmostEqual(float(found[2]) / worst.max(), 1.0, delta=6e-3)
         self.assertNotRegex(line(run, "to halve it"), "ten times|longer")
-        right = run_case(merged(self.rest, {"solver": {"criterion": "residual", "tolerance": 1e-6}}), 1, self.here("right"))
+        # sweeps may wander above this tolerance for thousands of iterations
+        newton = {"method": "newton", "criterion": "residual", "tolerance": 1e-6, "acceleration": None}
+        right = run_case(merged(self.rest, {"solver": newton}), 1, self.here("right"))
         self.assertEqual(line(right, "finished"), "finished    all 5 steps reached the tolerance; results in results")
 
     def test_advice(self):
@@ -155,7 +157,7 @@ class LastWords(RunTestCase):
         run = run_case(merged(self.rest, {"time": {"steps": 200}, "scene": {"overlap_projection": False},
                                           "solver": {"criterion": "residual", "tolerance": 0.3, "warm_start": False}}), 1, self.here("sinks"))
         self.assert_status(run, 0)
-        self.assertRegex(line(run, "to halve it"), r"^to halve it nothing yet: overlaps grow, and want a smaller &time step or &solver tolerance first$")
+        self.assertRegex(line(run, "to halve it"), r"^to halve it nothing yet: overlaps grow, and need a smaller &time step or &solver tolerance first$")
 
     def test_scales(self):
         """The log names the velocity scale after the first step and when another kind comes; the end has the range. In free fall loads
@@ -199,7 +201,7 @@ class LastWords(RunTestCase):
                  "time": {"step": 1e-3, "steps": 3}, "solver": {"warm_start": False}, "output": {"directory": "results"}}
         write(self.here("tower.csv"), "id,x,y,radius\n" + "".join(f"{k},0,{0.1 * k - 0.05},0.05\n" for k in range(1, 61)))
         run = run_case(tower, 1, self.here("layers"))
-        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, [0-3] of them went on from it; passes cost as much as \d+ sweeps\n")
+        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, [0-3] of them continued from it; passes cost as much as \d+ sweeps\n")
         none = run_case(merged(tower, {"solver": {"layered_start": False}}), 1, self.here("no layers"))
         self.assertNotIn("\nlayers  ", none.stdout)
 

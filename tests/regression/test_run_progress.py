@@ -49,7 +49,7 @@ class Progress(RunTestCase):
         for ranks in (1, 2):
             run = run_case(case, ranks, self.here(f"balance {ranks}"))
             self.assert_status(run, 0)
-            found = re.findall(r"^balance     seconds in sweeps: slowest rank ([\d.]+), slowest subdomain ([\d.]+) of the mean (\w+)",
+            found = re.findall(r"^balance     time of sweeps over its mean: ([\d.]+) on the slowest rank, ([\d.]+) in the slowest subdomain, (\w+)",
                                run.stdout, re.M)
             self.assertEqual([line[2] for line in found], ["until", "until", "since"], run.stdout)
             for rank, subdomain, _ in found:
@@ -105,7 +105,7 @@ class Progress(RunTestCase):
         case = namelist({"scene": {"bodies": "column", "column_count": 3000, "radius": 0.5, "mass": 1.0},
                          "time": {"step": 1e-3, "steps": 2}, "output": {"directory": "results"},
                          "solver": {"criterion": "residual", "tolerance": 1e-14, "acceleration": "none", "max_iterations": 1000000000}})
-        sign = r"step 1 is being solved: \d+ iterations in \d[\d.minh ]* s, residual \d\.\dE-\d+ at the last check, tolerance 1.0E-014"
+        sign = r"step 1 is being solved: \d+ iterations in \d[\d.minh ]* s, residual \d\.\dE-\d+ at the last check, tolerance 1.0E-14"
         for title, command, columns, shown in (("wide", [], 150, sign), ("narrow", [], 40, r"step 1 is being solved: \d+ iterat"),
                                                ("launched", [MPIEXEC, "-n", "2"], 150, sign)):
             with self.subTest(title):
@@ -126,7 +126,7 @@ class Progress(RunTestCase):
                 write(self.here(title, "case.nml"), case)
                 status, said = self.on_terminal([*command, GRAVIER, "case.nml"], self.here(title))
                 self.assertEqual(status, 0, said)
-                self.assertRegex(said, r"\r\033\[Kstep 1/30  1.000E-03 s  \d+ contacts  \d+ iterations  \S+E-\d+  .* left")
+                self.assertRegex(said, r"\r\033\[Kstep 1/30  1.000E-03 s  \d+ contacts  \d+ iterations  \S+E-\d+  .* remaining")
                 self.assertEqual(STEP.findall(said), [])
                 self.assertTrue(max(len(line) for line in re.findall(r"\033\[K(step [^\r]*)", said)) < 80)
                 with open(self.here(title, "results", "run.log"), encoding="ascii") as file:
@@ -150,12 +150,12 @@ class Progress(RunTestCase):
         """Whether it converged, where the time went, what would halve it: as the history has it."""
         residual = merged(self.case, {"solver": {"criterion": "residual"}})
         idle = run_case(residual, 2, self.here("idle"))
-        self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-004; [\d.]+ iterations a solve\n")
+        self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-04; [\d.]+ iterations a solve\n")
         self.assertRegex(idle.stdout, r"\ntime        [\d.]+ s, [\d.]+ m?s a step: [a-z]+.* \d+ %")
         self.assertIn("\nto halve it 1 of 2 ranks own no subdomain and wait: as many &decomposition subdomains, now 1, or fewer ranks", idle.stdout)
         lost = run_case(merged(residual, {"time": {"steps": 5}, "solver": {"tolerance": 1e-16, "max_iterations": 3000},
                                           "output": {"every": 0}}), 1, self.here("lost"))
-        said = re.search(r"\nconverged   NO: 5 of 5 solves did not reach the tolerance 1.00E-016; at worst (\S+); ", lost.stdout)
+        said = re.search(r"\nconverged   NO: 5 of 5 solves did not reach the tolerance 1.00E-16; at worst (\S+); ", lost.stdout)
         self.assertTrue(said, lost.stdout)
         self.assertAlmostEqual(float(said[1]) / lost.history()["residual"].max(), 1.0, delta=0.01)
         self.assertIn("\nto halve it solves that give up take most iterations: another &solver method or a smaller &time step may let them "

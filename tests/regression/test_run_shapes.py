@@ -98,7 +98,7 @@ REFUSED = [
     ("pieces of space", {}, changed(SHAPES, "capsule -0.1 0  0.1 0  0.05", "box 1 1 1"), BODIES,
      ('a.shapes: line 9: "box": expected shape, rounding, polygon, disk, capsule, regular or random_hull',)),
     ("shapes too large to reckon with", {}, SHAPES + "shape moon\ncapsule -1e30 0 1e30 0 1e30\n", BODIES,
-     ("a.shapes: line 10: shape moon: a size of 2.00000000E+030", "expected a number from 1e-30 to 1e30")),
+     ("a.shapes: line 10: shape moon: a size of 2.00000000E+30", "expected a number from 1e-30 to 1e30")),
     ("an unknown shape", {}, SHAPES, changed(BODIES, "pill", "pile"), ("bodies.csv: line 5: column shape", '"pile"', "brick, ell, pill")),
     ("shapes without a library", {"scene": {"shapes": None}}, SHAPES, BODIES, ("bodies.csv: column scale is unknown in 2D",)),
     ("a library without a bodies file", {"scene": {"bodies": "lattice", "bodies_file": None, "lattice_count": [2, 2], "radius_min": 0.01,

@@ -44,6 +44,12 @@ LONGEST_FILE = 2**28
 ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1", "OMPI_MCA_coll": "basic,libnbc,self"}
 
 
+def how_often(words):
+    """The number of `never`, `once`, `twice` or `N times`, as a log says it."""
+    rare = {"never": 0, "once": 1, "twice": 2}
+    return rare[words] if words in rare else int(words.removesuffix(" times"))
+
+
 class Run:
     """What a run left: status of the launcher, text of the ranks and of the launcher, files in `directory`."""
 

@@ -9,7 +9,7 @@ module gravier_test_scenes
   use gravier_boundary, only: boundary_t
   use gravier_surface, only: surface_t
   use gravier_surface_registry, only: make_surface
-  use gravier_neighbour_search, only: neighbour_rule_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_box_counts, only: choose_boxes
   use gravier_decomposition, only: decomposition_t
   use gravier_check, only: check

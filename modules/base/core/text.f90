@@ -3,10 +3,11 @@ module gravier_text
   use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: to_text, lower, shell_word, growing_text_t
+  public :: to_text, times_text, counted, lower, shell_word, growing_text_t
 
   !> Shortest usual text of a number: integers without blanks, reals with 9 significant digits
-  !> or as many as asked, logicals as T or F.
+  !> or as many as asked, logicals as T or F. The exponent of a real has two digits, and three where it needs them; with 17
+  !> digits, as tables have them, it always has three.
   interface to_text
     module procedure text_of_i4
     module procedure text_of_i8
@@ -72,13 +73,45 @@ contains
     character(len=:), allocatable :: text
     character(len=40) :: buffer
     character(len=16) :: form
-    integer :: n
+    integer :: n, place
     n = 9
     if (present(digits)) n = max(1, min(17, digits))
     write (form, "('(es',i0,'.',i0,'e3)')") n + 9, n - 1
     write (buffer, form) value
     text = trim(adjustl(buffer))
+    if (n == 17) return
+    place = scan(text, "E")
+    if (place > 0) then
+      if (text(place + 2:place + 2) == "0") text = text(:place + 1)//text(place + 3:)
+    end if
   end function text_of_real
+
+  !> How often something happened, in words: never, once, twice, 3 times.
+  pure function times_text(number) result(text)
+    integer(i8), intent(in) :: number
+    character(len=:), allocatable :: text
+
+    select case (number)
+    case (0)
+      text = "never"
+    case (1)
+      text = "once"
+    case (2)
+      text = "twice"
+    case default
+      text = to_text(number)//" times"
+    end select
+  end function times_text
+
+  !> A number with its noun, whose plural ends in s: 1 solve, 2 solves.
+  pure function counted(number, noun) result(text)
+    integer(i8), intent(in) :: number
+    character(len=*), intent(in) :: noun
+    character(len=:), allocatable :: text
+
+    text = to_text(number)//" "//noun
+    if (number /= 1) text = text//"s"
+  end function counted
 
   pure function text_of_logical(value) result(text)
     logical, intent(in) :: value

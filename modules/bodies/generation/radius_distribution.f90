@@ -33,7 +33,7 @@ module gravier_radius_distribution
     real(dp) :: radius = 0.0_dp, radius_min = 0.0_dp, radius_max = 0.0_dp
     !> median of log_normal before it is cut [m], and standard deviation of ln r
     real(dp) :: radius_mean = 0.0_dp, radius_deviation = 0.0_dp
-    !> radii of the table [m], and the share of grains with this radius or one of an earlier row; the last is 1
+    !> radii of the table [m], and the fraction of grains with this radius or one of an earlier row; the last is 1
     real(dp), allocatable, private :: table_radius(:), cumulated_share(:)
   contains
     procedure :: read_table => distribution_read_table

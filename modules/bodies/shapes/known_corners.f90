@@ -10,7 +10,7 @@ module gravier_known_corners
   real(dp), parameter :: golden = 0.5_dp*(1.0_dp + sqrt(5.0_dp))
   !> places that are tried for a corner of a random stone, of which the one farthest from all corners before is taken
   integer, parameter :: tries = 16
-  !> share of the room of a corner of a random polygon in which it lies
+  !> fraction of the room of a corner of a random polygon in which it lies
   real(dp), parameter :: loose = 0.8_dp
 
 contains

@@ -10,30 +10,11 @@ module gravier_neighbour_search
   use gravier_boundary, only: boundary_t
   use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
+  use gravier_neighbour_rule, only: neighbour_rule_t, owner_point
   use gravier_region, only: region_t
   implicit none
   private
-  public :: neighbour_rule_t, neighbour_search_t, sweep_order, owner_point, rule_dual, rule_primal
-
-  !> a pair of grains belongs to the subdomain that holds the midpoint of the centres (paper, section 2.1)
-  integer, parameter :: rule_dual = 1
-  !> a pair belongs to the subdomain that holds the centre of its candidate; pairs of a grain and a boundary always do
-  integer, parameter :: rule_primal = 2
-
-  type :: neighbour_rule_t
-    !> pairs whose gap is at most this are contacts [m]
-    real(dp) :: alert_distance = 0.0_dp
-    !> pairs stay listed while no two bodies have come nearer than by this [m]
-    real(dp) :: skin = 0.0_dp
-    !> largest and mean radius of the scene [m]
-    real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
-    !> rule_dual or rule_primal
-    integer :: kind = rule_dual
-  contains
-    procedure :: range => rule_range
-    procedure :: reach => rule_reach
-    procedure :: sweep_edge => rule_sweep_edge
-  end type neighbour_rule_t
+  public :: neighbour_search_t, sweep_order
 
   !> The search for the near pairs that belong to one subdomain: what it knows besides the grains.
   type :: neighbour_search_t
@@ -75,43 +56,6 @@ module gravier_neighbour_search
     & -1, -1, 1, 0, -1, 1, 1, -1, 1, -1, 0, 1, 0, 0, 1, 1, 0, 1, -1, 1, 1, 0, 1, 1, 1, 1, 1], [3, 13])
 
 contains
-
-  !> Gap up to which pairs are listed [m].
-  pure real(dp) function rule_range(self) result(range)
-    class(neighbour_rule_t), intent(in) :: self
-    range = self%alert_distance + self%skin
-  end function rule_range
-
-  !> How far from its centre a grain's pairs may have the point that decides their owner, or the candidate whose owner
-  !> needs it [m].
-  pure real(dp) function rule_reach(self, radius) result(reach)
-    class(neighbour_rule_t), intent(in) :: self
-    !> [m]
-    real(dp), intent(in) :: radius
-    reach = radius + self%largest_radius + self%range()
-    if (self%kind /= rule_primal) reach = 0.5_dp*reach
-  end function rule_reach
-
-  !> Edge of the cells in whose order contacts are swept [m].
-  pure real(dp) function rule_sweep_edge(self) result(edge)
-    class(neighbour_rule_t), intent(in) :: self
-    edge = 2.0_dp*self%mean_radius + self%alert_distance
-    if (.not. edge > 0.0_dp) edge = 1.0_dp
-  end function rule_sweep_edge
-
-  !> The point whose subdomain owns a pair of grains: the midpoint of the centres (dual), the candidate's centre (primal).
-  pure function owner_point(kind, candidate, antagonist) result(point)
-    integer, intent(in) :: kind
-    !> centres, the antagonist's shifted to where it meets the candidate (nd) [m]
-    real(dp), intent(in) :: candidate(:), antagonist(:)
-    real(dp) :: point(size(candidate))
-
-    if (kind == rule_primal) then
-      point(:) = candidate
-    else
-      point(:) = 0.5_dp*(candidate + antagonist)
-    end if
-  end function owner_point
 
   !> Order of points along rows of cells, the last axis slowest, then by identifier: it depends on the set of points alone.
   subroutine sweep_order(points, lower, edge, id, order)
@@ -164,36 +108,44 @@ contains
     type(pair_memory_t), intent(in) :: memory
     type(neighbour_list_t), intent(inout) :: list
     type(entries_t) :: entries
+    real(dp), allocatable :: extent(:)
+    integer :: k
 
     call list%init(self%period%on(), 4*bodies%n + 16)
     if (bodies%n > 0) then
-      call make_entries(bodies, self%period, self%rule, entries)
-      call hash_entries(entries, bodies, self%rule)
-      call search_boundaries(self, bodies, owned, list)
-      call search_class(self, bodies, region, entries, list)
-      if (count(entries%used) > 1) call search_larger(self, bodies, region, entries, list)
+      allocate (extent(bodies%n))
+      do k = 1, bodies%n
+        extent(k) = bodies%radius(k) + self%rule%margin(norm2(bodies%velocity(1:bodies%nd, k)))
+      end do
+      call make_entries(bodies, extent, self%period, self%rule, entries)
+      call hash_entries(entries, extent, self%rule)
+      call search_boundaries(self, bodies, extent, owned, list)
+      call search_class(self, bodies, extent, region, entries, list)
+      if (count(entries%used) > 1) call search_larger(self, bodies, extent, region, entries, list)
     end if
     call sort_list(self, bodies, memory, list)
   end subroutine search_find
 
   !> Sort entries into the cells of their classes.
-  subroutine hash_entries(entries, bodies, rule)
+  subroutine hash_entries(entries, extent, rule)
     type(entries_t), intent(inout) :: entries
-    type(body_set_t), intent(in) :: bodies
+    !> of the bodies: radius with the way that lists leave to go [m]
+    real(dp), intent(in), contiguous :: extent(:)
     type(neighbour_rule_t), intent(in) :: rule
     integer(i8), allocatable :: keys(:)
-    real(dp) :: lower(bodies%nd)
+    real(dp) :: lower(size(entries%position, 1)), largest
     integer :: e, l, place(3)
 
     lower(:) = minval(entries%position, dim=2)
     entries%lower = lower
+    largest = maxval(extent)
     do l = 0, n_levels - 1
-      entries%edge(l) = 2.0_dp*rule%largest_radius*0.5_dp**l + rule%range()
+      entries%edge(l) = 2.0_dp*largest*0.5_dp**l + rule%alert_distance
       if (.not. entries%edge(l) > 0.0_dp) entries%edge(l) = 1.0_dp
     end do
     allocate (keys(entries%n), entries%level(entries%n))
     do e = 1, entries%n
-      l = level_of(bodies%radius(entries%body(e)), rule%largest_radius)
+      l = level_of(extent(entries%body(e)), largest)
       entries%level(e) = l
       entries%used(l) = .true.
       place(:) = entries%place(e, l)
@@ -211,28 +163,33 @@ contains
   end function entries_place
 
   !> List the grains of the subdomain that are near a boundary.
-  subroutine search_boundaries(self, bodies, owned, list)
+  subroutine search_boundaries(self, bodies, extent, owned, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
+    real(dp), intent(in), contiguous :: extent(:)
     integer, intent(in), contiguous :: owned(:)
     type(neighbour_list_t), intent(inout) :: list
     integer :: k, b
-    real(dp) :: distance, normal(bodies%nd)
+    real(dp) :: distance, normal(bodies%nd), range(size(self%boundaries))
 
+    do b = 1, size(self%boundaries)
+      range(b) = self%rule%alert_distance + self%rule%margin(norm2(self%boundaries(b)%velocity))
+    end do
     do k = 1, bodies%n
       if (owned(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
       do b = 1, size(self%boundaries)
         if (.not. self%boundaries(b)%touches()) cycle
         call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)
-        if (distance - bodies%radius(k) <= self%rule%range()) call list%add(k, -b, no_shift)
+        if (distance - extent(k) <= range(b)) call list%add(k, -b, no_shift)
       end do
     end do
   end subroutine search_boundaries
 
   !> List the near pairs of entries of one class: those in a cell, and those in cells that touch.
-  subroutine search_class(self, bodies, region, entries, list)
+  subroutine search_class(self, bodies, extent, region, entries, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
+    real(dp), intent(in), contiguous :: extent(:)
     class(region_t), intent(in) :: region
     type(entries_t), intent(in) :: entries
     type(neighbour_list_t), intent(inout) :: list
@@ -245,7 +202,7 @@ contains
         place(:) = entries%place(a, l)
         do a = hash%first(cell), hash%first(cell + 1) - 1
           do b = a + 1, hash%first(cell + 1) - 1
-            call test_pair(self, bodies, region, entries, hash%order(a), hash%order(b), list)
+            call test_pair(self, bodies, extent, region, entries, hash%order(a), hash%order(b), list)
           end do
         end do
         do k = 1, merge(4, 13, bodies%nd == 2)
@@ -254,7 +211,7 @@ contains
           if (other == 0 .or. other == cell) cycle
           do a = hash%first(cell), hash%first(cell + 1) - 1
             do b = hash%first(other), hash%first(other + 1) - 1
-              call test_pair(self, bodies, region, entries, hash%order(a), hash%order(b), list)
+              call test_pair(self, bodies, extent, region, entries, hash%order(a), hash%order(b), list)
             end do
           end do
         end do
@@ -263,9 +220,10 @@ contains
   end subroutine search_class
 
   !> List the near pairs of two classes. A grain of a larger class never lies farther off than one of the cells of that class.
-  subroutine search_larger(self, bodies, region, entries, list)
+  subroutine search_larger(self, bodies, extent, region, entries, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
+    real(dp), intent(in), contiguous :: extent(:)
     class(region_t), intent(in) :: region
     type(entries_t), intent(in) :: entries
     type(neighbour_list_t), intent(inout) :: list
@@ -286,7 +244,7 @@ contains
               other = entries%hash%find(cell_key(l, near))
               if (other == 0) cycle
               do b = entries%hash%first(other), entries%hash%first(other + 1) - 1
-                call test_pair(self, bodies, region, entries, a, entries%hash%order(b), list)
+                call test_pair(self, bodies, extent, region, entries, a, entries%hash%order(b), list)
               end do
             end do
           end do
@@ -296,9 +254,10 @@ contains
   end subroutine search_larger
 
   !> List entries a and b where they are near, the subdomain owns their pair, and this is the one of its images that counts.
-  subroutine test_pair(self, bodies, region, entries, a, b, list)
+  subroutine test_pair(self, bodies, extent, region, entries, a, b, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
+    real(dp), intent(in), contiguous :: extent(:)
     class(region_t), intent(in) :: region
     type(entries_t), intent(in) :: entries
     integer, intent(in) :: a, b
@@ -315,7 +274,7 @@ contains
     do d = 1, nd
       square = square + (entries%position(d, a) - entries%position(d, b))**2
     end do
-    if (square > (bodies%radius(i) + bodies%radius(j) + self%rule%range())**2) return
+    if (square > (extent(i) + extent(j) + self%rule%alert_distance)**2) return
     if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
     periodic = self%period%on()
     shift(:) = 0
@@ -432,12 +391,14 @@ contains
   end function is_where_owned
 
   !> The grains and those of their periodic images that may meet another one.
-  subroutine make_entries(bodies, period, rule, entries)
+  subroutine make_entries(bodies, extent, period, rule, entries)
     type(body_set_t), intent(in) :: bodies
+    real(dp), intent(in), contiguous :: extent(:)
     type(period_t), intent(in) :: period
     type(neighbour_rule_t), intent(in) :: rule
     type(entries_t), intent(out) :: entries
     integer :: k, x, y, z, low(3), high(3), round, n
+    real(dp) :: largest
 
     if (.not. period%on()) then
       entries%n = bodies%n
@@ -448,10 +409,11 @@ contains
       end do
       return
     end if
+    largest = maxval(extent)
     do round = 1, 2
       n = 0
       do k = 1, bodies%n
-        call image_range(bodies%position(:, k), bodies%radius(k) + rule%largest_radius + rule%range(), low, high)
+        call image_range(bodies%position(:, k), extent(k) + largest + rule%alert_distance, low, high)
         do z = low(3), high(3)
           do y = low(2), high(2)
             do x = low(1), high(1)

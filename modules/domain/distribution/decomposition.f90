@@ -10,7 +10,7 @@ module gravier_decomposition
   use gravier_shape_library, only: shape_library_t
   use gravier_body_figures, only: body_figures_t
   use gravier_boundary, only: boundary_t
-  use gravier_neighbour_search, only: neighbour_rule_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_partition, only: partition_t
   implicit none
   private

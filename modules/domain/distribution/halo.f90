@@ -7,6 +7,7 @@ module gravier_halo
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
+  use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_neighbour_search, only: neighbour_search_t, sweep_order
   use gravier_decomposition, only: decomposition_t
   implicit none
@@ -21,20 +22,20 @@ module gravier_halo
     type(neighbour_list_t) :: list
   end type local_bodies_t
 
-  !> Where the grains of a subdomain were when its list was made (nd, n) [m].
-  type :: places_t
-    real(dp), allocatable :: position(:, :)
-  end type places_t
+  !> The grains of a subdomain when its list was made: their places (nd, n) [m] and speeds (n) [m/s].
+  type :: reference_t
+    real(dp), allocatable :: position(:, :), speed(:)
+  end type reference_t
 
   !> The halo of the subdomains of this rank, and who sends which grain to whom.
   type :: halo_t
     type(local_bodies_t), allocatable :: view(:)
     !> as they were when the lists were made
-    type(places_t), allocatable :: reference(:)
+    type(reference_t), allocatable :: reference(:)
     type(boundary_t), allocatable :: reference_boundaries(:)
     !> ghosts sent: subdomain of this rank and place among its owned bodies (2, n); subdomain that sees it, and its rank (n)
     integer, allocatable :: sent(:, :), recipient(:), destination(:)
-    !> ghosts received, in the order of arrival: subdomain of this rank and place in its view (2, n)
+    !> ghosts received, in the order of arrival: subdomain of this rank and place among its local bodies (2, n)
     integer, allocatable :: arrival(:, :)
     !> to be set before the first list
     type(pair_memory_t) :: memory
@@ -48,7 +49,7 @@ module gravier_halo
 
 contains
 
-  !> Make views and lists of the grains as they have settled. Collective.
+  !> Make the local bodies and lists from the grains as they have migrated. Collective.
   subroutine halo_build(self, decomposition)
     class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
@@ -57,7 +58,9 @@ contains
     type(neighbour_search_t) :: search
     integer :: s
 
-    call plan_ghosts(self, decomposition)
+    search%rule = decomposition%rule
+    call find_largest_extent(decomposition, search%rule)
+    call plan_ghosts(self, decomposition, search%rule)
     call write_ghosts(self, decomposition, records)
     call sparse_exchange(decomposition%comm, records, self%destination, received)
     call decomposition%unpack_by_subdomain(received, 2, ghosts)
@@ -65,12 +68,11 @@ contains
     if (allocated(self%reference)) deallocate (self%reference)
     allocate (self%view(size(decomposition%owned)), self%reference(size(decomposition%owned)))
     call make_views(self, decomposition, ghosts, received)
-    search%rule = decomposition%rule
     search%period = decomposition%period
     search%boundaries = decomposition%boundaries
     search%counts = decomposition%shapes%counts
     do s = 1, size(self%view)
-      self%reference(s)%position = decomposition%owned(s)%position
+      call note_reference(decomposition%owned(s), self%reference(s))
       associate (view => self%view(s))
         search%subdomain = decomposition%subdomain_of(s)
         call search%find(view%bodies, view%owner, decomposition%partition, self%memory, view%list)
@@ -80,12 +82,44 @@ contains
     self%builds = self%builds + 1
   end subroutine halo_build
 
+  !> Collective.
+  subroutine find_largest_extent(decomposition, rule)
+    type(decomposition_t), intent(in) :: decomposition
+    type(neighbour_rule_t), intent(inout) :: rule
+    integer :: s, k
+
+    rule%largest_extent = 0.0_dp
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          rule%largest_extent = max(rule%largest_extent, owned%radius(k) + rule%margin(norm2(owned%velocity(1:owned%nd, k))))
+        end do
+      end associate
+    end do
+    rule%largest_extent = decomposition%comm%highest(rule%largest_extent)
+  end subroutine find_largest_extent
+
+  subroutine note_reference(owned, reference)
+    type(body_set_t), intent(in) :: owned
+    type(reference_t), intent(out) :: reference
+    integer :: k
+
+    reference%position = owned%position
+    allocate (reference%speed(owned%n))
+    do k = 1, owned%n
+      reference%speed(k) = norm2(owned%velocity(1:owned%nd, k))
+    end do
+  end subroutine note_reference
+
   !> Find the grains of this rank that other subdomains see.
-  subroutine plan_ghosts(self, decomposition)
+  subroutine plan_ghosts(self, decomposition, rule)
     class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    !> with the largest extent
+    type(neighbour_rule_t), intent(in) :: rule
     integer, allocatable :: near(:)
     integer :: s, k, j, n_near, n, round
+    real(dp) :: reach
 
     if (allocated(self%sent)) deallocate (self%sent, self%recipient, self%destination)
     allocate (near(32))
@@ -94,7 +128,8 @@ contains
       do s = 1, size(decomposition%owned)
         associate (owned => decomposition%owned(s))
           do k = 1, owned%n
-            call decomposition%partition%near(owned%position(:, k), decomposition%rule%reach(owned%radius(k)), near, n_near)
+            reach = rule%reach(owned%radius(k), norm2(owned%velocity(1:owned%nd, k)))
+            call decomposition%partition%near(owned%position(:, k), reach, near, n_near)
             do j = 1, n_near
               if (near(j) == decomposition%subdomain_of(s)) cycle
               n = n + 1
@@ -202,7 +237,7 @@ contains
     end do
   end subroutine sort_views
 
-  !> Bring the places, velocities and what else changes in every step up to date in the views. Collective.
+  !> Bring the places, velocities and what else changes in every step up to date of the local bodies. Collective.
   subroutine halo_refresh(self, decomposition)
     class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
@@ -229,29 +264,34 @@ contains
     end do
   end subroutine halo_refresh
 
-  !> Whether some pair outside the lists may have come within the alert distance. Collective.
+  !> Whether some pair outside the lists may have come within the alert distance: a grain has gone farther than its margin, or a
+  !> boundary farther than its own and what all grains have left of theirs. Collective.
   logical function halo_are_due(self, decomposition) result(due)
     class(halo_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
-    real(dp) :: farthest, boundary
+    !> least that a grain has left of its margin
+    real(dp) :: left
     integer :: s, k, b
 
     due = .true.
     if (.not. allocated(self%view)) return
-    farthest = 0.0_dp
-    do s = 1, size(decomposition%owned)
-      associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          farthest = max(farthest, sum((owned%position(:, k) - self%reference(s)%position(:, k))**2))
-        end do
-      end associate
-    end do
-    farthest = sqrt(decomposition%comm%highest(farthest))
-    boundary = 0.0_dp
-    do b = 1, size(decomposition%boundaries)
-      boundary = max(boundary, way_of(decomposition%boundaries(b), self%reference_boundaries(b)))
-    end do
-    due = farthest + max(farthest, boundary) > decomposition%rule%skin
+    associate (rule => decomposition%rule)
+      left = huge(1.0_dp)
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s), before => self%reference(s))
+          do k = 1, owned%n
+            left = min(left, rule%margin(before%speed(k)) - norm2(owned%position(:, k) - before%position(:, k)))
+          end do
+        end associate
+      end do
+      left = -decomposition%comm%highest(-left)
+      due = left < 0.0_dp
+      do b = 1, size(decomposition%boundaries)
+        associate (now => decomposition%boundaries(b), before => self%reference_boundaries(b))
+          due = due .or. way_of(now, before) > rule%margin(norm2(before%velocity)) + left
+        end associate
+      end do
+    end associate
   end function halo_are_due
 
   !> How far the surface of a boundary has moved at most [m]. The axis of a drum, which turns about it, picks up roundings,

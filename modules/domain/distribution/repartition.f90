@@ -13,7 +13,7 @@ module gravier_repartition
 
   !> How space is to be divided, and how often.
   type :: repartition_rule_t
-    !> cells with grains in them, shared out by METIS; else boxes
+    !> cells with grains in them, distributed by METIS; else boxes
     logical :: by_graph = .false.
     !> boxes along each axis; where some are 0, they are chosen by the number of subdomains
     integer :: grid(3) = 0
@@ -55,7 +55,7 @@ contains
     real(dp) :: lower(decomposition%nd), upper(decomposition%nd), edge
 
     call decomposition%bounding_box(bodies, lower, upper)
-    edge = 2.0_dp*decomposition%rule%largest_radius + decomposition%rule%range()
+    edge = decomposition%rule%cell_edge()
     ! without grains any edge serves
     if (.not. edge > 0.0_dp) edge = 1.0_dp
     call check_subdomains(lower, upper, edge, rule%subdomains, error)

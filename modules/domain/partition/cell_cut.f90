@@ -1,4 +1,4 @@
-!> The cells of a group shared out among its subdomains: the graph of the occupied pieces, cut by METIS, and what is empty
+!> The cells of a group distributed among its subdomains: the graph of the occupied pieces, cut by METIS, and what is empty
 !> given to a near subdomain.
 module gravier_cell_cut
   use gravier_kinds, only: i4, i8
@@ -67,7 +67,7 @@ contains
     call fill_cells(groups, g, owner)
   end subroutine cut_group
 
-  !> Build the graph of occupied pieces and cut it. Pieces that share a face weigh more than those that share a corner.
+  !> Build the graph of occupied pieces and cut it. Pieces that share a face have a larger weight than those that share a corner.
   subroutine cut_pieces(groups, cell_of, weight, vertex, n_parts, part, error)
     type(cell_groups_t), intent(in) :: groups
     !> (entries) each

@@ -1,4 +1,4 @@
-!> Partitions of space into subdomains: a grid of equal boxes (paper, (3)-(4)), or cells shared out by a graph partition.
+!> Partitions of space into subdomains: a grid of equal boxes (paper, (3)-(4)), or cells distributed by a graph partition.
 module gravier_partition
   use gravier_kinds, only: dp, i4, i8
   use gravier_narrow, only: narrow
@@ -88,7 +88,7 @@ contains
     self%upper(1:self%nd) = upper
   end subroutine set_box
 
-  !> Cells shared out so that each subdomain holds about as much weight and few neighbours are cut. Each rank gives points of
+  !> Cells distributed so that each subdomain holds about as much weight and few neighbours are cut. Each rank gives points of
   !> its own. The graph that a rank cuts and what it keeps of the cells are bounded: where one graph of cell_limit cells gives
   !> each subdomain too few, its cells make groups of subdomains, and the group of a cell is cut by itself, more finely.
   !> Errors are the same on all ranks, and so is the partition on any number of ranks. Collective.

@@ -288,7 +288,7 @@ contains
       ! a file that the program dies over must not be shorter than its headers say
       call h5fget_filesize_f(self%id, length, stat)
       if (stat == 0) call extend_file(self%path, int(length, i8), error)
-      ! HDF5 waits for ever when one rank cannot write its share of the headers: give them their place first
+      ! HDF5 waits for ever when one rank cannot write its fraction of the headers: give them their place first
       call reserve_space(self%path, bytes_of_link, error, start=self%flushed, held=self%flushed + self%reserved)
     end if
     call self%comm%agree(error)

@@ -22,7 +22,7 @@ contains
   pure function nscdd_features() result(features)
     type(method_features_t) :: features
     features = method_features_t(name="nscdd", meaning="NSCDD", moments=.true., sleeping=.true., &
-      & momentum_by_default=default_always)
+      & accelerated_by_default=default_always)
   end function nscdd_features
 
   subroutine nscdd_start(self, problem, error)

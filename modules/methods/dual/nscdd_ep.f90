@@ -52,7 +52,7 @@ contains
 
   pure function nscdd_ep_features() result(features)
     type(method_features_t) :: features
-    features = method_features_t(name="nscdd_ep", meaning="NSCDD-EP", momentum_by_default=default_on_active, &
+    features = method_features_t(name="nscdd_ep", meaning="NSCDD-EP", accelerated_by_default=default_on_active, &
       & active_by_default=.true.)
   end function nscdd_ep_features
 
@@ -81,7 +81,7 @@ contains
 
     if (allocated(error)) return
     call self%nscdd_t%start(problem, error)
-    call self%matrix%set_share(1.0_dp)
+    call self%matrix%set_factor(1.0_dp)
     self%guarded = is_enriched(self)
     if (.not. is_enriched(self)) return
     call make_field(problem, self%change)
@@ -95,7 +95,7 @@ contains
 
   pure logical function is_enriched(self)
     class(nscdd_ep_t), intent(in) :: self
-    is_enriched = self%matrix%direction%value*self%matrix%share > 0.0_dp
+    is_enriched = self%matrix%direction%value*self%matrix%factor > 0.0_dp
   end function is_enriched
 
   subroutine nscdd_ep_iterate(self, problem, measure, jump, error)
@@ -129,7 +129,7 @@ contains
     call self%guard%watch(problem, lowered)
     if (.not. lowered) return
     call start_sweeps(self, problem, shared_masses=.true.)
-    call self%matrix%set_share(self%guard%share)
+    call self%matrix%set_factor(self%guard%factor)
     self%guarded = is_enriched(self)
     self%work%lowered = self%work%lowered + 1
     self%prepared = .false.

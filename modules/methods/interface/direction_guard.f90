@@ -35,7 +35,7 @@ module gravier_direction_guard
 
   type :: direction_guard_t
     !> what is left of l in this solve, and times that l was lowered in it
-    real(dp) :: share = 1.0_dp
+    real(dp) :: factor = 1.0_dp
     integer :: lowered = 0
     type(kept_impulses_t), allocatable, private :: kept(:)
     !> |r - y|^2: largest before growth set in, largest of this window, sums over this window, the last, and the one before growth
@@ -59,7 +59,7 @@ contains
     if (allocated(self%kept)) deallocate (self%kept)
     allocate (self%kept(size(problem%sub)))
     call keep(self, problem)
-    self%share = 1.0_dp
+    self%factor = 1.0_dp
     self%lowered = 0
     self%reference = problem%force_scale**2*real(problem%n_contacts, dp)
     call open_windows(self)
@@ -161,8 +161,8 @@ contains
       problem%sub(s)%impulse(:, :, :) = guard%kept(s)%value
     end do
     guard%lowered = guard%lowered + 1
-    guard%share = factor*guard%share
-    if (guard%lowered >= most_lowerings) guard%share = 0.0_dp
+    guard%factor = factor*guard%factor
+    if (guard%lowered >= most_lowerings) guard%factor = 0.0_dp
     call open_windows(guard)
     lowered = .true.
   end subroutine lower

@@ -32,14 +32,14 @@ module gravier_enriched_matrix
   type :: enriched_matrix_t
     type(search_direction_t) :: direction
     !> what the safeguard has left of l
-    real(dp) :: share = 1.0_dp
+    real(dp) :: factor = 1.0_dp
     !> iterations since l was set
     integer, private :: uses = 0
     !> l has blocks that are not symmetric: set before `start`, factorised by `factorise_blocks`
     logical :: general = .false.
     type(enriched_part_t), allocatable :: part(:)
   contains
-    procedure :: set_share => enriched_matrix_set_share
+    procedure :: set_factor => enriched_matrix_set_factor
     procedure :: count_use => enriched_matrix_count_use
     procedure :: start => enriched_matrix_start
     procedure :: update => enriched_matrix_update
@@ -86,13 +86,13 @@ contains
     part%contact_work(:, :, :) = 0.0_dp
   end subroutine make_room
 
-  !> Take another share of l, from the next `update` on, which is due at once.
-  pure subroutine enriched_matrix_set_share(self, share)
+  !> Take another fraction of l, from the next `update` on, which is due at once.
+  pure subroutine enriched_matrix_set_factor(self, factor)
     class(enriched_matrix_t), intent(inout) :: self
-    real(dp), intent(in) :: share
-    self%share = share
+    real(dp), intent(in) :: factor
+    self%factor = factor
     self%uses = 0
-  end subroutine enriched_matrix_set_share
+  end subroutine enriched_matrix_set_factor
 
   !> Count an iteration, and say whether `update` is due in it: in the first one; with l on active contacts, which come and go, in
   !> the 2nd, 4th, 8th ... too. Factors are worth hundreds of sweeps, and those of some iterations ago serve almost as well.
@@ -122,7 +122,7 @@ contains
     do s = 1, size(self%part)
       associate (part => self%part(s), sub => problem%sub(s))
         if (sub%n_bodies == 0) cycle
-        call set_direction(self%direction, self%share, problem%kernels, sub, part%direction)
+        call set_direction(self%direction, self%factor, problem%kernels, sub, part%direction)
         call make_diagonal_blocks(part%direction, sub%n_contacts, block)
         call assemble(problem%kernels, sub, block, .false., entries)
         before = part%factor%factorisations
@@ -134,9 +134,9 @@ contains
   end subroutine enriched_matrix_update
 
   !> l of every component of every contact, with W_aa of the undivided bodies.
-  pure subroutine set_direction(rule, share, kernels, sub, direction)
+  pure subroutine set_direction(rule, factor, kernels, sub, direction)
     type(search_direction_t), intent(in) :: rule
-    real(dp), intent(in) :: share
+    real(dp), intent(in) :: factor
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     !> (lanes, nc, blocks)
@@ -148,11 +148,11 @@ contains
     do c = 1, sub%n_contacts
       q = lane_of(c)
       g = block_of(c)
-      direction(q, :, g) = share*rule%value
+      direction(q, :, g) = factor*rule%value
       if (rule%relative) then
         call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
-        direction(q, 1, g) = share*rule%value/w(1)
-        direction(q, 2:, g) = share*rule%value/w(2)
+        direction(q, 1, g) = factor*rule%value/w(1)
+        direction(q, 2:, g) = factor*rule%value/w(2)
       end if
     end do
     if (rule%active_only) call drop_inactive(kernels, sub, direction)

@@ -4,7 +4,7 @@
 !> every weight alpha. Inner loop: semismooth Newton steps on gravier_proximal_law. The impulses of a step, dr = c - L H^T dV, are
 !> eliminated contact by contact; with M V = R^d + H r at every point there remains (M + H L H^T) dV = H c, in subdomains
 !>   X_L F = sum_E A_E M_L,E^-1 H_E c_E,   dV_E = M_L,E^-1 (H_E c_E - A_E^T F),   M_L,E = M~_E + H_E L_E H_E^T,
-!> the interface problem of NSCDD-EP with blocks L for l. Newton's method converges near a solution: sweeps with momentum come
+!> the interface problem of NSCDD-EP with blocks L for l. Newton's method converges near a solution: accelerated sweeps come
 !> first, and again where it makes no progress.
 module gravier_newton
   use gravier_kinds, only: dp
@@ -24,8 +24,8 @@ module gravier_newton
   private
   public :: newton_t
 
-  !> turns of sweeps with momentum; in later ones they are plain
-  integer, parameter :: turns_with_momentum = 3
+  !> turns of accelerated sweeps; in later ones they are plain
+  integer, parameter :: accelerated_turns = 3
   !> iterations of a window of sweeps in the first turn, doubled in the next ones; what is left of the least change of the last
   !> window where sweeps do well
   integer, parameter :: first_window = 100
@@ -88,7 +88,7 @@ contains
   pure function newton_features() result(features)
     type(method_features_t) :: features
     features = method_features_t(name="newton", &
-      & meaning="sweeps of NSCDD with momentum and, where they stagnate, a proximal Newton method", direct_interface_only=.true.)
+      & meaning="accelerated sweeps of NSCDD and, where they stagnate, a proximal Newton method", direct_interface_only=.true.)
   end function newton_features
 
   subroutine newton_set(self, options)
@@ -96,7 +96,7 @@ contains
     type(method_options_t), intent(in) :: options
 
     call self%nscdd_t%set(options)
-    self%momentum%on = .true.
+    self%acceleration%on = .true.
   end subroutine newton_set
 
   pure subroutine newton_held(self, nc, nv, held)
@@ -120,7 +120,7 @@ contains
     integer :: s
 
     if (allocated(error)) return
-    self%momentum%on = .true.
+    self%acceleration%on = .true.
     call self%nscdd_t%start(problem, error)
     self%persists = .true.
     self%matrix%general = .true.
@@ -146,12 +146,13 @@ contains
     call begin_sweeps(self)
   end subroutine newton_start
 
-  !> Sweeps come next: with momentum in the first turns, plain in later ones. Where momentum goes round, plain sweeps creep on.
+  !> Sweeps come next: accelerated in the first turns, plain in later ones. Where accelerated sweeps oscillate, plain ones still
+  !> progress slowly.
   subroutine begin_sweeps(self)
     class(newton_t), intent(inout) :: self
 
     self%sweeping = .true.
-    self%momentum%on = self%turn < turns_with_momentum
+    self%acceleration%on = self%turn < accelerated_turns
     self%check_next = .false.
     self%keeps_best = .true.
     self%taken = 0
@@ -185,11 +186,11 @@ contains
 
     stagnant = .false.
     self%taken = self%taken + 1
-    if (.not. self%momentum%on) then
-      stagnant = self%taken == plain_sweeps*2**min(self%turn - turns_with_momentum, most_doublings)
+    if (.not. self%acceleration%on) then
+      stagnant = self%taken == plain_sweeps*2**min(self%turn - accelerated_turns, most_doublings)
       return
     end if
-    self%lowest = min(self%lowest, self%momentum%change)
+    self%lowest = min(self%lowest, self%acceleration%change)
     if (mod(self%taken, first_window*2**self%turn) /= 0) return
     stagnant = self%lowest > little_gain**2*self%last_lowest
     self%last_lowest = self%lowest
@@ -301,7 +302,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     integer :: s
 
-    if (self%momentum%on .or. .not. self%least < self%least_swept) then
+    if (self%acceleration%on .or. .not. self%least < self%least_swept) then
       do s = 1, size(self%part)
         problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
         problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
@@ -460,8 +461,8 @@ contains
     if (residual <= progress_made*self%mark) then
       self%mark = residual
       self%taken = 0
-    else if (self%taken >= merge(first_patience*2**min(self%turn, turns_with_momentum), late_patience, &
-        & self%momentum%on)) then
+    else if (self%taken >= merge(first_patience*2**min(self%turn, accelerated_turns), late_patience, &
+        & self%acceleration%on)) then
       self%turn = self%turn + 1
       call begin_sweeps(self)
       return

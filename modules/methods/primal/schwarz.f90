@@ -5,7 +5,7 @@ module gravier_schwarz
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_body_mass, only: add_inverse_mass, inverse_product
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_method, only: method_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, extrapolate
+  use gravier_method, only: method_t, take_options, work_t, acceleration_t, start_sweeps, sweep_all, extrapolate
   use gravier_method_options, only: method_features_t, method_options_t
   implicit none
   private
@@ -23,13 +23,14 @@ module gravier_schwarz
     real(dp), allocatable :: value(:, :)
     !> what the last iteration asked it to change by
     real(dp), allocatable :: change(:, :)
-    !> R^ddm of the iteration before; allocated with momentum
+    !> R^ddm of the iteration before; allocated where sweeps are accelerated
     real(dp), allocatable :: previous(:, :)
   end type neighbour_load_t
 
-  !> The share of a change of R^ddm that is taken over: 1 in the paper, less where the method would diverge. It does so by
-  !> changes d_k that alternate from one iteration to the next, and grow: where |d_k - d_k-1|^2 is more than twice its lowest
-  !> value so far, and d_k no longer goes along with d_k-1, the automatic factor is lowered, see doc/theory.md section 9.
+  !> The relaxation factor, the fraction of a change of R^ddm that is applied: 1 in the paper, less where the method would
+  !> diverge. It does so by changes d_k that alternate from one iteration to the next, and grow: where |d_k - d_k-1|^2 is more
+  !> than twice its lowest value so far, and d_k no longer goes along with d_k-1, the automatic factor is lowered, see
+  !> doc/theory.md section 9.
   type :: relaxation_t
     !> in (0, 1]
     real(dp) :: factor = 1.0_dp
@@ -88,7 +89,7 @@ contains
     self%work%solves = self%work%solves + 1
     self%adapts = self%relaxation%automatic
     call start_sweeps(self, problem, shared_masses=.false.)
-    call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
+    call start_neighbour_loads(problem, self%acceleration%on, self%relaxation, self%load)
   end subroutine schwarz_start
 
   subroutine schwarz_iterate(self, problem, measure, jump, error)
@@ -101,7 +102,7 @@ contains
 
     jump = 0.0_dp
     if (allocated(error)) return
-    call extrapolate_loads(self%momentum, self%load)
+    call extrapolate_loads(self%acceleration, self%load)
     call sweep_all(self, problem)
     if (measure) jump = problem%jump()
     call start_timer(phase_exchange)
@@ -134,10 +135,10 @@ contains
 
   !> Loads that agree with the impulses at the start of a solve, which `start_sweeps` has put into the velocities; none
   !> on components that cannot move. Collective.
-  subroutine start_neighbour_loads(problem, momentum, relaxation, load)
+  subroutine start_neighbour_loads(problem, acceleration, relaxation, load)
     type(contact_problem_t), intent(inout) :: problem
     !> whether the loads are to be extrapolated
-    logical, intent(in) :: momentum
+    logical, intent(in) :: acceleration
     !> started anew
     type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), allocatable, intent(out) :: load(:)
@@ -160,7 +161,7 @@ contains
       end do
       allocate (load(s)%change, mold=load(s)%value)
       load(s)%change(:, :) = 0.0_dp
-      if (momentum) load(s)%previous = load(s)%value
+      if (acceleration) load(s)%previous = load(s)%value
     end do
     if (relaxation%automatic) then
       relaxation = relaxation_t(least=1.0_dp/largest_multiplicity(problem))
@@ -185,20 +186,21 @@ contains
     largest = problem%comm%highest(largest)
   end function largest_multiplicity
 
-  !> With momentum, bring the loads to those under the extrapolated impulses, as `begin_sweeps` does with the velocities.
-  subroutine extrapolate_loads(momentum, load)
-    type(momentum_t), intent(in) :: momentum
+  !> Where sweeps are accelerated, bring the loads to those under the extrapolated impulses, as `begin_sweeps` does with the
+  !> velocities.
+  subroutine extrapolate_loads(acceleration, load)
+    type(acceleration_t), intent(in) :: acceleration
     type(neighbour_load_t), intent(inout) :: load(:)
     integer :: s
 
-    if (.not. momentum%on .or. momentum%resting) return
+    if (.not. acceleration%on .or. acceleration%resting) return
     do s = 1, size(load)
-      call extrapolate(momentum%beta, load(s)%value, load(s)%previous)
+      call extrapolate(acceleration%beta, load(s)%value, load(s)%previous)
     end do
   end subroutine extrapolate_loads
 
   !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* /= E of B_E B_E*^T R_E*, and change the velocities by
-  !> what the loads have changed. With under-relaxation, only a share of the change is taken over. Collective.
+  !> what the loads have changed. With under-relaxation, only a fraction of the change is applied. Collective.
   subroutine take_neighbour_loads(problem, relaxation, load, work)
     type(contact_problem_t), intent(inout) :: problem
     type(relaxation_t), intent(inout) :: relaxation

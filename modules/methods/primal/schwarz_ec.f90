@@ -59,8 +59,8 @@ contains
     self%adapts = self%relaxation%automatic
     self%relaxation%watched = .true.
     call start_sweeps(self, problem, shared_masses=.false.)
-    call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
-    call self%matrix%set_share(1.0_dp)
+    call start_neighbour_loads(problem, self%acceleration%on, self%relaxation, self%load)
+    call self%matrix%set_factor(1.0_dp)
     self%guarded = is_enriched(self)
     if (self%guarded) call self%guard%start(problem)
     call self%matrix%start(problem, error)
@@ -78,7 +78,7 @@ contains
 
     jump = 0.0_dp
     if (allocated(error)) return
-    call extrapolate_loads(self%momentum, self%load)
+    call extrapolate_loads(self%acceleration, self%load)
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
     call self%matrix%count_use(due)
@@ -107,15 +107,15 @@ contains
     end if
     if (.not. lowered) return
     call start_sweeps(self, problem, shared_masses=.false.)
-    call start_neighbour_loads(problem, self%momentum%on, self%relaxation, self%load)
-    call self%matrix%set_share(self%guard%share)
+    call start_neighbour_loads(problem, self%acceleration%on, self%relaxation, self%load)
+    call self%matrix%set_factor(self%guard%factor)
     self%guarded = is_enriched(self)
     self%work%lowered = self%work%lowered + 1
   end subroutine schwarz_ec_iterate
 
   pure logical function is_enriched(self)
     class(schwarz_ec_t), intent(in) :: self
-    is_enriched = self%matrix%direction%value*self%matrix%share > 0.0_dp
+    is_enriched = self%matrix%direction%value*self%matrix%factor > 0.0_dp
   end function is_enriched
 
   !> R~_E = (I + L_E M_E^-1)^-1 ( R_E - L_E M_E^-1 (R_E^d + R_E^ddm) + H_E l_E v_E ) with L_E = H_E l_E H_E^T, on the shared

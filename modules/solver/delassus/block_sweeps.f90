@@ -1,5 +1,5 @@
-!> Nonlinear Gauss-Seidel on a packed contact problem with any blocks: each contact in turn is solved exactly, plain or with
-!> momentum.
+!> Nonlinear Gauss-Seidel on a packed contact problem with any blocks: each contact in turn is solved exactly, by plain or
+!> accelerated sweeps.
 module gravier_block_sweeps
   use gravier_kinds, only: dp
   use gravier_delassus, only: delassus_t
@@ -15,7 +15,7 @@ module gravier_block_sweeps
     real(dp) :: tolerance = 1.0e-8_dp
     integer :: most_sweeps = 100000
     !> extrapolate the impulses between sweeps
-    logical :: momentum = .false.
+    logical :: acceleration = .false.
     !> end when the gain of the last sweeps promises no result within so many more
     integer :: patience = huge(1)
   end type sweep_control_t
@@ -38,12 +38,13 @@ contains
     !> of the result
     real(dp), intent(out) :: figure
     type(growth_t), intent(out) :: growth
-    !> velocities, results of the sweep before with momentum, and of the one that ended the last window (dimension, contacts)
+    !> velocities, results of the sweep before where sweeps are accelerated, and of the one that ended the last window
+    !> (dimension, contacts)
     real(dp), allocatable :: v(:, :), previous(:, :), past(:, :)
     real(dp) :: moved, moved_before, least, least_before, t
 
-    allocate (v(size(r, 1), size(r, 2)), previous(size(r, 1), merge(size(r, 2), 0, control%momentum)))
-    if (control%momentum) previous(:, :) = r
+    allocate (v(size(r, 1), size(r, 2)), previous(size(r, 1), merge(size(r, 2), 0, control%acceleration)))
+    if (control%acceleration) previous(:, :) = r
     allocate (past, source=r)
     t = 1.0_dp
     moved_before = huge(moved)
@@ -57,7 +58,7 @@ contains
       if (moved <= near_tolerance*control%tolerance .or. sweeps == 1) then
         if (reached()) return
       end if
-      if (control%momentum) call extrapolate(problem, moved > moved_before, t, previous, r)
+      if (control%acceleration) call extrapolate(problem, moved > moved_before, t, previous, r)
       moved_before = moved
       least = min(least, moved)
       if (mod(sweeps, window) == 0) then
@@ -68,7 +69,7 @@ contains
       end if
     end do
     ! extrapolated impulses are no result
-    if (control%momentum .and. sweeps > 0) r(:, :) = previous
+    if (control%acceleration .and. sweeps > 0) r(:, :) = previous
     if (reached()) return
 
   contains
@@ -81,7 +82,7 @@ contains
 
     !> What the window added to the impulses.
     subroutine look_at_growth()
-      if (control%momentum) then
+      if (control%acceleration) then
         v(:, :) = previous - past
         past(:, :) = previous
       else

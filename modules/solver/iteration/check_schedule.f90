@@ -3,7 +3,7 @@
 !> A residual costs as much as two sweeps, the estimate of the velocity error as much again. What sweeps move impulses by goes with
 !> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from
 !> the
-!> goal; with momentum, whose sums are there after each iteration, it comes as soon as they speak for one.
+!> goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence.
 module gravier_check_schedule
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -19,13 +19,13 @@ module gravier_check_schedule
   !> checks that may be left out one after the other, and times the goal: an expected figure that is worth a check
   integer, parameter :: most_skips = 9
   real(dp), parameter :: worth_a_check = 1.2_dp
-  !> the first iteration that sweeps with momentum may have checked before it is due
+  !> the first iteration that accelerated sweeps may have checked before it is due
   integer, parameter :: early_check = 2
   !> iterations between two checks, over those made: at least where they are not due, and at most
   real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
   !> what is left of the figure since the last check where the next one need not wait twice as long
   real(dp), parameter :: falling = 0.85_dp
-  !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, with momentum
+  !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, for accelerated sweeps
   real(dp), parameter :: first_ratio = 0.5_dp
 
   type :: check_schedule_t
@@ -54,7 +54,7 @@ contains
     class(method_t), intent(in) :: method
 
     first = self%check_every
-    if (self%chooses .and. method%momentum%on) first = min(early_check, self%check_every)
+    if (self%chooses .and. method%acceleration%on) first = min(early_check, self%check_every)
   end function check_schedule_first_check
 
   !> Whether a check comes after an iteration that is about to be made. Collective.
@@ -69,8 +69,8 @@ contains
     type(convergence_history_t), intent(inout) :: history
 
     calls = mod(iteration, self%check_every) == 0
-    ! sums of the iterations before are there with momentum
-    if (self%chooses .and. (calls .or. (method%momentum%on .and. iteration >= early_check))) &
+    ! sums of the iterations before are there where sweeps are accelerated
+    if (self%chooses .and. (calls .or. (method%acceleration%on .and. iteration >= early_check))) &
       & calls = is_worth_a_check(self, problem, method, iteration, goal, reference, history)
   end function check_schedule_calls
 
@@ -97,7 +97,7 @@ contains
       if (sums(2) > 0.0_dp) self%progress = sqrt(sums(1)/sums(2))
       expected = self%ratio*self%progress
       enough = worth_a_check
-      if (method%momentum%on) then
+      if (method%acceleration%on) then
         if (.not. self%ratio > 0.0_dp) expected = first_ratio*self%progress
         enough = 1.0_dp
       end if

@@ -94,7 +94,7 @@ contains
     if (self%unreached(tenfold) == 0) iterations = real(self%reached(tenfold), dp)
   end function effort_looser
 
-  !> Whether the last decade above the tolerance was seen: a fair share of the iterations lies in it.
+  !> Whether the last decade above the tolerance was seen: a fair fraction of the iterations lies in it.
   pure logical function effort_sees_decay(self) result(sees)
     class(effort_t), intent(in) :: self
     real(dp) :: all, decade

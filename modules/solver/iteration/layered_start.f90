@@ -1,9 +1,9 @@
 !> A start that carries loads across: impulses layer by layer from the free surface to the supports.
 !>
-!> Sweeps carry a load one grain further each, momentum 0.35 diameters each. From a cold start a packing of height H therefore takes
-!> a number of iterations in proportion to H. Here the packing is cut into layers by the way to its supports. Each layer in turn is
-!> solved by sweeps with momentum on what lies below, which stands still; what it presses with is then handed to the next. All
-!> layers together take a number of sweeps over the whole packing that does not depend on H.
+!> Plain sweeps carry a load one grain further each, accelerated ones 0.35 diameters each. From a cold start a packing of height H
+!> therefore takes a number of iterations in proportion to H. Here the packing is cut into layers by the way to its supports. Each
+!> layer in turn is solved by accelerated sweeps on what lies below, which stands still; the force that it exerts is then handed
+!> to the next layer. All layers together take a number of sweeps over the whole packing that does not depend on H.
 !>
 !>   way     length of the shortest way from a body to a boundary that supports (gravier_supports) over closed contacts, in mean
 !>           diameters
@@ -18,7 +18,7 @@ module gravier_layered_start
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: add_inverse_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_method, only: momentum_t, work_t
+  use gravier_method, only: acceleration_t, work_t
   use gravier_sweep_order, only: group_contacts
   use gravier_supports, only: supports_t, find_supports
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
@@ -347,7 +347,7 @@ contains
     hot(lane_of(n) + 1:, :, block_of(n)) = 0.0_dp
   end subroutine set_operators
 
-  !> Sweeps with momentum over the contacts taken, and the exchange of NSCDD after each. Collective.
+  !> Accelerated sweeps over the contacts taken, and the exchange of NSCDD after each. Collective.
   subroutine solve_layer(problem, change, layers, inner)
     type(contact_problem_t), intent(inout) :: problem
     !> of the impulses by a sweep, relative, at which the layer is done
@@ -355,7 +355,7 @@ contains
     type(layers_t), intent(inout) :: layers(:)
     !> sweeps made
     integer, intent(out) :: inner
-    type(momentum_t) :: momentum
+    type(acceleration_t) :: acceleration
     real(dp) :: parts(2, size(layers)), sums(2), v
     integer :: s, i, d
 
@@ -366,12 +366,12 @@ contains
           do i = 1, size(this%movable)
             do d = 1, size(this%velocity, 1)
               v = this%velocity(d, this%movable(i))
-              this%velocity(d, this%movable(i)) = v + momentum%beta*(v - this%previous(d, i))
+              this%velocity(d, this%movable(i)) = v + acceleration%beta*(v - this%previous(d, i))
               this%previous(d, i) = v
             end do
           end do
           if (size(this%taken) > 0) call problem%kernels%sweep_momentum(this%n_grouped, this%pair, this%hot, this%weight, &
-            & this%velocity, this%impulse, parts(:, s), momentum%beta, this%last_impulse)
+            & this%velocity, this%impulse, parts(:, s), acceleration%beta, this%last_impulse)
           if (problem%n_subdomains > 1) call problem%shared%load(s, this%velocity)
         end associate
       end do
@@ -383,7 +383,7 @@ contains
       end if
       call problem%comm%sum_parts(parts, sums)
       if (inner >= least_sweeps .and. sums(1) <= change**2*sums(2)) return
-      call momentum%steer(sums(1))
+      call acceleration%steer(sums(1))
     end do
     inner = most_sweeps
   end subroutine solve_layer

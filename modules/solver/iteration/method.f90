@@ -9,7 +9,7 @@ module gravier_method
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   implicit none
   private
-  public :: method_t, take_options, work_t, momentum_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
+  public :: method_t, take_options, work_t, acceleration_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
     & end_sweeps, extrapolate
 
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
@@ -21,9 +21,9 @@ module gravier_method
   !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
   integer, parameter :: window = 10, idle_limit = 20
   real(dp), parameter :: progress_made = 0.8_dp
-  !> share of a local solve's step that sweeps with momentum take after the first window, of its normal, tangential and rolling
+  !> relaxation factors of local solves in accelerated sweeps after the first window, of the normal, tangential and rolling
   !> part, of disks and of spheres
-  real(dp), parameter :: share_2d(3) = [1.0_dp, 0.7_dp, 1.0_dp], share_3d(3) = [1.1_dp, 0.7_dp, 1.0_dp]
+  real(dp), parameter :: relaxation_2d(3) = [1.0_dp, 0.7_dp, 1.0_dp], relaxation_3d(3) = [1.1_dp, 0.7_dp, 1.0_dp]
 
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
@@ -34,7 +34,7 @@ module gravier_method
     integer(i8) :: analyses = 0, factorisations = 0
     !> times that the safeguard of an enriched method has lowered its search direction
     integer(i8) :: lowered = 0
-    !> times that the memory of momentum was restarted, and that momentum gave way to plain iterations
+    !> times that the Nesterov momentum was restarted, and that acceleration gave way to plain iterations
     integer(i8) :: restarted = 0, suspended = 0
     !> times that the automatic relaxation factor of a Schwarz method was lowered, and how far at most
     integer(i8) :: relaxed = 0
@@ -42,19 +42,19 @@ module gravier_method
   end type work_t
 
   !> What extrapolation keeps of the last iteration, for one subdomain.
-  type :: momentum_part_t
+  type :: acceleration_part_t
     !> impulses (lanes, nc, blocks) [N s]
     real(dp), allocatable :: impulse(:, :, :)
     !> velocities under them (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: velocity(:, :)
-  end type momentum_part_t
+  end type acceleration_part_t
 
   !> Nesterov's extrapolation between iterations: iteration k starts from y = r_k + beta (r_k - r_k-1) with
   !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
   !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 22: growth from one iteration to the next shortens the
   !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
   !> without progress come as many plain iterations as the solve has had.
-  type :: momentum_t
+  type :: acceleration_t
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
     logical :: resting = .false.
@@ -69,11 +69,11 @@ module gravier_method
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
     !> iterations of this solve, windows since `lowest`, plain iterations to come
     integer :: iterations = 0, idle_windows = 0, plain = 0
-    type(momentum_part_t), allocatable :: part(:)
+    type(acceleration_part_t), allocatable :: part(:)
   contains
-    procedure :: steer => momentum_steer
-    procedure :: whole => momentum_whole
-  end type momentum_t
+    procedure :: steer => acceleration_steer
+    procedure :: whole => acceleration_whole
+  end type acceleration_t
 
   type, abstract :: method_t
     !> whether growth is left to a safeguard of the method, which mends it
@@ -84,7 +84,7 @@ module gravier_method
     logical :: adapts = .false.
     !> n_GS: sweeps of one iteration
     integer :: sweeps = 1
-    type(momentum_t) :: momentum
+    type(acceleration_t) :: acceleration
     !> the next iteration costs much more than a check: check after it
     logical :: check_next = .false.
     !> the method keeps the best impulses of a solve: `conclude` takes them
@@ -146,7 +146,7 @@ contains
     type(method_options_t), intent(in) :: options
 
     self%sweeps = options%sweeps
-    self%momentum%on = options%momentum
+    self%acceleration%on = options%acceleration
     self%direction_text = ""
   end subroutine take_options
 
@@ -157,9 +157,9 @@ contains
     integer, intent(in) :: nc, nv
     type(held_list_t), intent(inout) :: held
 
-    if (.not. self%momentum%on) return
-    call held%add("impulse of momentum", .true., 8, nc)
-    call held%add("velocity of momentum", .false., 8, nv)
+    if (.not. self%acceleration%on) return
+    call held%add("impulse before (acceleration)", .true., 8, nc)
+    call held%add("velocity before (acceleration)", .false., 8, nv)
   end subroutine method_held
 
   !> The end of a solve without success, with v_global evaluated: what is left are the impulses of the last iteration; methods
@@ -172,11 +172,11 @@ contains
     call problem%evaluate()
   end subroutine method_conclude
 
-  !> Whether something in the method works against growth: a safeguard, momentum that gives way, a factor that is lowered, or
+  !> Whether something in the method works against growth: a safeguard, acceleration that gives way, a factor that is lowered, or
   !> impulses kept from before.
   pure logical function method_mends_growth(self) result(mends)
     class(method_t), intent(in) :: self
-    mends = self%guarded .or. self%adapts .or. self%keeps_best .or. self%momentum%on
+    mends = self%guarded .or. self%adapts .or. self%keeps_best .or. self%acceleration%on
   end function method_mends_growth
 
   !> Give back what the method holds; methods that hold something override it.
@@ -250,22 +250,22 @@ contains
     allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)
     problem%progress_is_summed = .false.
     if (.not. allocated(method%seconds)) allocate (method%seconds(size(problem%sub)), source=0.0_dp)
-    if (method%momentum%on) call start_momentum(method%momentum, problem)
+    if (method%acceleration%on) call start_acceleration(method%acceleration, problem)
   end subroutine start_sweeps
 
-  subroutine start_momentum(momentum, problem)
-    type(momentum_t), intent(inout) :: momentum
+  subroutine start_acceleration(acceleration, problem)
+    type(acceleration_t), intent(inout) :: acceleration
     type(contact_problem_t), intent(in) :: problem
     integer :: s
 
-    momentum = momentum_t(on=.true.)
-    if (problem%kernels%row%compliance_n > 0) momentum%most = most_extrapolation(problem)
-    allocate (momentum%part(size(problem%sub)))
+    acceleration = acceleration_t(on=.true.)
+    if (problem%kernels%row%compliance_n > 0) acceleration%most = most_extrapolation(problem)
+    allocate (acceleration%part(size(problem%sub)))
     do s = 1, size(problem%sub)
-      momentum%part(s)%impulse = problem%sub(s)%impulse
-      momentum%part(s)%velocity = problem%sub(s)%velocity
+      acceleration%part(s)%impulse = problem%sub(s)%impulse
+      acceleration%part(s)%velocity = problem%sub(s)%velocity
     end do
-  end subroutine start_momentum
+  end subroutine start_acceleration
 
   !> The largest beta that pays where all contacts are compliant, (1 - sqrt(q))/(1 + sqrt(q)) with the least part q that the
   !> compliance has of a local operator (Nesterov 2004, section 2.2.1, for a problem with curvatures between q and 1): more would
@@ -289,7 +289,7 @@ contains
     most = (1.0_dp - root)/(1.0_dp + root)
   end function most_extrapolation
 
-  !> The sweeps of one iteration in every subdomain of this rank. Collective with momentum.
+  !> The sweeps of one iteration in every subdomain of this rank. Collective where they are accelerated.
   subroutine sweep_all(method, problem)
     class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
@@ -334,7 +334,7 @@ contains
     call stop_timer(phase_exchange)
   end subroutine sweep_and_pass
 
-  !> With momentum, bring the velocities to those under the extrapolated impulses, from which the first sweep starts:
+  !> Where sweeps are accelerated, bring the velocities to those under the extrapolated impulses, from which the first sweep starts:
   !> V depends on r linearly.
   subroutine begin_sweeps(method, problem)
     class(method_t), intent(inout) :: method
@@ -343,36 +343,36 @@ contains
 
     call start_timer(phase_sweep)
     problem%progress_is_summed = .false.
-    if (.not. method%momentum%on) return
+    if (.not. method%acceleration%on) return
     ! what alternates between subdomains, which a Schwarz method adapts a factor to, bears no longer steps
-    if (.not. method%adapts .and. (method%momentum%whole() .neqv. method%momentum%whole_in_place)) then
-      call change_shares(method%momentum, problem)
+    if (.not. method%adapts .and. (method%acceleration%whole() .neqv. method%acceleration%whole_in_place)) then
+      call change_relaxation_factors(method%acceleration, problem)
     end if
-    if (method%momentum%resting) return
+    if (method%acceleration%resting) return
     do s = 1, size(problem%sub)
-      call extrapolate(method%momentum%beta, problem%sub(s)%velocity, method%momentum%part(s)%velocity)
+      call extrapolate(method%acceleration%beta, problem%sub(s)%velocity, method%acceleration%part(s)%velocity)
     end do
   end subroutine begin_sweeps
 
-  !> Put local operators in place that take the whole of a local solve, or the shares with which momentum gains most.
-  subroutine change_shares(momentum, problem)
-    type(momentum_t), intent(inout) :: momentum
+  !> Set the local operators to the full step of a local solve, or to the relaxation factors with which acceleration gains most.
+  subroutine change_relaxation_factors(acceleration, problem)
+    type(acceleration_t), intent(inout) :: acceleration
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: share(3)
+    real(dp) :: factors(3)
     integer :: s
 
-    if (momentum%whole()) then
-      share(:) = 1.0_dp
+    if (acceleration%whole()) then
+      factors(:) = 1.0_dp
     else if (problem%kernels%nd == 2) then
-      share(:) = share_2d
+      factors(:) = relaxation_2d
     else
-      share(:) = share_3d
+      factors(:) = relaxation_3d
     end if
     do s = 1, size(problem%sub)
-      call problem%sub(s)%update_local_operator(problem%kernels, share)
+      call problem%sub(s)%update_local_operator(problem%kernels, factors)
     end do
-    momentum%whole_in_place = momentum%whole()
-  end subroutine change_shares
+    acceleration%whole_in_place = acceleration%whole()
+  end subroutine change_relaxation_factors
 
   !> v := v + beta (v - previous), previous := v.
   pure subroutine extrapolate(beta, velocity, previous)
@@ -427,8 +427,8 @@ contains
       real(dp), intent(out) :: sums(2)
 
       associate (sub => problem%sub(s), kernels => problem%kernels, first => (a - 1)*lanes + 1, last => z*lanes)
-        if (method%momentum%on .and. k == 1 .and. .not. method%momentum%resting) then
-          associate (previous => method%momentum%part(s)%impulse, beta => method%momentum%beta)
+        if (method%acceleration%on .and. k == 1 .and. .not. method%acceleration%resting) then
+          associate (previous => method%acceleration%part(s)%impulse, beta => method%acceleration%beta)
             if (present(law_velocity)) then
               call kernels%sweep_momentum_recording(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, &
                 & sub%velocity, sub%impulse(:, :, a:z), sums, beta, previous(:, :, a:z), law_velocity(:, :, a:z))
@@ -449,7 +449,7 @@ contains
 
   end subroutine sweep_once
 
-  !> Count the sweeps, and choose the extrapolation of the next iteration. Collective with momentum.
+  !> Count the sweeps, and choose the extrapolation of the next iteration. Collective where they are accelerated.
   subroutine end_sweeps(method, problem)
     class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
@@ -459,18 +459,18 @@ contains
     method%work%sweeps = method%work%sweeps + method%sweeps
     method%work%iterations = method%work%iterations + 1
     call stop_timer(phase_sweep)
-    if (.not. method%momentum%on) return
+    if (.not. method%acceleration%on) return
     call problem%sum_progress(sums)
-    restarted = method%momentum%restarted
-    plain = method%momentum%plain
-    call method%momentum%steer(sums(1))
-    method%work%restarted = method%work%restarted + method%momentum%restarted - restarted
-    if (method%momentum%plain > plain) method%work%suspended = method%work%suspended + 1
+    restarted = method%acceleration%restarted
+    plain = method%acceleration%plain
+    call method%acceleration%steer(sums(1))
+    method%work%restarted = method%work%restarted + method%acceleration%restarted - restarted
+    if (method%acceleration%plain > plain) method%work%suspended = method%work%suspended + 1
   end subroutine end_sweeps
 
   !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
-  pure subroutine momentum_steer(self, change)
-    class(momentum_t), intent(inout) :: self
+  pure subroutine acceleration_steer(self, change)
+    class(acceleration_t), intent(inout) :: self
     !> |r - y|^2 of the first sweep, over all subdomains [N^2 s^2]
     real(dp), intent(in) :: change
     real(dp) :: t
@@ -489,41 +489,41 @@ contains
     t = self%t
     self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
     self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin, self%most)
-  end subroutine momentum_steer
+  end subroutine acceleration_steer
 
   !> Whether the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly,
   !> and plain ones do.
-  pure logical function momentum_whole(self) result(whole)
-    class(momentum_t), intent(in) :: self
+  pure logical function acceleration_whole(self) result(whole)
+    class(acceleration_t), intent(in) :: self
     whole = self%resting .or. self%iterations < window
-  end function momentum_whole
+  end function acceleration_whole
 
-  !> The end of a window of iterations: the margin, and whether momentum still pays.
-  pure subroutine close_window(momentum)
-    type(momentum_t), intent(inout) :: momentum
+  !> The end of a window of iterations: the margin, and whether acceleration still pays.
+  pure subroutine close_window(acceleration)
+    type(acceleration_t), intent(inout) :: acceleration
 
-    if (momentum%window_change > momentum%last_window_change) then
-      momentum%margin = min(1.0_dp, widen*momentum%margin)
+    if (acceleration%window_change > acceleration%last_window_change) then
+      acceleration%margin = min(1.0_dp, widen*acceleration%margin)
     else
-      momentum%margin = max(least_margin, narrow*momentum%margin)
+      acceleration%margin = max(least_margin, narrow*acceleration%margin)
     end if
-    if (momentum%plain > 0) then
-      momentum%plain = momentum%plain - window
-      if (momentum%plain <= 0) then
-        momentum%t = 1.0_dp
-        momentum%margin = wary_margin
-        momentum%idle_windows = 0
-        momentum%lowest = momentum%window_change
+    if (acceleration%plain > 0) then
+      acceleration%plain = acceleration%plain - window
+      if (acceleration%plain <= 0) then
+        acceleration%t = 1.0_dp
+        acceleration%margin = wary_margin
+        acceleration%idle_windows = 0
+        acceleration%lowest = acceleration%window_change
       end if
-    else if (momentum%window_change < progress_made*momentum%lowest) then
-      momentum%lowest = momentum%window_change
-      momentum%idle_windows = 0
+    else if (acceleration%window_change < progress_made*acceleration%lowest) then
+      acceleration%lowest = acceleration%window_change
+      acceleration%idle_windows = 0
     else
-      momentum%idle_windows = momentum%idle_windows + 1
-      if (momentum%idle_windows >= idle_limit) momentum%plain = momentum%iterations
+      acceleration%idle_windows = acceleration%idle_windows + 1
+      if (acceleration%idle_windows >= idle_limit) acceleration%plain = acceleration%iterations
     end if
-    momentum%last_window_change = momentum%window_change
-    momentum%window_change = 0.0_dp
+    acceleration%last_window_change = acceleration%window_change
+    acceleration%window_change = 0.0_dp
   end subroutine close_window
 
 end module gravier_method

@@ -7,7 +7,7 @@ module gravier_method_options
 
   integer, parameter :: name_length = 16, meaning_length = 120
 
-  !> where momentum is the default: never, on all problems, on those of active contacts (`contacts` of &enriched) only
+  !> where acceleration is the default: never, on all problems, on those of active contacts (`contacts` of &enriched) only
   integer, parameter :: default_never = 0, default_always = 1, default_on_active = 2
 
   !> What a method is called, and what it serves. The input, its checks and its reference are made from this.
@@ -20,8 +20,8 @@ module gravier_method_options
     !> contacts may have moments of rolling and pivoting friction; contacts may sleep
     logical :: moments = .false., sleeping = .false.
     !> one of the constants above
-    integer :: momentum_by_default = default_never
-    !> it takes a `relaxation` factor, which it adapts itself where none is given; momentum needs that
+    integer :: accelerated_by_default = default_never
+    !> it takes a `relaxation` factor, which it adapts itself where none is given; acceleration needs that
     logical :: relaxes = .false.
     !> its search direction is for active contacts unless `contacts` of &enriched says otherwise
     logical :: active_by_default = .false.
@@ -32,7 +32,7 @@ module gravier_method_options
   !> What &solver and &enriched say to a method.
   type :: method_options_t
     integer :: sweeps = 1
-    logical :: momentum = .false.
+    logical :: acceleration = .false.
     !> a given relaxation factor, in (0, 1]
     logical :: relaxation_given = .false.
     real(dp) :: relaxation = 1.0_dp

@@ -38,8 +38,8 @@ module gravier_solve
     !> velocity error over the velocity scale of the problem
     real(dp) :: accuracy = 0.1_dp
     integer :: max_iterations = 10000
-    !> iterations between two checks; of these, some that would tell nothing new are left out; with momentum, whose sums are
-    !> there after each iteration, a check comes as soon as they speak for one
+    !> iterations between two checks; of these, some that would tell nothing new are left out. Accelerated sweeps have their sums
+    !> after each iteration, and are checked as soon as these indicate convergence
     integer :: check_every = 10
     !> keep the figures of every check, and leave none out
     logical :: trace = .false.
@@ -422,7 +422,7 @@ contains
     has_stagnated = .false.
     ! the residual of no impulses is relative to something else
     if (report%iterations == 0) return
-    call state%stagnation%note(problem, report%iterations, report%figure, method%momentum%on, &
+    call state%stagnation%note(problem, report%iterations, report%figure, method%acceleration%on, &
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
     if (.not. due) return
     if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)

@@ -1,7 +1,7 @@
 !> Whether a solve gains anything yet.
 !>
-!> A solve has stagnated where its figure has not fallen by a tenth for so many iterations, with momentum or without, and for as many
-!> as it has had until then, and where it has had enough iterations for a wave to run from end to end and back. Either its method finds
+!> A solve has stagnated if its figure has not fallen by a tenth for so many iterations, accelerated or plain, and for as many as
+!> it has had until then, and if it has had enough iterations for a wave to run from end to end and back. Either its method finds
 !> no solution, or there is none: then the impulses grow in vain (gravier_vain_impulses).
 module gravier_stagnation
   use gravier_kinds, only: dp
@@ -13,9 +13,9 @@ module gravier_stagnation
 
   !> what is left of the figure where a solve has gained something
   real(dp), parameter :: gained = 0.9_dp
-  !> iterations without gain, with momentum and without; before the end of which impulses are kept, to see whether they grow in vain
+  !> iterations without gain, accelerated and plain; before the end of which impulses are kept, to see whether they grow in vain
   integer, parameter :: patience = 1000, plain_patience = 2000, watch = 500
-  !> times the plain patience where a residual that is small already is what is missing: it falls in phases with and without momentum,
+  !> times the plain patience where a residual that is small already is what is missing: it falls in accelerated and plain phases,
   !> which grow
   integer, parameter :: residual_patience = 4
   real(dp), parameter :: small_residual = 1.0e-3_dp
@@ -37,12 +37,12 @@ module gravier_stagnation
 contains
 
   !> A check after an iteration found this figure: whether nothing was gained for too long.
-  subroutine stagnation_note(self, problem, iteration, figure, with_momentum, missing_residual, due)
+  subroutine stagnation_note(self, problem, iteration, figure, accelerated, missing_residual, due)
     class(stagnation_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: iteration
     real(dp), intent(in) :: figure
-    logical, intent(in) :: with_momentum
+    logical, intent(in) :: accelerated
     !> the residual where it is above its tolerance, else 0
     real(dp), intent(in) :: missing_residual
     logical, intent(out) :: due
@@ -51,7 +51,7 @@ contains
     if (figure < gained*self%best) then
       self%best = figure
       self%best_at = iteration
-      self%next_look = 2*iteration + merge(patience, plain_patience, with_momentum)
+      self%next_look = 2*iteration + merge(patience, plain_patience, accelerated)
       if (missing_residual > 0.0_dp .and. missing_residual < small_residual) &
         & self%next_look = iteration + residual_patience*(plain_patience + iteration)
       self%kept_at = 0

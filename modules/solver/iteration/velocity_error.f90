@@ -6,7 +6,7 @@
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
 !>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those
 !> one
-!>      iteration before with momentum, which keeps them; else those of some iterations before.
+!>      iteration before where sweeps are accelerated, which keep them; else those of some iterations before.
 !>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
 !>      (gravier_layered_start) long waves are gone, and a = 1.7.
@@ -30,19 +30,19 @@ module gravier_velocity_error
 
   !> weight of Y in the estimate
   real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp
-  !> share of the error allowed that bodies may move with where all could rest; weight of L in what is allowed
+  !> fraction of the error allowed that bodies may move with where all could rest; factor of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
   real(dp), parameter :: violations_allowed = 5.0_dp
   !> times the error allowed by which a body may sink, and by which bodies may on average, each counting the same
   real(dp), parameter :: body_allowed = 5.0_dp, bodies_allowed = 1.0_dp
-  !> share of the bodies that have as much mass as all, were they as heavy as the mean of the mass, below which masses are uneven
+  !> fraction of the bodies that have as much mass as all, were they as heavy as the mean of the mass, below which masses are uneven
   real(dp), parameter :: even_share = 0.25_dp
   !> times the error allowed by which what lies above a level may sink where what moves is at most so many times the error allowed
   real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
-  !> share of the square of a test's velocity below which what the others have left of it counts as 0
+  !> fraction of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
-  !> without momentum, ratio between the iterations at which impulses are copied, and the first of them
+  !> plain sweeps: ratio between the iterations at which impulses are copied, and the first of them
   real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
   integer, parameter :: first_copy = 2
   !> test impulses; places of the sums of an assessment, the first of which make the residual: the powers y . w, the products of the
@@ -149,7 +149,7 @@ contains
     integer, intent(in) :: iteration
     integer :: s
 
-    if (method%momentum%on .or. iteration < self%next_copy) return
+    if (method%acceleration%on .or. iteration < self%next_copy) return
     self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
     self%taken_at = iteration
     do s = 1, size(self%part)
@@ -194,7 +194,7 @@ contains
     are_slow = 2.0_dp*problem%comm%highest(fastest) <= limit
   end function velocity_error_all_are_slow
 
-  !> What is compared with the error that is allowed [m/s]: E with more weight on L, or C over a share of the error allowed. What
+  !> What is compared with the error that is allowed [m/s]: E with a larger factor of L, or C over a fraction of that error. What
   !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much,
   !> and no body sink by much.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
@@ -251,8 +251,8 @@ contains
         if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
         if (sub%n_contacts == 0) cycle
         ! without earlier impulses the third test impulse is 0, which tells nothing
-        if (method%momentum%on .and. iteration > 0) then
-          call test(sub, part, method%momentum%part(s)%impulse)
+        if (method%acceleration%on .and. iteration > 0) then
+          call test(sub, part, method%acceleration%part(s)%impulse)
         else if (self%taken_at > 0 .and. self%taken_at < iteration) then
           call test(sub, part, part%previous)
         else

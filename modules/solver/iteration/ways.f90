@@ -13,7 +13,7 @@ module gravier_ways
 
   !> length of the way of what none leads to
   real(dp), parameter :: unreached = huge(1.0_dp)
-  !> share of the largest free speed below which the shift of a closed contact is rounding of places
+  !> fraction of the largest free speed below which the shift of a closed contact is rounding of places
   real(dp), parameter :: rounded = 1.0e-3_dp
 
   !> Of one subdomain.
@@ -51,7 +51,7 @@ contains
 
   subroutine take_closed(sub, at, closed, ways, unit)
     type(subproblem_t), intent(in) :: sub
-    !> row of `hot` that holds the shift
+    !> row of the contact data that holds the shift
     integer, intent(in) :: at
     !> shift below which a contact counts as closed [m/s]
     real(dp), intent(in) :: closed

@@ -62,7 +62,7 @@ module gravier_contact_problem
     !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (gravier_body_mass)
     !> (nw, n_columns)
     real(dp), allocatable :: inverse_mass(:, :)
-    !> the same as the method shares masses out (nw, n_columns)
+    !> the same as the method divides masses among copies (nw, n_columns)
     real(dp), allocatable :: weight(:, :)
     !> (2, lanes*blocks), (lanes, nh, blocks), (lanes, nc, blocks): see gravier_contact_kernels
     integer, allocatable :: pair(:, :)
@@ -111,7 +111,7 @@ module gravier_contact_problem
     integer(i8) :: n_contacts = 0, n_asleep = 0
     !> root mean square of the impulses, by the last `residual` [N s]
     real(dp) :: impulse_scale = 0.0_dp
-    !> share of the squared defect that lies in contacts that sleep, by the last `residual`
+    !> fraction of the squared defect that lies in contacts that sleep, by the last `residual`
     real(dp) :: asleep_share = 0.0_dp
     !> whether everything prescribed is at rest and no contact sends velocities back, so that rest obeys all laws; set by
     !> gravier_velocity_error
@@ -160,17 +160,17 @@ contains
     call self%update_local_operator(kernels)
   end subroutine subproblem_share_masses
 
-  !> Inverse diagonal of the local operators from `weight`, into `hot`.
-  pure subroutine subproblem_update_local_operator(self, kernels, share)
+  !> Inverse diagonal of the local operators from `weight`, into the contact data.
+  pure subroutine subproblem_update_local_operator(self, kernels, factors)
     class(subproblem_t), intent(inout) :: self
     type(kernels_t), intent(in) :: kernels
-    !> share of a local solve's step that sweeps take, of its normal, tangential and rolling part; 1 if absent
-    real(dp), intent(in), optional :: share(3)
+    !> relaxation factors of local solves in sweeps, of the normal, tangential and rolling part; 1 if absent
+    real(dp), intent(in), optional :: factors(3)
     real(dp) :: taken(3)
 
     if (self%n_contacts == 0) return
     taken(:) = 1.0_dp
-    if (present(share)) taken(:) = share
+    if (present(factors)) taken(:) = factors
     call kernels%set_operators(self%pair, self%hot, self%weight, taken)
     ! contacts of no effect are all zero
     self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
@@ -418,7 +418,7 @@ contains
     self%asleep_share = 0.0_dp
   end subroutine contact_problem_wake
 
-  !> Sums of `progress` over all subdomains of the scene, for momentum, checks and safeguards: one reduction an iteration at
+  !> Sums of `progress` over all subdomains of the scene, for acceleration, checks and safeguards: one reduction an iteration at
   !> most. Collective.
   subroutine contact_problem_sum_progress(self, sums)
     class(contact_problem_t), intent(inout) :: self

@@ -9,7 +9,7 @@ module gravier_impulse_memory
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_list, only: pair_memory_t
-  use gravier_neighbour_search, only: owner_point
+  use gravier_neighbour_rule, only: owner_point
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
   implicit none

@@ -348,11 +348,11 @@ contains
     call check(all(abs(bodies%period - [0.0_dp, 2.0_dp, 0.0_dp]) <= 0), "its period in 2D")
 
     call check_write_box([0.0_dp, 0.0_dp], [1.0_dp, -2.0_dp], error)
-    call expect(error, status_failure, "/box/period: -2.00000000E+000, but a number >= 0 was expected", "writing a negative period")
+    call expect(error, status_failure, "/box/period: -2.00000000E+00, but a number >= 0 was expected", "writing a negative period")
     call refuse_layout("+/box/period", "/box/origin: missing")
     call refuse_layout("+/box/size", "/box/size: unknown; known are origin, period")
     call refuse_box(1, 1.0_dp, "/box/origin: 1 numbers, but 2 were expected")
-    call refuse_box(2, -1.0_dp, "/box/period: -1.00000000E+000, but a number >= 0 was expected")
+    call refuse_box(2, -1.0_dp, "/box/period: -1.00000000E+00, but a number >= 0 was expected")
     call refuse_box(2, ieee_value(1.0_dp, ieee_quiet_nan), "/box/period: NaN or infinity")
   end subroutine test_box
 
@@ -638,8 +638,8 @@ contains
     call refuse_hdf5(0_i8, 0.0_dp, 1.0_dp, "/bodies/id: row 3 (counted from 0): 0, but an id >= 1 was expected")
     call refuse_hdf5(4_i8, ieee_value(1.0_dp, ieee_quiet_nan), 1.0_dp, "/bodies/position: id 4: NaN or infinity")
     call refuse_hdf5(4_i8, 0.0_dp, ieee_value(1.0_dp, ieee_positive_inf), "/bodies/radius: id 4: NaN or infinity")
-    call refuse_hdf5(4_i8, 0.0_dp, 0.0_dp, "/bodies/radius: id 4: 0.00000000E+000, but a number > 0 was expected")
-    call refuse_hdf5(4_i8, 0.0_dp, -2.0_dp, "/bodies/radius: id 4: -2.00000000E+000, but a number > 0 was expected")
+    call refuse_hdf5(4_i8, 0.0_dp, 0.0_dp, "/bodies/radius: id 4: 0.00000000E+00, but a number > 0 was expected")
+    call refuse_hdf5(4_i8, 0.0_dp, -2.0_dp, "/bodies/radius: id 4: -2.00000000E+00, but a number > 0 was expected")
 
     call make_bodies(2, 8, bodies)
     call write_few(base//".h5", bodies, error)

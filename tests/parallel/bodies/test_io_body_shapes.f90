@@ -198,7 +198,7 @@ contains
       & 'line 2: column shape: "brick", but a scale that makes a radius that is a number', 2)
     call refuse_csv(header, "1,0,0,brick,2,,9", &
       & 'line 2: column radius: "9", but an empty cell, or the radius of the shape, which '// &
-      & "is 1.00000000E+001 at this scale, was expected", 2)
+      & "is 1.00000000E+01 at this scale, was expected", 2)
     call refuse_csv(header, "1,0,0,,2,,1", &
       & 'line 2: column scale: "2", but an empty cell for a body without a shape was expected', 2)
     call refuse_csv(header, "1,0,0,disk,,,", "line 2: column radius: empty, but a finite number was expected", 2)
@@ -364,15 +364,15 @@ contains
     call refuse_hdf5(2_i8, 1.0_dp, 0.0_dp, "brick", &
       & "/bodies/shape: id 2: 2, but a number from 0 to 1, that of the last of its names")
     call refuse_hdf5(-1_i8, 1.0_dp, 0.0_dp, "brick", "/bodies/shape: id 2: -1, but a number from 0 to 1")
-    call refuse_hdf5(1_i8, 0.0_dp, 0.0_dp, "brick", "/bodies/scale: id 2: 0.00000000E+000, but a number > 0 was expected")
-    call refuse_hdf5(1_i8, 1.0_dp, 1.0e31_dp, "brick", "/bodies/orientation: id 2: 1.00000000E+031, but a number of at most 1e30")
-    call refuse_hdf5(0_i8, 1.0_dp, 0.0_dp, "brick", "/bodies/radius: id 2: 0.00000000E+000, but a number > 0 was expected")
+    call refuse_hdf5(1_i8, 0.0_dp, 0.0_dp, "brick", "/bodies/scale: id 2: 0.00000000E+00, but a number > 0 was expected")
+    call refuse_hdf5(1_i8, 1.0_dp, 1.0e31_dp, "brick", "/bodies/orientation: id 2: 1.00000000E+31, but a number of at most 1e30")
+    call refuse_hdf5(0_i8, 1.0_dp, 0.0_dp, "brick", "/bodies/radius: id 2: 0.00000000E+00, but a number > 0 was expected")
 
     call make_bodies(2, 8, bodies)
     call write_bodies(comm, base//".h5", bodies, error, shapes)
     shapes%shape(1)%size = 6.0_dp
     call read_bodies(comm, base//".h5", 2, bodies, error, shapes)
-    call expect(error, "/bodies/radius: id 1: 1.66666667E+000, but 0, or the radius of the shape at this scale, 2.00000000E+000")
+    call expect(error, "/bodies/radius: id 1: 1.66666667E+00, but 0, or the radius of the shape at this scale, 2.00000000E+00")
     call make_bodies(3, 8, bodies)
     do i = 1, bodies%n
       if (bodies%id(i) == 4) bodies%orientation(:, i) = 0.0_dp

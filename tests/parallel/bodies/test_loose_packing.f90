@@ -236,7 +236,7 @@ contains
     allocate (radius(size(id)), position(2, size(id)))
     radius(:) = sqrt(0.7_dp/(n*acos(-1.0_dp)))
     call place_loosely(comm, make_box(2, all_periodic, 1.0_dp, 1.0_dp, 1.0_dp), 1, id, radius, position, error)
-    call expect(error, "solid fraction 7.00E-001 is too high: of 600 grains, ")
+    call expect(error, "solid fraction 7.00E-01 is too high: of 600 grains, ")
     where (id == n) radius(:) = 0.5001_dp
     call place_loosely(comm, make_box(2, all_periodic, 2.0_dp, 1.0_dp, 1.0_dp), 1, id, radius, position, error)
     call expect(error, "m wide along axis 2")

@@ -5,7 +5,7 @@ program test_neighbourhood
   use gravier_periodic, only: no_shift, shift_code, shift_of_code
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_boundary, only: boundary_t
-  use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_neighbour_rule, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape, make_decomposition
@@ -28,6 +28,10 @@ program test_neighbourhood
       call test_views(nd, axes, 7, .true., rule_dual)
       call test_views(nd, axes, 7, .false., rule_primal)
     end do
+  end do
+  do axes = 0, 3
+    call test_fast_grains(2, axes, 7, rule_dual)
+    call test_fast_grains(3, axes, 5, rule_primal)
   end do
   call test_due_grains()
   call test_due_boundaries()
@@ -71,6 +75,63 @@ contains
       call move(decomposition, cloud, 10 + t, skin)
     end do
   end subroutine test_views
+
+  !> Grains of all speeds: each may go as far as lists leave it, in any direction, and none farther.
+  subroutine test_fast_grains(nd, axes, n_subdomains, kind)
+    integer, intent(in) :: nd, axes, n_subdomains, kind
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(halo_t) :: seen
+    real(dp), parameter :: duration = 0.1_dp, most = 3.0_dp*skin
+    real(dp) :: direction(nd), way(n_grains)
+    integer :: g, d, s, k, fast
+
+    call cloud%init(nd, n_grains, 0.03_dp, 0.1_dp, 90 + nd)
+    call cloud%make_periodic(axes)
+    call wrap(cloud)
+    decomposition%rule = cloud%rule(alert, skin, kind)
+    decomposition%rule%duration = duration
+    decomposition%rule%most_travel = most
+    call make_decomposition(comm, cloud, n_subdomains, nd, .true., decomposition)
+    fast = 0
+    do g = 1, n_grains
+      way(g) = max(0.5_dp*skin, min(most, duration*2.0_dp*draw(91, g, 1)))
+      if (way(g) > 0.5_dp*skin) fast = fast + 1
+    end do
+    call check(fast > n_grains/2 .and. fast < n_grains .and. any(way >= most), "grains of all speeds")
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        owned%velocity(:, :) = 0.0_dp
+        do k = 1, owned%n
+          owned%velocity(mod(k, nd) + 1, k) = -2.0_dp*draw(91, int(owned%id(k)), 1)
+        end do
+      end associate
+    end do
+    call decomposition%migrate()
+    seen%memory%n_impulse = 2
+    call seen%build(decomposition)
+    do g = 1, n_grains
+      do d = 1, nd
+        direction(d) = draw(92, g, d) - 0.5_dp
+      end do
+      cloud%place(:, g) = cloud%place(:, g) + 0.999_dp*way(g)*direction/norm2(direction)
+    end do
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          owned%position(:, k) = cloud%place(:, owned%id(k))
+        end do
+      end associate
+    end do
+    call check(.not. seen%are_due(decomposition), "grains within the way that they are left")
+    call seen%refresh(decomposition)
+    call check_pairs(decomposition, seen, cloud, alert, .false.)
+    do g = 1, n_grains, 37
+      call shift_grain(decomposition, g, 2.01_dp*way(g))
+      call check(seen%are_due(decomposition), "a grain that went farther than it was left")
+      call shift_grain(decomposition, g, -2.01_dp*way(g))
+    end do
+  end subroutine test_fast_grains
 
   subroutine wrap(cloud)
     type(cloud_t), intent(inout) :: cloud

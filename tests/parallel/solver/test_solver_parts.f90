@@ -285,7 +285,7 @@ contains
     call make_column(3, 2, "&solver method = 'nscdd' /", sim)
     schedule%check_every = 10
     schedule%chooses = chooses
-    method%momentum%on = .false.
+    method%acceleration%on = .false.
     call check_equal(schedule%first_check(method), 10, "the first check of plain sweeps")
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(.not. calls(schedule, sim%problem, method, 9), "no check before it is due")
@@ -304,7 +304,7 @@ contains
     call check_equal(iteration, merge(120, 170, chooses), "nine checks in a row are left out, and no tenth")
     call schedule%forget_ratio()
     call check(calls(schedule, sim%problem, method, 200), "without a ratio a check is made")
-    method%momentum%on = .true.
+    method%acceleration%on = .true.
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(calls(schedule, sim%problem, method, 210), "and so with momentum")
     ! the figure has fallen, the ratio is 4, and no pause is longer than 0.06 of the iterations made
@@ -542,7 +542,7 @@ contains
     call make_column(3, 2, "&solver method = 'nscdd' /", sim)
     call put_impulse(sim%problem, 1.0_dp)
     call guard%start(sim%problem)
-    call check_close(guard%share, 1.0_dp, 0.0_dp, "the whole direction at the start")
+    call check_close(guard%factor, 1.0_dp, 0.0_dp, "the whole direction at the start")
     change = 1.0e-3_dp
     do window = 1, 4
       do i = 1, 5
@@ -554,7 +554,7 @@ contains
       end do
       change = 1.2_dp*change
     end do
-    call check_close(guard%share, 0.5_dp, 0.0_dp, "half of the direction")
+    call check_close(guard%factor, 0.5_dp, 0.0_dp, "half of the direction")
     call check_equal(guard%lowered, 1, "lowered once")
     do s = 1, size(sim%problem%sub)
       call check_close(sim%problem%sub(s)%impulse(1, 1, 1), 15.0_dp, 0.0_dp, "impulses from before the growth")
@@ -562,9 +562,9 @@ contains
     call set_progress(sim%problem, 1.0e6_dp)
     call guard%watch(sim%problem, lowered)
     call check(lowered, "an explosion lowers it at once")
-    call check_close(guard%share, 0.5_dp/16.0_dp, 0.0_dp, "to a sixteenth")
+    call check_close(guard%factor, 0.5_dp/16.0_dp, 0.0_dp, "to a sixteenth")
     call guard%give_up(sim%problem, lowered)
-    call check(lowered .and. guard%share <= 0.0_dp, "giving up leaves nothing of it")
+    call check(lowered .and. guard%factor <= 0.0_dp, "giving up leaves nothing of it")
     call sim%free()
   end subroutine check_guard
 

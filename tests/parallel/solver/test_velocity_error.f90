@@ -150,7 +150,7 @@ contains
     ! with earlier impulses, which tell something else, Y is as large: the impulses alone see all of a uniform velocity
     do s = 1, size(sim%problem%sub)
       associate (impulse => sim%problem%sub(s)%impulse)
-        sim%method%momentum%part(s)%impulse = impulse*(1.0_dp + 0.5_dp*sin(impulse/(mass*gravity*step)))
+        sim%method%acceleration%part(s)%impulse = impulse*(1.0_dp + 0.5_dp*sin(impulse/(mass*gravity*step)))
       end associate
     end do
     call velocity%assess(sim%problem, sim%method, 1, residual, defect)

@@ -10,7 +10,7 @@ program test_impulse_memory
   use gravier_motion, only: advance_position
   use gravier_contact_kernels, only: kernels_t, contact_tangents, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_neighbour_rule, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_physics, only: physics_t

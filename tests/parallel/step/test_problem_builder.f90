@@ -7,7 +7,7 @@ program test_problem_builder
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
-  use gravier_neighbour_search, only: rule_dual, rule_primal
+  use gravier_neighbour_rule, only: rule_dual, rule_primal
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_nlgs, only: nlgs_t

@@ -1374,7 +1374,7 @@ contains
     call refuse(two // "&law materials = 'a' kind = 'adhesive' adhesion = 1 adhesion_range = 0 /", &
       "&law (the 1st) adhesion_range = 0: expected a finite real number > 0 (m)")
     call refuse(scene("bodies = 'column' alert_distance = 0.05") // "&material name = 'a' / " // wet, &
-      "&scene alert_distance = 0.05: expected at least 1.000E-001 m, the largest range of a &law")
+      "&scene alert_distance = 0.05: expected at least 1.000E-01 m, the largest range of a &law")
     call refuse(column // "&solver criterion = 'error' / &material name = 'a' / " // wet, &
       "&solver criterion = 'error': expected 'residual' where there is a &law: the exact solution is that of the scene's law")
   end subroutine test_laws

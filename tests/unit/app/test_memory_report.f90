@@ -111,7 +111,7 @@ contains
         & 4*size(sub%multiplicity))/sub%n_bodies + (4*size(sub%place) + 8*size(sub%radius))/sub%n_grains
       if (allocated(sub%attraction_load)) bytes(body) = bytes(body) + 8*size(sub%attraction_load)/sub%n_columns
       bytes(seen) = grain_bytes(view%bodies) + (4*size(view%owner) + 4*size(view%origin))/view%bodies%n
-      bytes(at_home) = grain_bytes(owned) + 8*size(simulation%halo%reference(1)%position)/owned%n
+      bytes(at_home) = grain_bytes(owned) + 8*(size(simulation%halo%reference(1)%position) + owned%n)/owned%n
     end associate
   end subroutine sum_arrays
 

@@ -4,13 +4,14 @@ program test_text
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_random_hash, only: hash_uniform
-  use gravier_text, only: to_text, lower, growing_text_t
+  use gravier_text, only: to_text, times_text, counted, lower, growing_text_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
 
   call MPI_Init()
   call test_integers()
   call test_reals()
+  call test_times()
   call test_round_trip()
   call test_logicals_and_case()
   call test_growing_text()
@@ -53,17 +54,29 @@ contains
   end subroutine test_integers
 
   subroutine test_reals()
-    call check_text(to_text(1.0_dp), "1.00000000E+000", "nine digits")
-    call check_text(to_text(-0.0012345678912_dp), "-1.23456789E-003", "rounded to nine digits")
-    call check_text(to_text(1.5_dp, 2), "1.5E+000", "two digits")
-    call check_text(to_text(6.0_dp, 1), "6.E+000", "one digit")
-    call check_text(to_text(6.0_dp, 0), "6.E+000", "at least one digit")
+    call check_text(to_text(1.0_dp), "1.00000000E+00", "nine digits")
+    call check_text(to_text(-0.0012345678912_dp), "-1.23456789E-03", "rounded to nine digits")
+    call check_text(to_text(1.5_dp, 2), "1.5E+00", "two digits")
+    call check_text(to_text(6.0_dp, 1), "6.E+00", "one digit")
+    call check_text(to_text(6.0_dp, 0), "6.E+00", "at least one digit")
     call check_text(to_text(0.1_dp, 17), "1.0000000000000001E-001", "seventeen digits")
     call check_text(to_text(0.1_dp, 40), "1.0000000000000001E-001", "at most seventeen digits")
     call check_text(to_text(-huge(1.0_dp), 17), "-1.7976931348623157E+308", "widest")
-    call check_text(to_text(0.0_dp, 3), "0.00E+000", "zero")
+    call check_text(to_text(0.0_dp, 3), "0.00E+00", "zero")
     call check_text(to_text(tiny(1.0_dp), 3), "2.23E-308", "small")
+    call check_text(to_text(1.0e-100_dp, 16), "1.000000000000000E-100", "an exponent of three digits")
+    call check_text(to_text(1.0e-99_dp, 16), "1.000000000000000E-99", "an exponent of two digits")
   end subroutine test_reals
+
+  subroutine test_times()
+    call check_text(times_text(0_i8), "never", "never")
+    call check_text(times_text(1_i8), "once", "once")
+    call check_text(times_text(2_i8), "twice", "twice")
+    call check_text(times_text(3_i8), "3 times", "more often")
+    call check_text(counted(0_i8, "solve"), "0 solves", "none")
+    call check_text(counted(1_i8, "solve"), "1 solve", "a single one")
+    call check_text(counted(2_i8, "solve"), "2 solves", "several")
+  end subroutine test_times
 
   !> 17 digits say every bit: random bit patterns that are finite, read back.
   subroutine test_round_trip()

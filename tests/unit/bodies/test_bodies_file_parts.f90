@@ -299,7 +299,7 @@ contains
     call make_bodies(dimension, found)
     found%radius(:) = 1.25_dp
     call read_body_shapes(comm, file, path, 0_i8, shapes, found, error)
-    call expect(error, "/bodies/radius: id 11: 1.25000000E+000, but 0, or the radius", "a radius that is not that of the scale")
+    call expect(error, "/bodies/radius: id 11: 1.25000000E+00, but 0, or the radius", "a radius that is not that of the scale")
     call parse_shapes("b.shapes", "shape box"//lf//merge("disk 0 0 1    ", "sphere 0 0 0 1", dimension == 2), dimension, others, &
       & error)
     call make_bodies(dimension, found)
@@ -425,13 +425,13 @@ contains
 
   subroutine test_bad_words()
     call refuse_words("regular 4", 2, "regular with 1 numbers: expected a number of corners and a radius, and perhaps x and y")
-    call refuse_words("regular 2 1", 2, "regular with corners 2.00000E+000: expected a whole number from 3 to 1000")
-    call refuse_words("regular 4.5 1", 2, "regular with corners 4.50000E+000: expected a whole number")
+    call refuse_words("regular 2 1", 2, "regular with corners 2.00000E+00: expected a whole number from 3 to 1000")
+    call refuse_words("regular 4.5 1", 2, "regular with corners 4.50000E+00: expected a whole number")
     call refuse_words("regular 4 0", 2, "regular with a length of 0")
     call refuse_words("cube -1", 3, "cube with a length of -1")
     call refuse_words("cube 1 2", 3, "cube with 2 numbers: expected a radius, and perhaps x, y and z")
-    call refuse_words("random_hull -1 9 1 1 1", 3, "random_hull with a seed -1.00000E+000: expected a whole number from 0")
-    call refuse_words("random_hull 1 3 1 1 1", 3, "random_hull with corners 3.00000E+000: expected a whole number from 4")
+    call refuse_words("random_hull -1 9 1 1 1", 3, "random_hull with a seed -1.00000E+00: expected a whole number from 0")
+    call refuse_words("random_hull 1 3 1 1 1", 3, "random_hull with corners 3.00000E+00: expected a whole number from 4")
     call refuse_words("random_hull 1 9 1 0", 2, "random_hull with a length of 0")
   end subroutine test_bad_words
 

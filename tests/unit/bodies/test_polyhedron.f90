@@ -273,11 +273,11 @@ contains
     call check_refused(error, "x: all points lie in a plane")
     points(:, :) = cube()
     call make_polyhedron("x", points, 1.0_dp, shape, error)
-    call check_refused(error, "x: the rounding of 1.00000000E+000 is too large: a face is only 1.00000000E+000 from the centre")
+    call check_refused(error, "x: the rounding of 1.00000000E+00 is too large: a face is only 1.00000000E+00 from the centre")
     call make_polyhedron("x", points, 0.0_dp, shape, error)
     call check_refused(error, "x: a rounding above 0 is needed")
     call make_box("x", [1.0_dp, -1.0_dp, 1.0_dp], 0.1_dp, shape, error)
-    call check_refused(error, "x: a side of -1.00000000E+000, but one above 0 was expected")
+    call check_refused(error, "x: a side of -1.00000000E+00, but one above 0 was expected")
   end subroutine test_refusals
 
   !> Surfaces that are given: squares and triangles, and what is wrong with them.

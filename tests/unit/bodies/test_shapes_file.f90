@@ -138,7 +138,7 @@ contains
     call refuse("shape a"//lf//"rounding 0.1"//lf//"rounding 0.1"//lf//"disk 0 0 1", 2, "line 3: rounding: expected once")
     call refuse("shape a"//lf//"rounding"//lf//"disk 0 0 1", 2, "line 2: rounding with 0 numbers: expected one number")
     call refuse("shape a"//lf//"rounding 0"//lf//"disk 0 0 1", 2, &
-      & "line 2: rounding 0.00000000E+000: expected a number from 1e-30")
+      & "line 2: rounding 0.00000000E+00: expected a number from 1e-30")
   end subroutine test_statements_refused
 
   subroutine test_names_refused()
@@ -160,8 +160,8 @@ contains
     call refuse("shape a"//lf//"polygon 0 0 1 0 0 1 1", 2, "line 2: polygon with 7 numbers: expected x and y of three corners")
     call refuse("shape a"//lf//"disk 0 0", 2, "line 2: disk with 2 numbers: expected x, y and a radius")
     call refuse("shape a"//lf//"capsule 0 0 1 0", 2, "line 2: capsule with 4 numbers: expected x and y of both ends and a radius")
-    call refuse("shape a"//lf//"disk 0 0 0", 2, "line 2: disk with a radius of 0.00000000E+000: expected a number from 1e-30")
-    call refuse("shape a"//lf//"capsule 0 0 1 0 -1", 2, "line 2: capsule with a radius of -1.00000000E+000: expected a number")
+    call refuse("shape a"//lf//"disk 0 0 0", 2, "line 2: disk with a radius of 0.00000000E+00: expected a number from 1e-30")
+    call refuse("shape a"//lf//"capsule 0 0 1 0 -1", 2, "line 2: capsule with a radius of -1.00000000E+00: expected a number")
     call refuse("shape a"//lf//"capsule 0 0 0 0 1", 2, "line 2: shape a: a capsule of length 0: expected two ends")
     call refuse("shape a"//lf//"polygon 0 0 2 0 1 0.5 0 2", 2, "line 2: shape a: a polygon that is not convex")
     call refuse("shape a"//lf//"polygon 0 0 1 0 2 0", 2, "line 2: shape a: a polygon without area")
@@ -255,9 +255,9 @@ contains
     call refuse("shape a"//lf//"box 1 1", 3, &
       & "line 2: box with 2 numbers: expected three lengths, and perhaps x, y and z of the centre")
     call refuse("shape a"//lf//"box 1 0 1", 3, &
-      & "line 2: box with a length of 0.00000000E+000: expected a number from 1e-30 to 1e30")
+      & "line 2: box with a length of 0.00000000E+00: expected a number from 1e-30 to 1e30")
     call refuse("shape a"//lf//"sphere 0 0 1", 3, "line 2: sphere with 3 numbers: expected x, y, z and a radius")
-    call refuse("shape a"//lf//"sphere 0 0 0 0", 3, "line 2: sphere with a radius of 0.00000000E+000: expected a number")
+    call refuse("shape a"//lf//"sphere 0 0 0 0", 3, "line 2: sphere with a radius of 0.00000000E+00: expected a number")
     call refuse("shape a"//lf//"capsule 0 0 0 1 0 0", 3, &
       & "line 2: capsule with 6 numbers: expected x, y and z of both ends and a radius")
     call refuse("shape a"//lf//"capsule 0 0 0 0 0 0 1", 3, "line 2: shape a: a capsule of length 0: expected two ends")
@@ -372,23 +372,23 @@ contains
     call refuse("shape a"//lf//"regular 5", 2, &
       & "line 2: regular with 1 numbers: expected a number of corners and a radius, and perhaps")
     call refuse("shape a"//lf//"regular 2 1", 2, &
-      & "line 2: regular with corners 2.00000E+000: expected a whole number from 3 to 1000")
+      & "line 2: regular with corners 2.00000E+00: expected a whole number from 3 to 1000")
     call refuse("shape a"//lf//"regular 4.5 1", 2, &
-      & "line 2: regular with corners 4.50000E+000: expected a whole number from 3 to 1000")
-    call refuse("shape a"//lf//"regular 5 0", 2, "line 2: regular with a length of 0.00000000E+000: expected a number from 1e-30")
+      & "line 2: regular with corners 4.50000E+00: expected a whole number from 3 to 1000")
+    call refuse("shape a"//lf//"regular 5 0", 2, "line 2: regular with a length of 0.00000000E+00: expected a number from 1e-30")
     call refuse("shape a"//lf//"cube 1 2", 3, &
       & "line 2: cube with 2 numbers: expected a radius, and perhaps x, y and z of the centre")
-    call refuse("shape a"//lf//"cube -1", 3, "line 2: cube with a length of -1.00000000E+000: expected a number from 1e-30")
+    call refuse("shape a"//lf//"cube -1", 3, "line 2: cube with a length of -1.00000000E+00: expected a number from 1e-30")
     call refuse("shape a"//lf//"cube 1", 2, 'line 2: "cube": expected shape')
     call refuse("shape a"//lf//"random_hull 1 12 1 1", 3, &
       & "line 2: random_hull with 4 numbers: expected a seed, a number of corners")
     call refuse("shape a"//lf//"random_hull -1 12 1 1 1", 3, &
-      & "random_hull with a seed -1.00000E+000: expected a whole number from 0")
+      & "random_hull with a seed -1.00000E+00: expected a whole number from 0")
     call refuse("shape a"//lf//"random_hull 1e12 12 1 1 1", 3, &
-      & "random_hull with a seed 1.00000E+012: expected a whole number from 0")
+      & "random_hull with a seed 1.00000E+12: expected a whole number from 0")
     call refuse("shape a"//lf//"random_hull 1 3 1 1 1", 3, &
-      & "random_hull with corners 3.00000E+000: expected a whole number from 4")
-    call refuse("shape a"//lf//"random_hull 1 12 1 0 1", 3, "random_hull with a length of 0.00000000E+000: expected")
+      & "random_hull with corners 3.00000E+00: expected a whole number from 4")
+    call refuse("shape a"//lf//"random_hull 1 12 1 0 1", 3, "random_hull with a length of 0.00000000E+00: expected")
     call refuse("shape a"//lf//"rounding 0.5"//lf//"cube 0.5", 3, "too large")
   end subroutine test_words_refused
 
@@ -425,7 +425,7 @@ contains
     call write_file("a.obj", tetrahedron("0 0 x", outwards))
     call refuse(shape, 3, 'line 2: shape a: a.obj: line 4: "x", but a number was expected')
     call write_file("a.obj", tetrahedron("0 0 1e31", outwards))
-    call refuse(shape, 3, "line 2: shape a: a.obj: a coordinate of 1.00000000E+031 in size: expected a number of at most 1e30")
+    call refuse(shape, 3, "line 2: shape a: a.obj: a coordinate of 1.00000000E+31 in size: expected a number of at most 1e30")
     call write_file("a.obj", tetrahedron("0 0 1", "f 1 2 3"//lf//"f 1 4 2"//lf//"f 1 3 4"//lf//"f 2 4 3"//lf))
     call refuse(shape, 3, "line 2: shape a: a.obj: the surface is inside out")
     call write_file("a.obj", tetrahedron("0 0 1", "f 1 3 2"//lf//"f 1 2 4"//lf//"f 1 4 3"//lf))

@@ -44,8 +44,8 @@ program test_neighbour_search
   use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
-  use gravier_neighbour_search, only: neighbour_rule_t, neighbour_search_t, sweep_order, owner_point, rule_dual, &
-    & rule_primal
+  use gravier_neighbour_rule, only: neighbour_rule_t, owner_point, rule_dual, rule_primal
+  use gravier_neighbour_search, only: neighbour_search_t, sweep_order
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape
   use test_search_region, only: sites_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -389,10 +389,22 @@ contains
     rule%skin = 0.5_dp
     rule%largest_radius = 2.0_dp
     rule%mean_radius = 1.5_dp
+    rule%largest_extent = 2.25_dp
     call check_close(rule%range(), 0.75_dp, 0.0_dp, "range of the lists")
-    call check_close(rule%reach(1.0_dp), 1.875_dp, 0.0_dp, "reach of a midpoint")
+    call check_close(rule%reach(1.0_dp, 0.0_dp), 1.875_dp, 0.0_dp, "reach of a midpoint")
     rule%kind = rule_primal
-    call check_close(rule%reach(1.0_dp), 3.75_dp, 0.0_dp, "reach of a candidate")
+    call check_close(rule%reach(1.0_dp, 0.0_dp), 3.75_dp, 0.0_dp, "reach of a candidate")
+    ! 8 s of way, at most 0.5 m
+    rule%duration = 8.0_dp
+    rule%most_travel = 0.5_dp
+    call check_close(rule%margin(0.015625_dp), 0.25_dp, 0.0_dp, "margin of a slow grain")
+    call check_close(rule%margin(0.046875_dp), 0.375_dp, 0.0_dp, "margin of a fast grain")
+    call check_close(rule%margin(1.0_dp), 0.5_dp, 0.0_dp, "largest margin")
+    call check_close(rule%reach(1.0_dp, 1.0_dp), 4.0_dp, 0.0_dp, "reach of a fast candidate")
+    call check_close(rule%range(), 1.25_dp, 0.0_dp, "range of the lists of fast grains")
+    call check_close(rule%cell_edge(), 5.25_dp, 0.0_dp, "edge of a cell of a subdomain, primal")
+    rule%kind = rule_dual
+    call check_close(rule%cell_edge(), 4.75_dp, 0.0_dp, "edge of a cell of a subdomain, dual")
     call check_close(rule%sweep_edge(), 3.25_dp, 0.0_dp, "edge of a cell of the sweep")
     call check_point(rule_dual, 1.5_dp, 3.5_dp, "midpoint")
     call check_point(rule_primal, 1.0_dp, 2.0_dp, "candidate")

@@ -5,7 +5,7 @@ program test_method_registry
   use gravier_method, only: method_t
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t, default_always, default_on_active
   use gravier_method_registry, only: method_holder_t, registered_methods, make_method, features_of, method_words, quoted_names, &
-    & all_methods, that_decompose, with_moments, with_sleeping, that_relax, with_momentum, with_momentum_on_active
+    & all_methods, that_decompose, with_moments, with_sleeping, that_relax, accelerated, accelerated_on_active
   implicit none
 
   call test_names()
@@ -44,8 +44,8 @@ contains
       & "those on subdomains")
     call check_equal(quoted_names(with_moments, "'", "or"), "'nlgs', 'schwarz' or 'nscdd'", "those with moments")
     call check_equal(quoted_names(with_sleeping, "'", "and"), "'nlgs', 'schwarz' and 'nscdd'", "those with sleeping contacts")
-    call check_equal(quoted_names(with_momentum, "`", "and"), "`nlgs` and `nscdd`", "those with momentum by default")
-    call check_equal(quoted_names(with_momentum_on_active, "`", "and"), "`nscdd_ep`", "one name alone")
+    call check_equal(quoted_names(accelerated, "`", "and"), "`nlgs` and `nscdd`", "those with momentum by default")
+    call check_equal(quoted_names(accelerated_on_active, "`", "and"), "`nscdd_ep`", "one name alone")
   end subroutine test_names
 
   !> Sweeps and momentum reach every method; Newton's always has momentum.
@@ -58,16 +58,16 @@ contains
     call registered_methods(methods)
     do k = 1, size(methods)
       features = methods(k)%method%features()
-      call make_method(trim(features%name), method_options_t(sweeps=7, momentum=.true.), method)
+      call make_method(trim(features%name), method_options_t(sweeps=7, acceleration=.true.), method)
       call check_equal(method%sweeps, 7, "sweeps of "//features%name)
-      call check(method%momentum%on, "momentum of "//features%name)
+      call check(method%acceleration%on, "momentum of "//features%name)
       call make_method(trim(features%name), method_options_t(), method)
-      call check(method%momentum%on .eqv. features%name == "newton", "no momentum of "//features%name)
+      call check(method%acceleration%on .eqv. features%name == "newton", "no momentum of "//features%name)
     end do
     features = features_of("nlgs")
-    call check_equal(features%momentum_by_default, default_always, "momentum of nlgs by default")
+    call check_equal(features%accelerated_by_default, default_always, "momentum of nlgs by default")
     features = features_of("nscdd_ep")
-    call check_equal(features%momentum_by_default, default_on_active, "momentum of nscdd_ep by default")
+    call check_equal(features%accelerated_by_default, default_on_active, "momentum of nscdd_ep by default")
   end subroutine test_options
 
   !> The search direction that the log names.
@@ -77,13 +77,13 @@ contains
     call make_method("nlgs", method_options_t(), method)
     call check_equal(method%direction_text, "", "no direction")
     call make_method("nscdd_ep", method_options_t(active_only=.true.), method)
-    call check_equal(method%direction_text, "l = 1.00E+002/W_aa (automatic), active contacts", "nscdd_ep on active contacts")
+    call check_equal(method%direction_text, "l = 1.00E+02/W_aa (automatic), active contacts", "nscdd_ep on active contacts")
     call make_method("nscdd_ep", method_options_t(), method)
-    call check_equal(method%direction_text, "l = 3.00E-001/W_aa (automatic), all contacts", "nscdd_ep on all contacts")
+    call check_equal(method%direction_text, "l = 3.00E-01/W_aa (automatic), all contacts", "nscdd_ep on all contacts")
     call make_method("schwarz_ec", method_options_t(), method)
-    call check_equal(method%direction_text, "l = 3.00E+000/W_aa (automatic), all contacts", "schwarz_ec")
+    call check_equal(method%direction_text, "l = 3.00E+00/W_aa (automatic), all contacts", "schwarz_ec")
     call make_method("schwarz_ec", method_options_t(direction_given=.true., direction=2.5_dp, direction_relative=.false.), method)
-    call check_equal(method%direction_text, "l = 2.50E+000 kg, all contacts", "a given direction")
+    call check_equal(method%direction_text, "l = 2.50E+00 kg, all contacts", "a given direction")
   end subroutine test_directions
 
   !> Momentum holds the impulses and velocities of one iteration, Newton's method more.
@@ -95,7 +95,7 @@ contains
     call make_method("nscdd", method_options_t(), method)
     call method%held(3, 6, plain)
     call check_equal(plain%n, 0, "nothing without momentum")
-    call make_method("nscdd", method_options_t(momentum=.true.), method)
+    call make_method("nscdd", method_options_t(acceleration=.true.), method)
     call method%held(3, 6, momentum)
     bytes = 0
     do k = 1, momentum%n

@@ -164,7 +164,7 @@ contains
     call check_close(r(1, 2), 1.0_dp, 1.0e-15_dp, "the second one sees it")
     call check_close(maxval(abs(r(2, :))), 0.0_dp, 0.0_dp, "no friction")
     call check_close(moved, sqrt(8.0_dp/39.0_dp), 1.0e-14_dp, "what it has moved: |s dr|/|q|")
-    control%momentum = .true.
+    control%acceleration = .true.
     control%tolerance = 1.0e-13_dp
     call solve_by_sweeps(problem, control, r, sweeps, figure, growth)
     call check_close(r(1, 1), 1.0_dp/3.0_dp, 1.0e-11_dp, "2 r_1 + r_2 = 2")
@@ -206,7 +206,7 @@ contains
     call check(.not. allocated(error), "problem of a column")
     control%tolerance = 1.0e-10_dp
     do k = 1, 2
-      control%momentum = k == 2
+      control%acceleration = k == 2
       r(:, :) = 0.0_dp
       call solve_by_sweeps(problem, control, r, sweeps(k), figure, growth)
       ! the smallest eigenvalue of W is (pi/(2 n))^2
@@ -286,7 +286,7 @@ contains
     control%tolerance = 1.0e-13_dp
     do k = 1, 2
       r(:, :) = 0.0_dp
-      control%momentum = k == 2
+      control%acceleration = k == 2
       call solve_by_sweeps(problem, control, r, sweeps, figure, growth)
       call check(figure <= control%tolerance, "sweeps reach their tolerance")
       call check_close(maxval(abs(r - expected)), 0.0_dp, 1.0e-11_dp, "sweeps find the impulses")

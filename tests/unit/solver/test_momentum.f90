@@ -2,7 +2,7 @@
 program test_momentum
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
-  use gravier_method, only: momentum_t
+  use gravier_method, only: acceleration_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -18,7 +18,7 @@ contains
 
   !> While changes decay, beta follows Nesterov's sequence up to the margin, which narrows to 0.02.
   subroutine test_decay()
-    type(momentum_t) :: momentum
+    type(acceleration_t) :: momentum
     real(dp) :: change, t, next
     integer :: k
 
@@ -44,7 +44,7 @@ contains
 
   !> Growth by more than 2 % shortens the memory by three tenths; less growth does not.
   subroutine test_growth_between_iterations()
-    type(momentum_t) :: momentum, grown
+    type(acceleration_t) :: momentum, grown
     integer :: k
 
     do k = 1, 6
@@ -71,7 +71,7 @@ contains
 
   !> Windows that grow, too slowly for one iteration to tell, take beta to zero within four.
   subroutine test_growth_between_windows()
-    type(momentum_t) :: momentum
+    type(acceleration_t) :: momentum
     real(dp) :: change
     integer :: k
 
@@ -90,7 +90,7 @@ contains
 
   !> Twenty windows without a fifth less: as many plain iterations as there were, then momentum again.
   subroutine test_idle_windows()
-    type(momentum_t) :: momentum
+    type(acceleration_t) :: momentum
     integer :: k, plain
 
     do k = 1, 209

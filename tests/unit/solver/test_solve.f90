@@ -355,7 +355,7 @@ contains
       call check(abs(report%history%first(k) - traced%history%first(k)) <= control%check_every, "history: levels")
     end do
     call check_equal(report%history%first_check, control%check_every, "history: the first check")
-    accelerated%momentum%on = .true.
+    accelerated%acceleration%on = .true.
     call make_column(sim, 2, 20, 0.0_dp)
     call solve_contacts(sim%problem, accelerated, control, report, error)
     call sim%free()
@@ -578,7 +578,7 @@ contains
     do k = 1, 2
       call sim%assemble(figures)
       call check_equal(figures%contacts, 3_i8, "lid: contacts")
-      nlgs%momentum%on = k == 2
+      nlgs%acceleration%on = k == 2
       control = velocity_control()
       call solve_contacts(sim%problem, nlgs, control, report, error)
       call check_equal(report%status, solve_unbounded, "lid: no solution")

@@ -19,8 +19,8 @@ program test_stagnation
 contains
 
   !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none is.
-  integer function first_due(with_momentum, missing_residual, factor)
-    logical, intent(in) :: with_momentum
+  integer function first_due(accelerated, missing_residual, factor)
+    logical, intent(in) :: accelerated
     real(dp), intent(in) :: missing_residual, factor
     type(stagnation_t) :: stagnation
     integer :: iteration
@@ -28,7 +28,7 @@ contains
 
     first_due = 0
     do iteration = 10, 20000, 10
-      call stagnation%note(problem, iteration, factor**iteration, with_momentum, missing_residual, due)
+      call stagnation%note(problem, iteration, factor**iteration, accelerated, missing_residual, due)
       if (.not. due) cycle
       first_due = iteration
       return

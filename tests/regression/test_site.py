@@ -1,0 +1,129 @@
+"""The site that `./gravier docs` builds: every link and anchor leads somewhere, formulas are drawn, the search finds words.
+
+A python3 with mkdocs is looked for as GRAVIER_DOCS_PYTHON and in build/docs; without one the test says so and is skipped.
+"""
+import html.parser
+import json
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+import urllib.parse
+from pathlib import Path
+
+SOURCE = Path(os.environ.get("GRAVIER_SOURCE_DIR", Path(__file__).resolve().parents[2])).resolve()
+PYTHON = os.environ.get("GRAVIER_DOCS_PYTHON") or str(SOURCE / "build/docs/bin/python")
+
+
+def has_mkdocs():
+    try:
+        return subprocess.run([PYTHON, "-c", "import mkdocs, latex2mathml"], capture_output=True, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+class Page(html.parser.HTMLParser):
+    """Links and anchors of a page, and its text outside code."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.anchors, self.words, self.code, self.formulas = [], set(), [], 0, 0
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        for name in ("href", "src"):
+            if attributes.get(name):
+                self.links.append(attributes[name])
+        for name in ("id", "name"):
+            if attributes.get(name):
+                self.anchors.add(attributes[name])
+        self.code += tag in ("code", "pre", "script", "style")
+        self.formulas += tag == "math"
+
+    def handle_endtag(self, tag):
+        self.code -= tag in ("code", "pre", "script", "style")
+
+    def handle_data(self, data):
+        if self.code <= 0:
+            self.words.append(data)
+
+
+class Site(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        if not has_mkdocs():
+            words = f"NO MKDOCS: {PYTHON} has no mkdocs with latex2mathml: the site is not checked; ./gravier docs installs them in build/docs"
+            print(words)
+            raise unittest.SkipTest(words)
+        cls.place = Path(tempfile.mkdtemp(prefix="gravier-site-"))
+        cls.addClassCleanup(shutil.rmtree, cls.place, ignore_errors=True)
+        done = subprocess.run([PYTHON, "-m", "mkdocs", "build", "--strict", "-f", str(SOURCE / "mkdocs.yml"), "-d", str(cls.place)],
+                              capture_output=True, text=True, check=False, cwd=SOURCE)
+        cls.said = done.stdout + done.stderr
+        cls.status = done.returncode
+        cls.pages = {path.relative_to(cls.place).as_posix(): Page(path.read_text(encoding="utf-8")) for path in cls.place.rglob("*.html")}
+
+    def test_it_builds_without_a_warning(self):
+        self.assertEqual(self.status, 0, self.said)
+        self.assertGreater(len(self.pages), 50)
+
+    def test_links_and_anchors_lead_somewhere(self):
+        count = 0
+        for name, page in self.pages.items():
+            if name == "404.html":  # its links are those of the root of a server
+                continue
+            for link in page.links:
+                address = urllib.parse.urlsplit(link)
+                if address.scheme or address.netloc:
+                    self.assertIn(address.scheme, ("http", "https", "data", "mailto"), f"{name}: {link}")
+                    continue
+                count += 1
+                path = urllib.parse.unquote(address.path)
+                target = (self.place / name).parent / path if path else self.place / name
+                self.assertTrue(target.exists(), f"{name}: {link}: no such file in the site")
+                anchor = urllib.parse.unquote(address.fragment)
+                if anchor and target.suffix == ".html":
+                    led_to = self.pages[target.resolve().relative_to(self.place.resolve()).as_posix()]
+                    self.assertIn(anchor, led_to.anchors, f"{name}: {link}: no such anchor")
+        self.assertGreater(count, 2000)
+
+    def test_nothing_is_fetched_from_elsewhere(self):
+        """Scripts, styles and pictures are files of the site."""
+        for path in self.place.rglob("*.html"):
+            for found in re.findall(r"<(?:script|img|link)\b[^>]*?(?:src|href)=\"((?:https?:)?//[^\"]+)\"", path.read_text(encoding="utf-8")):
+                self.assertFalse(found, f"{path.name}: {found}")
+
+    def test_formulas_are_drawn(self):
+        """As many as the theory has, and no dollar or placeholder is left in a text."""
+        self.assertGreater(self.pages["theory.html"].formulas, 300)
+        for name, page in self.pages.items():
+            if not name.startswith("tree/"):
+                left = re.search(r"STANDSHERE|\$[^$\n]*\\[a-z]+", "".join(page.words))
+                self.assertIsNone(left, f"{name}: {left and left[0]}")
+
+    def test_no_markdown_is_left_in_a_text(self):
+        """Tables, lists, fences and bold words have become HTML."""
+        for name, page in self.pages.items():
+            if not name.startswith("tree/"):
+                left = re.search(r"^\s*\|.*\|\s*$|^```|\*\*\w", "".join(page.words), re.M)
+                self.assertIsNone(left, f"{name}: {left and left[0]}")
+
+    def test_all_pages_of_the_sources_are_there(self):
+        for path in [*(SOURCE / "doc").glob("*.md"), *(SOURCE / "doc/reference").glob("*.md")]:
+            name = path.relative_to(SOURCE / "doc").with_suffix(".html").as_posix()
+            self.assertIn(name, self.pages)
+        for name in ("readme.html", "changelog.html", "contributing.html"):
+            self.assertIn(name, self.pages)
+
+    def test_the_search_finds_words(self):
+        index = json.loads((self.place / "search/search_index.json").read_text(encoding="utf-8"))
+        for word, page in (("capillarity", "reference/law_capillary.html"), ("Nesterov", "acceleration.html"), ("walltime", "checkpoints.html")):
+            self.assertTrue(any(word in entry["text"] and entry["location"].startswith(page) for entry in index["docs"]), word)
+
+
+if __name__ == "__main__":
+    unittest.main()
