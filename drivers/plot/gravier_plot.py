@@ -101,10 +101,12 @@ def colours(run, step, bodies, kind, limits=None):
     return values / 10.0**power, label, {"cmap": TURNS if low < 0.0 else SPEEDS, "norm": plt.Normalize(low / 10.0**power, top / 10.0**power)}
 
 
-def box_around(bodies, planes, view):
-    """Corners of the box that holds the bodies and, in 2D, the feet of the planes, with a margin."""
+def box_around(bodies, planes, facets, view):
+    """Corners of the box that holds the bodies, facets and, in 2D, the feet of the planes, with a margin."""
     centre, radius = view.place(bodies.position), bodies.radius[:, None]
     low, high = (centre - radius).min(axis=0), (centre + radius).max(axis=0)
+    if len(facets) > 0:
+        low, high = numpy.minimum(low, facets.min(axis=(0, 1))), numpy.maximum(high, facets.max(axis=(0, 1)))
     if view.flat and len(planes.position) > 0:
         # the point of a plane that is nearest to the middle of the bodies
         middle = 0.5 * (low + high)
@@ -124,8 +126,8 @@ def present(run, step):
 
 
 def draw_boundaries(axes, rows, keys, low, high):
-    """Boundaries of a scene in 2D: planes as lines across the picture, cut where another plane leaves them behind, segments and
-    circles as they are (a segment that turns, as it was at the start)."""
+    """Boundaries of a scene in 2D that have no facets: planes as lines across the picture, cut where another plane leaves them behind,
+    segments and circles as they are (a segment that turns, as it was at the start)."""
     style = {"color": "0.25", "linewidth": 1.5, "solid_capstyle": "butt", "zorder": 3}
     length = numpy.linalg.norm(high - low)
     planes = rows.shape == "plane"
@@ -144,6 +146,22 @@ def draw_boundaries(axes, rows, keys, low, high):
             axes.plot(*numpy.array([point, end]).T, **style)
         elif shape == "circle" and "radius" in key:
             axes.add_patch(plt.Circle(point, key["radius"], fill=False, edgecolor="0.25", linewidth=1.5, zorder=3))
+
+
+def present_facets(run, step, view, rows):
+    """Corners of the facets of the mesh walls that are there, in the plane of the picture (n, corners of a facet, 2)."""
+    facets = run.facets(step)
+    if facets is None:
+        return numpy.zeros((0, run.dimension, 2))
+    return view.place(facets.corners[numpy.isin(facets.boundary, rows.id)])
+
+
+def draw_facets(axes, view, corners):
+    """Facets: lines in 2D, sides of triangles behind the bodies in 3D."""
+    if view.flat:
+        axes.add_collection(LineCollection(corners, colors="0.25", linewidths=1.5, capstyle="round", zorder=3))
+    else:
+        axes.add_collection(PolyCollection(corners, facecolors="none", edgecolors="0.6", linewidths=0.3, zorder=0.5))
 
 
 class Frame:
@@ -187,7 +205,8 @@ def draw_packing(run, step, options, frame=None):
     view = View(run.dimension, *options.view)
     rows, keys = present(run, step)
     planes = gravier.Table({name: rows[name][rows.shape == "plane"] for name in ("position", "normal")})
-    low, high = box_around(bodies, planes, view) if frame.low is None else (frame.low, frame.high)
+    facets = present_facets(run, step, view, rows)
+    low, high = box_around(bodies, planes, facets, view) if frame.low is None else (frame.low, frame.high)
     size = (high - low) / (high - low).max()
     figure, axes = plt.subplots(figsize=(options.size * size[0] + 1.3, options.size * size[1] + 0.9))
 
@@ -215,6 +234,7 @@ def draw_packing(run, step, options, frame=None):
         title += f", {len(contacts)} contacts"
     if chains:
         draw_chains(axes, run, step, view, frame.force)
+    draw_facets(axes, view, facets)
     if view.flat:
         draw_boundaries(axes, rows, keys, low, high)
         axes.set(xlabel="x [m]", ylabel="y [m]")
@@ -345,7 +365,7 @@ def shared_frame(run, steps, options):
         bodies = run.bodies(step)
         rows, _ = present(run, step)
         planes = gravier.Table({name: rows[name][rows.shape == "plane"] for name in ("position", "normal")})
-        low, high = box_around(bodies, planes, view)
+        low, high = box_around(bodies, planes, present_facets(run, step, view, rows), view)
         lows.append(low)
         highs.append(high)
         values = None if options.colour == "subdomain" else quantity(run, step, bodies, options.colour)[0]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Make the bodies files of data/scenes anew, from fixed seeds; compacted ones by the program itself.
+"""Make the bodies files and the meshes of data/scenes anew, from fixed seeds; compacted bodies by the program itself.
 
     python3 drivers/studies/scene_bodies.py data/scenes        half a minute; GRAVIER_BIN_DIR says where gravier is"""
 import argparse
@@ -72,6 +72,25 @@ def shear(folder, rng):
                  np.concatenate([bottom_row, top_row, centres]), np.concatenate([np.full(80, 0.01), radii]), [1] * 40 + [2] * 40 + [0] * len(radii))
 
 
+def funnel(folder, rng, sides=48):
+    """A cone on a tube below and a cylinder above as triangles of a binary STL file, open at both ends; spheres on a lattice in the
+    cylinder."""
+    profile = [(0.03, -0.03), (0.03, 0.0), (0.07, 0.06), (0.07, 0.2)]
+    angle = 2.0 * np.pi * np.arange(sides + 1) / sides
+    ring = [np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(sides + 1, height)], axis=1) for radius, height in profile]
+    triangles = []
+    for below, above in zip(ring[:-1], ring[1:]):
+        for k in range(sides):
+            triangles += [(below[k], below[k + 1], above[k + 1]), (below[k], above[k + 1], above[k])]
+    record = np.zeros(len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    record["corners"] = triangles
+    head = b"funnel of drivers/studies/scene_bodies.py, in m".ljust(80)
+    (folder / "funnel.stl").write_bytes(head + np.uint32(len(record)).tobytes() + record.tobytes())
+    print(f"{folder / 'funnel.stl'}: {len(record)} triangles")
+    inside = lambda x, largest: np.hypot(x[:, 0], x[:, 1]) < 0.069 - 1.03 * largest
+    write_bodies(folder / "funnel.csv", "a lattice in a cylinder", *lattice([-0.07, -0.07, 0.065], [0.07, 0.07, 0.155], 0.005, 0.006, rng, inside))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", metavar="FOLDER", type=Path)
@@ -91,6 +110,7 @@ def main():
         [-0.25, 0.02], [0.25, 0.75], 0.004, 0.006, rng, lambda x, largest: x[:, 1] > 0.8 * abs(x[:, 0]) + 1.5 * largest))
     write_bodies(folder / "hopper_3d.csv", "a lattice above two slopes", *lattice(
         [-0.1, 0.0, 0.0], [0.1, 0.0616, 0.22], 0.004, 0.005, rng, slope))
+    funnel(folder, np.random.default_rng(8))
     write_bodies(folder / "collapse.csv", "a lattice", *lattice([0.0, 0.0], [0.2, 0.8], 0.004, 0.006, rng))
 
 

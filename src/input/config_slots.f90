@@ -169,6 +169,7 @@ contains
     case ("name"); slot%text => config%boundaries(instance)%name
     case ("shape"); slot%choice => config%boundaries(instance)%shape
     case ("group"); slot%integer => config%boundaries(instance)%group
+    case ("file"); slot%text => config%boundaries(instance)%file
     case ("velocity"); slot%reals => config%boundaries(instance)%velocity
     case ("rotation"); slot%reals => config%boundaries(instance)%rotation
     case ("pivot"); slot%reals => config%boundaries(instance)%pivot

@@ -1,6 +1,6 @@
 !> The table of all groups and keys of an input file: names, kinds, units, defaults, allowed values, meanings.
-!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the shapes
-!> of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
+!> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the
+!> shapes of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
 module gravier_config_table
   use gravier_declared_keys, only: collected_key_t, collected_keys_t, kind_length
   use gravier_law_registry, only: collect_law_keys => law_keys
@@ -64,6 +64,8 @@ module gravier_config_table
 
   !> stands for the shapes of a boundary that carry forces, until the table is complete
   character(len=*), parameter :: solid_shapes = "(solid)"
+  !> stands for the shapes whose facets a file has, until the table is complete
+  character(len=*), parameter :: faceted_shapes = "(faceted)"
   !> distributions of the radii that have bounds
   character(len=*), parameter :: bounded_radii = "uniform uniform_volume log_normal"
 
@@ -162,13 +164,17 @@ module gravier_config_table
     [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
            note="`'boundary K'`, K its number"), &
      key_t("boundary", "shape", kind_choice, "''", "", &
-           "what it is: `segment` and `circle` in 2D, `rectangle` and `cylinder` in 3D only; `grains`: glued grains of the "// &
-           "bodies file; `outlet`: a plane behind which grains leave the scene", &
+           "what it is: `segment` and `circle` in 2D, `rectangle` and `cylinder` in 3D only; `mesh`: facets of a file; "// &
+           "`grains`: glued grains of the bodies file; `outlet`: a plane behind which grains leave the scene", &
            note="required", required=.true.)]
 
   type(key_t), parameter :: boundary_keys(*) = &
     [key_t("boundary", "group", kind_integer, "0", ">= 1", "number of the group of grains in the bodies file", &
            note="required", chooser="shape", chosen=glued_grains), &
+     key_t("boundary", "file", kind_text, "''", "not empty", &
+           "path of the facets of a mesh: an STL or OBJ file of triangles or polygons in 3D, an OBJ file of lines or a CSV "// &
+           "file of the points `x,y` of one line in 2D; see [mesh walls](user_guide.md#mesh-walls)", &
+           note="required", chooser="shape", chosen=faceted_shapes), &
      key_t("boundary", "velocity", kind_real, "3*0", "", "prescribed velocity; its third component is 0 in 2D", &
            count=3, unit="m/s"), &
      key_t("boundary", "rotation", kind_real, "3*0", "", &
@@ -423,19 +429,22 @@ contains
   subroutine complete_boundary_keys()
     type(surface_holder_t), allocatable :: surfaces(:)
     type(surface_features_t) :: features
-    character(len=kind_length) :: solid
+    character(len=kind_length) :: solid, faceted
     integer :: k
 
     call registered_surfaces(surfaces)
     solid = ""
+    faceted = ""
     do k = 1, size(surfaces)
       features = surfaces(k)%surface%features()
       if (features%touches) solid = adjustl(trim(solid)//" "//features%kind)
+      if (features%faceted) faceted = adjustl(trim(faceted)//" "//features%kind)
     end do
     do k = 1, size(keys)
       if (keys(k)%group /= "boundary") cycle
       if (keys(k)%name == "shape") keys(k)%allowed = trim(surface_rows%kinds)//" "//glued_grains
       if (keys(k)%chosen == solid_shapes) keys(k)%chosen = trim(solid)//" "//glued_grains
+      if (keys(k)%chosen == faceted_shapes) keys(k)%chosen = faceted
     end do
   end subroutine complete_boundary_keys
 

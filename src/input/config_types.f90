@@ -181,6 +181,8 @@ module gravier_config_types
     real(dp), allocatable :: value(:, :)
     !> grains: the group of the bodies file
     integer :: group
+    !> mesh: the file of its facets; blank for other shapes
+    character(len=text_length) :: file
     !> m/s
     real(dp) :: velocity(3)
     !> rad/s; in 2D the first entry is the rate about z and the others are 0

@@ -4,6 +4,7 @@ module gravier_body_collector
   use gravier_body_mass, only: invert_symmetric, multiply_symmetric
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_body_store, only: collect_fields
+  use gravier_pair_places, only: has_facets
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -32,13 +33,13 @@ contains
   end subroutine collect_bodies
 
   !> Where all boundaries are, how they move and what the grains did to them in the last step: the table `boundaries` with the key
-  !> `id`, the same on all ranks.
+  !> `id`, the same on all ranks. Where some have facets, `axes` are those of their files, one after the other.
   subroutine collect_boundaries(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table
-    real(dp), allocatable :: position(:, :), normal(:, :), velocity(:, :), force(:, :)
-    real(dp) :: place(3)
-    integer :: b, nd, n
+    real(dp), allocatable :: position(:, :), normal(:, :), velocity(:, :), force(:, :), axes(:, :)
+    real(dp) :: place(3), along(3, 3)
+    integer :: b, d, nd, n
 
     nd = simulation%decomposition%nd
     associate (boundaries => simulation%decomposition%boundaries)
@@ -61,12 +62,24 @@ contains
     call table%add_reals("normal", "", normal)
     call table%add_reals("velocity", "m/s, rad/s", velocity)
     call table%add_reals("force", "N", force)
+    associate (boundaries => simulation%decomposition%boundaries)
+      if (.not. has_facets(boundaries)) return
+      allocate (axes(nd*nd, n), source=0.0_dp)
+      do b = 1, n
+        if (.not. boundaries(b)%is_faceted()) cycle
+        call boundaries(b)%surface%find_axes(along)
+        do d = 1, nd
+          axes(nd*(d - 1) + 1:nd*d, b) = along(1:nd, d)
+        end do
+      end do
+    end associate
+    call table%add_reals("axes", "", axes)
   end subroutine collect_boundaries
 
   !> Bodies that the contacts of this rank's subdomains act on and that can move, boundaries included, one item a copy: the table
-  !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), the diagonal of
-  !> M, `load` f = M v_f and `velocity` of the last solve, each of nv components, and `inertia`, the entries xy, xz and yz of M among
-  !> spins in space, where bodies have shapes.
+  !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), the diagonal
+  !> of M, `load` f = M v_f and `velocity` of the last solve, each of nv components, and `inertia`, the entries xy, xz and yz of M
+  !> among spins in space, where bodies have shapes.
   subroutine collect_problem_bodies(problem, table)
     type(contact_problem_t), intent(in) :: problem
     type(field_list_t), intent(out) :: table
@@ -104,7 +117,8 @@ contains
     if (size(inertia, 1) > 0) call table%add_reals("inertia", "kg m^2", inertia)
   end subroutine collect_problem_bodies
 
-  !> The inertia of body `b` in space, which may have a shape, and the load on its spin; of one that cannot turn, what is there stays.
+  !> The inertia of body `b` in space, which may have a shape, and the load on its spin; of one that cannot turn, what is there
+  !> stays.
   pure subroutine take_inertia(sub, b, diagonal, inertia, load)
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: b

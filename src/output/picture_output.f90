@@ -1,5 +1,5 @@
-!> The files of a run for ParaView: bodies.vtkhdf, a point a grain or, where bodies have shapes, their polygons, and
-!> contacts.vtkhdf, a line a contact.
+!> The files of a run for ParaView: bodies.vtkhdf, a point a grain or, where bodies have shapes, their polygons; contacts.vtkhdf, a
+!> line a contact; and, where boundaries have facets, boundaries.vtkhdf, a triangle or line a facet, once where none of them moves.
 module gravier_picture_output
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -9,7 +9,9 @@ module gravier_picture_output
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_body_collector, only: collect_bodies
+  use gravier_pair_places, only: has_facets
   use gravier_body_polygons, only: draw_polygons
+  use gravier_facet_tables, only: draw_facets, count_facets, facets_move
   use gravier_contact_collector, only: collect_contacts
   use gravier_output, only: output_t, of_states
   implicit none
@@ -18,7 +20,9 @@ module gravier_picture_output
 
   type, extends(output_t) :: picture_output_t
     private
-    type(vtkhdf_file_t) :: bodies, contacts
+    type(vtkhdf_file_t) :: bodies, contacts, facets
+    !> the facets are to be written with this state
+    logical :: facets_due = .false.
   contains
     procedure, nopass :: wanted => picture_output_wanted
     procedure :: open => picture_output_open
@@ -26,7 +30,8 @@ module gravier_picture_output
     procedure :: finish => picture_output_finish
   end type picture_output_t
 
-  character(len=*), parameter :: bodies_name = "bodies.vtkhdf", contacts_name = "contacts.vtkhdf"
+  character(len=*), parameter :: bodies_name = "bodies.vtkhdf", contacts_name = "contacts.vtkhdf", &
+    & facets_name = "boundaries.vtkhdf"
   !> what is asked of contacts
   character(len=16), parameter :: contact_fields(5) = [character(len=16) :: points_name, "normal_force", "tangential_force", &
     & "gap", "status"]
@@ -58,6 +63,12 @@ contains
       bodies = max(simulation%n_grains, 1_i8)
       call draw_bodies(simulation, table)
       call open_one(self%bodies, simulation, directory//bodies_name, table, states*bodies, error)
+      if (has_facets(simulation%decomposition%boundaries)) then
+        call draw_facets(simulation, table)
+        self%facets_due = facets_move(simulation) .or. .not. simulation%restarted
+        call open_one(self%facets, simulation, directory//facets_name, table, merge(states, 1_i8, facets_move(simulation))* &
+          & count_facets(simulation%decomposition%boundaries, .false.), error)
+      end if
       if (.not. output%contacts) return
       ! a dense packing has about two contacts a disk, three a sphere
       call describe_contacts(table)
@@ -96,6 +107,11 @@ contains
     end associate
     call draw_bodies(simulation, table)
     call self%bodies%write_step(simulation%step, simulation%time, table, error)
+    if (self%facets_due) then
+      call draw_facets(simulation, table)
+      call self%facets%write_step(simulation%step, simulation%time, table, error)
+      self%facets_due = facets_move(simulation)
+    end if
     if (.not. (simulation%config%output%contacts .and. allocated(simulation%problem%sub))) return
     call collect_contacts(simulation, contact_fields, table)
     call self%contacts%write_step(simulation%step, simulation%time, table, error)
@@ -107,6 +123,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     call self%bodies%close(error)
+    call self%facets%close(error)
     call self%contacts%close(error)
   end subroutine picture_output_finish
 

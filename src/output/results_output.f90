@@ -12,6 +12,8 @@ module gravier_results_output
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_body_collector, only: collect_bodies, collect_boundaries
   use gravier_shape_tables, only: describe_shapes
+  use gravier_pair_places, only: has_facets
+  use gravier_facet_tables, only: describe_facets
   use gravier_contact_collector, only: collect_contacts
   use gravier_output, only: output_t, of_states
   implicit none
@@ -44,7 +46,7 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: directory, command
     type(error_t), allocatable, intent(inout) :: error
-    type(field_list_t) :: boundaries
+    type(field_list_t) :: boundaries, facets
     type(field_list_t), allocatable :: shapes(:)
 
     self%stage = of_states
@@ -58,6 +60,10 @@ contains
       & simulation%config%scene%dimension, error)
     call describe_boundaries(simulation, boundaries)
     call self%file%write_table(boundaries, error)
+    if (has_facets(simulation%decomposition%boundaries)) then
+      call describe_facets(simulation, facets)
+      call self%file%write_table(facets, error)
+    end if
     if (.not. simulation%effects%shapes) return
     call describe_shapes(simulation%decomposition%shapes, simulation%decomposition%nd, shapes)
     call self%file%write_tables(shapes, error)

@@ -3,6 +3,7 @@ module gravier_start_lines
   use gravier_kinds, only: i8
   use gravier_text, only: to_text
   use gravier_communicator, only: mpi_library
+  use gravier_boundary, only: boundary_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_simulation, only: simulation_t
@@ -40,11 +41,28 @@ contains
         & "effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.)//newline// &
         & "off         "//effects_text(simulation%effects, .false.)//newline// &
         & "unknowns    "//cost_text(simulation)//newline
+      text = text//mesh_lines(decomposition%boundaries)
       if (config%solver%sleeping) text = text//"sleeping    contacts of bodies at rest for "//to_text(config%solver%sleep_after)// &
         & " steps leave the sweeps; the residual is that of all contacts"//newline
     end associate
     text = text//"options in force"//newline
   end function start_lines
+
+  !> A line for each boundary that has facets.
+  function mesh_lines(boundaries) result(text)
+    type(boundary_t), intent(in) :: boundaries(:)
+    character(len=:), allocatable :: text
+    integer :: b
+
+    text = ""
+    do b = 1, size(boundaries)
+      if (.not. boundaries(b)%is_faceted()) cycle
+      text = text//"mesh        '"//boundaries(b)%name//"': "//to_text(boundaries(b)%surface%n_facets())//" facets"
+      if (boundaries(b)%surface%n_left_out() > 0) text = text//"; "//to_text(boundaries(b)%surface%n_left_out())// &
+        & " more are left out, which have no area"
+      text = text//newline
+    end do
+  end function mesh_lines
 
   !> How space is divided.
   function boxes_text(simulation) result(text)

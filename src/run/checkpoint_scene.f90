@@ -105,7 +105,7 @@ contains
     at = at + length + 1
   end subroutine next_line
 
-  !> The options in force that must not change, a line each, and what tells contents of tables apart.
+  !> The options in force that must not change, a line each, and what tells contents of tables and meshes apart.
   function fixed_options(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
@@ -128,7 +128,10 @@ contains
       & library_digest(simulation%decomposition%shapes))
     call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
     do b = 1, size(simulation%config%boundaries)
-      call add_table(simulation%decomposition%boundaries(simulation%n_walls + b)%table, trim(simulation%config%boundaries(b)%table))
+      associate (boundary => simulation%decomposition%boundaries(simulation%n_walls + b), given => simulation%config%boundaries(b))
+        call add_table(boundary%table, trim(given%table))
+        if (boundary%is_faceted()) call add_contents(trim(given%file), boundary%surface%digest())
+      end associate
     end do
 
   contains

@@ -13,6 +13,7 @@ module gravier_simulation
   use gravier_repartition, only: repartition_rule_t, divide
   use gravier_boundary_loads, only: set_glued_velocities
   use gravier_sleeping, only: sleeping_rule_t
+  use gravier_pair_places, only: has_facets
   use gravier_impulse_memory, only: memory_of
   use gravier_time_stepper, only: time_stepper_t, step_figures_t
   use gravier_config_types, only: config_t
@@ -169,7 +170,7 @@ contains
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)
       self%halo%memory = memory_of(self%problem%kernels, self%config%solver%warm_start, scene%laws%remembers, &
-        & self%sleeping%after > 0)
+        & self%sleeping%after > 0, scene%effects%shapes .or. has_facets(scene%boundaries))
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)

@@ -127,8 +127,7 @@ contains
     do k = 1, size(scene%boundaries)
       associate (boundary => scene%boundaries(k))
         far_off = maxval(abs(boundary%pivot))
-        if (allocated(boundary%surface)) far_off = max(far_off, maxval(abs(boundary%surface%point)), &
-          & maxval(abs(boundary%surface%edge)), boundary%surface%radius)
+        if (allocated(boundary%surface)) far_off = max(far_off, boundary%surface%far_off())
         call check("boundary '"//boundary%name//"'", far_off)
       end associate
     end do

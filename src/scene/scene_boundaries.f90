@@ -6,6 +6,7 @@ module gravier_scene_boundaries
   use gravier_communicator, only: communicator_t
   use gravier_bodies_file, only: bodies_data_t
   use gravier_surface_registry, only: make_surface
+  use gravier_mesh_file, only: read_mesh
   use gravier_boundary, only: boundary_t, drive_names
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_config_surfaces, only: set_surface
@@ -50,6 +51,7 @@ contains
         boundary%id = last_id + b
         call set_boundary(config%boundaries(b), nd, boundary)
         boundary%material = material_number(config, config%boundaries(b)%material)
+        if (boundary%is_faceted()) call read_facets(trim(config%boundaries(b)%file), nd, boundary, error)
         if (config%boundaries(b)%table /= "") call boundary%table%read(trim(config%boundaries(b)%table), drive_names(nd), error)
       end associate
     end do
@@ -60,6 +62,25 @@ contains
       if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
     end do
   end subroutine make_boundaries
+
+  !> Read the facets of a boundary. Failures (status_input): as of read_mesh; no facet with an area or, in 2D, a length.
+  subroutine read_facets(path, nd, boundary, error)
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: nd
+    type(boundary_t), intent(inout) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), allocatable :: facet(:, :, :)
+
+    if (allocated(error)) return
+    call read_mesh(path, nd, facet, error)
+    if (allocated(error)) then
+      error%message = "boundary '"//boundary%name//"': file: "//error%message
+      return
+    end if
+    call boundary%surface%take_facets(facet)
+    if (boundary%surface%n_facets() == 0) call raise(error, status_input, "boundary '"//boundary%name//"': file: "//path// &
+      & ": expected a facet with "//trim(merge("a length", "an area ", nd == 2)))
+  end subroutine read_facets
 
   !> Refuse a table with a column that would do nothing, or that turns what forces move.
   subroutine check_table(boundary, nd, path, error)

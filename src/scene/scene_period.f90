@@ -18,7 +18,7 @@ module gravier_scene_period
 contains
 
   !> Refuse boundaries that are not the same one period farther: planes across a periodic axis, what turns an endless surface
-  !> across one, finite shapes and turning glued grains that take more than a period. Glued grains of this rank are checked.
+  !> across one, finite shapes, meshes and turning glued grains that take more than a period. Glued grains of this rank are checked.
   subroutine check_in_period(config, scene, reach, error)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
@@ -56,6 +56,11 @@ contains
       real(dp) :: width
 
       width = 2.0_dp*boundary%half_width(d)
+      if (features%faceted .and. .not. boundary%turns()) then
+        if (width > (1.0_dp + straight)*scene%period%length(d)) call refuse(boundary, "a width of at most the period of "// &
+          & to_text(scene%period%length(d), 4)//" m, here "//to_text(width, 4)//" m, along")
+        return
+      end if
       if (.not. features%encloses) width = width + reach
       if (width > scene%period%length(d)) call refuse(boundary, "a width, with a diameter of the largest grain "// &
         & "and the range of the lists, of at most the period of "//to_text(scene%period%length(d), 4)//" m, here "// &

@@ -3,7 +3,6 @@ module gravier_start_overlap
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_periodic, only: shift_of_code
   use gravier_neighbour_rule, only: neighbour_rule_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_pair_points, only: pair_points_t
@@ -90,13 +89,16 @@ contains
     real(dp) :: branch(simulation%decomposition%nd), distance, smaller
     type(pair_points_t) :: points
     type(shape_work_t) :: work
-    integer :: i, j, shift(3)
+    logical :: has_points
+    integer :: i, j
 
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     associate (bodies => view%bodies, decomposition => simulation%decomposition)
       overlap%id(1) = bodies%id(i)
-      if (decomposition%no > 0) then
+      has_points = decomposition%no > 0
+      if (j < 0) has_points = has_points .or. decomposition%boundaries(-j)%is_faceted()
+      if (has_points) then
         if (j < 0) then
           if (decomposition%boundaries(-j)%remove_at <= simulation%time) return
         end if
@@ -119,10 +121,7 @@ contains
         return
       end if
       branch(:) = bodies%position(:, i) - bodies%position(:, j)
-      if (size(view%list%shift) > 0) then
-        shift(:) = shift_of_code(view%list%shift(p))
-        branch(:) = branch - shift(1:size(branch))*decomposition%period%length(1:size(branch))
-      end if
+      if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
       overlap%share = (bodies%radius(i) + bodies%radius(j) - norm2(branch))/min(bodies%radius(i), bodies%radius(j))
       overlap%id(2) = bodies%id(j)
       overlap%boundary = max(bodies%glued(i), bodies%glued(j))

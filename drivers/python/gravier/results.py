@@ -170,12 +170,26 @@ class Run:
         return self._split(self._group(step, "bodies"))
 
     def boundaries(self, step=None):
-        """id, name, shape, position, normal, velocity, spin, force."""
+        """id, name, shape, position, normal, velocity, spin, force and, where some have facets, axes (n, d, d), a row each."""
         rows = self._split(self._group(step, "boundaries"))
         with self._open() as file:
             for key in ("name", "shape"):
                 rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
+        if "axes" in rows:
+            rows["axes"] = rows["axes"].reshape(-1, self.dimension, self.dimension)
         return rows
+
+    def facets(self, step=None):
+        """Facets of mesh walls where they are: boundary (its id) and corners (n, d, d), a row a corner [m]; None where there are none."""
+        with self._open() as file:
+            if "facets" not in file:
+                return None
+            boundary, corners = (self._values(file[f"facets/{key}"]) for key in ("boundary", "corners"))
+        rows = self.boundaries(step)
+        row = {number: k for k, number in enumerate(rows.id)}
+        of = np.array([row[number] for number in boundary], dtype=int)
+        corners = corners.reshape(-1, self.dimension, self.dimension)
+        return Table({"boundary": boundary, "corners": corners @ rows.axes[of] + rows.position[of][:, None, :]})
 
     def contacts(self, step=None):
         """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s] and, where bodies have shapes, point (n, d), the place
@@ -334,6 +348,10 @@ class BodiesFile(Run):
                                                    normal=np.zeros((0, self.dimension)))
         return Table(id=rows.id, name=np.array([f"wall {number}" for number in rows.id], dtype=str), shape=np.full(len(rows), "plane"),
                      position=rows.point, normal=rows.normal)
+
+    def facets(self, step=None):
+        """None: a bodies file has no mesh walls."""
+        self.find_step(step)
 
     def contacts(self, step=None):
         """None: a bodies file has no contacts."""

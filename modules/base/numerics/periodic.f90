@@ -12,6 +12,7 @@ module gravier_periodic
   contains
     procedure :: on => period_on
     procedure :: wrap => period_wrap
+    procedure :: add_shift => period_add_shift
   end type period_t
 
   !> code of the shift by no period
@@ -40,6 +41,22 @@ contains
       x(d) = inside
     end do
   end subroutine period_wrap
+
+  !> Move a place, or a way, by the shift of a code times `sense`.
+  pure subroutine period_add_shift(self, code, sense, x)
+    class(period_t), intent(in) :: self
+    integer, intent(in) :: code
+    !> 1, or -1 for the opposite way
+    integer, intent(in) :: sense
+    !> (nd) [m]
+    real(dp), intent(inout) :: x(:)
+    integer :: shift(3), d
+
+    shift(:) = shift_of_code(code)
+    do d = 1, size(x)
+      x(d) = x(d) + sense*shift(d)*self%length(d)
+    end do
+  end subroutine period_add_shift
 
   !> The image of `x` in [origin, origin + period), also after rounding, and the whole periods between: `x` is about
   !> inside + turns*period. A coordinate more than 2^30 periods away has turns +-huge(1); one that is not a number goes to

@@ -6,6 +6,7 @@ module gravier_boundary
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_time_table, only: time_table_t
   use gravier_surface, only: surface_t
+  use gravier_facet, only: near_facets_t
   use gravier_surface_registry, only: glued_grains
   implicit none
   private
@@ -54,6 +55,8 @@ module gravier_boundary
     procedure :: lets_out => boundary_lets_out
     procedure :: is_plane => boundary_is_plane
     procedure :: is_glued => boundary_is_glued
+    procedure :: is_faceted => boundary_is_faceted
+    procedure :: find_facets => boundary_find_facets
     procedure :: find_place => boundary_find_place
     procedure :: is_driven => boundary_is_driven
     procedure :: is_moved => boundary_is_moved
@@ -129,6 +132,14 @@ contains
     class(boundary_t), intent(in) :: self
     boundary_is_glued = .not. allocated(self%surface)
   end function boundary_is_glued
+
+  !> Whether it is made of facets, so that a grain may touch it in several points; while it is there or not.
+  pure logical function boundary_is_faceted(self)
+    class(boundary_t), intent(in) :: self
+
+    boundary_is_faceted = allocated(self%surface)
+    if (boundary_is_faceted) boundary_is_faceted = self%surface%is%faceted
+  end function boundary_is_faceted
 
   !> Whether forces move it.
   pure logical function boundary_is_driven(self)
@@ -225,8 +236,38 @@ contains
     normal(:) = away(1:size(x))
   end subroutine boundary_locate
 
-  !> The corners of a surface that ends, in order around it, from a point: two of a segment, four of a rectangle; none of what goes on
-  !> for ever or is round.
+  !> The facets within `reach` of a point, seen from there; none of a surface that is not faceted. One that does not turn may be as
+  !> wide as the period, so that its images are looked at as well. In 2D facets that continue each other are one.
+  pure subroutine boundary_find_facets(self, x, reach, near)
+    class(boundary_t), intent(in) :: self
+    !> (nd) [m]
+    real(dp), intent(in) :: x(:)
+    !> [m]
+    real(dp), intent(in) :: reach
+    !> what it held is lost
+    type(near_facets_t), intent(inout) :: near
+    real(dp) :: image(3), from(3)
+    integer :: images(3), i, j, k
+
+    near%n = 0
+    call find_image(self, x, image)
+    images(:) = merge(1, 0, self%period > 0.0_dp .and. .not. self%turns())
+    do k = -images(3), images(3)
+      do j = -images(2), images(2)
+        do i = -images(1), images(1)
+          from(1) = image(1) + i*self%period(1)
+          from(2) = image(2) + j*self%period(2)
+          from(3) = image(3) + k*self%period(3)
+          from(:) = from - self%surface%point
+          call self%surface%find_facets(from, reach, near)
+        end do
+      end do
+    end do
+    if (size(x) == 2) call near%join_lines()
+  end subroutine boundary_find_facets
+
+  !> The corners of a surface that ends, in order around it, from a point: two of a segment, four of a rectangle; none of what goes
+  !> on for ever, is round or has facets.
   pure subroutine boundary_find_corners(self, x, n, corners)
     class(boundary_t), intent(in) :: self
     !> (nd) [m]
@@ -238,7 +279,8 @@ contains
 
     n = 0
     corners(:, :) = 0.0_dp
-    if (self%surface%is%endless .or. .not. any(abs(self%surface%edge) > 0.0_dp)) return
+    if (self%surface%is%endless .or. self%surface%is%faceted) return
+    if (.not. any(abs(self%surface%edge) > 0.0_dp)) return
     call find_image(self, x, from)
     n = merge(2, 4, .not. any(abs(self%surface%edge(:, 2)) > 0.0_dp))
     corners(:, 1) = self%surface%point - from

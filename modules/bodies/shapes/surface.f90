@@ -1,7 +1,8 @@
 !> What the surface of a boundary is: its place, its keys in the input, and the answers that contacts, lists and checks ask of it.
 module gravier_surface
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_declared_keys, only: declared_key_t
+  use gravier_facet, only: near_facets_t
   implicit none
   private
   public :: surface_t, surface_features_t, point_key, set_direction, is_vector, facing
@@ -12,7 +13,7 @@ module gravier_surface
   !> the key that all shapes have
   type(declared_key_t), parameter :: point_key = declared_key_t("point", "3*0", "", "m", &
     & "a point of a plane, of an outlet or of the axis of a cylinder, "// &
-    & "the first end of a segment, a corner of a rectangle, the centre of a circle", 3)
+    & "the first end of a segment, a corner of a rectangle, the centre of a circle, the origin of the file of a mesh", 3)
 
   !> What holds for all surfaces of a shape.
   type :: surface_features_t
@@ -30,6 +31,8 @@ module gravier_surface
     logical :: endless_axis = .false.
     !> grains are inside
     logical :: encloses = .false.
+    !> it is made of facets that a file has: a grain may touch it in several points
+    logical :: faceted = .false.
   end type surface_features_t
 
   !> A surface where it is now. Its vectors move and turn with the boundary; in 2D their third component is 0. A shape that needs
@@ -50,6 +53,15 @@ module gravier_surface
     procedure(surface_keys), deferred, nopass :: keys
     procedure(surface_set), deferred :: set
     procedure(surface_locate), deferred :: locate
+    procedure :: take_facets => surface_take_facets
+    procedure :: find_facets => surface_find_facets
+    procedure :: find_box => surface_find_box
+    procedure :: n_facets => surface_n_facets
+    procedure :: n_left_out => surface_n_left_out
+    procedure :: get_facet => surface_get_facet
+    procedure :: find_axes => surface_find_axes
+    procedure :: far_off => surface_far_off
+    procedure :: digest => surface_digest
     procedure :: find_middle => surface_find_middle
     procedure :: half_width => surface_half_width
     procedure :: way => surface_way
@@ -91,6 +103,105 @@ module gravier_surface
   end interface
 
 contains
+
+  !> Take the facets of a file; without effect on a shape that is not faceted.
+  subroutine surface_take_facets(self, corner)
+    class(surface_t), intent(inout) :: self
+    !> (3, 2 or 3 by the dimension, facets) [unit of the file]
+    real(dp), intent(in), contiguous :: corner(:, :, :)
+
+    associate (unused_self => self, unused => corner)
+    end associate
+  end subroutine surface_take_facets
+
+  !> Add the facets that are within `reach` of a point to those found; a shape that is not faceted has none.
+  pure subroutine surface_find_facets(self, from, reach, near)
+    class(surface_t), intent(in) :: self
+    !> from the point of the surface [m]
+    real(dp), intent(in) :: from(3)
+    !> [m]
+    real(dp), intent(in) :: reach
+    !> seen from the point asked about
+    type(near_facets_t), intent(inout) :: near
+
+    associate (unused_self => self, unused_from => from, unused_reach => reach, unused_near => near)
+    end associate
+  end subroutine surface_find_facets
+
+  !> Corners between which a surface that ends lies, but for its radius.
+  pure subroutine surface_find_box(self, n, corner)
+    class(surface_t), intent(in) :: self
+    integer, intent(out) :: n
+    !> the first n [m]
+    real(dp), intent(out) :: corner(3, 8)
+    integer :: k
+
+    n = 4
+    corner(:, :) = 0.0_dp
+    do k = 0, 3
+      corner(:, k + 1) = self%point
+      if (k == 1 .or. k == 3) corner(:, k + 1) = corner(:, k + 1) + self%edge(:, 1)
+      if (k >= 2) corner(:, k + 1) = corner(:, k + 1) + self%edge(:, 2)
+    end do
+  end subroutine surface_find_box
+
+  !> Facets that the surface has, 0 of a shape that is not faceted.
+  pure integer function surface_n_facets(self) result(n)
+    class(surface_t), intent(in) :: self
+
+    associate (unused => self)
+    end associate
+    n = 0
+  end function surface_n_facets
+
+  !> Facets of the file that the surface does not have, since they have no area or, in 2D, no length.
+  pure integer function surface_n_left_out(self) result(n)
+    class(surface_t), intent(in) :: self
+
+    associate (unused => self)
+    end associate
+    n = 0
+  end function surface_n_left_out
+
+  !> Where the corners of facet `k` are; without effect on a shape that is not faceted.
+  pure subroutine surface_get_facet(self, k, corner)
+    class(surface_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> (3, 2 or 3) [m]
+    real(dp), intent(inout) :: corner(:, :)
+
+    associate (unused_self => self, unused_k => k, unused => corner)
+    end associate
+  end subroutine surface_get_facet
+
+  !> The axes of the file of a faceted shape as they lie now, one a column; the global ones for other shapes.
+  pure subroutine surface_find_axes(self, axes)
+    class(surface_t), intent(in) :: self
+    real(dp), intent(out) :: axes(3, 3)
+    integer :: d
+
+    associate (unused => self)
+    end associate
+    axes(:, :) = 0.0_dp
+    do d = 1, 3
+      axes(d, d) = 1.0_dp
+    end do
+  end subroutine surface_find_axes
+
+  !> Largest coordinate or length of the surface [m].
+  pure real(dp) function surface_far_off(self) result(far_off)
+    class(surface_t), intent(in) :: self
+    far_off = max(maxval(abs(self%point)), maxval(abs(self%edge)), self%radius)
+  end function surface_far_off
+
+  !> A number that tells the contents of the file of a faceted shape from others; 0 without one.
+  pure integer(i8) function surface_digest(self) result(digest)
+    class(surface_t), intent(in) :: self
+
+    associate (unused => self)
+    end associate
+    digest = 0
+  end function surface_digest
 
   !> Middle of a surface that ends [m].
   pure subroutine surface_find_middle(self, middle)

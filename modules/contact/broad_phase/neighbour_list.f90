@@ -11,7 +11,8 @@ module gravier_neighbour_list
     integer :: n_impulse = 0
     !> rows of the states that laws with a memory give pairs, and of the steps at rest, where contacts may sleep; 0 for none
     integer :: law_row = 0, rest_row = 0
-    !> where bodies have shapes: the first of two rows of the key that tells a point of a pair from its others, 0 for no point
+    !> where bodies have shapes or boundaries facets: the first of two rows of the key that tells a point of a pair from its others,
+    !> 0 for no point
     integer :: key_row = 0
     !> entries of the elongation of a tangential spring, 0 where no contact yields
     integer :: n_spring = 0
@@ -20,8 +21,8 @@ module gravier_neighbour_list
     procedure :: words => pair_memory_words
   end type pair_memory_t
 
-  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. A pair of bodies that may touch
-  !> in several points stands there as often, one time after the other.
+  !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. A pair of bodies that may
+  !> touch in several points stands there as often, one time after the other.
   !> The impulses of the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
   !> global axes. So does the elongation of the tangential spring, as a number in 2D, in 3D as a vector in global axes.
   type :: neighbour_list_t
@@ -45,6 +46,7 @@ module gravier_neighbour_list
     procedure :: add => neighbour_list_add
     procedure :: finish => neighbour_list_finish
     procedure :: points_of => neighbour_list_points_of
+    procedure :: begins => neighbour_list_begins
     procedure :: keeps => neighbour_list_keeps
     procedure :: n_kept => neighbour_list_n_kept
   end type neighbour_list_t
@@ -134,6 +136,17 @@ contains
       points = points + 1
     end do
   end function neighbour_list_points_of
+
+  !> Whether a pair begins at place `p`, so that the place before is one of another pair.
+  pure logical function neighbour_list_begins(self, p) result(begins)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p
+
+    begins = p == 1
+    if (begins) return
+    begins = self%candidate(p - 1) /= self%candidate(p) .or. self%antagonist(p - 1) /= self%antagonist(p)
+    if (size(self%shift) > 0 .and. .not. begins) begins = self%shift(p - 1) /= self%shift(p)
+  end function neighbour_list_begins
 
   !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses, elongations and states to zero.
   subroutine neighbour_list_finish(self, order, memory)

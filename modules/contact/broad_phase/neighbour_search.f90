@@ -4,12 +4,14 @@ module gravier_neighbour_search
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
-  use gravier_periodic, only: period_t, no_shift, shift_code, shift_of_code
+  use gravier_periodic, only: period_t, no_shift, shift_code
   use gravier_body_store, only: body_set_t
-  use gravier_shape_library, only: point_counts_t, boundary_number
+  use gravier_shape_library, only: point_counts_t
+  use gravier_facet, only: near_facets_t
   use gravier_boundary, only: boundary_t
   use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
+  use gravier_pair_places, only: has_facets, repeat_pairs
   use gravier_neighbour_rule, only: neighbour_rule_t, owner_point
   use gravier_region, only: region_t
   implicit none
@@ -171,6 +173,7 @@ contains
     type(neighbour_list_t), intent(inout) :: list
     integer :: k, b
     real(dp) :: distance, normal(bodies%nd), range(size(self%boundaries))
+    type(near_facets_t) :: near
 
     do b = 1, size(self%boundaries)
       range(b) = self%rule%alert_distance + self%rule%margin(norm2(self%boundaries(b)%velocity))
@@ -179,6 +182,11 @@ contains
       if (owned(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
       do b = 1, size(self%boundaries)
         if (.not. self%boundaries(b)%touches()) cycle
+        if (self%boundaries(b)%is_faceted()) then
+          call self%boundaries(b)%find_facets(bodies%position(:, k), extent(k) + range(b), near)
+          if (near%n > 0) call list%add(k, -b, no_shift)
+          cycle
+        end if
         call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)
         if (distance - extent(k) <= range(b)) call list%add(k, -b, no_shift)
       end do
@@ -311,7 +319,7 @@ contains
     real(dp), allocatable :: point(:, :)
     integer, allocatable :: order(:)
     real(dp) :: antagonist(bodies%nd), lower(bodies%nd)
-    integer :: p, nd, shift(3)
+    integer :: p, nd
 
     nd = bodies%nd
     allocate (id(2, list%n), point(nd, list%n), order(list%n))
@@ -323,45 +331,17 @@ contains
       else
         id(2, p) = bodies%id(list%antagonist(p))
         antagonist(:) = bodies%position(:, list%antagonist(p))
-        if (self%period%on()) then
-          shift(:) = shift_of_code(list%shift(p))
-          antagonist(:) = antagonist + shift(1:nd)*self%period%length(1:nd)
-        end if
+        if (self%period%on()) call self%period%add_shift(list%shift(p), 1, antagonist)
         point(:, p) = owner_point(self%rule%kind, bodies%position(:, list%candidate(p)), antagonist)
       end if
     end do
     lower(:) = 0.0_dp
     if (list%n > 0) lower(:) = minval(point, dim=2)
     call sweep_order(point, lower, self%rule%sweep_edge(), id, order)
-    if (bodies%no > 0) call repeat_pairs(self%counts, bodies, list, order)
+    if (bodies%no > 0 .or. has_facets(self%boundaries)) call repeat_pairs(self%counts, self%boundaries, self%rule, bodies, &
+      & list, order)
     call list%finish(order, memory)
   end subroutine sort_list
-
-  !> Let each pair stand in the order as often as its bodies may touch in points.
-  subroutine repeat_pairs(counts, bodies, list, order)
-    type(point_counts_t), intent(in) :: counts
-    type(body_set_t), intent(in) :: bodies
-    type(neighbour_list_t), intent(in) :: list
-    !> of the pairs
-    integer, allocatable, intent(inout) :: order(:)
-    integer, allocatable :: longer(:), points(:)
-    integer :: k, p, n, antagonist
-
-    allocate (points(list%n))
-    do p = 1, list%n
-      antagonist = boundary_number
-      if (list%antagonist(p) > 0) antagonist = bodies%shape(list%antagonist(p))
-      points(p) = counts%between(bodies%shape(list%candidate(p)), antagonist)
-    end do
-    allocate (longer(sum(points)))
-    n = 0
-    do k = 1, size(order)
-      p = order(k)
-      longer(n + 1:n + points(p)) = p
-      n = n + points(p)
-    end do
-    call move_alloc(longer, order)
-  end subroutine repeat_pairs
 
   !> Class of a radius: the grid whose cells are as large as its pairs need.
   pure integer function level_of(radius, largest) result(level)

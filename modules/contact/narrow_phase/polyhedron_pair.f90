@@ -1,8 +1,8 @@
 !> Contacts of two rounded convex pieces in space, and of a piece and a half-space.
 !>
-!> The normal is the direction of the shortest way between the cores, which is continuous in their places. Where both pieces lie along
-!> the plane of contact with a face or an edge, the contact is a patch: the common part of both, seen along the normal. Neither face is
-!> the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
+!> The normal is the direction of the shortest way between the cores, which is continuous in their places. Where both pieces lie
+!> along the plane of contact with a face or an edge, the contact is a patch: the common part of both, seen along the normal.
+!> Neither face is the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
 module gravier_polyhedron_pair
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
@@ -16,7 +16,8 @@ module gravier_polyhedron_pair
   use gravier_manifold, only: manifold_t, feature_base
   implicit none
   private
-  public :: find_polyhedron_manifold, find_halfspace_manifold
+  public :: find_polyhedron_manifold, find_halfspace_manifold, find_patch
+  public :: make_frame, needs_exact, largest_face, number_of, same_gap
 
   real(dp), parameter :: unturned(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
   real(dp), parameter :: origin(3) = 0.0_dp
@@ -24,7 +25,7 @@ module gravier_polyhedron_pair
   !> difference
   real(dp), parameter :: deeper = 0.02_dp
   !> points whose gaps differ by less than this part of the roundings are equally deep
-  real(dp), parameter :: same = 0.01_dp
+  real(dp), parameter :: same_gap = 0.01_dp
 
 contains
 
@@ -102,7 +103,7 @@ contains
         exact%key = number_of(a, feature_a)*feature_base + number_of(b, feature_b)
         call add_point(exact, alert, scale, n, point)
       end if
-      call fill_manifold(frame, scale, same*sum(rounding), most, n, point, manifold)
+      call fill_manifold(frame, scale, same_gap*sum(rounding), most, n, point, manifold)
     end associate
   end subroutine find_patch
 
@@ -168,8 +169,8 @@ contains
     end associate
   end subroutine find_tangents
 
-  !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the plane,
-  !> and all other vertices that are near enough. Keys are those of the piece's vertices.
+  !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the
+  !> plane, and all other vertices that are near enough. Keys are those of the piece's vertices.
   pure subroutine find_halfspace_manifold(a, radius, normal, distance, alert, most, manifold)
     type(convex_piece_t), intent(in) :: a
     !> what the lengths of the piece are multiplied by [m]
@@ -218,7 +219,7 @@ contains
     do k = 1, m
       call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
     end do
-    call fill_manifold(frame, radius, same*radius*a%rounding, most, n, point, manifold)
+    call fill_manifold(frame, radius, same_gap*radius*a%rounding, most, n, point, manifold)
     do k = 1, manifold%n
       manifold%cores_overlap = manifold%cores_overlap .or. manifold%gap(k) < -radius*a%rounding
     end do

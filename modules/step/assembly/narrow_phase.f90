@@ -2,7 +2,6 @@
 !> their laws.
 module gravier_narrow_phase
   use gravier_kinds, only: dp
-  use gravier_periodic, only: period_t, shift_of_code
   use gravier_contact_spring, only: spring_t
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
@@ -63,23 +62,25 @@ contains
     found%n_awake = found%n
   end subroutine find_contacts
 
-  !> The contacts of disks or spheres: one a pair.
+  !> The contacts of disks or spheres: one a pair, but for boundaries of facets, of which a grain may touch several.
   subroutine find_round_contacts(view, decomposition, physics, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
+    type(shape_work_t) :: work
     integer :: p, i, j, nd
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
+    call work%init(nd)
     do p = 1, view%list%n
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
       if (j > 0) then
         branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
-        if (size(view%list%shift) > 0) call shift_back(decomposition%period, view%list%shift(p), branch)
+        if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
         if (is_far(view%list, p, gap, alert)) cycle
@@ -92,6 +93,10 @@ contains
         end if
       else
         if (.not. decomposition%boundaries(-j)%present) cycle
+        if (decomposition%boundaries(-j)%is_faceted()) then
+          if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, work, found)
+          cycle
+        end if
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
         gap = distance - view%bodies%radius(i)
         if (is_far(view%list, p, gap, alert)) cycle
@@ -99,6 +104,27 @@ contains
       call add_contact(view, decomposition, physics, p, gap, normal, found)
     end do
   end subroutine find_round_contacts
+
+  !> The contacts of a disk or a sphere with a boundary of facets, whose pair begins at place `p`.
+  subroutine find_facet_contacts(view, decomposition, physics, p, work, found)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    type(shape_work_t), intent(inout) :: work
+    type(contact_list_t), intent(inout) :: found
+    type(pair_points_t) :: points
+    real(dp) :: normal(decomposition%nd)
+    integer :: k
+
+    call find_points(view, decomposition, p, work, points)
+    call carry_memory(points, p, view%list)
+    do k = 1, points%n
+      normal(:) = points%normal(1:size(normal), k)
+      call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found)
+    end do
+    found%overlapping_cores = found%overlapping_cores + points%overlapping_cores
+  end subroutine find_facet_contacts
 
   !> The contacts of bodies with shapes: a pair has as many places in the list as it may have points.
   subroutine find_contacts_of_shapes(view, decomposition, physics, found)
@@ -223,19 +249,5 @@ contains
       place = round_place(view, found%source(f), found%gap(f), found%normal(:, f))
     end if
   end function place_of
-
-  !> Take the shift of the antagonist into account in the way from it to the candidate.
-  pure subroutine shift_back(period, code, branch)
-    type(period_t), intent(in) :: period
-    integer, intent(in) :: code
-    !> (nd) [m]
-    real(dp), intent(inout) :: branch(:)
-    integer :: shift(3), d
-
-    shift(:) = shift_of_code(code)
-    do d = 1, size(branch)
-      branch(d) = branch(d) - shift(d)*period%length(d)
-    end do
-  end subroutine shift_back
 
 end module gravier_narrow_phase

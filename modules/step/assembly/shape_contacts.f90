@@ -1,17 +1,17 @@
 !> The points in which two bodies touch, or a body and a boundary, where bodies have shapes.
 module gravier_shape_contacts
   use gravier_kinds, only: dp
-  use gravier_periodic, only: period_t, shift_of_code
-  use gravier_orientation, only: orientation_matrix
   use gravier_convex_piece, only: convex_piece_t
   use gravier_shape_library, only: shape_library_t, of_face
-  use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold
   use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
+  use gravier_facet, only: near_facets_t
+  use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
+  use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets
   use gravier_pair_points, only: pair_points_t
   implicit none
   private
@@ -20,23 +20,14 @@ module gravier_shape_contacts
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
 
-  !> A body, seen from the centre of the candidate.
-  type :: seen_body_t
-    !> number of its shape, 0 for a disk or a sphere
-    integer :: shape = 0
-    !> [m]
-    real(dp) :: radius = 0.0_dp
-    !> its centre (3) [m]
-    real(dp) :: centre(3) = 0.0_dp
-    !> its angle in the plane [rad], its axes in space, one a column
-    real(dp) :: angle = 0.0_dp, axes(3, 3) = 0.0_dp
-  end type seen_body_t
-
-  !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, and room for two placed pieces of the plane.
+  !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for two placed pieces of the plane, and for
+  !> facets.
   type :: shape_work_t
     private
     type(convex_piece_t) :: ball
     type(placed_piece_t) :: a, b
+    type(near_facets_t) :: near, turned
+    type(facet_contacts_t) :: facets
   contains
     procedure :: init => shape_work_init
   end type shape_work_t
@@ -76,7 +67,7 @@ contains
     associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
       if (j > 0) then
         way(:) = bodies%position(:, j) - bodies%position(:, i)
-        if (size(view%list%shift) > 0) call add_shift(decomposition%period, view%list%shift(p), way)
+        if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), 1, way)
         if (norm2(way) > bodies%radius(i) + bodies%radius(j) + alert) return
         call see_body(bodies, i, candidate)
         call see_body(bodies, j, antagonist)
@@ -92,26 +83,6 @@ contains
     end associate
     call points%keep_deepest(view%list%points_of(p))
   end subroutine find_points
-
-  !> What contacts need of body `k`.
-  pure subroutine see_body(bodies, k, seen)
-    type(body_set_t), intent(in) :: bodies
-    integer, intent(in) :: k
-    type(seen_body_t), intent(out) :: seen
-    integer :: d
-
-    seen%shape = bodies%shape(k)
-    seen%radius = bodies%radius(k)
-    do d = 1, 3
-      seen%axes(d, d) = 1.0_dp
-    end do
-    if (seen%shape == 0) return
-    if (bodies%nd == 2) then
-      seen%angle = bodies%orientation(1, k)
-    else
-      call orientation_matrix(bodies%orientation(:, k), seen%axes)
-    end if
-  end subroutine see_body
 
   !> The points of two bodies, piece by piece.
   subroutine touch_body(shapes, a, b, nd, alert, work, points)
@@ -175,26 +146,7 @@ contains
     call turn_manifold(a%axes, manifold)
   end subroutine meet_in_space
 
-  !> From the axes of a body to global axes.
-  pure subroutine turn_manifold(axes, manifold)
-    real(dp), intent(in) :: axes(3, 3)
-    type(manifold_t), intent(inout) :: manifold
-    real(dp) :: before(3)
-    integer :: k, d
-
-    before(:) = manifold%normal
-    do d = 1, 3
-      manifold%normal(d) = sum(axes(d, :)*before)
-    end do
-    do k = 1, manifold%n
-      before(:) = manifold%point(:, k)
-      do d = 1, 3
-        manifold%point(d, k) = sum(axes(d, :)*before)
-      end do
-    end do
-  end subroutine turn_manifold
-
-  !> The points with a boundary: a plane, a surface that ends at straight edges, or one that is round.
+  !> The points with a boundary: a plane, a surface that ends at straight edges, one that is round, or one of facets.
   subroutine touch_boundary(shapes, a, centre, boundary, alert, work, points)
     type(shape_library_t), intent(in) :: shapes
     type(seen_body_t), intent(in) :: a
@@ -210,6 +162,18 @@ contains
     integer :: k, n
 
     if (.not. boundary%present) return
+    if (boundary%is_faceted()) then
+      call boundary%find_facets(centre, a%radius + alert, work%near)
+      do k = 1, n_pieces(shapes, a)
+        if (work%near%n == 0) exit
+        if (a%shape == 0) then
+          call touch_facets(work%ball, a, k, size(centre), alert, work, points)
+        else
+          call touch_facets(shapes%shape(a%shape)%piece(k), a, k, size(centre), alert, work, points)
+        end if
+      end do
+      return
+    end if
     call boundary%locate(centre, distance, normal)
     if (distance - a%radius > alert) return
     call boundary%find_corners(centre, n, corners)
@@ -240,6 +204,34 @@ contains
     end subroutine touch
 
   end subroutine touch_boundary
+
+  !> The points of a piece with the facets near its body.
+  subroutine touch_facets(piece, a, number, nd, alert, work, points)
+    type(convex_piece_t), intent(in) :: piece
+    type(seen_body_t), intent(in) :: a
+    !> of the piece
+    integer, intent(in) :: number, nd
+    real(dp), intent(in) :: alert
+    type(shape_work_t), intent(inout) :: work
+    type(pair_points_t), intent(inout) :: points
+    real(dp) :: centre(3)
+    integer :: k
+
+    if (size(piece%vertex, 2) == 1) then
+      call turn_vertex(piece%vertex(:, 1), a, centre)
+      call find_ball_contacts(centre, a%radius*piece%rounding, work%near, alert, work%facets)
+    else if (nd == 2) then
+      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), work%a)
+      call find_polygon_contacts(work%a, work%near, alert, work%facets)
+    else
+      call turn_facets(a%axes, work%near, work%turned)
+      call find_polyhedron_contacts(piece, a%radius, work%turned, alert, of_face, work%facets)
+    end if
+    do k = 1, work%facets%n
+      if (nd == 3 .and. size(piece%vertex, 2) > 1) call turn_manifold(a%axes, work%facets%manifold(k))
+      call points%add(work%facets%manifold(k), number, mod(work%facets%facet(k), feature_base))
+    end do
+  end subroutine touch_facets
 
   subroutine touch_plane(piece, a, normal, distance, alert, placed, manifold)
     type(convex_piece_t), intent(in) :: piece
@@ -333,25 +325,6 @@ contains
 
   end subroutine touch_round_surface
 
-  !> A vertex of a body from its centre, in global axes [m].
-  pure subroutine turn_vertex(vertex, a, turned)
-    !> (nd) of a body of radius 1
-    real(dp), intent(in) :: vertex(:)
-    type(seen_body_t), intent(in) :: a
-    real(dp), intent(out) :: turned(3)
-    integer :: d
-
-    turned(3) = 0.0_dp
-    if (size(vertex) == 2) then
-      turned(1) = a%radius*(cos(a%angle)*vertex(1) - sin(a%angle)*vertex(2))
-      turned(2) = a%radius*(sin(a%angle)*vertex(1) + cos(a%angle)*vertex(2))
-    else
-      do d = 1, 3
-        turned(d) = a%radius*sum(a%axes(d, :)*vertex)
-      end do
-    end if
-  end subroutine turn_vertex
-
   pure integer function n_pieces(shapes, seen) result(n)
     type(shape_library_t), intent(in) :: shapes
     type(seen_body_t), intent(in) :: seen
@@ -423,19 +396,5 @@ contains
       end associate
     end if
   end subroutine place
-
-  !> Take the shift of the antagonist into account in the way from the candidate to it.
-  pure subroutine add_shift(period, code, way)
-    type(period_t), intent(in) :: period
-    integer, intent(in) :: code
-    !> (nd) [m]
-    real(dp), intent(inout) :: way(:)
-    integer :: shift(3), d
-
-    shift(:) = shift_of_code(code)
-    do d = 1, size(way)
-      way(d) = way(d) + shift(d)*period%length(d)
-    end do
-  end subroutine add_shift
 
 end module gravier_shape_contacts

@@ -4,7 +4,6 @@ module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort_rows
-  use gravier_periodic, only: shift_of_code
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
@@ -23,15 +22,16 @@ module gravier_impulse_memory
 contains
 
   !> What pairs have to keep.
-  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest) result(memory)
+  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest, has_points) result(memory)
     type(kernels_t), intent(in) :: kernels
-    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted
-    logical, intent(in) :: warm_start, remembers, counts_rest
+    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted; pairs may touch in several
+    !> points
+    logical, intent(in) :: warm_start, remembers, counts_rest, has_points
 
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
     memory%law_row = merge(1, 0, remembers)
     if (counts_rest) memory%rest_row = memory%law_row + 1
-    if (kernels%row%arm_i > 0) memory%key_row = memory%n_states() + 1
+    if (has_points) memory%key_row = memory%n_states() + 1
     if (kernels%row%compliance_t > 0) memory%n_spring = merge(1, 3, kernels%nd == 2)
   end function memory_of
 
@@ -179,7 +179,7 @@ contains
     type(local_bodies_t), intent(in) :: view
     integer(i8), intent(inout), contiguous :: records(:, :)
     real(dp) :: point(decomposition%nd), candidate(decomposition%nd), antagonist(decomposition%nd)
-    integer :: p, n, d, shift(3)
+    integer :: p, n, d
 
     n = 0
     associate (list => view%list, position => view%bodies%position)
@@ -189,12 +189,7 @@ contains
         point(:) = position(:, list%candidate(p))
         if (list%antagonist(p) > 0) then
           antagonist(:) = position(:, list%antagonist(p))
-          if (size(list%shift) > 0) then
-            shift(:) = shift_of_code(list%shift(p))
-            do d = 1, decomposition%nd
-              antagonist(d) = antagonist(d) + shift(d)*decomposition%period%length(d)
-            end do
-          end if
+          if (size(list%shift) > 0) call decomposition%period%add_shift(list%shift(p), 1, antagonist)
           candidate(:) = point
           point(:) = owner_point(decomposition%rule%kind, candidate, antagonist)
         end if

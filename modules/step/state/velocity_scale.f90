@@ -103,8 +103,8 @@ contains
     type(boundary_t), intent(in) :: boundaries(:)
     !> (boundaries) [m]
     real(dp), intent(out) :: lever(:)
-    real(dp) :: place(3)
-    integer :: b, k
+    real(dp) :: place(3), corner(3, 8)
+    integer :: b, k, n
 
     lever(:) = 0.0_dp
     do b = 1, size(boundaries)
@@ -119,9 +119,9 @@ contains
           end do
         else
           associate (surface => boundary%surface)
-            do k = 0, 3
-              place(:) = surface%point + mod(k, 2)*surface%edge(:, 1) + (k/2)*surface%edge(:, 2)
-              lever(b) = max(lever(b), arm(boundary, place) + surface%radius)
+            call surface%find_box(n, corner)
+            do k = 1, n
+              lever(b) = max(lever(b), arm(boundary, corner(:, k)) + surface%radius)
             end do
           end associate
         end if

@@ -18,7 +18,7 @@ program test_config
   character(len=*), parameter :: positive = "expected a finite real number > 0"
   character(len=*), parameter :: third = "expected a third component of 0 where dimension = 2"
   character(len=*), parameter :: plane_keys = " shape = 'plane' normal = 0, 1 "
-  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder' or 'grains'"
+  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder', 'mesh' or 'grains'"
 
   call MPI_Init()
   call test_whole_file()
@@ -942,12 +942,12 @@ contains
     call refuse(column // plane // "&boundary shap = 'plane' /", "unknown key 'shap' in &boundary; did you mean 'shape'?")
     call refuse(column // "&boundry /", "unknown group &boundry; did you mean &boundary?")
     call refuse(column // plane // "&boundary name = 'b' /", "&boundary (the 2nd, 'b') shape is missing: expected 'plane', " &
-      // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet' or 'grains'")
+      // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet', 'mesh' or 'grains'")
     many = column
     do i = 1, 21
       many = many // plane
       if (i == 3) call refuse(many // "&boundary name = '' /", "&boundary (the 4th, '') shape is missing: expected 'plane', " &
-        // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet' or 'grains'")
+        // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet', 'mesh' or 'grains'")
       if (i == 10) call refuse(many // "&boundary group = a /", "&boundary (the 11th) group = a: expected an integer >= 1")
     end do
     call refuse(many // "&boundary group = a /", "&boundary (the 22nd) group = a: expected an integer >= 1")
@@ -955,8 +955,8 @@ contains
 
   !> Each shape in its dimension, and not in the other.
   subroutine test_shapes()
-    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'outlet' or 'grains' where dimension = 2"
-    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'outlet' or 'grains' where dimension = 3"
+    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'outlet', 'mesh' or 'grains' where dimension = 2"
+    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'outlet', 'mesh' or 'grains' where dimension = 3"
     character(len=*), parameter :: file = "&scene bodies = 'file' bodies_file = 'a.h5' /" // time
     character(len=*), parameter :: space = "&scene bodies = 'file' bodies_file = 'a.h5' dimension = 3 /" // time
     character(len=*), parameter :: segment = "&boundary shape = 'segment' end = 1, 1 /"
@@ -1000,7 +1000,7 @@ contains
     call refuse_without("shape = 'cylinder' axis(1) = 1", "radius", positive // " (m), required by shape = 'cylinder'")
     call refuse_without("shape = 'grains'", "group", "expected an integer >= 1, required by shape = 'grains'")
     call refuse_foreign("grains", "group = 1", "point(1) = 1", &
-      "'plane', 'segment', 'rectangle', 'circle', 'cylinder' or 'outlet'")
+      "'plane', 'segment', 'rectangle', 'circle', 'cylinder', 'outlet' or 'mesh'")
     call refuse_foreign("circle", "radius = 1", "normal(1) = 1", "'plane' or 'outlet'")
     call refuse_foreign("plane", "normal(1) = 1", "end(1) = 1", "'segment'")
     call refuse_foreign("plane", "normal(1) = 1", "edge_a = 0, 1", "'rectangle'")

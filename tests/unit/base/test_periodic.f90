@@ -3,7 +3,7 @@ program test_periodic
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_periodic, only: wrap, shift_code, shift_of_code, no_shift
+  use gravier_periodic, only: period_t, wrap, shift_code, shift_of_code, no_shift
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -13,6 +13,7 @@ program test_periodic
   call test_far()
   call test_random()
   call test_codes()
+  call test_shift()
   call finish_checks()
   call MPI_Finalize()
 
@@ -102,5 +103,22 @@ contains
     call check(within, "inside the period")
     call check(same, "whole periods away")
   end subroutine test_random
+
+  !> Places go forth and back by whole periods, along periodic axes alone.
+  subroutine test_shift()
+    type(period_t) :: period
+    real(dp) :: place(3)
+    integer :: shift(3)
+
+    period%length(:) = [2.0_dp, 0.0_dp, 8.0_dp]
+    shift(:) = [1, 0, -1]
+    place(:) = [0.5_dp, 0.25_dp, 1.0_dp]
+    call period%add_shift(shift_code(shift), 1, place)
+    call check(all(abs(place - [2.5_dp, 0.25_dp, -7.0_dp]) <= 0.0_dp), "a place that is shifted")
+    call period%add_shift(shift_code(shift), -1, place(1:2))
+    call check(all(abs(place - [0.5_dp, 0.25_dp, -7.0_dp]) <= 0.0_dp), "one of the plane that is shifted back")
+    call period%add_shift(no_shift, 1, place)
+    call check(all(abs(place - [0.5_dp, 0.25_dp, -7.0_dp]) <= 0.0_dp), "no shift")
+  end subroutine test_shift
 
 end program test_periodic

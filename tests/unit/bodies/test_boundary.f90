@@ -196,7 +196,7 @@ contains
     call check(b%is_glued() .and. b%shape_name() == "grains", "a boundary without a surface")
     call check(.not. (b%touches() .or. b%lets_out() .or. b%is_plane()), "glued grains have no surface to touch")
     call registered_surfaces(surfaces)
-    call check_equal(size(surfaces), 6, "registered shapes")
+    call check_equal(size(surfaces), 7, "registered shapes")
     do k = 1, size(surfaces)
       features = surfaces(k)%surface%features()
       call make_surface(trim(features%kind), b%surface)

@@ -34,7 +34,7 @@ contains
 
     call registered_surfaces(surfaces)
     call surface_keys(collected)
-    call check(collected%kinds == "plane segment rectangle circle cylinder outlet", "words of the shapes")
+    call check(collected%kinds == "plane segment rectangle circle cylinder outlet mesh", "words of the shapes")
     call check(index(" "//trim(collected%kinds)//" ", " "//glued_grains//" ") == 0, "glued grains are no surface")
     do k = 1, size(surfaces)
       features = surfaces(k)%surface%features()

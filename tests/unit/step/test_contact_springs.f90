@@ -34,7 +34,7 @@ contains
     type(pair_memory_t) :: memory
 
     call problem%kernels%choose(dimension, effects_t(friction=.true., compliance=.true.))
-    memory = memory_of(problem%kernels, .true., .false., .false.)
+    memory = memory_of(problem%kernels, .true., .false., .false., .false.)
     call check_equal(memory%n_spring, merge(1, 3, dimension == 2), "entries of an elongation")
     allocate (problem%sub(1), halo%view(1))
     associate (sub => problem%sub(1), kernels => problem%kernels, row => problem%kernels%row, list => halo%view(1)%list)

@@ -1,0 +1,197 @@
+!> Which facets of a wall a convex piece touches, among those that it is near to.
+!>
+!> A piece touches a wall where its core is locally nearest to the union of the facets. The point of a facet that is nearest to the
+!> core is such a place if no other facet that has the point rises from it along the normal: the normal then lies in the normal cone
+!> of each of them (R. T. Rockafellar, Convex Analysis, 1970, theorem 27.4, for each pair of convex sets). A side or a corner inside
+!> a flat part of the wall, or in a hollow, is therefore no place of contact, and one that sticks out is one place, however many
+!> facets have it.
+module gravier_facet_candidates
+  use gravier_kinds, only: dp
+  use gravier_facet, only: near_facets_t, find_foot, longest_side
+  implicit none
+  private
+  public :: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
+
+  !> places nearer to each other than this part of the rounding, with normals that differ by less, are one
+  real(dp), parameter :: same = 1.0e-6_dp
+  !> distances that differ by less than this part of the rounding may be equal: facets that lie along the plane of contact come
+  !> first
+  real(dp), parameter :: equal = 1.0e-9_dp
+  !> gaps between facets are rounding of the file where they are less than this part of the rounding of a piece
+  real(dp), parameter :: narrow_gap = 1.0e-3_dp
+
+  !> A place where a piece may touch a facet.
+  type :: facet_candidate_t
+    !> of the facet among those near
+    integer :: place = 0
+    !> of the core [m]; below 0 where it overlaps the facet
+    real(dp) :: distance = 0.0_dp
+    !> the normal is that of the facet
+    logical :: lies_along = .false.
+    !> unit vector from the facet to the piece, and the point of the facet [m]
+    real(dp) :: normal(3) = 0.0_dp, foot(3) = 0.0_dp
+    !> it is no place of contact, or one that was seen to
+    logical :: dropped = .false.
+  end type facet_candidate_t
+
+  !> Candidates, the nearest first once they are sorted.
+  type :: facet_candidates_t
+    integer :: n = 0
+    type(facet_candidate_t), allocatable :: item(:)
+    !> numbers of the items in the order of their distances (n)
+    integer, allocatable :: order(:)
+  contains
+    procedure :: clear => facet_candidates_clear
+    procedure :: add => facet_candidates_add
+    procedure :: sort => facet_candidates_sort
+    procedure :: drop_hidden => facet_candidates_drop_hidden
+    procedure :: drop_repeated => facet_candidates_drop_repeated
+  end type facet_candidates_t
+
+contains
+
+  !> Distance below which points of two facets are one, for a piece of some rounding [m].
+  pure real(dp) function tolerance_for(near, rounding) result(tolerance)
+    type(near_facets_t), intent(in) :: near
+    !> [m]
+    real(dp), intent(in) :: rounding
+    tolerance = min(near%tolerance, narrow_gap*rounding)
+  end function tolerance_for
+
+  !> Forget all candidates, and have room for so many.
+  pure subroutine facet_candidates_clear(self, room)
+    class(facet_candidates_t), intent(inout) :: self
+    integer, intent(in) :: room
+
+    self%n = 0
+    if (allocated(self%item)) then
+      if (size(self%item) >= room) return
+      deallocate (self%item, self%order)
+    end if
+    allocate (self%item(2*room + 8), self%order(2*room + 8))
+  end subroutine facet_candidates_clear
+
+  pure subroutine facet_candidates_add(self, candidate)
+    class(facet_candidates_t), intent(inout) :: self
+    type(facet_candidate_t), intent(in) :: candidate
+
+    self%n = self%n + 1
+    self%item(self%n) = candidate
+  end subroutine facet_candidates_add
+
+  !> Find the order of the candidates: by distance, those along the plane of contact first where distances may be equal, then by the
+  !> numbers of their facets.
+  pure subroutine facet_candidates_sort(self, near, rounding)
+    class(facet_candidates_t), intent(inout) :: self
+    type(near_facets_t), intent(in) :: near
+    !> of the piece [m]
+    real(dp), intent(in) :: rounding
+    real(dp) :: value(self%n)
+    integer :: k, l, kept
+
+    do k = 1, self%n
+      value(k) = self%item(k)%distance
+      if (.not. self%item(k)%lies_along) value(k) = value(k) + equal*rounding
+    end do
+    do k = 1, self%n
+      kept = k
+      l = k
+      do while (l > 1)
+        if (.not. is_before(kept, self%order(l - 1))) exit
+        self%order(l) = self%order(l - 1)
+        l = l - 1
+      end do
+      self%order(l) = kept
+    end do
+
+  contains
+
+    pure logical function is_before(a, b)
+      integer, intent(in) :: a, b
+
+      is_before = value(a) < value(b)
+      if (.not. is_before .and. .not. value(b) < value(a)) &
+        & is_before = near%number(self%item(a)%place) < near%number(self%item(b)%place)
+    end function is_before
+
+  end subroutine facet_candidates_sort
+
+  !> Drop candidates from whose points a facet rises that is nearer to the piece. The first candidate stays.
+  pure subroutine facet_candidates_drop_hidden(self, near, tolerance, slack)
+    !> sorted
+    class(facet_candidates_t), intent(inout) :: self
+    type(near_facets_t), intent(in) :: near
+    !> of tolerance_for [m]
+    real(dp), intent(in) :: tolerance
+    !> rise at and below which a facet counts as flat, in parts of its longest side
+    real(dp), intent(in) :: slack
+    integer :: k, l
+
+    do k = 2, self%n
+      associate (item => self%item(self%order(k)))
+        do l = 1, k - 1
+          item%dropped = rises(near%corner(:, :, self%item(self%order(l))%place), item, tolerance, slack)
+          if (item%dropped) exit
+        end do
+      end associate
+    end do
+  end subroutine facet_candidates_drop_hidden
+
+  !> Whether a facet has the point of a candidate and rises from there along its normal.
+  pure logical function rises(corner, item, tolerance, slack)
+    !> (3, 2 or 3) [m]
+    real(dp), intent(in), contiguous :: corner(:, :)
+    type(facet_candidate_t), intent(in) :: item
+    real(dp), intent(in) :: tolerance, slack
+    real(dp) :: height
+    integer :: c
+
+    height = -huge(1.0_dp)
+    do c = 1, size(corner, 2)
+      height = max(height, dot_product(item%normal, corner(:, c) - item%foot))
+    end do
+    rises = .false.
+    if (height <= tiny(1.0_dp)) return
+    if (height > slack*longest_side(corner)) rises = has_point(corner, item%foot, tolerance)
+  end function rises
+
+  !> Whether a facet has a point.
+  pure logical function has_point(corner, point, tolerance)
+    !> (3, 2 or 3) [m]
+    real(dp), intent(in), contiguous :: corner(:, :)
+    real(dp), intent(in) :: point(3)
+    !> distance below which the point is on the facet [m]
+    real(dp), intent(in) :: tolerance
+    real(dp) :: from(3, size(corner, 2)), foot(3)
+    integer :: c, where_foot_is
+
+    do c = 1, size(corner, 2)
+      from(:, c) = corner(:, c) - point
+    end do
+    call find_foot(from, foot, where_foot_is)
+    has_point = dot_product(foot, foot) <= tolerance**2
+  end function has_point
+
+  !> Drop candidates that are one with another: a point of a side or corner that several facets have.
+  pure subroutine facet_candidates_drop_repeated(self, rounding)
+    !> sorted
+    class(facet_candidates_t), intent(inout) :: self
+    !> [m]
+    real(dp), intent(in) :: rounding
+    integer :: k, l
+
+    do k = 2, self%n
+      associate (item => self%item(self%order(k)))
+        do l = 1, k - 1
+          if (item%dropped) exit
+          associate (other => self%item(self%order(l)))
+            if (other%dropped) cycle
+            if (maxval(abs(item%foot - other%foot)) > same*rounding) cycle
+            item%dropped = maxval(abs(item%normal - other%normal)) <= same
+          end associate
+        end do
+      end associate
+    end do
+  end subroutine facet_candidates_drop_repeated
+
+end module gravier_facet_candidates

@@ -1,0 +1,279 @@
+!> Contacts of a convex piece with facets of a wall that are near it, in the plane and in space. The facets have two sides and no
+!> thickness.
+module gravier_facet_contacts
+  use gravier_kinds, only: dp
+  use gravier_facet, only: near_facets_t, find_foot, find_facet_normal, within
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
+  use gravier_core_overlap, only: find_least_separation
+  use gravier_polygon_pair, only: placed_piece_t, find_polygon_manifold
+  use gravier_polyhedron_pair, only: find_patch
+  use gravier_flat_patch, only: make_facet_piece, set_facet_piece, lies_flat, find_flat_patch
+  use gravier_facet_candidates, only: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
+  use gravier_manifold, only: manifold_t
+  implicit none
+  private
+  public :: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
+
+  !> Rise of a facet, in parts of its length, at and below which it does not hide a point: rounding for balls. Pieces with sides
+  !> also keep points that they reach by a small turn.
+  real(dp), parameter :: slack_of_balls = 1.0e-10_dp, slack_of_pieces = 1.0e-3_dp
+  !> sine of the angle between the normals of a contact and of a facet within which they are one
+  real(dp), parameter :: aligned = 1.0e-8_dp
+  !> corners of facets are this near to a plane that has them, in parts of the rounding, and over the tolerance of the file
+  real(dp), parameter :: in_plane = 1.0e-2_dp, over_tolerance = 5.0_dp
+  !> cosine of the angle between normals of contacts with one plane
+  real(dp), parameter :: one_side = 0.98_dp
+
+  !> Manifolds, each with one facet or with a flat part of several.
+  type :: facet_contacts_t
+    integer :: n = 0
+    !> number of the facet, or of the nearest of several (n)
+    integer, allocatable :: facet(:)
+    type(manifold_t), allocatable :: manifold(:)
+    type(facet_candidates_t), private :: candidates
+    type(convex_piece_t), private :: sheet
+  contains
+    procedure, private :: add => facet_contacts_add
+  end type facet_contacts_t
+
+contains
+
+  pure subroutine facet_contacts_add(self, facet, manifold)
+    class(facet_contacts_t), intent(inout) :: self
+    integer, intent(in) :: facet
+    type(manifold_t), intent(in) :: manifold
+    integer, allocatable :: longer_facet(:)
+    type(manifold_t), allocatable :: longer(:)
+
+    if (.not. allocated(self%facet)) allocate (self%facet(8), self%manifold(8))
+    if (self%n == size(self%facet)) then
+      allocate (longer_facet(2*self%n), longer(2*self%n))
+      longer_facet(1:self%n) = self%facet
+      longer(1:self%n) = self%manifold
+      call move_alloc(longer_facet, self%facet)
+      call move_alloc(longer, self%manifold)
+    end if
+    self%n = self%n + 1
+    self%facet(self%n) = facet
+    self%manifold(self%n) = manifold
+  end subroutine facet_contacts_add
+
+  !> The contacts of a disk or a ball: one with each facet that it touches within, one with each side or corner that sticks out.
+  pure subroutine find_ball_contacts(centre, radius, near, alert, found)
+    !> [m], from where the facets are seen
+    real(dp), intent(in) :: centre(3)
+    !> [m]
+    real(dp), intent(in) :: radius
+    type(near_facets_t), intent(in) :: near
+    !> largest gap of a contact [m]
+    real(dp), intent(in) :: alert
+    !> what it held is lost
+    type(facet_contacts_t), intent(inout) :: found
+    type(facet_candidate_t) :: candidate
+    type(manifold_t) :: manifold
+    real(dp) :: corner(3, size(near%corner, 2)), foot(3)
+    integer :: k, c, where_foot_is
+
+    found%n = 0
+    call found%candidates%clear(near%n)
+    do k = 1, near%n
+      do c = 1, size(corner, 2)
+        corner(:, c) = near%corner(:, c, k) - centre
+      end do
+      call find_foot(corner, foot, where_foot_is)
+      candidate = facet_candidate_t(place=k, distance=norm2(foot), lies_along=where_foot_is == within)
+      if (candidate%distance - radius > alert) cycle
+      if (candidate%lies_along .or. .not. candidate%distance > 0.0_dp) then
+        call find_facet_normal(corner, candidate%normal)
+        if (dot_product(candidate%normal, foot) > 0.0_dp) candidate%normal(:) = -candidate%normal
+      else
+        candidate%normal(:) = -foot/candidate%distance
+      end if
+      candidate%foot(:) = centre + foot
+      call found%candidates%add(candidate)
+    end do
+    call found%candidates%sort(near, radius)
+    call found%candidates%drop_hidden(near, tolerance_for(near, radius), slack_of_balls)
+    call found%candidates%drop_repeated(radius)
+    do k = 1, found%candidates%n
+      associate (item => found%candidates%item(found%candidates%order(k)))
+        if (item%dropped) cycle
+        manifold%n = 1
+        manifold%normal(:) = item%normal
+        manifold%gap(1) = item%distance - radius
+        manifold%point(:, 1) = item%foot + 0.5_dp*manifold%gap(1)*item%normal
+        manifold%cores_overlap = .not. item%distance > 0.0_dp
+        call found%add(near%number(item%place), manifold)
+      end associate
+    end do
+  end subroutine find_ball_contacts
+
+  !> The contacts of a capsule or a polygon in the plane.
+  subroutine find_polygon_contacts(piece, near, alert, found)
+    !> from where the facets are seen
+    type(placed_piece_t), intent(in) :: piece
+    type(near_facets_t), intent(in) :: near
+    real(dp), intent(in) :: alert
+    !> what it held is lost
+    type(facet_contacts_t), intent(inout) :: found
+    type(placed_piece_t) :: line
+    type(facet_candidate_t) :: candidate
+    type(manifold_t) :: manifold(near%n)
+    integer :: k, c
+
+    found%n = 0
+    call found%candidates%clear(near%n)
+    line%n = 2
+    allocate (line%vertex(2, 2), line%corner(2, 2))
+    do k = 1, near%n
+      line%vertex(:, :) = near%corner(1:2, :, k)
+      line%corner(:, :) = line%vertex
+      call find_polygon_manifold(piece, line, alert, manifold(k))
+      if (manifold(k)%n == 0) cycle
+      candidate = facet_candidate_t(place=k, distance=minval(manifold(k)%gap(1:manifold(k)%n)) + piece%rounding)
+      candidate%lies_along = abs(dot_product(manifold(k)%normal, near%corner(:, 2, k) - near%corner(:, 1, k))) <= &
+        & aligned*norm2(near%corner(:, 2, k) - near%corner(:, 1, k))
+      candidate%normal(:) = manifold(k)%normal
+      ! of two points the middle: the ends of a common part may lie on facets beside this one
+      do c = 1, manifold(k)%n
+        candidate%foot(:) = candidate%foot + (manifold(k)%point(:, c) - 0.5_dp*manifold(k)%gap(c)*manifold(k)%normal)/manifold(k)%n
+      end do
+      call found%candidates%add(candidate)
+    end do
+    call found%candidates%sort(near, piece%rounding)
+    call found%candidates%drop_hidden(near, tolerance_for(near, piece%rounding), slack_of_pieces)
+    do k = 1, found%candidates%n
+      associate (item => found%candidates%item(found%candidates%order(k)))
+        if (.not. item%dropped) call found%add(near%number(item%place), manifold(item%place))
+      end associate
+    end do
+  end subroutine find_polygon_contacts
+
+  !> The contacts of a piece in space that is no ball, in its axes.
+  pure subroutine find_polyhedron_contacts(piece, radius, near, alert, most, found)
+    type(convex_piece_t), intent(in) :: piece
+    !> what the lengths of the piece are multiplied by [m]
+    real(dp), intent(in) :: radius
+    !> in the axes of the piece, from its centre
+    type(near_facets_t), intent(in) :: near
+    real(dp), intent(in) :: alert
+    !> points of a manifold wanted at most
+    integer, intent(in) :: most
+    !> what it held is lost
+    type(facet_contacts_t), intent(inout) :: found
+    type(core_distance_t) :: distance(near%n)
+    type(placed_pair_t) :: pair
+    type(manifold_t) :: manifold
+    real(dp) :: corner(3, 3, near%n)
+    integer :: k, n, pass
+
+    found%n = 0
+    if (.not. allocated(found%sheet%vertex)) call make_facet_piece(found%sheet)
+    pair%radius_a = radius
+    pair%radius_b = radius
+    do k = 1, 3
+      pair%rotation(k, k) = 1.0_dp
+    end do
+    call find_candidates(piece, pair, near, alert, distance, found)
+    call found%candidates%sort(near, radius*piece%rounding)
+    call found%candidates%drop_hidden(near, tolerance_for(near, radius*piece%rounding), slack_of_pieces)
+    ! planes first: they have the sides that they end at
+    do pass = 1, 2
+      do k = 1, found%candidates%n
+        associate (item => found%candidates%item(found%candidates%order(k)))
+          if (item%dropped) cycle
+          call set_facet_piece(near%corner(:, :, item%place), radius, found%sheet)
+          if (lies_flat(found%sheet, distance(item%place)) .neqv. pass == 1) cycle
+          manifold%n = 0
+          manifold%normal(:) = distance(item%place)%normal
+          manifold%cores_overlap = distance(item%place)%overlap
+          if (pass == 1) then
+            call take_plane(near, k, radius*piece%rounding, found, n, corner)
+            call find_flat_patch(piece, radius, distance(item%place), corner(:, :, 1:n), alert, most, manifold)
+          else
+            call find_patch(piece, found%sheet, pair, distance(item%place), alert, most, manifold)
+          end if
+          call found%add(near%number(item%place), manifold)
+        end associate
+      end do
+    end do
+  end subroutine find_polyhedron_contacts
+
+  !> The facets that the core of a piece is near enough to, each with the distance.
+  pure subroutine find_candidates(piece, pair, near, alert, distance, found)
+    type(convex_piece_t), intent(in) :: piece
+    type(placed_pair_t), intent(in) :: pair
+    type(near_facets_t), intent(in) :: near
+    real(dp), intent(in) :: alert
+    type(core_distance_t), intent(inout) :: distance(:)
+    type(facet_contacts_t), intent(inout) :: found
+    type(facet_candidate_t) :: candidate
+    real(dp) :: normal(3), along, reach
+    integer :: k
+
+    call found%candidates%clear(near%n)
+    reach = pair%radius_a*piece%rounding
+    do k = 1, near%n
+      call set_facet_piece(near%corner(:, :, k), pair%radius_b, found%sheet)
+      call find_core_distance(piece, found%sheet, pair, max(0.0_dp, reach + alert), distance(k))
+      if (distance(k)%beyond) cycle
+      if (distance(k)%overlap) call find_least_separation(piece, found%sheet, pair, distance(k))
+      if (distance(k)%distance - reach > alert) cycle
+      normal(:) = found%sheet%face_normal(:, 1)
+      along = dot_product(normal, distance(k)%normal)
+      candidate = facet_candidate_t(place=k, distance=distance(k)%distance)
+      candidate%lies_along = norm2(distance(k)%normal - along*normal) <= aligned
+      if (candidate%lies_along) distance(k)%normal(:) = sign(1.0_dp, along)*normal
+      candidate%normal(:) = distance(k)%normal
+      candidate%foot(:) = distance(k)%point_b
+      call found%candidates%add(candidate)
+    end do
+  end subroutine find_candidates
+
+  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side,
+  !> and nor have others at points of theirs.
+  pure subroutine take_plane(near, first, rounding, found, n, corner)
+    type(near_facets_t), intent(in) :: near
+    !> place of the candidate in the order
+    integer, intent(in) :: first
+    !> of the piece [m]
+    real(dp), intent(in) :: rounding
+    type(facet_contacts_t), intent(inout) :: found
+    integer, intent(out) :: n
+    !> the first n [m]
+    real(dp), intent(out), contiguous :: corner(:, :, :)
+    real(dp) :: normal(3), height, room
+    logical :: is_in_plane(near%n)
+    integer :: k, c, lead
+
+    lead = found%candidates%item(found%candidates%order(first))%place
+    call find_facet_normal(near%corner(:, :, lead), normal)
+    room = min(over_tolerance*near%tolerance, in_plane*rounding)
+    n = 1
+    corner(:, :, 1) = near%corner(:, :, lead)
+    do k = 1, near%n
+      is_in_plane(k) = .true.
+      do c = 1, 3
+        height = dot_product(normal, near%corner(:, c, k) - near%corner(:, 1, lead))
+        is_in_plane(k) = is_in_plane(k) .and. abs(height) <= room
+      end do
+      if (k == lead .or. .not. is_in_plane(k)) cycle
+      n = n + 1
+      corner(:, :, n) = near%corner(:, :, k)
+    end do
+    associate (chosen => found%candidates%item(found%candidates%order(first)))
+      do k = 1, found%candidates%n
+        associate (item => found%candidates%item(k))
+          if (item%dropped .or. item%place == lead .or. dot_product(item%normal, chosen%normal) <= one_side) cycle
+          item%dropped = is_in_plane(item%place)
+          do c = 1, n
+            if (item%dropped) exit
+            item%dropped = has_point(corner(:, :, c), item%foot, tolerance_for(near, rounding))
+          end do
+        end associate
+      end do
+    end associate
+  end subroutine take_plane
+
+end module gravier_facet_contacts

@@ -1,0 +1,313 @@
+"""Mesh walls against the analytic walls that they stand for: planes cut into triangles in any way, corners, edges that stick out, drums
+of chords, boxes on floors, walls that are driven or loaded, floors as wide as the period."""
+import os
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, each, merged, run_case, write
+import gravier
+from mesh_scenes import box, floor, quadrangles, stl_bytes, stl_text, write_line
+from shaped_scenes import body, prepare, shaped_case
+
+G = 9.81
+RADIUS = 0.05
+MESH = {"name": "wall", "shape": "mesh", "file": "wall.stl"}
+LINE = {"name": "wall", "shape": "mesh", "file": "wall.csv"}
+TIGHT = {"solver": {"tolerance": 1e-11, "check_every": 1}}
+
+
+def rotation(seed):
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return turn if np.linalg.det(turn) > 0 else -turn
+
+
+def numbers(vector):
+    return [float(x) for x in vector]
+
+
+class Motion:
+    """What a run left of all bodies and of the contacts; arrays by written state."""
+
+    def __init__(self, run):
+        self.found, self.directory = run.results(), run.path("results")
+        self.steps = sorted({int(name.split("/")[2]) for name in self.found if name.startswith("/steps/") and name.count("/") > 2})
+        self.position = self.all("bodies/position")
+        self.velocity = self.all("bodies/velocity")
+
+    def all(self, name):
+        return np.array([self.found[f"/steps/{step}/{name}"] for step in self.steps])
+
+    def contacts(self, step=-1):
+        return self.found[f"/steps/{self.steps[step]}/contacts/impulse"]
+
+    def most_contacts(self):
+        return max(len(self.contacts(k)) for k in range(1, len(self.steps)))
+
+
+class MeshWalls(RunTestCase):
+
+    def play(self, title, dimension, rows, boundaries, *parts, mesh=None, line=None, ranks=1):
+        """A run of bodies between boundaries, of which one may be a mesh."""
+        directory = prepare(self.here(title), dimension, rows)
+        if mesh is not None:
+            write(os.path.join(directory, "wall.stl"), stl_text(mesh))
+        if line is not None:
+            write_line(os.path.join(directory, "wall.csv"), line)
+        case = shaped_case(dimension, boundaries, {"scene": {"friction": 0.3}, "time": {"step": 1.0 / 512}, "output": {"every": 10}}, TIGHT, *parts)
+        if all(row["shape"] == "grain" for row in rows):
+            del case["scene"]["shapes"]
+        run = run_case(case, ranks, directory)
+        self.assert_status(run, 0)
+        return Motion(run)
+
+    def same(self, one, other, tolerance=1e-11):
+        """The same motion and the same number of contacts."""
+        np.testing.assert_allclose(one.position, other.position, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(one.velocity, other.velocity, rtol=0, atol=100 * tolerance)
+        for k in range(1, len(one.steps)):
+            self.assertEqual(len(one.contacts(k)), len(other.contacts(k)), f"contacts of step {k}")
+
+    @staticmethod
+    def ball(place, velocity=(0.0, 0.0, 0.0)):
+        return body("grain", numbers(place), velocity=numbers(velocity), radius=RADIUS)
+
+    def test_plane(self):
+        """A ball rolls as on a plane over 2, 200 and 20 000 triangles, lying along the axes and turned."""
+        for turn in (np.eye(3), rotation(3)):
+            rows = [self.ball(turn @ [-1.3, -0.9, RADIUS], turn @ [1.5, 1.1, 0.0])]
+            scene = {"scene": {"gravity": numbers(turn @ [0.5, 0.2, -G])}}
+            plane = {"name": "wall", "shape": "plane", "normal": numbers(turn[:, 2])}
+            name = "turned" if turn[0, 0] != 1.0 else "flat"
+            wanted = self.play(f"{name} plane", 3, rows, [plane], scene)
+            for count in (1, 10, 100):
+                with self.subTest(name, triangles=2 * count**2):
+                    self.same(wanted, self.play(f"{name} {count}", 3, rows, [MESH], scene, mesh=floor(count, 2.0, count, turn)), 1e-12)
+
+    def test_single_precision(self):
+        """Triangles of a binary file, which do not lie in one plane by its rounding, carry a ball that rolls along them."""
+        turn = rotation(5)
+        directory = self.here("single")
+        prepare(directory, 3, [self.ball(turn @ [-1.3, -0.9, RADIUS + 1e-6], turn @ [1.5, 1.1, 0.0])])
+        with open(os.path.join(directory, "wall.stl"), "wb") as file:
+            file.write(stl_bytes(floor(40, 2.0, 4, turn)))
+        case = shaped_case(3, [MESH], {"scene": {"friction": 0.3, "gravity": numbers(turn @ [0.0, 0.0, -G])}, "output": {"every": 10},
+                                       "time": {"steps": 300}})
+        del case["scene"]["shapes"]
+        run = run_case(case, 1, directory)
+        self.assert_status(run, 0)
+        motion = Motion(run)
+        height = motion.position[:, 0] @ turn[:, 2] - RADIUS
+        # roundings of 1e-7 m, and what a ball rises over edges of such angles
+        self.assertLess(np.abs(height).max(), 2e-5)
+        rolling = motion.velocity[-1, 0, :3] @ turn
+        # friction takes two sevenths of the sliding velocity
+        np.testing.assert_allclose(rolling, [1.5 * 5 / 7, 1.1 * 5 / 7, 0.0], atol=2e-3)
+
+    def test_corner(self):
+        """In a box of twelve triangles a ball comes to rest in a corner, as between three planes."""
+        rows = [self.ball([0.2, 0.3, 0.25])]
+        scene = {"scene": {"gravity": [-3.0, -2.0, -9.0]}, "time": {"steps": 450}}
+        planes = [{"shape": "plane", "normal": numbers(normal)} for normal in np.eye(3)]
+        wanted = self.play("corner of planes", 3, rows, planes, scene)
+        found = self.play("corner of a box", 3, rows, [MESH], scene, mesh=box([0, 0, 0], [1, 1, 1]))
+        self.same(wanted, found)
+        self.assertEqual(len(found.contacts()), 3)
+        np.testing.assert_allclose(np.sort(found.contacts()[:, 0]), np.sort(wanted.contacts()[:, 0]), rtol=1e-8)
+
+    def test_edge(self):
+        """A ball that rolls slowly over the edge of a table turns about it without slip, and leaves it where nothing presses any more:
+        7/10 v^2 = 7/10 v0^2 + g R (1 - cos) and v^2 = g R cos."""
+        first = 0.15
+        rows = [body("grain", [-0.01, 0.013, RADIUS], velocity=[first, 0.0, 0.0], spin=[0.0, first / RADIUS, 0.0], radius=RADIUS)]
+        table = np.concatenate([floor(4, 0.5, 1, shift=(-0.5, 0.0, 0.0)),
+                                quadrangles(np.array([[[0.0, y, z] for z in (0.0, -0.2, -0.5)] for y in (-0.5, 0.1, 0.5)]))])
+        wanted = (1.0 + 0.7 * first**2 / (G * RADIUS)) / 1.7
+        for halved in (0, 2):
+            motion = self.play(f"edge {halved}", 3, rows, [MESH], {"scene": {"friction": 5.0}, "time": {"step": 2.0**-9 / 2**halved, "steps": 150 * 2**halved},
+                                                                      "output": {"every": 1}}, mesh=table)
+            pressed = [k for k in range(1, len(motion.steps)) if len(motion.contacts(k)) > 0 and motion.contacts(k)[:, 0].max() > 1e-12]
+            self.assertEqual(motion.most_contacts(), 1)
+            last = motion.position[pressed[-1], 0]
+            self.assertGreater(last[0], 0.0)
+            gap = np.hypot(last[0], last[2]) - RADIUS
+            self.assertLess(abs(gap), 2e-4 / 4**halved)
+            # a step turns the ball by 0.02
+            self.assertLess(abs(last[2] / np.hypot(last[0], last[2]) - wanted), 0.02 / 2**halved)
+            np.testing.assert_allclose(motion.position[:, 0, 1], 0.013, atol=1e-12)
+
+    def test_drum_of_chords(self):
+        """A disk that falls into the lowest corner of a polygon has its centre as far from the drum's as R - r/cos(pi/n), which
+        becomes R - r as 1/n^2."""
+        large = 0.4
+        def rest(n):
+            angle = 2.0 * np.pi * (np.arange(n + 1) % n) / n - 0.5 * np.pi
+            line = large * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            rows = [body("grain", [0.0, -0.34], radius=RADIUS)]
+            motion = self.play(f"drum {n}", 2, rows, [LINE], {"scene": {"friction": 0.0}, "time": {"steps": 50}}, line=line)
+            self.assertEqual(len(motion.contacts()), 2)
+            np.testing.assert_allclose(motion.position[-1, 0, 0], 0.0, atol=1e-9)
+            return -motion.position[-1, 0, 1]
+        sides = [8, 16, 32, 64]
+        errors = np.array([large - RADIUS - place for (place,) in each(lambda n: (rest(n),), [(n,) for n in sides])])
+        np.testing.assert_allclose(errors, [RADIUS / np.cos(np.pi / n) - RADIUS for n in sides], rtol=1e-3)
+        np.testing.assert_allclose(errors[:-1] / errors[1:], 4.0, rtol=0.1)
+
+    def test_boxes(self):
+        """A cube at rest, one that slides and one that lies askew in the air stand as on a plane: four points, with the same loads."""
+        scene = {"time": {"steps": 100}, "scene": {"friction": 0.4}}
+        cubes = {"rest": body("cube", [0.013, 0.021, 0.05]), "slide": body("cube", [0.013, 0.021, 0.05], velocity=[1.0, 0.7, 0.0]),
+                 "pill": body("pill", [0.013, 0.021, 0.03], turn=[1.0, 0.0, 1.0, 0.0], velocity=[0.0, 0.2, 0.0])}
+        for title, row in cubes.items():
+            wanted = self.play(f"{title} on a plane", 3, [row], [{"shape": "plane", "normal": [0.0, 0.0, 1.0]}], scene)
+            for count in (1, 7, 40):
+                with self.subTest(title, count=count):
+                    found = self.play(f"{title} on {count}", 3, [row], [MESH], scene, mesh=floor(count, 0.6, count))
+                    self.same(wanted, found)
+                    np.testing.assert_allclose(np.sort(found.contacts()[:, 0]), np.sort(wanted.contacts()[:, 0]), rtol=1e-6)
+        self.assertEqual(len(wanted.contacts()), 2)
+
+    def test_loads_of_a_box(self):
+        """The four points of a cube at rest in the middle of a triangulated floor carry about a quarter of its weight each: balance fixes
+        three sums of the four."""
+        found = self.play("quarters", 3, [body("cube", [0.0, 0.0, 0.05])], [MESH], {"time": {"steps": 20}}, mesh=floor(8, 0.3, 2))
+        force = found.contacts()[:, 0]
+        self.assertEqual(len(force), 4)
+        np.testing.assert_allclose(force, 0.25 * 2500.0 * 0.1**3 * G / 512, rtol=0.02)
+        np.testing.assert_allclose(force.sum(), 2500.0 * 0.1**3 * G / 512, rtol=1e-9)
+
+    def test_squares(self):
+        """The same in the plane, on a line of many points, whose segments become one."""
+        line = [(x, 0.0) for x in np.linspace(-1.0, 1.0, 81)]
+        for title, row in {"rest": body("square", [0.013, 0.05]), "slide": body("square", [0.013, 0.05], velocity=[1.0, 0.0]),
+                           "askew": body("square", [0.013, 0.1], turn=0.3), "disk": body("grain", [0.013, 0.06], velocity=[1.0, 0.0], radius=0.05)}.items():
+            with self.subTest(title):
+                wanted = self.play(f"{title} on a segment", 2, [row], [{"shape": "segment", "point": [-1.0, 0.0], "end": [1.0, 0.0]}])
+                self.same(wanted, self.play(f"{title} on a line", 2, [row], [LINE], line=line))
+
+    def test_drives(self):
+        """A mesh of a rectangle moves as the rectangle does: with a velocity, turning, by a table, by a load."""
+        corner, one, two = np.array([-0.5, -0.4, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.8, 0.0])
+        grid = [[corner + i / 5 * one + j / 4 * two for j in range(5)] for i in range(6)]
+        rectangle = {"name": "wall", "shape": "rectangle", "point": numbers(corner), "edge_a": numbers(one), "edge_b": numbers(two)}
+        rows = [self.ball([0.05, 0.03, RADIUS]), self.ball([-0.2, 0.11, RADIUS + 0.01])]
+        drives = {
+            "velocity": {"velocity": [0.3, 0.1, 0.05]},
+            "rotation": {"rotation": [0.2, 0.5, 1.0], "pivot": [0.1, 0.0, 0.0]},
+            "table": {"table": "drive.csv"},
+            "load": {"free": [False, False, True], "mass": 4.0, "force": [0.0, 0.0, 70.0]},
+        }
+        for title, keys in drives.items():
+            with self.subTest(title):
+                for wall in (rectangle, MESH):
+                    directory = self.here(f"{title} {wall['shape']}")
+                    os.makedirs(directory, exist_ok=True)
+                    write(os.path.join(directory, "drive.csv"), "time,vx,vz\n0,0,0\n0.05,1,0.2\n0.1,-1,-0.2\n0.2,0.5,0\n")
+                scene = {"time": {"steps": 110}}
+                wanted = self.play(f"{title} rectangle", 3, rows, [{**rectangle, **keys}], scene)
+                # the pivot of a rectangle is its corner unless told
+                found = self.play(f"{title} mesh", 3, rows, [{**MESH, **keys}], scene, mesh=quadrangles(np.array(grid)))
+                self.same(wanted, found)
+                np.testing.assert_allclose(found.all("boundaries/force"), wanted.all("boundaries/force"), rtol=0, atol=1e-6)
+                np.testing.assert_allclose(found.all("boundaries/velocity"), wanted.all("boundaries/velocity"), rtol=0, atol=1e-9)
+                if title == "rotation":
+                    self.has_turned(found.directory, np.array(grid), np.array(keys["rotation"]) * 110 / 512, np.array(keys["pivot"]))
+        axes = found.all("boundaries/axes")[:, 0].reshape(-1, 3, 3)
+        np.testing.assert_allclose(axes @ np.transpose(axes, (0, 2, 1)), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)
+
+    def test_laws(self):
+        """Bounces, rolling resistance, liquid bridges and bonds act as on a plane, while a ball goes from facet to facet."""
+        material = {"material": [{"name": "stone"}], "scene": {"wall_material": "stone"}}
+        laws = {
+            "bounce": ([0.0, 0.0, 0.2], [0.7, 0.4, 0.0], {"scene": {"restitution": 0.6, "tangential_restitution": 0.3}}),
+            "rolling": ([0.0, 0.0, RADIUS], [0.7, 0.4, 0.0], {"scene": {"rolling_friction": 0.1}}),
+            "wet": ([0.0, 0.0, RADIUS], [0.7, 0.4, 0.4], {**material, "law": [{"materials": ["stone"], "kind": "capillary", "friction": 0.3,
+                                                                             "capillarity": 20.0, "decay_length": 0.004, "debonding_distance": 0.01}]}),
+            "bond": ([0.0, 0.0, RADIUS], [0.0, 0.0, 0.0], {**material, "scene": {"wall_material": "stone", "gravity": [20.0, 0.0, 5.0]}, "law": [
+                {"materials": ["stone"], "kind": "bonded", "friction": 0.3, "bond_strength": 100.0, "bond_friction": 0.5, "bond_distance": 1e-3}]}),
+        }
+        for title, (place, velocity, part) in laws.items():
+            with self.subTest(title):
+                rows = [self.ball(place, velocity)]
+                part = merged(part, {"time": {"steps": 150}, "solver": {"tolerance": 1e-10}})
+                wanted = self.play(f"{title} on a plane", 3, rows, [{"name": "wall", "shape": "plane", "normal": [0.0, 0.0, 1.0]}], part)
+                self.same(wanted, self.play(f"{title} on a mesh", 3, rows, [MESH], part, mesh=floor(30, 1.0, 6)), 1e-10)
+
+    def has_turned(self, directory, grid, vector, pivot):
+        """The facets that Python shows are where a rotation by a vector brings them."""
+        facets = gravier.Run(directory).facets()
+        angle = np.linalg.norm(vector)
+        u = vector / angle
+        cross = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+        turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+        np.testing.assert_allclose(facets.corners, (quadrangles(grid) - pivot) @ turn.T + pivot, rtol=0, atol=1e-9)
+
+    def test_period(self):
+        """A floor as wide as the period has no seam: balls and cubes cross it as on a plane."""
+        scene = {"scene": {"period": [1.2, 0.0, 0.0], "period_origin": [-0.6, 0.0, 0.0]}, "time": {"steps": 150}}
+        for title, row in {"ball": self.ball([0.4, 0.0, RADIUS], [1.5, 0.0, 0.0]), "cube": body("cube", [0.4, 0.0, 0.05], velocity=[1.5, 0.1, 0.0])}.items():
+            with self.subTest(title):
+                wanted = self.play(f"{title} over a plane", 3, [row], [{"shape": "plane", "normal": [0.0, 0.0, 1.0]}], scene)
+                found = self.play(f"{title} over a seam", 3, [row], [MESH], scene, mesh=floor(5, 0.6))
+                self.same(wanted, found)
+                self.assertTrue(np.any(found.all("bodies/image") != 0))
+
+    def test_rest(self):
+        """A heap of bodies at rest in a bowl of triangles starts its steps from the last ones: few iterations, one manifold at each place."""
+        angle = 2.0 * np.pi * np.arange(25) / 24
+        bowl = np.array([[[radius * np.cos(t), radius * np.sin(t), height] for t in angle]
+                         for radius, height in ((0.02, 0.0), (0.15, 0.03), (0.3, 0.12), (0.4, 0.4))])
+        rows = [self.ball([0.11 * i, 0.11 * j, 0.2 + 0.01 * i]) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        rows += [body("cube", [0.13 * i, 0.13 * j, 0.42], turn=[1.0, 0.2, 0.1 * i, 0.3]) for i in (-0.5, 0.5) for j in (-0.5, 0.5)]
+        directory = prepare(self.here("bowl"), 3, rows)
+        write(os.path.join(directory, "wall.stl"), stl_text(quadrangles(bowl)))
+        case = shaped_case(3, [MESH], {"scene": {"friction": 0.5}, "time": {"step": 2e-3, "steps": 700}, "output": {"every": 100}})
+        run = run_case(case, 1, directory)
+        self.assertIn(run.status, (0, 3), str(run))
+        history = run.history()
+        self.assertLess(np.median(history["iterations"][-100:]), 60)
+        motion = Motion(run)
+        self.assertGreater(motion.position[-1][:, 2].min(), 0.0)
+        self.assertLess(np.abs(motion.velocity[-1][:, :3]).max(), 0.02)
+
+    def test_refused(self):
+        """What no mesh can be is refused in one line with the file, before anything is computed."""
+        rows = [self.ball([0.0, 0.0, RADIUS])]
+        plain = stl_text(floor(1, 1.0))
+        flat = stl_text(np.array([[[0, 0, 0], [1, 0, 0], [2, 0, 0]]], dtype=float))
+        for title, keys, text, wanted in (
+                ("no file", {"file": "other.stl"}, plain, "boundary 'wall': file: other.stl"),
+                ("no key", {"file": None}, plain, "file"),
+                ("ending", {"file": "bodies.csv"}, plain, "expected a path that ends with .stl or .obj in 3D"),
+                ("no area", {}, flat, "expected a facet with an area"),
+                ("scale", {"scale": 0.0}, plain, "scale"),
+                ("number", {}, plain.replace("vertex 1.0", "vertex one", 1), "\"one\", but a number was expected"),
+                ("period", {}, stl_text(floor(1, 1.1)), "a width of at most the period"),
+                ("plane", {"normal": [0.0, 0.0, 1.0]}, plain, "normal")):
+            with self.subTest(title):
+                directory = prepare(self.here(title), 3, rows)
+                write(os.path.join(directory, "wall.stl"), text)
+                wall = {key: value for key, value in {**MESH, **keys}.items() if value is not None}
+                case = shaped_case(3, [wall], {"scene": {"period": [2.0, 0.0, 0.0]}} if title == "period" else {})
+                del case["scene"]["shapes"]
+                run = run_case(case, 1, directory, ["--check"])
+                self.assert_status(run, 2)
+                self.assertIn(wanted, run.stderr)
+                self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
+
+    def test_start_overlap(self):
+        """A ball and a cube that lie in a wall at the start are refused."""
+        for title, row in {"ball": self.ball([0.0, 0.0, 0.2 * RADIUS]), "cube": body("cube", [0.0, 0.0, 0.01])}.items():
+            with self.subTest(title):
+                directory = prepare(self.here(f"in the wall {title}"), 3, [row])
+                write(os.path.join(directory, "wall.stl"), stl_text(floor(3, 1.0)))
+                case = shaped_case(3, [MESH], {"scene": {"start_overlap": 0.1}})
+                if title == "ball":
+                    del case["scene"]["shapes"]
+                run = run_case(case, 1, directory)
+                self.assert_status(run, 2)
+                self.assertIn("body 1 overlaps boundary 'wall'", run.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
