@@ -22,6 +22,7 @@ module gravier_time_stepper
   use gravier_load_areas, only: find_load_areas
   use gravier_problem_builder, only: build_problem
   use gravier_pair_laws, only: conclude_pairs
+  use gravier_contact_springs, only: conclude_springs
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_body_motion, only: move_to_middle, drive, count_fast, move_to_end
   use gravier_velocity_return, only: take_velocities
@@ -59,7 +60,7 @@ module gravier_time_stepper
     integer(i8) :: asleep = 0
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
-    !> [m], 0 where nothing overlaps; [J]
+    !> of rigid contacts [m], 0 where nothing overlaps; [J]
     real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
     !> after a solve that diverged to NaN or infinity: a contact where it did; after one whose impulses grow without bound: the
     !> contact with the largest
@@ -76,8 +77,6 @@ module gravier_time_stepper
     type(effects_t) :: effects
     type(time_table_t) :: gravity_table
     ! ---- how a step is made
-    !> weight of the new velocity in the positions
-    real(dp) :: theta = 0.5_dp
     !> solves start from the impulses of the step before
     logical :: warm_start = .true.
     !> overlap beyond which places are projected; huge where that is off [m]
@@ -153,7 +152,7 @@ contains
     solved = solved_step_of(self, figures)
     call self%diagnostics%take_step(solved)
     call self%balance%take_step(solved)
-    call move_to_end(self%decomposition, self%physics, self%theta, self%n_glued > 0)
+    call move_to_end(self%decomposition, self%physics, self%physics%theta, self%n_glued > 0)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
     shifts = 0.0_dp
@@ -173,7 +172,7 @@ contains
 
     call start_timer(phase_bodies)
     self%physics%first = self%step == 0
-    call move_to_middle(self%decomposition, self%physics, self%theta, self%time, self%n_glued > 0, listed)
+    call move_to_middle(self%decomposition, self%physics, self%physics%theta, self%time, self%n_glued > 0, listed)
     call drive(self%decomposition, self%physics, self%gravity_table, self%time, changed)
     if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%halo)
     figures%fast = count_fast(self%decomposition, self%physics)
@@ -193,9 +192,10 @@ contains
     figures%contacts = self%problem%n_contacts
     figures%asleep = self%problem%n_asleep
     do s = 1, size(self%problem%sub)
-      if (self%problem%sub(s)%n_contacts > 0) figures%max_overlap = max(figures%max_overlap, -minval(self%problem%sub(s)%gap))
+      figures%max_overlap = max(figures%max_overlap, self%problem%sub(s)%overlap(yielding=.false.))
     end do
     figures%max_overlap = self%comm%highest(figures%max_overlap)
+    if (self%physics%laws%yields) call measure_springs(self)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
     if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, &
@@ -209,6 +209,22 @@ contains
     call measure_velocity_scale(self)
   end subroutine time_stepper_assemble
 
+  !> The largest deformation of compliant contacts, and how stiff they are for the step. Collective.
+  subroutine measure_springs(self)
+    class(time_stepper_t), intent(inout) :: self
+    real(dp) :: largest(2)
+    integer :: s
+
+    largest(:) = 0.0_dp
+    do s = 1, size(self%problem%sub)
+      largest(1) = max(largest(1), self%problem%sub(s)%overlap(yielding=.true.))
+      largest(2) = max(largest(2), self%problem%sub(s)%stiffest)
+    end do
+    call self%comm%highest_of(largest)
+    self%tally%deformation = max(self%tally%deformation, largest(1))
+    self%tally%stiffest = max(self%tally%stiffest, largest(2))
+  end subroutine measure_springs
+
   !> From the impulses of a solve to velocities of grains and boundaries, and to what the next step starts from. Collective.
   subroutine take_solution(self, figures)
     class(time_stepper_t), intent(inout) :: self
@@ -217,6 +233,7 @@ contains
     if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
       & self%halo, self%problem)
     if (self%warm_start) call keep_impulses(self%problem, self%halo)
+    if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%halo)
     call take_velocities(self%decomposition, self%physics, self%problem)

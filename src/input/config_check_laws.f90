@@ -92,6 +92,17 @@ contains
                 "'residual' where there is a &law: the exact solution is that of the scene's law")
     if (allocated(error)) return
     call collect_laws(config, laws)
+    do i = 1, size(config%laws)
+      report%instance = i
+      associate (law => laws%of(i)%law)
+        call expect(report, law%fault_key == "", "law", trim(law%fault_key), error, trim(law%fault_expected))
+        call expect(report, config%scene%dimension == 3 .or. .not. law%of_spheres, "law", "kind", error, &
+                    "a law that holds in 2D, as 'elastic': this one is of spheres")
+      end associate
+    end do
+    report%instance = 1
+    call expect(report, config%output%fclib_step == 0 .or. .not. laws%yields, "output", "fclib_step", error, &
+                "none where contacts are compliant: problems of FCLIB have rigid ones")
     call expect(report, config%scene%alert_distance >= laws%range .or. .not. config%scene%alert_given, "scene", &
                 "alert_distance", error, "at least "//to_text(laws%range, 4)//" m, the largest range of a &law")
   end subroutine check_laws
@@ -126,9 +137,20 @@ contains
       holds = .true.
       if (index(keys(k)%allowed, "> 0") == 1) holds = slot%real > 0.0_dp
       if (index(keys(k)%allowed, ">= 0") == 1) holds = slot%real >= 0.0_dp
-      if (keys(k)%allowed == "in [0, 1]") holds = slot%real >= 0.0_dp .and. slot%real <= 1.0_dp
+      if (index(keys(k)%allowed, "in ") == 1) holds = is_within(keys(k)%allowed, slot%real)
       call expect(report, holds, "law", trim(keys(k)%name), error)
     end do
   end subroutine check_values
+
+  !> Whether a number is in the interval of a rule `in [a, b]` or `in (a, b]`.
+  pure logical function is_within(rule, x)
+    character(len=*), intent(in) :: rule
+    real(dp), intent(in) :: x
+    real(dp) :: ends(2)
+
+    read (rule(index(rule, "in ") + 4:len_trim(rule) - 1), *) ends
+    is_within = x >= ends(1) .and. x <= ends(2)
+    if (index(rule, "(") > 0) is_within = is_within .and. x > ends(1)
+  end function is_within
 
 end module gravier_config_check_laws

@@ -75,7 +75,9 @@ contains
       text = "overlaps    in the first step at most "//to_text(tally%start_overlap, 3)//" m, later at most "// &
         & to_text(tally%later_overlap, 3)//" m"
       if (radius > 0.0_dp) text = text//", "//to_text(tally%later_overlap/radius, 2)//" of the mean radius"
+      if (simulation%physics%laws%yields) text = text//", of rigid contacts"
       text = text//newline
+      if (simulation%physics%laws%yields) text = text//spring_line(simulation)
       if (simulation%overlap_allowed >= huge(1.0_dp)) then
         text = text//indent//"overlaps are not projected"//newline
       else if (tally%projected == 0) then
@@ -92,6 +94,18 @@ contains
         & to_text(tally%most_cores)//" pairs in one"//newline
     end associate
   end function overlap_lines
+
+  !> How far compliant contacts were deformed, and how stiff they are for the step.
+  function spring_line(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (tally => simulation%tally, radius => simulation%decomposition%rule%mean_radius)
+      text = indent//"compliant contacts are deformed by at most "//to_text(tally%deformation, 3)//" m"
+      if (radius > 0.0_dp) text = text//", "//to_text(tally%deformation/radius, 2)//" of the mean radius"
+      text = text//"; h sqrt(k/m) at most "//to_text(tally%stiffest, 3)//newline
+    end associate
+  end function spring_line
 
   !> A fraction as people write it; what is not 0 is not written as 0.
   pure function percent(share) result(text)

@@ -1,6 +1,7 @@
 !> What a run keeps in memory, array by array.
 module gravier_memory_report
   use gravier_kinds, only: dp, i8
+  use gravier_contact_spring, only: spring_step_t
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_body_store, only: body_layout_t
@@ -120,6 +121,7 @@ contains
     call items(2)%add("antagonist", 4, 1)
     call items(2)%add("shift", 4, merge(1, 0, simulation%decomposition%ni > 0))
     call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
+    call items(2)%add("elongation", 8, simulation%halo%memory%n_spring)
     call items(2)%add("state", 4, simulation%halo%memory%n_states())
     call describe_body(simulation, held, items(3))
     items(4)%name = "grain seen, ghosts included"
@@ -142,6 +144,7 @@ contains
       call item%add("hot", 8, kernels%nh)
       call item%add("impulse", 8, kernels%nc)
       if (simulation%physics%laws%attracts) call item%add("attraction", 8, 1)
+      if (simulation%physics%laws%yields) call item%add("spring", 8, storage_size(spring_step_t())/64)
       call item%add("gap", 8, 1)
       call item%add("source", 4, 1)
       ! a projection of places borrows these

@@ -14,9 +14,9 @@ module gravier_run_log
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory
   use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_acceleration, &
-    & warn_relaxation, warn_partition, note_balance, note_scale
+    & warn_relaxation, warn_partition, warn_springs, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
-  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line
+  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
   use gravier_start_lines, only: banner_text, start_lines
@@ -49,6 +49,8 @@ module gravier_run_log
     type(error_t), allocatable :: unwritten
     !> up to the last step
     type(work_t) :: told
+    !> stiffest compliant contact that was warned of, by the product of the step and its frequency
+    real(dp) :: told_stiffest = 0.5_dp*most_by_spring
     !> kind of the velocity scale that was named last
     character(len=20) :: scale_kind = ""
   contains
@@ -361,6 +363,10 @@ contains
       & "subdomains: the old partition stays", error)
     if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "//to_text(figures%fast)// &
       & " grains move by more than their radius in step "//to_text(simulation%step), error)
+    if (simulation%tally%stiffest > 2.0_dp*self%told_stiffest) then
+      self%told_stiffest = simulation%tally%stiffest
+      call warn(self, warn_springs, 1_i8, "warning     "//spring_warning(simulation), error)
+    end if
     call write_recoveries(self, simulation, simulation%step, error)
     if (figures%solve%status /= solve_converged) call warn(self, warn_unconverged, 1_i8, "  *** "// &
       & failure_text(simulation, figures)//" in step "//to_text(simulation%step), error)

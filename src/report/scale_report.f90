@@ -7,7 +7,7 @@ module gravier_scale_report
   use gravier_scene_scales, only: scene_scales_t
   implicit none
   private
-  public :: scale_lines, scale_warnings, error_scale_line
+  public :: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
 
   character(len=*), parameter :: newline = new_line("a")
   !> digits of a figure
@@ -19,6 +19,8 @@ module gravier_scale_report
   real(dp), parameter :: most_by_fall = 1.0_dp
   !> radii of the smallest grain by which a boundary may move in a step
   real(dp), parameter :: most_by_boundary = 0.1_dp
+  !> h sqrt(k/m) of the stiffest spring of a contact, six steps of a collision
+  real(dp), parameter :: most_by_spring = 0.5_dp
   !> h sqrt(P/rho)/d
   real(dp), parameter :: most_relative_step = 0.1_dp
   !> fraction of the speed of a wall that errors may have in slow shear
@@ -85,6 +87,7 @@ contains
       if (scales%speed*h > most_by_boundary*scales%smallest .and. scales%smallest > 0.0_dp) call warn_step("boundary '"// &
         & simulation%decomposition%boundaries(scales%fastest)%name//"' moves by "//figure(scales%speed*h/scales%smallest)// &
         & " radii of the smallest grain in it", most_by_boundary*scales%smallest/scales%speed)
+      if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
@@ -114,6 +117,18 @@ contains
     end subroutine warn
 
   end subroutine scale_warnings
+
+  !> That the step does not resolve the collisions of the stiffest compliant contacts.
+  function spring_warning(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (h => simulation%config%time%step, stiffest => simulation%tally%stiffest)
+      text = "&time step = "//figure(h)//" s: h sqrt(k/m) = "//figure(stiffest)//" at the stiffest compliant contact, so that "// &
+        & "collisions are not resolved and spring_restitution does not hold; at most "//figure(h*most_by_spring/stiffest)// &
+        & " s would do"
+    end associate
+  end function spring_warning
 
   pure function pressure_unit(simulation) result(unit)
     type(simulation_t), intent(in) :: simulation

@@ -69,6 +69,7 @@ contains
     call file%write_scalar("lists_made", simulation%halo%builds, error)
     associate (memory => simulation%halo%memory)
       call file%write_scalar("impulse_entries", int(memory%n_impulse, i8), error)
+      call file%write_scalar("spring_entries", int(memory%n_spring, i8), error)
       call file%write_scalar("law_row", int(memory%law_row, i8), error)
       call file%write_scalar("rest_row", int(memory%rest_row, i8), error)
       call file%write_scalar("key_row", int(memory%key_row, i8), error)

@@ -239,15 +239,17 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:)
-    integer(i8) :: n_impulse, law_row, rest_row, key_row
+    integer(i8) :: n_impulse, n_spring, law_row, rest_row, key_row
     type(pair_memory_t) :: kept
     integer :: s, n
 
     call file%read_scalar("impulse_entries", n_impulse, error)
+    call file%read_scalar("spring_entries", n_spring, error)
     call file%read_scalar("law_row", law_row, error)
     call file%read_scalar("rest_row", rest_row, error)
     call file%read_scalar("key_row", key_row, error)
     call take_count(n_impulse, path//": impulse_entries", kept%n_impulse, error)
+    call take_count(n_spring, path//": spring_entries", kept%n_spring, error)
     call take_count(law_row, path//": law_row", kept%law_row, error)
     call take_count(rest_row, path//": rest_row", kept%rest_row, error)
     call take_count(key_row, path//": key_row", kept%key_row, error)

@@ -140,7 +140,7 @@ contains
     class(simulation_t), intent(inout) :: self
 
     call self%balance%begin(self%decomposition, self%physics)
-    call self%diagnostics%init(self%decomposition, self%config%output%diagnostics)
+    call self%diagnostics%init(self%decomposition, self%physics, self%config%output%diagnostics)
   end subroutine simulation_start_diagnostics
 
   !> Make room for the subdomains that &decomposition asks for, without grains.
@@ -162,6 +162,7 @@ contains
       self%physics%rotation = config%rotation
       self%physics%laws = scene%laws
       self%physics%h = self%config%time%step
+      self%physics%theta = self%config%time%theta
       associate (solver => self%config%solver)
         self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
       end associate
@@ -233,7 +234,6 @@ contains
       self%written_steps = schedule_t(every=config%output%every, last=config%time%steps)
       if (config%scene%bodies == "column") allocate (self%exact, source=column_solution_t(config%scene%column_count, &
         & -config%scene%mass*config%scene%gravity(config%scene%dimension)*config%time%step))
-      self%theta = config%time%theta
       self%warm_start = config%solver%warm_start
       associate (parts => config%decomposition)
         self%division = repartition_rule_t(parts%partition == "metis", parts%grid, parts%subdomains, parts%repartition_every, &

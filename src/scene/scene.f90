@@ -92,7 +92,7 @@ contains
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
     call check_moments(config, scene%effects, error)
-    call check_shapes(config, scene%effects, error)
+    call check_shapes(config, scene, error)
     call check_places(comm, config, data, scene, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
@@ -212,16 +212,18 @@ contains
   end subroutine check_moments
 
   !> Bodies with shapes turn, and no moments resist that: the arms of their contacts do.
-  subroutine check_shapes(config, effects, error)
+  subroutine check_shapes(config, scene, error)
     type(config_t), intent(in) :: config
-    type(effects_t), intent(in) :: effects
+    type(scene_t), intent(in) :: scene
     type(error_t), allocatable, intent(inout) :: error
 
-    if (.not. effects%shapes) return
+    if (.not. scene%effects%shapes) return
     if (.not. config%scene%rotation) call raise(error, status_input, config%file// &
       & ": &scene rotation = .false.: expected .true. where bodies have shapes")
-    if (effects%rolling) call raise(error, status_input, config%file// &
+    if (scene%effects%rolling) call raise(error, status_input, config%file// &
       & ": rolling or pivoting friction: expected 0 where bodies have shapes")
+    if (scene%laws%of_spheres) call raise(error, status_input, config%file// &
+      & ": &law kind = 'hertz': expected another, as 'elastic', where bodies have shapes: this one is of spheres")
   end subroutine check_shapes
 
   !> The criterion 'error' knows the impulses of a column that gravity presses on the ground.
@@ -289,12 +291,13 @@ contains
       if (scene%laws%n > 0) then
         call add_law(scene%laws%largest)
         effects%cohesion = scene%laws%attracts
+        effects%compliance = scene%laws%yields
       end if
       ! moments are in the kernels of friction
       effects%friction = effects%friction .or. effects%rolling
       turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. config%rotation
       if (allocated(data%shape)) effects%shapes = comm%any_true(any(data%shape > 0))
-      effects%rotation = effects%friction .or. turning .or. effects%shapes
+      effects%rotation = effects%friction .or. turning .or. effects%shapes .or. effects%compliance
       effects%periodic = scene%period%on()
       effects%glued = comm%any_true(any(data%group > 0))
       effects%gravity = any(abs(config%gravity) > 0.0_dp) .or. config%gravity_table /= ""

@@ -12,7 +12,7 @@ module gravier_declared_keys
     character(len=24) :: name
     !> as it would be typed after the equal sign; blank: each group must give it
     character(len=16) :: default
-    !> the rule of each value: "", "> 0", ">= 0", "in [0, 1]", or "not all 0" for several
+    !> the rule of each value: "", "> 0", ">= 0", "in [a, b]", "in (a, b]", or "not all 0" for several
     character(len=16) :: allowed
     character(len=24) :: unit
     character(len=200) :: meaning

@@ -236,15 +236,12 @@ contains
     normal(:) = away(1:size(x))
   end subroutine boundary_locate
 
-  !> The facets within `reach` of a point, seen from there; none of a surface that is not faceted. One that does not turn may be as
-  !> wide as the period, so that its images are looked at as well. In 2D facets that continue each other are one.
+  !> The facets within `reach` of a point, seen from there, of a faceted surface. One that does not turn may be as wide as the period,
+  !> so that its images are looked at as well. In 2D facets that continue each other are one.
   pure subroutine boundary_find_facets(self, x, reach, near)
     class(boundary_t), intent(in) :: self
-    !> (nd) [m]
-    real(dp), intent(in) :: x(:)
-    !> [m]
-    real(dp), intent(in) :: reach
-    !> what it held is lost
+    !> (nd) [m], and [m]; what `near` held is lost
+    real(dp), intent(in) :: x(:), reach
     type(near_facets_t), intent(inout) :: near
     real(dp) :: image(3), from(3)
     integer :: images(3), i, j, k

@@ -14,6 +14,8 @@ module gravier_neighbour_list
     !> where bodies have shapes or boundaries facets: the first of two rows of the key that tells a point of a pair from its others,
     !> 0 for no point
     integer :: key_row = 0
+    !> entries of the elongation of a tangential spring, 0 where no contact yields
+    integer :: n_spring = 0
   contains
     procedure :: n_states => pair_memory_n_states
     procedure :: words => pair_memory_words
@@ -22,7 +24,7 @@ module gravier_neighbour_list
   !> Pairs in sweep order. The candidate is a grain; of two grains it is that of the lower identifier. A pair of bodies that may
   !> touch in several points stands there as often, one time after the other.
   !> The impulses of the last step stay with the pair: the normal one, then in 2D the tangential one, in 3D the tangential vector in
-  !> global axes.
+  !> global axes. So does the elongation of the tangential spring, as a number in 2D, in 3D as a vector in global axes.
   type :: neighbour_list_t
     integer :: n = 0
     type(pair_memory_t) :: memory
@@ -35,6 +37,8 @@ module gravier_neighbour_list
     integer, allocatable :: shift(:)
     !> (entries of an impulse, n) [N s]
     real(dp), allocatable :: impulse(:, :)
+    !> (entries of an elongation, n) [m]
+    real(dp), allocatable :: spring(:, :)
     !> numbers that pairs keep, 0 at first (memory%n_states, n)
     integer, allocatable :: state(:, :)
   contains
@@ -58,7 +62,7 @@ contains
   !> Words of what is kept with a pair.
   pure integer function pair_memory_words(self) result(n)
     class(pair_memory_t), intent(in) :: self
-    n = self%n_impulse + self%n_states()
+    n = self%n_impulse + self%n_spring + self%n_states()
   end function pair_memory_words
 
   !> Whether pair `p` keeps something from the last step.
@@ -66,7 +70,7 @@ contains
     class(neighbour_list_t), intent(in) :: self
     integer, intent(in) :: p
 
-    keeps = any(abs(self%impulse(:, p)) > 0.0_dp) .or. any(self%state(:, p) /= 0)
+    keeps = any(abs(self%impulse(:, p)) > 0.0_dp) .or. any(self%state(:, p) /= 0) .or. any(abs(self%spring(:, p)) > 0.0_dp)
   end function neighbour_list_keeps
 
   !> Pairs that keep something from the last step.
@@ -88,7 +92,7 @@ contains
 
     self%n = 0
     if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
-    if (allocated(self%impulse)) deallocate (self%impulse, self%state)
+    if (allocated(self%impulse)) deallocate (self%impulse, self%spring, self%state)
     allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
   end subroutine neighbour_list_init
 
@@ -144,7 +148,7 @@ contains
     if (size(self%shift) > 0 .and. .not. begins) begins = self%shift(p - 1) /= self%shift(p)
   end function neighbour_list_begins
 
-  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses and states to zero.
+  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses, elongations and states to zero.
   subroutine neighbour_list_finish(self, order, memory)
     class(neighbour_list_t), intent(inout) :: self
     !> places of the pairs as they were added, each as often as the pair is to stand in the list
@@ -157,6 +161,7 @@ contains
     self%n = size(order)
     self%memory = memory
     allocate (self%impulse(memory%n_impulse, self%n), source=0.0_dp)
+    allocate (self%spring(memory%n_spring, self%n), source=0.0_dp)
     allocate (self%state(memory%n_states(), self%n), source=0)
   end subroutine neighbour_list_finish
 

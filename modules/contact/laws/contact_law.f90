@@ -6,6 +6,7 @@ module gravier_contact_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
   use gravier_contact_coefficients, only: coefficients_t
+  use gravier_contact_spring, only: spring_t
   implicit none
   private
   public :: contact_law_t, contact_pair_t, contact_terms_t, add_resistance_keys, unused
@@ -37,10 +38,15 @@ module gravier_contact_law
     real(dp) :: radius = 0.0_dp
     !> relative velocity at the start of the step: along the normal, > 0 where the bodies part, and size of the tangential one [m/s]
     real(dp) :: normal_velocity = 0.0_dp, slip = 0.0_dp
+    !> where some law has springs: step [s]; radius and mass of one sphere that meets a plane as the two bodies meet each other
+    !> [m, kg]; what a pressure is multiplied with to be a force over a length, 2 `radius`, 1 in 2D [m, 1]
+    real(dp) :: h = 0.0_dp, reduced_radius = 0.0_dp, reduced_mass = 0.0_dp, breadth = 1.0_dp
     !> what the pair remembers from step to step under a law with memory, 0 at first
     integer :: state = 0
     !> made by `evaluate`, from an ordinary contact without friction: its free gap is the gap where that is open
     type(contact_terms_t) :: terms
+    !> made by `evaluate` where the law has springs; else rigid
+    type(spring_t) :: spring
     !> once the step is solved: r~_n and |r_t| [N s]
     real(dp) :: normal = 0.0_dp, tangential = 0.0_dp
   end type contact_pair_t
@@ -48,6 +54,10 @@ module gravier_contact_law
   type, abstract :: contact_law_t
     !> some pair may have an attraction; pairs have states
     logical :: attracts = .false., remembers = .false.
+    !> pairs have springs, whose elongations stay with them
+    logical :: yields = .false.
+    !> it has a meaning between spheres and planes alone
+    logical :: of_spheres = .false.
     !> all its pairs have the same terms, which are then found once a run and not once a step and pair
     logical :: is_constant = .false.
     !> bodies of its two materials pass through each other: their pairs are never listed
@@ -56,6 +66,9 @@ module gravier_contact_law
     type(coefficients_t) :: largest
     !> gap up to which bodies that have not been nearer act on each other [m]
     real(dp) :: range = 0.0_dp
+    !> of values that keep the rules of their keys but do not go together: the first key at fault and what is expected of it
+    character(len=24) :: fault_key = ""
+    character(len=80) :: fault_expected = ""
   contains
     procedure(law_kind), deferred, nopass :: kind
     procedure(law_keys), deferred, nopass :: keys

@@ -34,8 +34,8 @@ module gravier_law_set
     integer, allocatable :: of_pair(:, :)
     !> some law has other terms for each pair
     logical :: varies = .false.
-    !> some law attracts, has a memory
-    logical :: attracts = .false., remembers = .false.
+    !> some law attracts, has a memory, has springs, is one of spheres alone
+    logical :: attracts = .false., remembers = .false., yields = .false., of_spheres = .false.
     !> the largest of all laws; range in [m]
     type(coefficients_t) :: largest
     real(dp) :: range = 0.0_dp
@@ -146,6 +146,8 @@ contains
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
       if (law%passes) call self%filter%add(a, b, size(self%of_pair, 1))
+      self%yields = self%yields .or. law%yields
+      self%of_spheres = self%of_spheres .or. law%of_spheres
       self%varies = self%varies .or. .not. law%is_constant
       call self%largest%raise_to(law%largest)
       self%range = max(self%range, law%range)

@@ -99,8 +99,10 @@ contains
         associate (row => problem%kernels%shift_row, nf => problem%kernels%nf)
           if (row > 0) work(:, 2:nf, :) = work(:, 2:nf, :) + sub%hot(:, row + 1:row + nf - 1, :)
         end associate
+        call add_compliance(problem%kernels, sub, sub%impulse, work)
         parts(1, s) = sum(part%step*work)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, part%lead, work)
+        call add_compliance(problem%kernels, sub, part%step, work)
         parts(2, s) = sum(part%step*work)
       end associate
     end do
@@ -114,6 +116,22 @@ contains
       end associate
     end do
   end subroutine impulse_feedback_take
+
+  !> Add to velocities of contacts what compliant ones yield under impulses.
+  pure subroutine add_compliance(kernels, sub, impulse, velocity)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> (lanes, nc, blocks) [N s], [m/s]
+    real(dp), intent(in), contiguous :: impulse(:, :, :)
+    real(dp), intent(inout), contiguous :: velocity(:, :, :)
+    integer :: d
+
+    if (kernels%row%compliance_n == 0) return
+    velocity(:, 1, :) = velocity(:, 1, :) + sub%hot(:, kernels%row%compliance_n, :)*impulse(:, 1, :)
+    do d = 2, kernels%nf
+      velocity(:, d, :) = velocity(:, d, :) + sub%hot(:, kernels%row%compliance_t, :)*impulse(:, d, :)
+    end do
+  end subroutine add_compliance
 
   !> M^-1 H d of the undivided bodies, from the reactions that all copies have summed.
   pure subroutine velocity_change(sub, change)

@@ -4,7 +4,7 @@ module gravier_method
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
   use gravier_communicator, only: communicator_t
-  use gravier_contact_kernels, only: lanes, n_blocks
+  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   implicit none
@@ -63,6 +63,8 @@ module gravier_method
     !> times that the memory was restarted in this solve
     integer :: restarted = 0
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
+    !> largest beta
+    real(dp) :: most = 1.0_dp
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
     !> iterations of this solve, windows since `lowest`, plain iterations to come
@@ -257,12 +259,35 @@ contains
     integer :: s
 
     acceleration = acceleration_t(on=.true.)
+    if (problem%kernels%row%compliance_n > 0) acceleration%most = most_extrapolation(problem)
     allocate (acceleration%part(size(problem%sub)))
     do s = 1, size(problem%sub)
       acceleration%part(s)%impulse = problem%sub(s)%impulse
       acceleration%part(s)%velocity = problem%sub(s)%velocity
     end do
   end subroutine start_acceleration
+
+  !> The largest beta that pays where all contacts are compliant, (1 - sqrt(q))/(1 + sqrt(q)) with the least part q that the
+  !> compliance has of a local operator (Nesterov 2004, section 2.2.1, for a problem with curvatures between q and 1): more would
+  !> let friction keep waves alive that plain sweeps damp. 1 where some contact is rigid. Collective.
+  real(dp) function most_extrapolation(problem) result(most)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: least, root
+    integer :: s, c
+
+    least = 1.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), row => problem%kernels%row)
+        do c = 1, sub%n_contacts
+          associate (contact => sub%hot(lane_of(c), :, block_of(c)))
+            least = min(least, contact(row%compliance_n)*contact(row%per_wnn), contact(row%compliance_t)*contact(row%per_wtt))
+          end associate
+        end do
+      end associate
+    end do
+    root = sqrt(max(0.0_dp, -problem%comm%highest(-least)))
+    most = (1.0_dp - root)/(1.0_dp + root)
+  end function most_extrapolation
 
   !> The sweeps of one iteration in every subdomain of this rank. Collective where they are accelerated.
   subroutine sweep_all(method, problem)
@@ -463,7 +488,7 @@ contains
     if (self%resting) return
     t = self%t
     self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
-    self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin)
+    self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin, self%most)
   end subroutine acceleration_steer
 
   !> Whether the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly,

@@ -9,6 +9,8 @@
 !>
 !> A solution needs bodies as fast as max|V| >= A/sum|P|. Where that is far beyond the speeds of the problem, there is none. With
 !> friction in z this is a sign and no proof, as in gravier_unbounded, which looks at the matrix of a problem in the same way.
+!> For compliant contacts the law holds for v + s + a r, and A loses z a r for the impulses r: springs give way before impulses grow
+!> without bound. Their shifts are speeds of the problem, since springs drive bodies that are at rest.
 module gravier_vain_impulses
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lane_of, block_of, project_on_cones
@@ -43,7 +45,7 @@ contains
         call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
       end associate
     end do
-    in_vain = exceeds_bound(problem)
+    in_vain = exceeds_bound(problem, now)
     call put_back(problem, now)
   end function are_in_vain
 
@@ -58,13 +60,15 @@ contains
       now(s)%value = problem%sub(s)%impulse
       problem%sub(s)%impulse(:, 2:, :) = 0.0_dp
     end do
-    in_vain = exceeds_bound(problem)
+    in_vain = exceeds_bound(problem, now)
     call put_back(problem, now)
   end function normals_are_in_vain
 
   !> Whether z, which stands in the place of the impulses, asks for velocities far beyond those of the problem. Collective.
-  logical function exceeds_bound(problem) result(exceeds)
+  logical function exceeds_bound(problem, impulses) result(exceeds)
     type(contact_problem_t), intent(inout) :: problem
+    !> r of the subdomains of this rank
+    type(kept_impulses_t), intent(in) :: impulses(:)
     !> A and sum |P| (2, subdomains)
     real(dp) :: parts(2, size(problem%sub)), sums(2), fastest
     integer :: s
@@ -73,7 +77,7 @@ contains
     fastest = 0.0_dp
     do s = 1, size(problem%sub)
       call problem%own_reactions(s)
-      call add_work(problem, problem%sub(s), parts(1, s))
+      call add_work(problem, problem%sub(s), impulses(s)%value, parts(1, s))
       call problem%shared%load(s, problem%sub(s)%reaction)
     end do
     call problem%shared%pass()
@@ -99,9 +103,11 @@ contains
   end subroutine put_back
 
   !> A of a subdomain, whose `reaction` is H z of its own contacts [J].
-  pure subroutine add_work(problem, sub, work)
+  pure subroutine add_work(problem, sub, r, work)
     type(contact_problem_t), intent(in) :: problem
     type(subproblem_t), intent(in) :: sub
+    !> impulses (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: r(:, :, :)
     real(dp), intent(inout) :: work
     integer :: b, c
 
@@ -111,6 +117,16 @@ contains
     do c = 1, sub%n_contacts
       work = work - sub%impulse(lane_of(c), 1, block_of(c))*sub%hot(lane_of(c), problem%kernels%nd + 1, block_of(c))
     end do
+    if (.not. allocated(sub%spring)) return
+    associate (row => problem%kernels%row, nd => problem%kernels%nd)
+      do c = 1, sub%n_contacts
+        associate (z => sub%impulse(lane_of(c), :, block_of(c)), contact => sub%hot(lane_of(c), :, block_of(c)))
+          work = work - z(1)*contact(row%compliance_n)*r(lane_of(c), 1, block_of(c)) &
+            & - sum(z(2:nd)*(contact(row%shift_t:row%shift_t + nd - 2) &
+            &                + contact(row%compliance_t)*r(lane_of(c), 2:nd, block_of(c))))
+        end associate
+      end do
+    end associate
   end subroutine add_work
 
   !> |P| of a subdomain, whose `reaction` is H z of all contacts, a copy of a shared body counting with its part; the moment of a
@@ -120,9 +136,12 @@ contains
     type(subproblem_t), intent(in) :: sub
     real(dp), intent(inout) :: total, fastest
     real(dp) :: reaction(problem%kernels%nd), speed
-    integer :: b, nd
+    integer :: b, c, nd
 
     nd = problem%kernels%nd
+    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring))
+      if (sub%yields(c)) fastest = max(fastest, abs(sub%hot(lane_of(c), problem%kernels%row%shift, block_of(c))))
+    end do
     do b = 1, sub%n_columns
       speed = norm2(sub%v_free(1:nd, b))
       if (b <= sub%n_grains) speed = speed + sub%radius(b)*norm2(sub%v_free(nd + 1:, b))

@@ -10,6 +10,8 @@ module gravier_contact_data
   public :: rows_2d_friction_shift_rolling, rows_2d_shaped, rows_2d_shaped_shift
   public :: rows_3d_frictionless, rows_3d_friction, rows_3d_friction_shift, rows_3d_friction_rolling
   public :: rows_3d_friction_shift_rolling, rows_3d_shaped, rows_3d_shaped_shift
+  public :: rows_2d_compliant, rows_2d_compliant_rolling, rows_2d_shaped_compliant
+  public :: rows_3d_compliant, rows_3d_compliant_rolling, rows_3d_shaped_compliant
 
   !> contacts of a block: long enough to hide the latency of square roots and divisions behind each other
   integer, parameter :: lanes = 16
@@ -21,7 +23,7 @@ module gravier_contact_data
     !> unit normal, from the antagonist to the candidate
     integer :: nx = 0, ny = 0, nz = 0
     !> what the law adds to the normal velocity: the free gap over the time step or, with restitution, e v_n at the start of
-    !> the step [m/s]
+    !> the step, or what the spring of a compliant contact makes of gap and velocity at the start [m/s]
     integer :: shift = 0
     !> relaxation factor over W_nn [kg]
     integer :: per_wnn = 0
@@ -31,7 +33,8 @@ module gravier_contact_data
     integer :: lever_i = 0, lever_j = 0
     !> coefficient of friction
     integer :: friction = 0
-    !> what the law adds to the tangential velocity along t and, of spheres, along s: e_t v_t at the start of the step [m/s]
+    !> what the law adds to the tangential velocity along t and, of spheres, along s: e_t v_t at the start of the step, or what
+    !> the spring of a compliant contact makes of its elongation and that velocity [m/s]
     integer :: shift_t = 0, shift_s = 0
     !> effective radius R* of rolling [m]
     integer :: rolling_radius = 0
@@ -44,6 +47,8 @@ module gravier_contact_data
     !> of bodies with shapes: in the plane, c x n of the arm c from the centre of the candidate, and of the antagonist, to the contact;
     !> in space, the first of the three components of either arm in global axes; 0 of boundaries [m]
     integer :: arm_i = 0, arm_j = 0
+    !> compliances a along the normal and the tangents, 0 of a rigid contact: the law holds for v + shift + a r [1/kg]
+    integer :: compliance_n = 0, compliance_t = 0
   end type contact_rows_t
 
   type(contact_rows_t), parameter :: rows_2d_frictionless = contact_rows_t(total=4, nx=1, ny=2, shift=3, per_wnn=4)
@@ -64,6 +69,16 @@ module gravier_contact_data
     & contact_rows_t(total=12, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, shift_t=9, &
     &                w_nt=10, arm_i=11, arm_j=12)
 
+  type(contact_rows_t), parameter :: rows_2d_compliant = &
+    & contact_rows_t(total=11, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, shift_t=9, &
+    &                compliance_n=10, compliance_t=11)
+  type(contact_rows_t), parameter :: rows_2d_compliant_rolling = &
+    & contact_rows_t(total=14, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, shift_t=9, &
+    &                rolling_radius=10, per_wrr=11, rolling_friction=12, compliance_n=13, compliance_t=14)
+  type(contact_rows_t), parameter :: rows_2d_shaped_compliant = &
+    & contact_rows_t(total=14, nx=1, ny=2, shift=3, per_wnn=4, per_wtt=5, lever_i=6, lever_j=7, friction=8, shift_t=9, &
+    &                w_nt=10, arm_i=11, arm_j=12, compliance_n=13, compliance_t=14)
+
   type(contact_rows_t), parameter :: rows_3d_frictionless = contact_rows_t(total=5, nx=1, ny=2, nz=3, shift=4, per_wnn=5)
   type(contact_rows_t), parameter :: rows_3d_friction = &
     & contact_rows_t(total=9, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, lever_i=7, lever_j=8, friction=9)
@@ -81,6 +96,16 @@ module gravier_contact_data
   type(contact_rows_t), parameter :: rows_3d_shaped_shift = &
     & contact_rows_t(total=17, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, friction=7, shift_t=8, shift_s=9, &
     &                w_nt=10, w_ns=11, arm_i=12, arm_j=15)
+  type(contact_rows_t), parameter :: rows_3d_compliant = &
+    & contact_rows_t(total=13, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, lever_i=7, lever_j=8, friction=9, &
+    &                shift_t=10, shift_s=11, compliance_n=12, compliance_t=13)
+  type(contact_rows_t), parameter :: rows_3d_compliant_rolling = &
+    & contact_rows_t(total=17, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, lever_i=7, lever_j=8, friction=9, &
+    &                shift_t=10, shift_s=11, rolling_radius=12, per_wrr=13, rolling_friction=14, pivoting_friction=15, &
+    &                compliance_n=16, compliance_t=17)
+  type(contact_rows_t), parameter :: rows_3d_shaped_compliant = &
+    & contact_rows_t(total=19, nx=1, ny=2, nz=3, shift=4, per_wnn=5, per_wtt=6, friction=7, shift_t=8, shift_s=9, &
+    &                w_nt=10, w_ns=11, arm_i=12, arm_j=15, compliance_n=18, compliance_t=19)
 
 contains
 

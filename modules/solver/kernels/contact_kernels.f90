@@ -21,12 +21,14 @@
 !> after the tangential one, with the spins that this one leaves (Acary & Bourrier 2021 state the law as a cone complementarity).
 !> A normal impulse turns bodies with shapes, so that W_nt is not zero between them: the tangential law is solved with the velocity
 !> that the normal impulse leaves, W_nt and W_ns being part of the contact data.
+!> A compliant contact yields by a r: its law holds for v + shift + a r, and its local operators are W + a.
 module gravier_contact_kernels
   use gravier_effects, only: effects_t
   use gravier_contact_data, only: contact_rows_t, lanes, n_blocks, block_of, lane_of, rows_2d_frictionless, rows_2d_friction, &
     & rows_2d_friction_shift, rows_2d_friction_rolling, rows_2d_friction_shift_rolling, rows_3d_frictionless, rows_3d_friction, &
     & rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling, &
-    & rows_2d_shaped, rows_2d_shaped_shift, rows_3d_shaped, rows_3d_shaped_shift
+    & rows_2d_shaped, rows_2d_shaped_shift, rows_3d_shaped, rows_3d_shaped_shift, rows_2d_compliant, rows_2d_compliant_rolling, &
+    & rows_2d_shaped_compliant, rows_3d_compliant, rows_3d_compliant_rolling, rows_3d_shaped_compliant
   use gravier_kernel_table, only: kernel_table_t
   use gravier_sweeps_2d, only: choose_sweeps_2d
   use gravier_sweeps_3d, only: choose_sweeps_3d
@@ -57,21 +59,23 @@ contains
     !> 2 or 3
     integer, intent(in) :: dimension
     !> without friction no contact turns a disk or a sphere, spins are none of its unknowns, and tangential restitution and rolling
-    !> have no meaning; where bodies have shapes, spins are unknowns, and rolling has none
+    !> have no meaning; where bodies have shapes, spins are unknowns, and rolling has none; compliant contacts are in the kernels of
+    !> friction, with a tangential shift
     type(effects_t), intent(in) :: effects
-    logical :: friction, shifted, rolling
+    logical :: friction, shifted, rolling, compliant
 
-    friction = effects%friction .or. effects%shapes
-    shifted = effects%friction .and. effects%tangential_restitution
+    compliant = effects%compliance
+    friction = effects%friction .or. effects%shapes .or. compliant
+    shifted = (effects%friction .and. effects%tangential_restitution) .or. compliant
     rolling = effects%friction .and. effects%rolling .and. .not. effects%shapes
     if (dimension == 2) then
-      self%row = rows_of_disks(friction, shifted, rolling, effects%shapes)
-      call choose_sweeps_2d(self, friction, shifted, rolling, effects%shapes)
-      call choose_loops_2d(self, friction, shifted, rolling, effects%shapes)
+      self%row = rows_of_disks(friction, shifted, rolling, effects%shapes, compliant)
+      call choose_sweeps_2d(self, friction, shifted, rolling, effects%shapes, compliant)
+      call choose_loops_2d(self, friction, shifted, rolling, effects%shapes, compliant)
     else
-      self%row = rows_of_spheres(friction, shifted, rolling, effects%shapes)
-      call choose_sweeps_3d(self, friction, shifted, rolling, effects%shapes)
-      call choose_loops_3d(self, friction, shifted, rolling, effects%shapes)
+      self%row = rows_of_spheres(friction, shifted, rolling, effects%shapes, compliant)
+      call choose_sweeps_3d(self, friction, shifted, rolling, effects%shapes, compliant)
+      call choose_loops_3d(self, friction, shifted, rolling, effects%shapes, compliant)
     end if
     self%nd = dimension
     self%nf = merge(dimension, 1, friction)
@@ -87,8 +91,8 @@ contains
     self%rolling_row = max(self%row%rolling_radius - 1, 0)
   end subroutine kernels_choose
 
-  pure type(contact_rows_t) function rows_of_disks(friction, shifted, rolling, shaped) result(row)
-    logical, intent(in) :: friction, shifted, rolling, shaped
+  pure type(contact_rows_t) function rows_of_disks(friction, shifted, rolling, shaped, compliant) result(row)
+    logical, intent(in) :: friction, shifted, rolling, shaped, compliant
 
     row = rows_2d_frictionless
     if (friction) row = rows_2d_friction
@@ -97,10 +101,13 @@ contains
     if (shifted .and. rolling) row = rows_2d_friction_shift_rolling
     if (shaped) row = rows_2d_shaped
     if (shaped .and. shifted) row = rows_2d_shaped_shift
+    if (compliant) row = rows_2d_compliant
+    if (compliant .and. rolling) row = rows_2d_compliant_rolling
+    if (compliant .and. shaped) row = rows_2d_shaped_compliant
   end function rows_of_disks
 
-  pure type(contact_rows_t) function rows_of_spheres(friction, shifted, rolling, shaped) result(row)
-    logical, intent(in) :: friction, shifted, rolling, shaped
+  pure type(contact_rows_t) function rows_of_spheres(friction, shifted, rolling, shaped, compliant) result(row)
+    logical, intent(in) :: friction, shifted, rolling, shaped, compliant
 
     row = rows_3d_frictionless
     if (friction) row = rows_3d_friction
@@ -109,6 +116,9 @@ contains
     if (shifted .and. rolling) row = rows_3d_friction_shift_rolling
     if (shaped) row = rows_3d_shaped
     if (shaped .and. shifted) row = rows_3d_shaped_shift
+    if (compliant) row = rows_3d_compliant
+    if (compliant .and. rolling) row = rows_3d_compliant_rolling
+    if (compliant .and. shaped) row = rows_3d_shaped_compliant
   end function rows_of_spheres
 
 end module gravier_contact_kernels

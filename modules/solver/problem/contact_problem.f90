@@ -6,6 +6,7 @@ module gravier_contact_problem
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
   use gravier_body_mass, only: add_inverse_mass, apply_inverse_mass, can_move, mass_product, multiply_mass, velocities_under
+  use gravier_contact_spring, only: spring_step_t
   use gravier_contact_kernels, only: kernels_t, global_impulse, lanes, n_blocks, lane_of, block_of
   implicit none
   private
@@ -71,6 +72,10 @@ module gravier_contact_problem
     !> where some law of the scene attracts: h F of the attraction F of each contact (lanes, blocks) [N s], and their load on the
     !> bodies, H (-h F n), of all copies (nv, n_columns) [N s, N m s]
     real(dp), allocatable :: attraction(:, :), attraction_load(:, :)
+    !> where some law of the scene has springs: those of each contact (n_contacts)
+    type(spring_step_t), allocatable :: spring(:)
+    !> largest product of the step and the frequency sqrt(k W_nn) of a normal spring
+    real(dp) :: stiffest = 0.0_dp
     !> gap at q_m (n_contacts) [m]
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
@@ -82,6 +87,8 @@ module gravier_contact_problem
     procedure :: multiply_mass => subproblem_multiply_mass
     procedure :: product_of => subproblem_product_of
     procedure :: normal_impulse => subproblem_normal_impulse
+    procedure :: yields => subproblem_yields
+    procedure :: overlap => subproblem_overlap
     procedure :: contact_reaction => subproblem_contact_reaction
     procedure :: free_velocity => subproblem_free_velocity
   end type subproblem_t
@@ -208,6 +215,31 @@ contains
     impulse = self%impulse(lane_of(c), 1, block_of(c))
     if (allocated(self%attraction)) impulse = impulse - self%attraction(lane_of(c), block_of(c))
   end function subproblem_normal_impulse
+
+  !> Whether contact `c` is compliant: its overlap is deformation, and no error.
+  pure logical function subproblem_yields(self, c) result(yields)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: c
+
+    yields = .false.
+    if (allocated(self%spring)) yields = self%spring(c)%spring%yields()
+  end function subproblem_yields
+
+  !> Largest overlap of the contacts that yield, or of those that are rigid; 0 where there is none [m].
+  pure real(dp) function subproblem_overlap(self, yielding) result(overlap)
+    class(subproblem_t), intent(in) :: self
+    logical, intent(in) :: yielding
+    integer :: c
+
+    overlap = 0.0_dp
+    if (.not. allocated(self%spring)) then
+      if (self%n_contacts > 0 .and. .not. yielding) overlap = max(overlap, -minval(self%gap))
+      return
+    end if
+    do c = 1, self%n_contacts
+      if (self%yields(c) .eqv. yielding) overlap = max(overlap, -self%gap(c))
+    end do
+  end function subproblem_overlap
 
   !> Impulse of all contacts on body `b`, component `d` of H r = H r~ - H h F n, once `evaluate` was called [N s, N m s].
   pure real(dp) function subproblem_contact_reaction(self, d, b) result(reaction)

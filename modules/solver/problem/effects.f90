@@ -4,13 +4,13 @@ module gravier_effects
   private
   public :: effects_t, n_effects, effect_name_length
 
-  integer, parameter :: n_effects = 15, effect_name_length = 24
+  integer, parameter :: n_effects = 16, effect_name_length = 24
 
   !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
   type :: effects_t
     !> some contact has mu > 0; some frictional contact sends its tangential velocity back; some moment resists rolling, or pivoting
-    !> (of spheres); some body is neither a disk nor a sphere: these four choose the kernels
-    logical :: friction = .false., tangential_restitution = .false., rolling = .false., shapes = .false.
+    !> (of spheres); some body is neither a disk nor a sphere; some contact yields: these five choose the kernels
+    logical :: friction = .false., tangential_restitution = .false., rolling = .false., shapes = .false., compliance = .false.
     !> what else contacts do: pivoting (in the kernels of rolling), normal restitution, cohesion
     logical :: pivoting = .false., restitution = .false., cohesion = .false.
     !> some grain turns; some axis is periodic; some boundary moves as prescribed, or is moved by forces; some grain is glued
@@ -43,22 +43,24 @@ contains
     on(6) = self%pivoting
     names(7) = "cohesion"
     on(7) = self%cohesion
-    names(8) = "periodic images"
-    on(8) = self%periodic
-    names(9) = "drives"
-    on(9) = self%drives
-    names(10) = "driven by forces"
-    on(10) = self%forces
-    names(11) = "glued grains"
-    on(11) = self%glued
-    names(12) = "shapes"
-    on(12) = self%shapes
-    names(13) = "gravity"
-    on(13) = self%gravity
-    names(14) = "body force"
-    on(14) = self%body_force
-    names(15) = "removal"
-    on(15) = self%removal
+    names(8) = "compliance"
+    on(8) = self%compliance
+    names(9) = "periodic images"
+    on(9) = self%periodic
+    names(10) = "drives"
+    on(10) = self%drives
+    names(11) = "driven by forces"
+    on(11) = self%forces
+    names(12) = "glued grains"
+    on(12) = self%glued
+    names(13) = "shapes"
+    on(13) = self%shapes
+    names(14) = "gravity"
+    on(14) = self%gravity
+    names(15) = "body force"
+    on(15) = self%body_force
+    names(16) = "removal"
+    on(16) = self%removal
   end subroutine effects_list
 
 end module gravier_effects

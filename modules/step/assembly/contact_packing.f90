@@ -9,6 +9,7 @@ module gravier_contact_packing
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, find_start_velocity, approach_velocity
   use gravier_pair_laws, only: boundary_of, law_of, terms_of
+  use gravier_contact_springs, only: pack_spring
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, place_of
   implicit none
@@ -55,6 +56,7 @@ contains
     allocate (sub%impulse(lanes, kernels%nc, n_blocks(found%n)), source=0.0_dp)
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
     if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
+    if (physics%laws%yields) allocate (sub%spring(found%n))
     do c = 1, found%n
       this%c = c
       this%q = lane_of(c)
@@ -177,7 +179,8 @@ contains
       if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction
-      if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, terms%tangential_restitution, this, sub)
+      if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, physics, terms%tangential_restitution, &
+        & this, sub)
       if (row%rolling_radius == 0) return
       sub%hot(q, row%rolling_radius, g) = rolling_radius(sub%hot(q, row%lever_i, g), sub%hot(q, row%lever_j, g))
       sub%hot(q, row%rolling_friction, g) = terms%rolling_friction
@@ -215,24 +218,29 @@ contains
       & returned = 0.0_dp
   end function returned_velocity
 
-  !> Tangential velocity at the start of the step as far as the contact sends it back (Newton).
-  subroutine pack_tangential_shift(view, found, boundaries, kernels, restitution, this, sub)
+  !> Tangential velocity at the start of the step as far as the contact sends it back (Newton), or what springs make of it.
+  subroutine pack_tangential_shift(view, found, boundaries, kernels, physics, restitution, this, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
     !> tangential
     real(dp), intent(in) :: restitution
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
+    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), v(kernels%nd)
     integer :: d
 
     call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
     call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
-    do d = 2, kernels%nd
-      sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = restitution*sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
+    do d = 1, kernels%nd
+      v(d) = sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
     end do
+    do d = 2, kernels%nd
+      sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = restitution*v(d)
+    end do
+    if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics%h, this%c, v, sub)
   end subroutine pack_tangential_shift
 
   !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched. Loads

@@ -2,6 +2,7 @@
 !> their laws.
 module gravier_narrow_phase
   use gravier_kinds, only: dp
+  use gravier_contact_spring, only: spring_t
   use gravier_contact_law, only: contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: neighbour_list_t
@@ -26,6 +27,8 @@ module gravier_narrow_phase
     real(dp), allocatable :: gap(:), normal(:, :)
     !> where some law has other terms for each pair (n)
     type(contact_terms_t), allocatable :: terms(:)
+    !> where some law has springs (n)
+    type(spring_t), allocatable :: spring(:)
     !> where bodies have shapes (n)
     type(contact_place_t), allocatable :: place(:)
     !> pairs of pieces whose cores overlap: more than their roundings
@@ -44,9 +47,10 @@ contains
     integer :: nd
 
     nd = decomposition%nd
-    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms, found%place)
+    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms, found%spring, found%place)
     allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
     allocate (found%terms(merge(view%list%n, 0, physics%laws%varies)))
+    allocate (found%spring(merge(view%list%n, 0, physics%laws%yields)))
     allocate (found%place(merge(view%list%n, 0, decomposition%no > 0)))
     found%n = 0
     found%overlapping_cores = 0
@@ -187,40 +191,42 @@ contains
     type(contact_list_t), intent(inout) :: found
     !> of bodies with shapes
     type(contact_place_t), intent(in), optional :: place
-    type(contact_terms_t) :: terms
+    type(contact_pair_t) :: pair
 
-    call find_terms(view, decomposition, physics, p, gap, normal, terms, place)
+    call find_terms(view, decomposition, physics, p, gap, normal, pair, place)
     if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
-    if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) return
+    if (gap > 0.0_dp .and. (pair%terms%restitution > 0.0_dp .or. &
+      & pair%terms%tangential_restitution > 0.0_dp)) return
     found%n = found%n + 1
     found%source(found%n) = p
     found%gap(found%n) = gap
     found%normal(:, found%n) = normal
-    if (size(found%terms) > 0) found%terms(found%n) = terms
+    if (size(found%terms) > 0) found%terms(found%n) = pair%terms
+    if (size(found%spring) > 0) found%spring(found%n) = pair%spring
     if (present(place)) found%place(found%n) = place
   end subroutine add_contact
 
-  !> What the law of a pair makes of the step, and the state that it gives the pair.
-  subroutine find_terms(view, decomposition, physics, p, gap, normal, terms, place)
+  !> What the law of a pair makes of the step: its terms and its springs; and the state that it gives the pair.
+  subroutine find_terms(view, decomposition, physics, p, gap, normal, pair, place)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
     !> [m], (nd)
     real(dp), intent(in) :: gap, normal(:)
-    type(contact_terms_t), intent(out) :: terms
+    type(contact_pair_t), intent(out) :: pair
     !> of bodies with shapes
     type(contact_place_t), intent(in), optional :: place
-    type(contact_pair_t) :: pair
     integer :: l, row
 
     row = view%list%memory%law_row
     l = law_of(view, decomposition%boundaries, physics%laws, p)
     if (.not. physics%laws%varies_at(l)) then
-      terms = terms_of(physics%laws, l, gap)
+      pair%terms = terms_of(physics%laws, l, gap)
       return
     end if
     pair%first = physics%first
+    pair%h = physics%h
     pair%gap = gap
     if (row > 0) pair%state = view%list%state(row, p)
     if (present(place)) then
@@ -229,7 +235,6 @@ contains
       call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, round_place(view, p, gap, normal), normal, pair)
     end if
     if (row > 0) view%list%state(row, p) = pair%state
-    terms = pair%terms
   end subroutine find_terms
 
   !> Where contact `f` of those found is.

@@ -97,11 +97,32 @@ contains
     pair%slip = norm2(v - pair%normal_velocity*normal)
     pair%terms%free_gap = max(pair%gap, 0.0_dp)
     associate (law => laws%of(l)%law)
+      if (law%yields) call find_reduced(view, i, j, nd, pair)
       pair%terms%rolling_friction = law%largest%rolling_friction
       pair%terms%pivoting_friction = law%largest%pivoting_friction
       call law%evaluate(pair)
     end associate
   end subroutine evaluate_pair
+
+  !> What springs ask of a pair: radius and mass of one sphere that meets a plane as the two bodies meet each other, and the breadth
+  !> of the contact. A boundary is plane and cannot move; a grain that is part of one cannot move either.
+  pure subroutine find_reduced(view, i, j, nd, pair)
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in) :: i, j, nd
+    !> with its radius
+    type(contact_pair_t), intent(inout) :: pair
+    real(dp) :: inverse
+
+    pair%breadth = merge(1.0_dp, 2.0_dp*pair%radius, nd == 2)
+    pair%reduced_radius = view%bodies%radius(i)
+    inverse = 0.0_dp
+    if (view%bodies%glued(i) == 0) inverse = 1.0_dp/view%bodies%mass(i)
+    if (j > 0) then
+      pair%reduced_radius = view%bodies%radius(i)*view%bodies%radius(j)/(view%bodies%radius(i) + view%bodies%radius(j))
+      if (view%bodies%glued(j) == 0) inverse = inverse + 1.0_dp/view%bodies%mass(j)
+    end if
+    pair%reduced_mass = 1.0_dp/inverse
+  end subroutine find_reduced
 
   !> The states of the pairs of a solved problem, whose impulses are those of the solve.
   subroutine conclude_pairs(problem, boundaries, laws, halo)

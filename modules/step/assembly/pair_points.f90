@@ -134,7 +134,7 @@ contains
     points%n = n
   end subroutine drop
 
-  !> Bring the impulses and states that the pair at place `p` keeps to the points of now: to those with the same keys first, then
+  !> Bring the impulses, elongations and states that the pair at place `p` keeps to the points of now: to those with the same keys first, then
   !> what is left, in its order, to the new points. Points take the places of the pair in their order.
   pure subroutine carry_memory(points, p, list)
     type(pair_points_t), intent(in) :: points
@@ -142,7 +142,7 @@ contains
     type(neighbour_list_t), intent(inout) :: list
     integer, allocatable :: source(:)
     logical, allocatable :: taken(:)
-    real(dp), allocatable :: impulse(:, :)
+    real(dp), allocatable :: impulse(:, :), spring(:, :)
     integer, allocatable :: state(:, :)
     integer :: k, l, m, row
 
@@ -151,6 +151,7 @@ contains
     if (points%n == 0 .and. all(list%state(row, p:p + m - 1) == 0)) return
     if (are_the_same()) return
     impulse = list%impulse(:, p:p + m - 1)
+    spring = list%spring(:, p:p + m - 1)
     state = list%state(:, p:p + m - 1)
     allocate (source(points%n), source=0)
     allocate (taken(m), source=.false.)
@@ -173,10 +174,12 @@ contains
       end do
     end do
     list%impulse(:, p:p + m - 1) = 0.0_dp
+    list%spring(:, p:p + m - 1) = 0.0_dp
     list%state(:, p:p + m - 1) = 0
     do k = 1, points%n
       if (source(k) > 0) then
         list%impulse(:, p + k - 1) = impulse(:, source(k))
+        list%spring(:, p + k - 1) = spring(:, source(k))
         list%state(:, p + k - 1) = state(:, source(k))
       end if
       list%state(row:row + 1, p + k - 1) = points%key(:, k)

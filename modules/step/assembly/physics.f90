@@ -20,8 +20,8 @@ module gravier_physics
     logical :: first = .false.
     !> grains turn
     logical :: rotation = .true.
-    !> step [s]
-    real(dp) :: h = 1.0_dp
+    !> step [s]; weight of the new velocity in the places
+    real(dp) :: h = 1.0_dp, theta = 0.5_dp
     !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
     integer :: sleep_after = 0
   contains

@@ -4,7 +4,7 @@ module gravier_problem_builder
   use gravier_timers, only: start_timer, stop_timer, phase_detection, phase_interface, phase_setup
   use gravier_body_figures, only: body_figures_t
   use gravier_boundary, only: boundary_t
-  use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
@@ -190,11 +190,11 @@ contains
 
   !> Scales of the residual, of the jump and of roundings: largest |R^d|, over the components that can move, largest free speed,
   !> and largest term of R^d of a body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may
-  !> strike. Collective.
+  !> strike; a spring that is compressed, with the impulse that it gives where nothing moves. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
     real(dp) :: scales(3), moving(problem%kernels%nd), speed, lightest, inverse
-    integer :: s, b, d, nd
+    integer :: s, b, c, d, nd
 
     nd = problem%kernels%nd
     scales(:) = 0.0_dp
@@ -216,6 +216,12 @@ contains
           speed = norm2(sub%v_free(1:nd, b))
           scales(1) = max(scales(1), speed/lightest)
           scales(2) = max(scales(2), speed)
+        end do
+        do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring))
+          if (.not. sub%yields(c)) cycle
+          associate (contact => sub%hot(lane_of(c), :, block_of(c)), row => problem%kernels%row)
+            scales(1) = max(scales(1), -contact(row%shift)/contact(row%compliance_n))
+          end associate
         end do
         scales(3) = max(scales(3), sub%largest_term)
         if (allocated(sub%attraction)) scales(3) = max(scales(3), maxval(sub%attraction))

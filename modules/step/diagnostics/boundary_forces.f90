@@ -2,6 +2,7 @@
 module gravier_boundary_forces
   use gravier_kinds, only: dp
   use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, name_length
   implicit none
   private
@@ -32,13 +33,14 @@ contains
   end function boundary_forces_features
 
   !> Take the names of the boundaries.
-  subroutine boundary_forces_begin(self, decomposition)
+  subroutine boundary_forces_begin(self, decomposition, physics)
     class(boundary_forces_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
     real(dp) :: place(3)
     integer :: b, k
 
-    associate (boundaries => decomposition%boundaries)
+    associate (boundaries => decomposition%boundaries, unused => physics)
       allocate (self%name(size(boundaries)))
       allocate (self%force(decomposition%nd, size(boundaries)), self%position(decomposition%nd, size(boundaries)), source=0.0_dp)
       do b = 1, size(boundaries)

@@ -7,6 +7,7 @@ module gravier_contact_structure
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: halo_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t
   implicit none
   private
@@ -59,9 +60,13 @@ contains
     features%meaning = "write coordination, fabric, sliding and forces in contacts"
   end function structure_features
 
-  subroutine structure_begin(self, decomposition)
+  subroutine structure_begin(self, decomposition, physics)
     class(contact_structure_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+
+    associate (unused => physics)
+    end associate
     allocate (self%fabric(decomposition%nd, decomposition%nd), source=0.0_dp)
   end subroutine structure_begin
 

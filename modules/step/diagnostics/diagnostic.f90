@@ -112,11 +112,12 @@ module gravier_diagnostic
 contains
 
   !> Begin with the scene as it is: allocate, and take what later steps are compared with. By default nothing. Collective.
-  subroutine diagnostic_begin(self, decomposition)
+  subroutine diagnostic_begin(self, decomposition, physics)
     class(diagnostic_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
 
-    associate (unused_self => self, unused => decomposition)
+    associate (unused_self => self, unused => decomposition, unused_physics => physics)
     end associate
   end subroutine diagnostic_begin
 

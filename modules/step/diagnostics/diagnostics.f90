@@ -3,6 +3,7 @@
 module gravier_diagnostics
   use gravier_kinds, only: dp, i8
   use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_features_t, solved_step_t, column_list_t, histogram_t, in_each_step, name_length
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   implicit none
@@ -42,21 +43,23 @@ module gravier_diagnostics
 contains
 
   !> Make those that are asked for, of a scene as it starts. Collective.
-  subroutine diagnostics_init(self, decomposition, asked)
+  subroutine diagnostics_init(self, decomposition, physics, asked)
     class(diagnostics_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
     !> (registered diagnostics)
     logical, intent(in) :: asked(:)
     type(diagnostic_holder_t), allocatable :: all_kinds(:)
 
     call registered_diagnostics(all_kinds)
-    call self%take(decomposition, all_kinds, asked)
+    call self%take(decomposition, physics, all_kinds, asked)
   end subroutine diagnostics_init
 
   !> Take over those of a list that are asked for, of a scene as it starts. Collective.
-  subroutine diagnostics_take(self, decomposition, list, asked)
+  subroutine diagnostics_take(self, decomposition, physics, list, asked)
     class(diagnostics_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
     !> is emptied
     type(diagnostic_holder_t), intent(inout) :: list(:)
     logical, intent(in) :: asked(:)
@@ -70,7 +73,7 @@ contains
       n = n + 1
       call move_alloc(list(k)%diagnostic, self%asked(n)%diagnostic)
       self%asked(n)%features = self%asked(n)%diagnostic%features()
-      call self%asked(n)%diagnostic%begin(decomposition)
+      call self%asked(n)%diagnostic%begin(decomposition, physics)
     end do
     call self%fill()
   end subroutine diagnostics_take

@@ -9,6 +9,7 @@ module gravier_energy_balance
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
+  use gravier_contact_springs, only: spring_energies
   use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
@@ -26,7 +27,11 @@ module gravier_energy_balance
     !> done by gravity and body force on the grains; by boundaries on grains where they move as prescribed, and by the
     !> forces of the user on the others
     real(dp) :: load_work = 0.0_dp, boundary_work = 0.0_dp
-    !> in contacts, by the normal and by the tangential impulses
+    !> where contacts are compliant: of their springs along the normals and along the tangents; that at the start, and whether it is
+    !> known
+    real(dp) :: elastic(2) = 0.0_dp, elastic_start = 0.0_dp
+    logical :: has_springs = .false., knows_springs = .false.
+    !> in contacts, by the normal and by the tangential impulses; what springs store is not among it
     real(dp) :: dissipated_normal = 0.0_dp, dissipated_friction = 0.0_dp
     !> kinetic energy of grains and boundaries that were taken out of the scene
     real(dp) :: carried_away = 0.0_dp
@@ -43,13 +48,13 @@ module gravier_energy_balance
   end type energy_balance_t
 
   !> words of the state of a balance
-  integer, parameter :: energy_words = 10
+  integer, parameter :: energy_words = 13
   !> what they are, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: energy_record = "translation rotation boundaries potential start load_work boundary_work "// &
-    & "dissipated_normal dissipated_friction carried_away"
+    & "dissipated_normal dissipated_friction carried_away elastic elastic_start"
   !> places among the sums of a step
   integer, parameter :: in_translation = 1, in_rotation = 2, in_start = 3, in_load = 4, in_normal = 5, in_friction = 6, &
-    & in_boundary = 7, n_sums = 7
+    & in_boundary = 7, in_springs = 7, n_sums = 10
 
 contains
 
@@ -71,6 +76,7 @@ contains
     call list%add("kinetic_rotation", self%rotation)
     call list%add("kinetic_boundaries", self%boundaries)
     call list%add("potential_energy", self%potential)
+    if (self%has_springs) call list%add("elastic_energy", sum(self%elastic))
     call list%add("load_work", self%load_work)
     call list%add("boundary_work", self%boundary_work)
     call list%add("dissipated_normal", self%dissipated_normal)
@@ -80,12 +86,17 @@ contains
   end subroutine energy_columns
 
   !> Begin with the scene as it is. Collective.
-  subroutine energy_begin(self, decomposition)
+  subroutine energy_begin(self, decomposition, physics)
     class(energy_balance_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
     real(dp) :: parts(2, size(decomposition%owned)), sums(2)
     integer :: s, k, b
 
+    self%has_springs = physics%laws%yields
+    self%knows_springs = .false.
+    self%elastic(:) = 0.0_dp
+    self%elastic_start = 0.0_dp
     self%load_work = 0.0_dp
     self%boundary_work = 0.0_dp
     self%dissipated_normal = 0.0_dp
@@ -136,7 +147,7 @@ contains
     class(energy_balance_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
     type(boundary_t) :: earlier(size(step%decomposition%boundaries))
-    real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums)
+    real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums), springs(3)
     integer :: s, b
 
     do b = 1, size(earlier)
@@ -148,6 +159,9 @@ contains
     do s = 1, size(step%problem%sub)
       call add_grains(step%halo%view(s), step%decomposition, s, step%physics, parts(:, s))
       call add_contacts(step, earlier, s, parts(:, s))
+      if (.not. self%has_springs) cycle
+      call spring_energies(step%problem, s, step%halo, step%physics, springs)
+      parts(in_springs + 1:in_springs + 3, s) = springs
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
     if (step%some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
@@ -157,8 +171,25 @@ contains
     self%dissipated_normal = self%dissipated_normal + sums(in_normal)
     self%dissipated_friction = self%dissipated_friction + sums(in_friction)
     self%boundary_work = self%boundary_work + sums(in_boundary)
+    if (self%has_springs) call take_springs(self, sums(in_springs + 1:in_springs + 3))
     call take_boundaries(self, step%decomposition%boundaries, step%boundary_impulses)
   end subroutine energy_take_step
+
+  !> What the springs have stored in a step is not dissipated.
+  pure subroutine take_springs(self, energies)
+    type(energy_balance_t), intent(inout) :: self
+    !> normal at the start of the step; normal, tangential at its end [J]
+    real(dp), intent(in) :: energies(3)
+
+    if (.not. self%knows_springs) then
+      self%elastic(1) = energies(1)
+      self%elastic_start = energies(1)
+      self%knows_springs = .true.
+    end if
+    self%dissipated_normal = self%dissipated_normal - (energies(2) - self%elastic(1))
+    self%dissipated_friction = self%dissipated_friction - (energies(3) - self%elastic(2))
+    self%elastic(:) = energies(2:3)
+  end subroutine take_springs
 
   !> Energies of the grains of a subdomain, and the work of the loads on them, h F . (V_i + V_{i+1})/2.
   pure subroutine add_grains(view, decomposition, s, physics, part)
@@ -372,14 +403,15 @@ contains
   pure real(dp) function energy_error(self) result(error)
     class(energy_balance_t), intent(in) :: self
     error = ((self%translation + self%rotation + self%boundaries) - self%start) - self%load_work - self%boundary_work + &
-      & self%dissipated_normal + self%dissipated_friction + self%carried_away
+      & self%dissipated_normal + self%dissipated_friction + self%carried_away + (sum(self%elastic) - self%elastic_start)
   end function energy_error
 
   !> Energy that the terms of the balance stand for: sum of their sizes [J].
   pure real(dp) function energy_turnover(self) result(turnover)
     class(energy_balance_t), intent(in) :: self
     turnover = self%translation + self%rotation + self%boundaries + self%start + abs(self%load_work) + abs(self%boundary_work) + &
-      & abs(self%dissipated_normal) + abs(self%dissipated_friction) + abs(self%carried_away)
+      & abs(self%dissipated_normal) + abs(self%dissipated_friction) + abs(self%carried_away) + sum(self%elastic) + &
+      & self%elastic_start
   end function energy_turnover
 
   !> All of the balance, bit for bit.
@@ -398,6 +430,9 @@ contains
     words(8) = transfer(self%dissipated_normal, 0_i8)
     words(9) = transfer(self%dissipated_friction, 0_i8)
     words(10) = transfer(self%carried_away, 0_i8)
+    words(11) = transfer(self%elastic(1), 0_i8)
+    words(12) = transfer(self%elastic(2), 0_i8)
+    words(13) = transfer(self%elastic_start, 0_i8)
   end subroutine energy_get_state
 
   pure subroutine energy_set_state(self, words)
@@ -415,6 +450,10 @@ contains
     self%dissipated_normal = transfer(words(8), 0.0_dp)
     self%dissipated_friction = transfer(words(9), 0.0_dp)
     self%carried_away = transfer(words(10), 0.0_dp)
+    self%elastic(1) = transfer(words(11), 0.0_dp)
+    self%elastic(2) = transfer(words(12), 0.0_dp)
+    self%elastic_start = transfer(words(13), 0.0_dp)
+    self%knows_springs = .true.
   end subroutine energy_set_state
 
 end module gravier_energy_balance

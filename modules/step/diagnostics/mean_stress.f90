@@ -8,6 +8,7 @@ module gravier_mean_stress
   use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
@@ -37,9 +38,13 @@ contains
     features%meaning = "write the mean stress and the solid fraction"
   end function mean_stress_features
 
-  subroutine mean_stress_begin(self, decomposition)
+  subroutine mean_stress_begin(self, decomposition, physics)
     class(mean_stress_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+
+    associate (unused => physics)
+    end associate
     allocate (self%stress(decomposition%nd, decomposition%nd), source=0.0_dp)
   end subroutine mean_stress_begin
 

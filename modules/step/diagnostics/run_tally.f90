@@ -26,6 +26,8 @@ module gravier_run_tally
     real(dp) :: shift = 0.0_dp, path = 0.0_dp
     !> largest overlap of the first step, which is that of the start, and of all later steps [m]
     real(dp) :: start_overlap = 0.0_dp, later_overlap = 0.0_dp
+    !> of compliant contacts: largest deformation [m], largest product of the step and the frequency of a normal spring
+    real(dp) :: deformation = 0.0_dp, stiffest = 0.0_dp
     !> largest residual at the end of a solve; largest velocity error over its scale, and solves where it is above far_off
     real(dp) :: worst_residual = 0.0_dp, worst_error = 0.0_dp
     integer(i8) :: far_off = 0

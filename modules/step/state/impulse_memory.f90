@@ -17,7 +17,7 @@ module gravier_impulse_memory
     & match_impulses, pair_record
 
   !> the words of a record of list_impulses, in their order: the version of checkpoints, which changes with them
-  character(len=*), parameter :: pair_record = "candidate antagonist impulse states"
+  character(len=*), parameter :: pair_record = "candidate antagonist impulse elongation states"
 
 contains
 
@@ -32,6 +32,7 @@ contains
     memory%law_row = merge(1, 0, remembers)
     if (counts_rest) memory%rest_row = memory%law_row + 1
     if (has_points) memory%key_row = memory%n_states() + 1
+    if (kernels%row%compliance_t > 0) memory%n_spring = merge(1, 3, kernels%nd == 2)
   end function memory_of
 
   !> Entries of an impulse kept with a pair: (n), (n, t), or n and the tangential vector; with rolling also the moment of disks
@@ -110,7 +111,7 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist, the impulse and the states, for the pairs of a list that keep something; the
+  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for the pairs of a list that keep something; the
   !> antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, records)
     type(local_bodies_t), intent(in) :: view
@@ -131,7 +132,10 @@ contains
         do e = 1, size(list%impulse, 1)
           records(lead + 2 + e, n) = transfer(list%impulse(e, p), 0_i8)
         end do
-        records(lead + 3 + size(list%impulse, 1):, n) = list%state(:, p)
+        do e = 1, size(list%spring, 1)
+          records(lead + 2 + size(list%impulse, 1) + e, n) = transfer(list%spring(e, p), 0_i8)
+        end do
+        records(lead + 3 + size(list%impulse, 1) + size(list%spring, 1):, n) = list%state(:, p)
       end do
     end associate
   end subroutine list_impulses
@@ -149,7 +153,7 @@ contains
   subroutine gather_impulses(decomposition, halo, records)
     type(decomposition_t), intent(in) :: decomposition
     type(halo_t), intent(in) :: halo
-    !> (1 + nd + 2 + words of the memory, n): subdomain (to be set), point, candidate, antagonist, impulse, states
+    !> (1 + nd + 2 + words of the memory, n): subdomain (to be set), point, candidate, antagonist, impulse, elongation, states
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer(i8), allocatable :: own(:, :)
     integer :: s, n, words
@@ -227,7 +231,7 @@ contains
 
   !> Give impulses and states to the pairs of a list that have the same bodies; what the records do not have stays.
   subroutine match_impulses(records, kept, view)
-    !> (2 + words of `kept`, n): candidate, antagonist, impulse, states
+    !> (2 + words of `kept`, n): candidate, antagonist, impulse, elongation, states
     integer(i8), intent(in), contiguous :: records(:, :)
     type(pair_memory_t), intent(in) :: kept
     type(local_bodies_t), intent(inout) :: view
@@ -249,6 +253,9 @@ contains
         do e = 1, min(list%memory%n_impulse, kept%n_impulse)
           list%impulse(e, p) = transfer(records(2 + e, k), 0.0_dp)
         end do
+        do e = 1, min(list%memory%n_spring, kept%n_spring)
+          list%spring(e, p) = transfer(records(2 + kept%n_impulse + e, k), 0.0_dp)
+        end do
         call take_state(list%memory%law_row, kept%law_row)
         call take_state(list%memory%rest_row, kept%rest_row)
         call take_state(list%memory%key_row, kept%key_row)
@@ -261,7 +268,7 @@ contains
     subroutine take_state(row, row_kept)
       integer, intent(in) :: row, row_kept
 
-      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = narrow(records(2 + kept%n_impulse + row_kept, k))
+      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = narrow(records(2 + kept%n_impulse + kept%n_spring + row_kept, k))
     end subroutine take_state
 
   end subroutine match_impulses

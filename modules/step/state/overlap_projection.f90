@@ -18,6 +18,8 @@ module gravier_overlap_projection
   integer, parameter :: check_every = 10, max_sweeps = 200
   !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
   real(dp), parameter :: remainder = 0.1_dp
+  !> gap of a contact that is left out, over the overlap allowed
+  real(dp), parameter :: out_of_reach = 1.0e9_dp
 
   !> What a projection borrows of a subproblem, and its work space; src/report/memory_report.f90 counts them.
   type :: borrowed_t
@@ -34,6 +36,7 @@ contains
   !> n.(d_i - d_j) + gap + allowed >= 0, in all subdomains with shared masses as in NSCDD; for boundaries, see
   !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
   !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
+  !> Compliant contacts are left out: their overlap is deformation.
   !> The problem comes back as it was but for velocities and masses, with the lengths of the displacements of all grains summed up:
   !> the same sum on any number of ranks. Collective.
   subroutine project_overlaps(decomposition, problem, h, allowed, shifts)
@@ -151,6 +154,7 @@ contains
       borrowed%law(:, 1, :) = sub%hot(:, nd + 1, :)
       do c = 1, sub%n_contacts
         sub%hot(lane_of(c), nd + 1, block_of(c)) = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
+        if (sub%yields(c)) sub%hot(lane_of(c), nd + 1, block_of(c)) = out_of_reach*allowed
       end do
       if (problem%kernels%nf > 1) then
         ! nothing turns then, and no moment is needed

@@ -107,6 +107,7 @@ contains
         found%gap(n) = old%gap(c)
         found%normal(:, n) = old%normal(:, c)
         if (size(old%terms) > 0) found%terms(n) = old%terms(c)
+        if (size(old%spring) > 0) found%spring(n) = old%spring(c)
         if (size(old%place) > 0) found%place(n) = old%place(c)
       end do
     end do

@@ -2,6 +2,7 @@
 module own_diagnostics
   use gravier_kinds, only: dp, i8
   use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t, &
     & in_written_steps
   implicit none
@@ -38,9 +39,13 @@ contains
     features%measures = in_written_steps
   end function counter_features
 
-  subroutine counter_begin(self, decomposition)
+  subroutine counter_begin(self, decomposition, physics)
     class(counter_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+
+    associate (unused => physics)
+    end associate
     self%begun = self%begun + decomposition%nd
   end subroutine counter_begin
 
@@ -214,7 +219,7 @@ contains
     allocate (list(1)%diagnostic, source=counter_t())
     allocate (list(2)%diagnostic, source=boundary_forces_t())
     allocate (list(3)%diagnostic, source=least_t())
-    call sim%diagnostics%take(sim%decomposition, list, [.true., .false., .true.])
+    call sim%diagnostics%take(sim%decomposition, sim%physics, list, [.true., .false., .true.])
     call check_equal(size(sim%diagnostics%asked), 2, "two of three are asked for")
     call check(allocated(list(2)%diagnostic), "the other one is left")
     call check_equal(sim%diagnostics%n_columns, 4, "their columns")
@@ -265,7 +270,7 @@ contains
     call make(case_text//" &output every = 2 /", sim)
     allocate (list(1)%diagnostic, source=contact_structure_t())
     allocate (list(2)%diagnostic, source=counter_t())
-    call sim%diagnostics%take(sim%decomposition, list, [.true., .true.])
+    call sim%diagnostics%take(sim%decomposition, sim%physics, list, [.true., .true.])
     call sim%diagnostics%get_histograms(histograms)
     call check_equal(size(histograms), 0, "no histogram before the first step")
     call advance(sim)

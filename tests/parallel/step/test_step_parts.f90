@@ -423,7 +423,7 @@ contains
   subroutine check_state(energy)
     type(energy_balance_t), intent(in) :: energy
     type(energy_balance_t) :: other
-    integer(i8) :: words(10), again(10)
+    integer(i8) :: words(13), again(13)
 
     call energy%get_state(words)
     call other%set_state(words)

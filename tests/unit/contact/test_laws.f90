@@ -14,6 +14,9 @@ program test_laws
   use gravier_adhesive_law, only: adhesive_law_t
   use gravier_capillary_law, only: capillary_law_t
   use gravier_bonded_law, only: bonded_law_t
+  use gravier_contact_spring, only: damping_ratio
+  use gravier_elastic_law, only: elastic_law_t
+  use gravier_hertz_law, only: hertz_law_t
   use gravier_law_registry, only: law_holder_t, registered_laws, law_keys
   use gravier_law_set, only: law_set_t
   use gravier_test_law_names, only: name_length, split_names, add_law
@@ -30,6 +33,8 @@ program test_laws
   call check_adhesive()
   call check_capillary()
   call check_bonded()
+  call check_elastic()
+  call check_hertz()
   call check_law_set()
   call check_defaults()
   call check_none()
@@ -75,7 +80,7 @@ contains
 
   !> Each law under its word, and every key once, with the laws that have it.
   subroutine check_registry()
-    character(len=*), parameter :: words = "coulomb frictionless none velocity adhesive capillary bonded"
+    character(len=*), parameter :: words = "coulomb frictionless none velocity adhesive capillary bonded elastic hertz"
     type(law_holder_t), allocatable :: laws(:)
     type(collected_keys_t) :: collected
     type(declared_key_t), allocatable :: own(:)
@@ -84,7 +89,7 @@ contains
     call registered_laws(laws)
     call law_keys(collected)
     n = size(collected%keys)
-    call check_equal(size(laws), 7, "laws")
+    call check_equal(size(laws), 9, "laws")
     call check_equal(collected%kinds, words, "words of the laws, in the order of the registry")
     do i = 1, n
       call check_equal(count(collected%keys(1:n)%key%name == collected%keys(i)%key%name), 1, &
@@ -107,7 +112,7 @@ contains
       if (collected%keys(i)%key%name == "restitution") call check_equal(collected%keys(i)%kinds, "coulomb frictionless velocity", &
         & "laws with restitution")
       if (collected%keys(i)%key%name == "rolling_friction") call check_equal(collected%keys(i)%kinds, &
-        & "coulomb velocity adhesive capillary bonded", "laws that resist rolling")
+        & "coulomb velocity adhesive capillary bonded elastic hertz", "laws that resist rolling")
     end do
   end subroutine check_registry
 
@@ -307,6 +312,77 @@ contains
   end subroutine check_bonded
 
   !> Pairs of materials in either order; what has no material, or no law, is under the scene's values.
+  !> Stiffness as it is given, or by a number, a pressure and a breadth; which of them is wanted.
+  subroutine check_elastic()
+    type(elastic_law_t) :: law
+    type(contact_pair_t) :: pair
+
+    call set_law(law, &
+      & "friction normal_stiffness stiffness_ratio spring_restitution tangential_damping spring_theta pull_off_force", &
+      & [0.3_dp, 2.0e4_dp, 0.5_dp, 0.6_dp, 0.4_dp, 0.7_dp, 0.2_dp])
+    call check(law%yields .and. law%attracts .and. .not. law%is_constant .and. .not. law%remembers, "what the law says of itself")
+    call check(law%fault_key == "", "no fault")
+    pair = pair_at(-0.01_dp)
+    call law%evaluate(pair)
+    call check_close(pair%spring%stiffness(1), 2.0e4_dp, 0.0_dp, "normal stiffness")
+    call check_close(pair%spring%stiffness(2), 1.0e4_dp, rounding*1.0e4_dp, "tangential stiffness")
+    call check_close(pair%spring%damping, damping_ratio(0.6_dp, 1.0_dp), 0.0_dp, "ratio of damping")
+    call check_close(pair%spring%tangential_damping, 0.4_dp, 0.0_dp, "tangential damping")
+    call check_close(pair%spring%weight, 0.7_dp, 0.0_dp, "weight")
+    call check_close(pair%spring%hertz, 0.0_dp, 0.0_dp, "a linear spring")
+    call check_close(pair%terms%friction, 0.3_dp, 0.0_dp, "friction")
+    call check_close(pair%terms%attraction, 0.2_dp, 0.0_dp, "attraction of bodies that touch")
+    pair = pair_at(0.01_dp)
+    call law%evaluate(pair)
+    call check_close(pair%terms%attraction, 0.0_dp, 0.0_dp, "no attraction of bodies apart")
+    call set_law(law, "stiffness_number stiffness_pressure", [1.0e4_dp, 50.0_dp])
+    pair%breadth = 0.02_dp
+    call law%evaluate(pair)
+    call check_close(pair%spring%stiffness(1), 1.0e4_dp, rounding*1.0e4_dp, "stiffness by number, pressure and breadth")
+    call check(.not. law%attracts .and. law%fault_key == "", "without attraction, without fault")
+    call set_law(law, "friction", [0.3_dp])
+    call check_equal(law%fault_key, "normal_stiffness", "no stiffness")
+    call set_law(law, "normal_stiffness stiffness_number stiffness_pressure", [1.0_dp, 1.0_dp, 1.0_dp])
+    call check_equal(law%fault_key, "normal_stiffness", "two stiffnesses")
+    call set_law(law, "stiffness_number", [1.0_dp])
+    call check_equal(law%fault_key, "stiffness_pressure", "a number without a pressure")
+  end subroutine check_elastic
+
+  !> Chords of the law of Hertz, and Mindlin's stiffness, at the compression of now or the one that is coming.
+  subroutine check_hertz()
+    type(hertz_law_t) :: law
+    type(contact_pair_t) :: pair
+    real(dp), parameter :: young = 1.0e6_dp, poisson = 0.3_dp, radius = 0.1_dp, mass = 0.5_dp
+    real(dp) :: k, depth
+
+    call set_law(law, "young_modulus poisson_ratio", [young, poisson])
+    k = 4.0_dp/3.0_dp*young/(2.0_dp*(1.0_dp - poisson**2))*sqrt(radius)
+    pair = pair_at(-0.01_dp)
+    pair%reduced_radius = radius
+    pair%reduced_mass = mass
+    pair%h = 1.0e-3_dp
+    call law%evaluate(pair)
+    call check_close(pair%spring%hertz, k, rounding*k, "K")
+    call check_close(pair%spring%stiffness(1), k*0.1_dp, rounding*k, "the chord at a compression of 0.01")
+    call check_close(pair%spring%stiffness(2)/(1.5_dp*pair%spring%stiffness(1)), 2.0_dp*(1.0_dp - poisson)/(2.0_dp - poisson), &
+      & rounding, "Mindlin's ratio of the stiffnesses at rest")
+    ! a contact that closes at 2 m/s, at most by 2 mm in the step; an impact would be deeper
+    pair = pair_at(0.001_dp)
+    pair%reduced_radius = radius
+    pair%reduced_mass = mass
+    pair%h = 1.0e-3_dp
+    pair%normal_velocity = -2.0_dp
+    call law%evaluate(pair)
+    call check_close(pair%spring%stiffness(1), k*sqrt(0.002_dp), rounding*k, "the chord of a contact that closes")
+    pair%h = 1.0_dp
+    depth = (1.25_dp*mass*4.0_dp/k)**0.4_dp
+    call law%evaluate(pair)
+    call check_close(pair%spring%stiffness(1), k*sqrt(depth), rounding*k, "the chord of an impact")
+    pair%normal_velocity = 1.0_dp
+    call law%evaluate(pair)
+    call check(pair%spring%stiffness(1) > 0.0_dp .and. pair%spring%stiffness(1) < 1.0e-4_dp*k*sqrt(radius), "hardly any, but some")
+  end subroutine check_hertz
+
   subroutine check_law_set()
     character(len=*), parameter :: names = "adhesion_range friction restitution adhesion"
     type(law_set_t) :: laws

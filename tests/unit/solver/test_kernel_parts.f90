@@ -4,7 +4,8 @@ program test_kernel_parts
   use gravier_kinds, only: dp
   use gravier_contact_data, only: contact_rows_t, lanes, n_blocks, block_of, lane_of, rows_2d_frictionless, rows_2d_friction, &
     & rows_2d_friction_shift, rows_2d_friction_rolling, rows_2d_friction_shift_rolling, rows_3d_frictionless, rows_3d_friction, &
-    & rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling
+    & rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling, rows_2d_compliant, &
+    & rows_2d_compliant_rolling, rows_3d_compliant, rows_3d_compliant_rolling
   use gravier_kernel_table, only: kernel_table_t
   use gravier_sweeps_2d, only: choose_sweeps_2d
   use gravier_sweeps_3d, only: choose_sweeps_3d
@@ -25,6 +26,10 @@ program test_kernel_parts
   call check_rows("3D, shift", rows_3d_friction_shift, 11)
   call check_rows("3D, rolling", rows_3d_friction_rolling, 13)
   call check_rows("3D, shift and rolling", rows_3d_friction_shift_rolling, 15)
+  call check_rows("2D, compliant", rows_2d_compliant, 11)
+  call check_rows("2D, compliant and rolling", rows_2d_compliant_rolling, 14)
+  call check_rows("3D, compliant", rows_3d_compliant, 13)
+  call check_rows("3D, compliant and rolling", rows_3d_compliant_rolling, 17)
   call test_choices()
   call test_drop()
   call test_tangents()
@@ -49,7 +54,7 @@ contains
     character(len=*), intent(in) :: what
     type(contact_rows_t), intent(in) :: row
     integer, intent(in) :: total
-    integer :: named(15), k
+    integer :: named(17), k
 
     call check_equal(row%total, total, what//": rows")
     named(1) = row%nx
@@ -67,6 +72,8 @@ contains
     named(13) = row%per_wrr
     named(14) = row%rolling_friction
     named(15) = row%pivoting_friction
+    named(16) = row%compliance_n
+    named(17) = row%compliance_t
     do k = 1, total
       call check_equal(count(named == k), 1, what//": each row has one name")
     end do
@@ -76,18 +83,18 @@ contains
 
   !> Each set of effects has loops of its own.
   subroutine test_choices()
-    type(kernel_table_t) :: tables(14)
-    logical, parameter :: friction(7) = [.false., .true., .true., .true., .true., .true., .true.]
-    logical, parameter :: shifted(7) = [.false., .false., .true., .false., .true., .false., .true.]
-    logical, parameter :: rolling(7) = [.false., .false., .false., .true., .true., .false., .false.]
-    logical, parameter :: shaped(7) = [.false., .false., .false., .false., .false., .true., .true.]
+    type(kernel_table_t) :: tables(20)
+    logical, parameter :: friction(10) = [.false., .true., .true., .true., .true., .true., .true., .true., .true., .true.]
+    logical, parameter :: shifted(10) = [.false., .false., .true., .false., .true., .false., .true., .true., .true., .true.]
+    logical, parameter :: rolling(10) = [.false., .false., .false., .true., .true., .false., .false., .false., .true., .false.]
+    logical, parameter :: shaped(10) = [.false., .false., .false., .false., .false., .true., .true., .false., .false., .true.]
     integer :: k, l
 
-    do k = 1, 7
-      call choose_sweeps_2d(tables(k), friction(k), shifted(k), rolling(k), shaped(k))
-      call choose_loops_2d(tables(k), friction(k), shifted(k), rolling(k), shaped(k))
-      call choose_sweeps_3d(tables(7 + k), friction(k), shifted(k), rolling(k), shaped(k))
-      call choose_loops_3d(tables(7 + k), friction(k), shifted(k), rolling(k), shaped(k))
+    do k = 1, 10
+      call choose_sweeps_2d(tables(k), friction(k), shifted(k), rolling(k), shaped(k), k > 7)
+      call choose_loops_2d(tables(k), friction(k), shifted(k), rolling(k), shaped(k), k > 7)
+      call choose_sweeps_3d(tables(10 + k), friction(k), shifted(k), rolling(k), shaped(k), k > 7)
+      call choose_loops_3d(tables(10 + k), friction(k), shifted(k), rolling(k), shaped(k), k > 7)
     end do
     do k = 1, size(tables)
       call check(associated(tables(k)%sweep_recording) .and. associated(tables(k)%sweep_momentum_recording) &
@@ -108,8 +115,8 @@ contains
     real(dp) :: hot(lanes, 5, 1), weight(3, 2), velocity(3, 2), impulse(lanes, 1, 1), sums(2), reaction(3, 2), residuals(3)
     integer :: pair(2, lanes)
 
-    call choose_sweeps_3d(kernels, .false., .false., .false., .false.)
-    call choose_loops_3d(kernels, .false., .false., .false., .false.)
+    call choose_sweeps_3d(kernels, .false., .false., .false., .false., .false.)
+    call choose_loops_3d(kernels, .false., .false., .false., .false., .false.)
     pair(:, :) = 1
     pair(2, 1) = 2
     hot(:, :, :) = 0.0_dp

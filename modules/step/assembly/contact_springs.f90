@@ -1,0 +1,150 @@
+!> The springs of compliant contacts: what they add to the packed contacts of a step, how far they are stretched after it, and their
+!> energy. Elongations along the tangents stay with the pairs of the neighbour lists (gravier_neighbour_list), as numbers in the
+!> plane and as vectors in space; those along the normal are the gaps.
+module gravier_contact_springs
+  use gravier_kinds, only: dp
+  use gravier_contact_spring, only: spring_t
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of, contact_tangents, lanes
+  use gravier_contact_operator, only: find_local_operator
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_halo, only: halo_t
+  use gravier_physics, only: physics_t
+  implicit none
+  private
+  public :: pack_spring, conclude_springs, spring_energies
+
+contains
+
+  !> Give contact `c` its springs: shifts and compliances. The contact is packed but for these and for its local operator; a rigid
+  !> contact comes back as it was, without compliance.
+  subroutine pack_spring(list, spring, kernels, h, c, velocity, sub)
+    type(neighbour_list_t), intent(in) :: list
+    type(spring_t), intent(in) :: spring
+    type(kernels_t), intent(in) :: kernels
+    !> [s]
+    real(dp), intent(in) :: h
+    integer, intent(in) :: c
+    !> of the contact at the start of the step (nd) [m/s]
+    real(dp), intent(in) :: velocity(:)
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: w(2), law(2), elongation(2)
+    integer :: d
+
+    associate (q => lane_of(c), g => block_of(c), row => kernels%row, own => sub%spring(c))
+      sub%hot(q, row%compliance_n:row%compliance_t, g) = 0.0_dp
+      own%spring = spring
+      if (.not. spring%yields()) return
+      own%velocity(1:size(velocity)) = velocity
+      call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
+      call own%damp(w(1), h, sub%gap(c))
+      sub%stiffest = max(sub%stiffest, h*sqrt(spring%stiffness(1)*w(1)))
+      law(:) = own%law(1, h, sub%gap(c))
+      sub%hot(q, row%compliance_n, g) = law(1)
+      sub%hot(q, row%shift, g) = law(2)
+      call recall_elongation(list, sub, c, kernels%nd, elongation)
+      do d = 2, kernels%nd
+        law(:) = own%law(d, h, elongation(d - 1))
+        sub%hot(q, row%compliance_t, g) = law(1)
+        sub%hot(q, row%shift_t + d - 2, g) = law(2)
+      end do
+    end associate
+  end subroutine pack_spring
+
+  !> Elongation of the tangential spring of contact `c` in its frame [m]. In space the vector that is kept is brought into the
+  !> tangent plane of now, its length unchanged.
+  pure subroutine recall_elongation(list, sub, c, nd, elongation)
+    type(neighbour_list_t), intent(in) :: list
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c, nd
+    !> along t and s; 0 along s in the plane
+    real(dp), intent(out) :: elongation(2)
+    real(dp) :: t(3), s(3), length
+
+    elongation(:) = 0.0_dp
+    associate (kept => list%spring(:, sub%source(c)))
+      if (nd == 2) then
+        elongation(1) = kept(1)
+      else
+        length = norm2(kept)
+        if (.not. length > 0.0_dp) return
+        call contact_tangents(sub%hot, c, t, s)
+        elongation(1) = sum(kept*t)
+        elongation(2) = sum(kept*s)
+        if (norm2(elongation) > 0.0_dp) elongation(:) = elongation*(length/norm2(elongation))
+      end if
+    end associate
+  end subroutine recall_elongation
+
+  !> Keep the elongations of the springs of a solved problem with the pairs of the lists; v_global is evaluated. A contact that
+  !> carries nothing forgets.
+  subroutine conclude_springs(problem, h, halo)
+    type(contact_problem_t), intent(in) :: problem
+    !> [s]
+    real(dp), intent(in) :: h
+    type(halo_t), intent(inout) :: halo
+    real(dp), allocatable :: v(:, :, :)
+    real(dp) :: elongation(2), t(3), s(3)
+    integer :: k, c, d, nd
+
+    nd = problem%kernels%nd
+    do k = 1, size(problem%sub)
+      associate (sub => problem%sub(k), list => halo%view(k)%list)
+        list%spring(:, :) = 0.0_dp
+        allocate (v, mold=sub%impulse)
+        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+        do c = 1, sub%n_contacts
+          associate (q => lane_of(c), g => block_of(c))
+            if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
+            do d = 2, nd
+              elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g))
+            end do
+          end associate
+          if (nd == 2) then
+            list%spring(1, sub%source(c)) = elongation(1)
+          else
+            call contact_tangents(sub%hot, c, t, s)
+            list%spring(:, sub%source(c)) = elongation(1)*t + elongation(2)*s
+          end if
+        end do
+        deallocate (v)
+      end associate
+    end do
+  end subroutine conclude_springs
+
+  !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents,
+  !> once `conclude_springs` was called. At the start elongations along the tangents are not known any more, and count as 0.
+  subroutine spring_energies(problem, k, halo, physics, energies)
+    type(contact_problem_t), intent(in) :: problem
+    !> place of the subdomain among those of this rank
+    integer, intent(in) :: k
+    type(halo_t), intent(in) :: halo
+    type(physics_t), intent(in) :: physics
+    !> normal at the start; normal, tangential at the end [J]
+    real(dp), intent(out) :: energies(3)
+    real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
+    integer :: c, d
+
+    energies(:) = 0.0_dp
+    associate (sub => problem%sub(k), nd => problem%kernels%nd, h => physics%h, theta => physics%theta)
+      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+      do c = 1, sub%n_contacts
+        if (.not. sub%yields(c)) cycle
+        associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
+          before = -(sub%gap(c) - (1.0_dp - theta)*h*own%velocity(1))
+          after = -(sub%gap(c) + theta*h*v(q, 1, g))
+          elongation(:) = 0.0_dp
+          energies(1) = energies(1) + own%spring%energy(before, elongation)
+          energies(2) = energies(2) + own%spring%energy(after, elongation)
+          if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
+          call recall_elongation(halo%view(k)%list, sub, c, nd, elongation)
+          do d = 2, nd
+            elongation(d - 1) = elongation(d - 1) - (1.0_dp - theta)*h*v(q, d, g)
+          end do
+          energies(3) = energies(3) + own%spring%energy(0.0_dp, elongation)
+        end associate
+      end do
+    end associate
+  end subroutine spring_energies
+
+end module gravier_contact_springs

@@ -1,0 +1,457 @@
+"""Compliant contacts in whole runs against formulas: impacts on springs and dashpots, the force of Hertz, a tangential spring that
+slides, energy, equilibria; bad input."""
+import itertools
+import os
+import re
+
+import numpy as np
+
+from gravier_runs import each, merged, run_case, write
+from small_scenes import EPS, G, Grain, SmallScene, plane
+
+RADIUS, MASS, STIFFNESS = 0.05, 0.7, 7000.0
+#: time and step of a half period of a ball on the plane
+FREQUENCY = np.sqrt(STIFFNESS / MASS)
+MATERIAL = [{"name": "m"}]
+
+
+def elastic(**values):
+    return {"materials": ["m"], "kind": "elastic", **values}
+
+
+def rate(errors):
+    """Order of convergence from the first to the last of errors at steps each half as long."""
+    errors = np.abs(errors)
+    return np.log2(errors[0] / errors[-1]) / (len(errors) - 1)
+
+
+def up(dimension):
+    return np.eye(dimension)[-1]
+
+
+class ComplianceScene(SmallScene):
+
+    def drop(self, title, dimension, step, steps, law, speed=1.0, lead=0.3, pair=False, **more):
+        """A ball, or two that meet head on, `lead` steps of way before they touch."""
+        self.step = step
+        n = up(dimension)
+        grains = [Grain((RADIUS + lead * step * speed) * n, -speed * n, radius=RADIUS, mass=MASS)]
+        walls = [plane(0 * n, n, material="m")]
+        if pair:
+            grains = [Grain((RADIUS + 0.5 * lead * step * speed) * n * sign, -0.5 * speed * n * sign, radius=RADIUS, mass=MASS)
+                      for sign in (1, -1)]
+            walls = []
+        output = {"every": steps if "every" not in more else more.pop("every"), "energy": True}
+        return self.play(title, grains, walls, steps=steps, material=MATERIAL, law=[law], output=output, **more)
+
+
+class Impacts(ComplianceScene):
+
+    def rebounds(self, title, dimension, law, counts, frequency=FREQUENCY, **more):
+        found = []
+        for count in counts:
+            record = self.drop(f"{title} {dimension} {count}", dimension, np.pi / frequency / count, 2 * count, law, **more)
+            v = record.velocity[-1, :, -1]
+            found.append(v[0] if len(v) == 1 else v[0] - v[1])
+        return np.array(found)
+
+    def test_elastic_impact(self):
+        """Without a dashpot a ball comes back with its velocity, and two do: the second order in the step at theta = 1/2. At theta
+        = 1 the step damps by exp(-pi h omega/2) to first order."""
+        for dimension, pair in itertools.product((2, 3), (False, True)):
+            with self.subTest(dimension=dimension, pair=pair):
+                frequency = FREQUENCY * np.sqrt(1 + pair)
+                law = elastic(normal_stiffness=STIFFNESS, spring_theta=0.5)
+                found = self.rebounds(f"elastic {pair}", dimension, law, (20, 40, 80), frequency, pair=pair)
+                self.assertGreater(rate(found - 1), 1.9)
+                self.verify("impact on a spring", f"restitution, h omega = pi/80, {'two balls' if pair else 'plane'}, {dimension}D",
+                            found[-1], 1, 1e-5)
+        law = elastic(normal_stiffness=STIFFNESS)
+        found = self.rebounds("damped by the step", 3, law, (80, 160))
+        self.verify("impact on a spring, theta = 1", "restitution, h omega = pi/160", found[-1], np.exp(-np.pi**2 / 320), 2e-4)
+        self.assertGreater(rate(found - np.exp(-np.pi**2 / 2 / np.array([80, 160]))), 1.8)
+
+    def test_restitution(self):
+        """The dashpot returns the restitution asked for, of a ball on a plane and of two, whatever their speed: second order."""
+        for wanted, pair, speed in ((0.8, False, 1.0), (0.5, True, 1.0), (0.5, False, 0.01), (0.1, False, 1.0)):
+            law = elastic(normal_stiffness=STIFFNESS, spring_restitution=wanted, spring_theta=0.5)
+            found = self.rebounds(f"restitution {wanted} {pair} {speed}", 3, law, (40, 160), FREQUENCY * np.sqrt(1 + pair),
+                                  pair=pair, speed=speed) / speed
+            self.verify("impact on a spring and a dashpot", f"restitution {wanted} at {speed} m/s", found[-1], wanted, 4e-5)
+
+    def test_time_of_contact(self):
+        """A ball is in contact for pi/omega: it comes back to where it touched then."""
+        count = 400
+        record = self.drop("time", 3, np.pi / FREQUENCY / count, count + 40, elastic(normal_stiffness=STIFFNESS, spring_theta=0.5),
+                           every=1)
+        gap = record.position[:, 0, -1] - RADIUS
+        inside = np.nonzero(gap < 0)[0]
+        # straight lines through the first and the last crossing
+        first, last = inside[0], inside[-1]
+        begin = record.time[first] - gap[first] / record.velocity[first, 0, -1]
+        end = record.time[last] - gap[last] / record.velocity[last, 0, -1]
+        self.verify("impact on a spring", "time of contact times omega over pi", (end - begin) * FREQUENCY / np.pi, 1, 2e-4)
+        self.verify("impact on a spring", "greatest compression times omega over v", -gap.min() * FREQUENCY, 1, 2e-5)
+
+    def test_hertz(self):
+        """Of elastic spheres: x_max = (5 m v^2/(4 K))^(2/5), time of contact 2.9433 x_max/v (Landau and Lifshitz), restitution by the
+        dashpot."""
+        young, poisson = 1.0e7, 0.3
+        for pair, wanted in ((False, 1.0), (True, 1.0), (False, 0.6)):
+            law = {"materials": ["m"], "kind": "hertz", "young_modulus": young, "poisson_ratio": poisson, "spring_theta": 0.5,
+                   "spring_restitution": wanted}
+            k = 4 / 3 * young / (2 * (1 - poisson**2)) * np.sqrt(RADIUS / (1 + pair))
+            deepest = (1.25 * MASS / (1 + pair) / k) ** 0.4
+            duration = 2.9432751 * deepest
+            rebound, depth = [], []
+            for count in (50, 100, 200):
+                record = self.drop(f"hertz {pair} {wanted} {count}", 3, duration / count, 2 * count, law, pair=pair, every=1)
+                z, v = record.position[:, :, -1], record.velocity[:, :, -1]
+                gap = z[:, 0] - RADIUS if not pair else z[:, 0] - z[:, 1] - 2 * RADIUS
+                v = v[:, 0] if not pair else v[:, 0] - v[:, 1]
+                rebound.append(v[-1])
+                depth.append(-gap.min())
+            inside = np.nonzero(gap < 0)[0]
+            begin, end = (record.time[i] - gap[i] / v[i] for i in (inside[0], inside[-1]))
+            title = f"Hertz, {'two spheres' if pair else 'plane'}"
+            self.verify(title, f"restitution {wanted}", rebound[-1], wanted, 1e-3)
+            # a dashpot that sets in with the fourth root of the compression leaves the order 5/4
+            self.assertGreater(rate(np.array(rebound) - wanted), 1.7 if wanted == 1 else 1.2, (title, rebound))
+            if wanted == 1:
+                self.verify(title, "greatest compression over that of the formula", depth[-1] / deepest, 1, 1e-3)
+                self.verify(title, "time of contact over that of the formula", (end - begin) / duration, 1, 1e-3)
+
+
+class Energies(ComplianceScene):
+
+    def test_ball_that_swings(self):
+        """A ball that stays on the plane swings with omega' = 2/h atan(h omega/2), and neither energy nor amplitude drift."""
+        count, periods = 20, 500
+        self.step = 2 * np.pi / FREQUENCY / count
+        rest = MASS * G / STIFFNESS
+        n = up(3)
+        record = self.play("swing", [Grain((RADIUS - 1.5 * rest) * n, radius=RADIUS, mass=MASS)], [plane(0 * n, n, material="m")],
+                           -G * n, steps=count * periods, material=MATERIAL,
+                           law=[elastic(normal_stiffness=STIFFNESS, spring_theta=0.5)], output={"every": 97, "energy": True})
+        z = record.position[:, 0, -1] - RADIUS + rest
+        turned = 2 / self.step * np.arctan(0.5 * self.step * FREQUENCY)
+        self.verify("ball that swings on a plane", "place [m]", z, -0.5 * rest * np.cos(turned * record.time), 1e-8 * rest)
+        history = record.run.history()
+        total = history["kinetic_translation"] + history["elastic_energy"] + history["potential_energy"]
+        self.verify("ball that swings on a plane", "energy over that of the start", total / total[0], 1, 1e-11)
+        self.verify("ball that swings on a plane", "dissipated [J]", history["dissipated_normal"], 0, 1e-11 * abs(total[0]))
+
+    def test_chain(self):
+        """Compressed balls between two walls swing in their modes, omega = 2 sqrt(k/m) sin(j pi/(2 (n + 1))), as the step has it:
+        omega' = 2/h atan(h omega/2). Long waves run with the speed of sound d sqrt(k/m)."""
+        n, depth, small = 9, 1e-3, 1e-5
+        along = np.array([1.0, 0.0, 0.0])
+        self.step = 0.2 / FREQUENCY
+        pitch = 2 * RADIUS - depth
+        number = np.arange(1, n + 1)
+        for mode in (1, 2, 9):
+            shape = np.sin(mode * np.pi * number / (n + 1))
+            grains = [Grain((RADIUS - depth + (k - 1) * pitch) * along, small * shape[k - 1] * FREQUENCY * along, radius=RADIUS,
+                            mass=MASS) for k in number]
+            end = 2 * (RADIUS - depth) + (n - 1) * pitch
+            record = self.play(f"chain {mode}", grains,
+                               [plane(0 * along, along, material="m"), plane(end * along, -along, material="m")], steps=400, material=MATERIAL, law=[elastic(normal_stiffness=STIFFNESS, spring_theta=0.5)],
+                               output={"every": 50}, scene={"start_overlap": 0.1})
+            frequency = 2 * FREQUENCY * np.sin(mode * np.pi / (2 * (n + 1)))
+            turned = 2 / self.step * np.arctan(0.5 * self.step * frequency)
+            wanted = small * FREQUENCY * shape * np.cos(turned * record.time[:, None])
+            self.verify("chain of nine balls between walls", f"velocity of mode {mode} [m/s]", record.velocity[:, :, 0], wanted,
+                        1e-9 * small * FREQUENCY)
+
+    def test_balance_of_damped_impacts(self):
+        """Energies close to rounding with dashpots, friction and sliding springs, and what is lost is dissipated."""
+        for dimension in (2, 3):
+            axes = np.eye(dimension)
+            grains = [Grain(0.1 * (k % 3) * axes[0] + (0.1 + 0.12 * (k // 3)) * axes[-1], (0.3 - 0.1 * k) * axes[0] - axes[-1],
+                            radius=RADIUS, mass=MASS) for k in range(9)]
+            self.step = 0.02 / FREQUENCY
+            record = self.play(f"balance {dimension}", grains, [plane(0 * axes[0], axes[-1], material="m")], -G * axes[-1], steps=400,
+                               material=MATERIAL, output={"every": 400, "energy": True}, solver={"tolerance": 1e-10},
+                               law=[elastic(normal_stiffness=STIFFNESS, spring_restitution=0.7, friction=0.4, tangential_damping=0.5,
+                                            spring_theta=0.5)])
+            history = record.run.history()
+            start = 0.5 * MASS * sum(np.sum(np.square(grain.velocity)) for grain in grains)
+            self.assertLess(np.abs(history["energy_error"]).max(), 1e-11 * start)
+            self.assertGreater(history["elastic_energy"].max(), 0.05 * start)
+            # a sliding or parting contact may give back roundings only
+            for name in ("dissipated_normal", "dissipated_friction"):
+                self.assertGreater(history[name][-1], 0.01 * start)
+                self.assertGreater(np.diff(history[name]).min(), -1e-3 * start)
+
+
+class Input(ComplianceScene):
+
+    def refused(self, title, **law):
+        more = law.pop("more", {})
+        run = run_case(merged({"scene": {"bodies": "lattice", "lattice_count": [2, 2], "radius_min": 0.05, "radius_max": 0.05},
+                               "material": MATERIAL, "law": [{"materials": ["m"], **law}], "time": {"step": 1e-3, "steps": 1}}, more),
+                       directory=self.here(title))
+        self.assert_status(run, 2)
+        self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
+        return run.stderr
+
+    def test_bad_values(self):
+        for key, value, expected in (("normal_stiffness", -1.0, ">= 0"), ("spring_restitution", 0.0, "in (0, 1]"),
+                                     ("spring_restitution", 1.5, "in (0, 1]"), ("spring_theta", 0.4, "in [0.5, 1]"),
+                                     ("stiffness_ratio", 0.0, "> 0"), ("pull_off_force", -1.0, ">= 0")):
+            text = self.refused(f"{key} {value}", **{"kind": "elastic", "normal_stiffness": 1e4, key: value})
+            self.assertIn(f"&law (the 1st) {key} = {value}: expected a finite real number {expected}", text)
+        text = self.refused("poisson", kind="hertz", young_modulus=1e7, poisson_ratio=0.6, more={"scene": {"dimension": 3, "lattice_count": [2, 2, 2]}})
+        self.assertIn("poisson_ratio = 0.6: expected a finite real number in [0, 0.5]", text)
+
+    def test_values_that_do_not_go_together(self):
+        either = "expected either a normal_stiffness or a stiffness_number greater than 0"
+        self.assertIn(f"&law (the 1st) normal_stiffness: {either}", self.refused("none", kind="elastic"))
+        self.assertIn(either, self.refused("both", kind="elastic", normal_stiffness=1.0, stiffness_number=1.0, stiffness_pressure=1.0))
+        self.assertIn("stiffness_pressure: expected a pressure greater than 0",
+                      self.refused("no pressure", kind="elastic", stiffness_number=1e4))
+        self.assertIn("kind = 'hertz': expected a law that holds in 2D", self.refused("disks", kind="hertz", young_modulus=1e7))
+        self.assertIn("fclib_step = 1: expected none where contacts are compliant",
+                      self.refused("fclib", kind="elastic", normal_stiffness=1e4, more={"output": {"fclib_step": 1}}))
+
+    def test_hertz_is_of_spheres(self):
+        directory = self.here("blocks")
+        os.makedirs(directory)
+        write(os.path.join(directory, "a.shapes"), "shape block\nrounding 0.002\nbox 0.1 0.1 0.1\n")
+        write(os.path.join(directory, "bodies.csv"), "id,x,y,z,shape,scale\n1,0,0,1,block,1\n2,0,0,2,block,1\n")
+        run = run_case({"scene": {"dimension": 3, "bodies": "file", "bodies_file": "bodies.csv", "shapes": "a.shapes"},
+                        "material": MATERIAL, "law": [{"materials": ["m"], "kind": "hertz", "young_modulus": 1e7}],
+                        "time": {"step": 1e-3, "steps": 1}}, directory=directory)
+        self.assert_status(run, 2)
+        self.assertIn("case.nml: &law kind = 'hertz': expected another, as 'elastic', where bodies have shapes: this one is of spheres",
+                      run.stderr)
+
+    def test_stiffness_that_the_step_does_not_resolve(self):
+        """The log names h sqrt(k/m) and the step that would do, in a run and in --check, and is silent where the step is fine."""
+        self.step = 0.02 / FREQUENCY
+        n = up(3)
+        grain = Grain((RADIUS - 1e-6) * n, radius=RADIUS, mass=MASS)
+        for factor, warned in ((1.0, False), (50.0, True)):
+            stiffness = STIFFNESS * factor**2
+            record = self.play(f"warning {factor}", [grain], [plane(0 * n, n, material="m")], -G * n, steps=3, material=MATERIAL,
+                               law=[elastic(normal_stiffness=stiffness)])
+            lines = [line for line in record.run.stdout.splitlines() if "h sqrt(k/m)" in line]
+            self.assertEqual(sum("warning" in line for line in lines), warned, lines)
+            self.assertIn("compliant contacts are deformed by at most", lines[-1])
+            if warned:
+                figures = re.search(r"h sqrt\(k/m\) = (\S+) at .*; at most (\S+) s would do", lines[0])
+                np.testing.assert_allclose([float(figure) for figure in figures.groups()], [1.0, 0.5 * self.step], rtol=1e-2)
+
+
+class Tangential(ComplianceScene):
+
+    def test_slope(self):
+        """On a slope below the angle of friction a ball that cannot turn comes to rest where m g sin a = k_t x; beyond it slides with
+        g (sin a - mu cos a)."""
+        ratio, friction = 0.4, 0.5
+        self.step = 0.05 / FREQUENCY
+        for dimension, angle in itertools.product((2, 3), (0.3, 0.8)):
+            along, n = np.eye(dimension)[0], up(dimension)
+            pull = np.sin(angle)
+            record = self.play(f"slope {dimension} {angle}", [Grain((RADIUS - MASS * G * np.cos(angle) / STIFFNESS) * n, radius=RADIUS,
+                                                                   mass=MASS)],
+                               [plane(0 * n, n, material="m")], G * (pull * along - np.cos(angle) * n), steps=4000, material=MATERIAL,
+                               law=[elastic(normal_stiffness=STIFFNESS, friction=friction, stiffness_ratio=ratio,
+                                            spring_restitution=0.2, tangential_damping=1.0)], scene={"rotation": False},
+                               output={"every": 1000})
+            if np.tan(angle) < friction:
+                self.verify(f"ball on a slope, {dimension}D", "elongation [m]", record.position[-1, 0, 0],
+                            MASS * G * pull / (ratio * STIFFNESS), 1e-12)
+            else:
+                self.verify(f"ball on a slope, {dimension}D", "acceleration [m/s^2]",
+                            (record.velocity[-1, 0, 0] - record.velocity[-2, 0, 0]) / (1000 * self.step),
+                            G * (pull - friction * np.cos(angle)), 1e-9)
+
+    def test_loop(self):
+        """Mindlin's loading and unloading with linear springs: a ball pressed between two planes that are driven to and fro against each
+        other stays where it is. The tangential force follows the displacement with the stiffness k_t between the bounds of friction: a
+        loop of hysteresis, to rounding."""
+        ratio, friction, depth, speed = 0.4, 0.5, 1e-3, 0.01
+        self.step = 1.0 / 1024
+        # amplitudes over the displacement at which sliding begins
+        yields = friction * depth / ratio
+        turns = np.cumsum([0, 1.5, 2.5, 1.5, 2.7, 0.4]) * yields / speed
+        turns = np.round(turns / self.step) * self.step
+        tables = {}
+        for name, sign in (("up.csv", -1), ("down.csv", 1)):
+            rows = ["time,vx"]
+            for begin, end in zip(turns[:-1], turns[1:]):
+                rows += [f"{begin + (begin > 0) * self.step / 2!r},{sign * speed!r}", f"{end - self.step / 2!r},{sign * speed!r}"]
+                sign = -sign
+            tables[name] = "\n".join(rows) + "\n"
+        for dimension, theta in itertools.product((2, 3), (0.5, 1.0)):
+            n = up(dimension)
+            record = self.play(f"loop {dimension} {theta}", [Grain(0 * n, radius=RADIUS, mass=MASS)],
+                               [plane(-(RADIUS - depth) * n, n, material="m", table="down.csv"),
+                                plane((RADIUS - depth) * n, -n, material="m", table="up.csv")], steps=int(turns[-1] / self.step) - 1,
+                               files=tables, material=MATERIAL, output={"every": 1, "contacts": True},
+                               law=[elastic(normal_stiffness=STIFFNESS, friction=friction, stiffness_ratio=ratio,
+                                            spring_theta=theta)],
+                               scene={"rotation": False, "start_overlap": 0.1})
+            states = record.contacts[1:]
+            normal = np.array([state["impulse"][0, 0] for state in states]) / self.step
+            found = np.array([state["impulse"][0, 1] for state in states]) / self.step
+            # t = -x on the lower plane, x in space; the force on the ball follows the plane
+            found *= -1 if dimension == 2 else 1
+            self.verify(f"ball between planes driven to and fro, {dimension}D", "place [m]", record.position, 0, 1e-15)
+            self.verify(f"ball between planes driven to and fro, {dimension}D", "normal force [N]", normal, STIFFNESS * depth, 1e-10)
+            v = record.boundary["velocity"][:, 0, 0]
+            v[0] = speed
+            # displacement at the instant of the spring, from that of the middle of each step
+            x = np.concatenate([[0], np.cumsum(0.5 * self.step * (v[:-1] + v[1:]))])
+            middle = x[:-1] + 0.5 * self.step * v[:-1]
+            at = middle - (1 - theta)**2 * self.step * v[:-1] + theta**2 * self.step * v[1:]
+            # the spring begins at the middle of the first step
+            force, kept = [], 0.0
+            for k, here in enumerate(at):
+                elongation = np.clip(kept + here - middle[k], -yields, yields)
+                force.append(ratio * STIFFNESS * elongation)
+                # at the middle of the next step
+                if k + 1 < len(at):
+                    kept = elongation + middle[k + 1] - here
+            bound = friction * STIFFNESS * depth
+            self.verify(f"ball between planes driven to and fro, {dimension}D", f"tangential force [N], theta = {theta}", found, force,
+                        1e-11 * bound)
+            self.assertGreater(np.max(force), 0.999 * bound)
+            self.assertLess(np.min(force), -0.999 * bound)
+
+
+class Attraction(ComplianceScene):
+
+    def test_pull_off(self):
+        """A ball that hangs under a plane by the attraction of bodies that touch, k x = F - m g; a stronger pull tears it off."""
+        for dimension, pull in itertools.product((2, 3), (0.9, 1.1)):
+            n = up(dimension)
+            force = 20.0
+            weight = pull * force / MASS
+            self.step = 0.05 / FREQUENCY
+            depth = (force - MASS * weight) / STIFFNESS
+            record = self.play(f"hangs {dimension} {pull}", [Grain(-(RADIUS - max(depth, 1e-5)) * n, radius=RADIUS, mass=MASS)],
+                               [plane(0 * n, -n, material="m")], -weight * n, steps=2000, material=MATERIAL,
+                               law=[elastic(normal_stiffness=STIFFNESS, pull_off_force=force, spring_restitution=0.3)])
+            place = record.position[-1, 0, -1]
+            if pull < 1:
+                self.verify(f"ball that hangs on a plane, {dimension}D", "place [m]", place, -RADIUS + depth, 1e-12)
+            else:
+                self.assertLess(place, -RADIUS - 0.5 * (weight - force / MASS) * (0.5 * record.time[-1])**2)
+
+
+class RigidLimit(ComplianceScene):
+
+    def test_column_and_block(self):
+        """One step of a column at rest that gravity presses, and of one that slides on a slope: velocities tend to those of rigid
+        contacts with the first order of 1/k."""
+        for friction, pull in ((0.0, 0.0), (0.3, 0.5), (0.8, 0.5)):
+            found, stiffnesses = [], [1e9, 1e10, 1e11]
+            grains = [Grain([0, 0, (2 * k + 1) * RADIUS], radius=RADIUS, mass=MASS) for k in range(6)]
+            gravity = G * np.array([np.sin(pull), 0, -np.cos(pull)])
+            self.step = 1e-3
+            # friction on the ground alone: a column that slides or sticks as one
+            walls = [plane([0, 0, 0], [0, 0, 1], material="m")]
+            options = {"steps": 1, "material": MATERIAL, "scene": {"rotation": False}, "solver": {"tolerance": 1e-14}}
+            rigid = self.play(f"rigid {friction} {pull}", grains, walls, gravity,
+                              law=[{"materials": ["m"], "kind": "coulomb", "friction": friction}], **options)
+            for stiffness in stiffnesses:
+                record = self.play(f"column {friction} {pull} {stiffness}", grains, walls, gravity,
+                                   law=[elastic(normal_stiffness=stiffness, friction=friction)], **options)
+                found.append(np.abs(record.velocity[-1] - rigid.velocity[-1]).max())
+            order = np.log10(np.array(found[:-1]) / found[1:])
+            self.assertTrue(np.all(np.abs(order - 1) < 0.05), (friction, pull, found))
+            self.verify("column of six as stiffness grows", f"distance of the velocities from the rigid ones [m/s], friction {friction}",
+                        found[-1], 0, 1e-4)
+
+
+class Invariance(ComplianceScene):
+
+    def case(self, dimension, **law):
+        count = [5, 6] if dimension == 2 else [3, 3, 4]
+        return {"scene": {"dimension": dimension, "bodies": "lattice", "lattice_count": count, "radius_min": 0.04, "radius_max": 0.06,
+                          "wall_material": "m"},
+                "material": MATERIAL,
+                "law": [elastic(**{"normal_stiffness": 1e6, "friction": 0.5, "spring_restitution": 0.5, "tangential_damping": 0.5, **law})],
+                "time": {"step": 1e-3, "steps": 240}, "solver": {"criterion": "residual", "tolerance": 1e-6},
+                "decomposition": {"subdomains": 4}, "output": {"directory": "results", "every": 60, "contacts": True, "energy": True}}
+
+    @staticmethod
+    def states(run):
+        return {name: value.tobytes() for name, value in run.results().items() if hasattr(value, "tobytes") and "/bodies/" in name
+                or "/contacts/" in name}
+
+    def test_ranks_and_restart(self):
+        """The same bits on 1, 2 and 4 ranks and after a restart on another number, with elongations, moments and the attraction."""
+        for dimension, method, law in ((2, "nscdd", {"rolling_friction": 0.1}), (3, "nscdd_ep", {"pull_off_force": 0.2}),
+                                       (3, "schwarz", {"spring_theta": 0.6})):
+            with self.subTest(dimension=dimension, method=method):
+                case = merged(self.case(dimension, **law), {"solver": {"method": method}})
+                name = f"{dimension} {method}"
+                runs = each(lambda ranks: run_case(case, ranks, self.here(f"{name} {ranks}")), [(1,), (2,), (4,)])
+                stopped = merged(case, {"time": {"steps": 120}, "output": {"checkpoint_every": 120}})
+                self.assert_status(run_case(stopped, 2, self.here(f"{name} stopped")), 0)
+                runs.append(run_case(case, 1, self.here(f"{name} stopped"), options=["--restart"]))
+                for run in runs:
+                    self.assert_status(run, 0)
+                for run in runs[1:]:
+                    self.assertEqual(self.states(run), self.states(runs[0]))
+                history = runs[0].history()
+                self.assertGreater(history["contacts"][-1], 20)
+                scale = history["kinetic_translation"].max()
+                self.verify("balls that fall on each other, compliant", f"error of the energy balance over the energy, {name}",
+                            history["energy_error"] / scale, 0.0, 1e-10)
+                np.testing.assert_array_equal(runs[-1].history()["energy_error"][-1], history["energy_error"][-1])
+
+    def test_overlaps_are_deformation(self):
+        """Soft balls lie in each other by more than what rigid ones may, and nothing is projected."""
+        run = run_case(merged(self.case(3, normal_stiffness=2e3), {"scene": {"overlap_allowed": 1e-4},
+                                                                                 "decomposition": {"subdomains": 1}}), directory=self.here("soft"))
+        self.assert_status(run, 0)
+        self.assertIn("no step projected overlaps", run.stdout)
+        self.assertEqual(run.history()["max_overlap"].max(), 0)
+        gaps = np.concatenate([value.ravel() for name, value in run.results().items() if name.endswith("/contacts/gap")])
+        self.assertLess(gaps.min(), -1e-3)
+
+
+class Uniqueness(ComplianceScene):
+    kappa, pressure = 1e4, 2000.0
+
+    def test_forces_do_not_depend_on_the_way(self):
+        """Packings made at a friction of 0.3, solved anew at 0.5 to 1.0 with kappa = 1e4 and a step of h sqrt(k/m) = 3: methods and
+        subdomains find the same forces, within 2000 sweeps to 1e-10."""
+        made = {"scene": {"bodies": "lattice", "friction": 0.3}, "time": {"step": 1e-3, "steps": 350},
+                "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 20000},
+                "output": {"directory": ".", "every": 0, "final_bodies": True}}
+        packings = {"C": {"dimension": 3, "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012, "seed": 1},
+                    "G": {"dimension": 2, "lattice_count": [20, 30], "radius_min": 0.006, "radius_max": 0.014, "seed": 1}}
+        # of the stiffest contact, measured: h sqrt(k/m) = 3
+        steps = {"C": 2.8e-4, "G": 1.6e-4}
+        pressures = {"C": 2060.0, "G": 5900.0}
+        ways = [("nlgs", 1), ("nscdd", 8), ("nscdd", 64), ("nscdd_ep", 8), ("schwarz", 8), ("schwarz_ec", 8), ("newton", 8)]
+        for name, scene in packings.items():
+            packed = run_case(merged(made, {"scene": scene}), directory=self.here(f"packing {name}"))
+            self.assert_status(packed, 0)
+            for friction in (0.5, 0.8, 1.0):
+                case = {"scene": {"dimension": scene["dimension"], "bodies": "file", "bodies_file": packed.path("final_bodies.h5"),
+                                  "wall_material": "m", "start_overlap": 0.5},
+                        "material": MATERIAL, "law": [elastic(friction=friction, stiffness_number=self.kappa,
+                                                              stiffness_pressure=pressures[name])],
+                        "time": {"step": steps[name], "steps": 1},
+                        "solver": {"criterion": "residual", "tolerance": 1e-13, "max_iterations": 20000},
+                        "output": {"directory": "results", "every": 1, "contacts": True, "trace": True}}
+                runs = each(lambda method, subdomains: run_case(merged(case, {
+                    "solver": {"method": method}, "decomposition": {"subdomains": subdomains}}),
+                    directory=self.here(f"{name} {friction} {method} {subdomains}")), ways)
+                first = None
+                for (method, subdomains), run in zip(ways, runs):
+                    self.assert_status(run, 0)
+                    trace = run.trace()
+                    taken = trace["iteration"][np.nonzero(trace["residual"] <= 1e-10)[0][0]]
+                    self.assertLessEqual(taken, 2000, (name, friction, method, subdomains))
+                    impulse = run.results()["/steps/1/contacts/impulse"]
+                    first = impulse if first is None else first
+                    scale = np.sqrt(np.mean(np.sum(first**2, axis=1)))
+                    self.verify("forces of compliant contacts", f"{name}, friction {friction}, {method} in {subdomains}: impulses over "
+                                "their root mean square", impulse / scale, first / scale, 1e-8)
