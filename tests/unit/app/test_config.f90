@@ -1359,8 +1359,8 @@ contains
     call refuse(two // "&law kind = 'coulomb' /", &
       "&law (the 1st) materials is missing: expected at most 2 texts in quotes, at most 4096 characters")
     call refuse(two // "&law materials = 'a' /", &
-      "&law (the 1st) kind is missing: expected 'coulomb', 'frictionless', 'none', 'velocity', 'adhesive', 'capillary', 'bonded', "// &
-      "'elastic' or 'hertz'")
+      "&law (the 1st) kind is missing: expected 'coulomb', 'frictionless', 'none', 'velocity', 'adhesive', 'capillary', "// &
+      "'bonded', 'elastic' or 'hertz'")
     call refuse(two // coulomb // "&law materials = 'b', 'a' kind = 'frictionless' /", &
       "&law (the 2nd) materials = 'b', 'a': expected a pair of its own, but the 1st has it too")
     call refuse(two // "&law materials = 'a' kind = 'coulomb' adhesion = 1 /", &
