@@ -35,7 +35,7 @@ contains
     end select
   end subroutine find_nearest
 
-  !> Of a segment.
+  !> Of a segment. Where the point is near the origin, rounding turns v against the segment, which is taken back.
   pure subroutine nearest_of_two(w, a, b, share, v)
     real(dp), intent(in) :: w(3, 4)
     integer, intent(in) :: a, b
@@ -59,10 +59,12 @@ contains
       share(a) = part_a/whole
       share(b) = 1.0_dp - share(a)
       v(:) = w(:, b) - share(a)*t
+      v(:) = v - dot_product(t, v)/whole*t
     else
       share(b) = part_b/whole
       share(a) = 1.0_dp - share(b)
       v(:) = w(:, a) + share(b)*t
+      v(:) = v - dot_product(t, v)/whole*t
     end if
   end subroutine nearest_of_two
 
@@ -106,7 +108,11 @@ contains
       share(a) = part(1)
       share(b) = part(2)
       share(c) = part(3)
-      v(:) = foot
+      ! of a thin triangle the point of these shares is in the plane more exactly than the foot, whose error is that of the normal times
+      ! the way to a corner
+      v(:) = w(:, a) + part(2)*u + part(3)*t
+      v(:) = v - dot_product(u, v)/dot_product(u, u)*u
+      call remove_across(u, t, v)
     else
       corner(1) = a
       corner(2) = b
@@ -123,6 +129,17 @@ contains
     end function signed_area
 
   end subroutine nearest_of_three
+
+  !> Make v normal to the part of t that is normal to u.
+  pure subroutine remove_across(u, t, v)
+    real(dp), intent(in) :: u(3), t(3)
+    real(dp), intent(inout) :: v(3)
+    real(dp) :: across(3)
+
+    across(:) = t - dot_product(u, t)/dot_product(u, u)*u
+    across(:) = across - dot_product(u, across)/dot_product(u, u)*u
+    v(:) = v - dot_product(across, v)/dot_product(across, across)*across
+  end subroutine remove_across
 
   !> Of those sides of a triangle that the origin can be seen from.
   pure subroutine nearest_of_sides(w, corner, part, share, v)

@@ -142,7 +142,9 @@ contains
       call check(k == 0 .or. all(found(1:k) >= 1 .and. found(1:k) <= size(corner, 3)), "numbers of facets")
       idle = idle + k
       do c = 1, size(corner, 3)
-        seen(:, :) = corner(:, :, c) - spread(point, 2, 3)
+        do d = 1, 3
+          seen(d, :) = corner(d, :, c) - point(d)
+        end do
         call find_foot(seen, foot, place)
         if (norm2(foot) > reach) cycle
         all_near = all_near + 1
