@@ -55,7 +55,8 @@ def main():
     options = parser.parse_args()
     count = options.count or (200_000 if options.quick else 10_000_000)
     jobs = [start(count//options.jobs, options.seed + k) for k in range(options.jobs)]
-    results = [read(job.communicate()[0]) for job in jobs]
+    said = [job.communicate()[0] for job in jobs]
+    results = [read(text) for text in said]
     missed = 0
 
     def row(what, measured, accepted, good):
@@ -73,6 +74,8 @@ def main():
     row(f"lines of places, {total}: those with a jump", str(jumps), f"{JUMPS*total:.1f}", jumps <= JUMPS*total)
     passed, failed = (sum(checks[k] for _, _, checks in results) for k in (0, 1))
     row(f"checks of the program, {passed + failed}: those that fail", str(failed), "0", failed == 0)
+    for line in [line for text in said for line in text.splitlines() if line.startswith("FAILED")][:20]:
+        print(line)
     return int(missed > 0)
 
 
