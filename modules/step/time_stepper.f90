@@ -14,7 +14,7 @@ module gravier_time_stepper
   use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
   use gravier_decomposition, only: decomposition_t
-  use gravier_removal, only: remove_grains
+  use gravier_removal, only: some_leave, remove_grains
   use gravier_halo, only: halo_t
   use gravier_repartition, only: repartition_rule_t, repartition, repartition_is_due
   use gravier_interface, only: interface_statistics_t
@@ -179,6 +179,7 @@ contains
     call stop_timer(phase_bodies)
     call start_timer(phase_neighbourhood)
     if (.not. listed) listed = self%halo%are_due(self%decomposition)
+    if (.not. listed) listed = some_leave(self%decomposition)
     figures%divided = repartition_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
     figures%listed = listed .or. figures%divided
     call list_neighbours(self, figures)

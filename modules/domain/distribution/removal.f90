@@ -1,11 +1,10 @@
-!> Grains that leave the scene, behind outlets or with the boundary that they are glued to. They do so when neighbour lists are
-!> made.
+!> Grains that leave the scene: behind outlets, or with the boundary that they are glued to.
 module gravier_removal
   use gravier_kinds, only: dp, i8
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: remove_grains
+  public :: some_leave, remove_grains
 
 contains
 
@@ -41,6 +40,21 @@ contains
       has_outlet = has_outlet .or. decomposition%boundaries(b)%lets_out()
     end do
   end function has_outlet
+
+  !> Whether some grain leaves the scene now. Collective.
+  logical function some_leave(decomposition)
+    type(decomposition_t), intent(in) :: decomposition
+    integer :: s, k
+
+    some_leave = .false.
+    if (.not. has_outlet(decomposition)) return
+    do s = 1, size(decomposition%owned)
+      do k = 1, decomposition%owned(s)%n
+        if (.not. stays(decomposition, s, k)) some_leave = .true.
+      end do
+    end do
+    some_leave = decomposition%comm%any_true(some_leave)
+  end function some_leave
 
   !> Take the grains that leave out of the scene. Collective.
   subroutine remove_grains(decomposition, has_glued, n_free, n_glued)
