@@ -41,8 +41,8 @@ module gravier_convex_distance
     integer :: steps = 0
   end type core_distance_t
 
-  !> sine of an angle of a triangle that is none
-  real(dp), parameter :: flat = 16*epsilon(1.0_dp)
+  !> squared sine of an angle of a triangle that is thin
+  real(dp), parameter :: thin = 1.0e-6_dp
   !> steps of a search that may go back
   integer, parameter :: most_back = 8
   !> more steps than a search takes
@@ -198,7 +198,7 @@ contains
     integer, intent(in) :: n
     real(dp), intent(inout) :: v(3)
     real(dp), intent(out) :: part(2)
-    real(dp) :: u(3), across(3), uu, ut, back, size_squared
+    real(dp) :: u(3), t(3), uu, ut, tt, det
 
     part(:) = 0.0_dp
     u(:) = w(:, 2) - w(:, 1)
@@ -209,18 +209,15 @@ contains
       v(:) = v + part(1)*u
       return
     end if
-    ! the part of the other side that is normal to u, in two steps for triangles that are thin
-    across(:) = w(:, 3) - w(:, 1)
-    size_squared = dot_product(across, across)
-    ut = dot_product(u, across)/uu
-    across(:) = across - ut*u
-    back = dot_product(u, across)/uu
-    across(:) = across - back*u
-    if (dot_product(across, across) > flat**2*size_squared) part(2) = -dot_product(across, v)/dot_product(across, across)
-    v(:) = v + part(2)*across
-    part(1) = -dot_product(u, v)/uu
-    v(:) = v + part(1)*u
-    part(1) = part(1) - part(2)*(ut + back)
+    t(:) = w(:, 3) - w(:, 1)
+    ut = dot_product(u, t)
+    tt = dot_product(t, t)
+    det = uu*tt - ut*ut
+    ! of a thin triangle the search knows the normal better than squares of its sides
+    if (det <= thin*uu*tt) return
+    part(1) = -(tt*dot_product(u, v) - ut*dot_product(t, v))/det
+    part(2) = -(uu*dot_product(t, v) - ut*dot_product(u, v))/det
+    v(:) = v + part(1)*u + part(2)*t
   end subroutine make_normal
 
   !> The vertex of a that is farthest along -v.
