@@ -167,6 +167,7 @@ contains
                   "a scene without it where "//shown_text(report, "scene", "gravity_table")//" replaces it")
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
+      call expect(report, scene%list_steps >= 0.0_dp, "scene", "list_steps", error)
       call expect(report, scene%overlap_allowed > 0.0_dp .or. .not. scene%overlap_given, "scene", "overlap_allowed", error)
       call expect(report, scene%start_overlap >= 0.0_dp, "scene", "start_overlap", error)
     end associate

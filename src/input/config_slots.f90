@@ -124,6 +124,7 @@ contains
     case ("period_origin"); slot%reals => config%scene%period_origin
     case ("alert_distance"); slot%real => config%scene%alert_distance
     case ("skin"); slot%real => config%scene%skin
+    case ("list_steps"); slot%real => config%scene%list_steps
     case ("overlap_allowed"); slot%real => config%scene%overlap_allowed
     case ("overlap_projection"); slot%logical => config%scene%overlap_projection
     case ("start_overlap"); slot%real => config%scene%start_overlap

@@ -153,6 +153,8 @@ module gravier_config_table
      key_t("scene", "skin", kind_real, "-1", ">= 0", &
            "gap beyond the alert distance up to which pairs are listed, so that neighbour lists last for several steps", &
            unit="m", note="0.2 of the mean radius"), &
+     key_t("scene", "list_steps", kind_real, "0", ">= 0", &
+           "steps for which neighbour lists leave a body room at its speed, beyond half the skin, at most half the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
            unit="m", note="0.01 of the mean radius, or the least rounding"), &
      key_t("scene", "overlap_projection", kind_logical, ".true.", "", "remove overlaps by moving grains and free boundaries"), &

@@ -66,6 +66,8 @@ module gravier_config_types
     real(dp) :: skin
     !> false: the skin is 0.2 of the mean radius
     logical :: skin_given = .false.
+    !> steps for which lists leave fast bodies room
+    real(dp) :: list_steps
     !> m; negative when not given
     real(dp) :: overlap_allowed
     !> false: the allowed overlap is 0.01 of the mean radius

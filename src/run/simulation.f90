@@ -29,9 +29,9 @@ module gravier_simulation
   !> solves, and would be projected again in every step
   real(dp), parameter :: overlap_left_of_shapes = 0.75_dp
 
-  !> steps for which neighbour lists leave fast bodies a way to go, with a fifth more for what speeds them up; and the farthest way,
-  !> over the mean radius: beyond it more pairs cost more than fewer lists save
-  real(dp), parameter :: list_steps = 12.0_dp, most_travel = 0.5_dp
+  !> the farthest way that neighbour lists leave fast bodies to go, over the mean radius: beyond it more pairs cost more than fewer
+  !> lists save
+  real(dp), parameter :: most_travel = 0.5_dp
 
   type, extends(time_stepper_t) :: simulation_t
     type(config_t) :: config
@@ -177,8 +177,8 @@ contains
       rule%alert_distance = max(rule%alert_distance, scene%laws%range)
       rule%filter = scene%laws%filter
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
-      rule%duration = list_steps*self%physics%h
-      rule%most_travel = most_travel*scene%mean_radius
+      rule%duration = config%list_steps*self%physics%h
+      rule%most_travel = merge(most_travel*scene%mean_radius, 0.0_dp, config%list_steps > 0.0_dp)
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
         & self%overlap_allowed = merge(config%overlap_allowed, min(0.01_dp*scene%mean_radius, scene%least_rounding), &

@@ -9,7 +9,7 @@ from gravier_runs import write
 DRUM = {
     "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "friction": 0.3, "period": [0.504, 0.0, 0.0],
               # the paddle stands in the grains
-              "gravity_table": "gravity.csv", "skin": 0.008, "start_overlap": 1.0},
+              "gravity_table": "gravity.csv", "skin": 0.008, "list_steps": 5.0, "start_overlap": 1.0},
     "boundary": [
         {"shape": "plane", "name": "belt", "point": [0.0, -0.01], "normal": [0.0, 1.0], "velocity": [0.3, 0.0]},
         {"shape": "plane", "name": "lid", "point": [0.0, 0.31], "normal": [0.0, -1.0], "free": [False, True], "mass": 2.0,

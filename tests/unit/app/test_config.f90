@@ -146,6 +146,7 @@ contains
     call check(scene%overlap_given, "overlap_given")
     call check(.not. scene%overlap_projection, "overlap_projection")
     call check_close(scene%start_overlap, 0.25_dp, 0.0_dp, "start_overlap")
+    call check_close(scene%list_steps, 12.0_dp, 0.0_dp, "list_steps")
   end subroutine check_whole_effects
 
   !> The values of a key of the shape of a boundary.
@@ -173,7 +174,7 @@ contains
       // "  wall_friction = 0.625, restitution = 0.25, wall_restitution = 0.75, rotation = .false." // newline &
       // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6" // newline &
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
-      // "  start_overlap = 0.25" // newline &
+      // "  start_overlap = 0.25, list_steps = 12" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
@@ -274,6 +275,7 @@ contains
     call check(.not. scene%overlap_given, "default overlap_given")
     call check(scene%overlap_projection, "default overlap_projection")
     call check_close(scene%start_overlap, 0.5_dp, 0.0_dp, "default start_overlap")
+    call check_close(scene%list_steps, 0.0_dp, 0.0_dp, "default list_steps")
   end subroutine check_default_effects
 
   subroutine check_default_methods(config)
@@ -683,6 +685,7 @@ contains
     call refuse(scene("bodies = 'column' body_force(3) = -1"), "&scene body_force(3) = -1: " // third)
     call refuse(scene("bodies = 'column' skin = -1"), "&scene skin = -1: expected a finite real number >= 0 (m)")
     call refuse(scene("bodies = 'column' overlap_allowed = 0"), "&scene overlap_allowed = 0: " // positive // " (m)")
+    call refuse(scene("bodies = 'column' list_steps = -1"), "&scene list_steps = -1: expected a finite real number >= 0")
     call refuse(scene("bodies = 'column' start_overlap = -1"), "&scene start_overlap = -1: expected a finite real number >= 0")
     call refuse(scene("bodies = 'column' rotation = 0"), "&scene rotation = 0: expected .true. or .false.")
     call refuse(scene("bodies = 'column' column_count = 0"), "&scene column_count = 0: expected an integer >= 1")
