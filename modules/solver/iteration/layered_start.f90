@@ -218,7 +218,7 @@ contains
       do k = 1, size(found)
         pair(:, k) = sub%pair(:, found(k))
       end do
-      call group_contacts(pair, sub%n_bodies, problem%kernels%row%arm_i > 0, order, this%n_grouped)
+      call group_contacts(pair, sub%n_bodies, order, this%n_grouped)
       if (allocated(this%taken)) deallocate (this%taken)
       allocate (this%taken(size(found)))
       do k = 1, size(found)

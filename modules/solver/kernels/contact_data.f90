@@ -5,7 +5,7 @@
 module gravier_contact_data
   implicit none
   private
-  public :: lanes, n_blocks, block_of, lane_of, last_point, contact_rows_t
+  public :: lanes, n_blocks, block_of, lane_of, contact_rows_t
   public :: rows_2d_frictionless, rows_2d_friction, rows_2d_friction_shift, rows_2d_friction_rolling
   public :: rows_2d_friction_shift_rolling, rows_2d_shaped, rows_2d_shaped_shift
   public :: rows_3d_frictionless, rows_3d_friction, rows_3d_friction_shift, rows_3d_friction_rolling
@@ -126,19 +126,5 @@ contains
     integer, intent(in) :: c
     lane_of = mod(c - 1, lanes) + 1
   end function lane_of
-
-  !> The last of the contacts c, c + stride, c + 2 stride, ... up to n that are between the same columns as contact `c`: points of
-  !> one pair of bodies.
-  pure integer function last_point(pair, c, stride, n) result(last)
-    !> (2, contacts)
-    integer, intent(in), contiguous :: pair(:, :)
-    integer, intent(in) :: c, stride, n
-
-    last = c
-    do while (last + stride <= n)
-      if (pair(1, last + stride) /= pair(1, c) .or. pair(2, last + stride) /= pair(2, c)) exit
-      last = last + stride
-    end do
-  end function last_point
 
 end module gravier_contact_data

@@ -41,9 +41,7 @@ contains
     call test_operators(kernels, packing)
     call test_arms(kernels, packing)
     call test_sweep(kernels, packing)
-    call test_points(kernels, packing)
     call test_versions(kernels, packing)
-    call test_blocks_of_points(kernels)
   end subroutine test_all
 
   !> Random contacts between bodies 1 to 5, of which the last one cannot move.
@@ -214,93 +212,6 @@ contains
     call check_close(sums(1), change, rounding, "squares of the changes")
     call check_close(sums(2), total, rounding, "squares of the impulses")
   end subroutine test_sweep
-
-  !> Contacts one after the other between the same bodies are relaxed twice, one after the other, before the next pair.
-  subroutine test_points(kernels, packing)
-    type(kernels_t), intent(in) :: kernels
-    type(packing_t), intent(in) :: packing
-    type(packing_t) :: start, after, expected
-    real(dp) :: sums(2), change, before(kernels%nc)
-    integer, parameter :: order(*) = [1, 2, 3, 1, 2, 3, 4, 5, 6, 5, 6, 7]
-    integer :: k
-
-    start = packing
-    start%pair(:, 2) = start%pair(:, 1)
-    start%pair(:, 3) = start%pair(:, 1)
-    start%pair(:, 6) = start%pair(:, 5)
-    call kernels%set_operators(start%pair, start%hot, start%weight, [1.0_dp, 1.0_dp, 1.0_dp])
-    start%hot(n_contacts + 1:, :, :) = 0.0_dp
-    after = start
-    expected = start
-    change = 0.0_dp
-    call kernels%sweep(0, after%pair, after%hot, after%weight, after%velocity, after%impulse, sums)
-    do k = 1, size(order)
-      before(:) = expected%impulse(order(k), :, 1)
-      call relax(kernels, order(k), expected)
-      if (count(order(:k) == order(k)) == 1) change = change + sum((expected%impulse(order(k), :, 1) - before)**2)
-    end do
-    call check_close(maxval(abs(after%impulse - expected%impulse)), 0.0_dp, rounding, "impulses of pairs with points")
-    call check_close(maxval(abs(after%velocity - expected%velocity)), 0.0_dp, rounding, "velocities of pairs with points")
-    call check_close(sums(1), change, rounding, "squares of the changes of the first time")
-  end subroutine test_points
-
-  !> Pairs that take a lane of two blocks each are relaxed as single contacts one after the other are.
-  subroutine test_blocks_of_points(kernels)
-    type(kernels_t), intent(in) :: kernels
-    real(dp), dimension(lanes, kernels%nh, 2) :: hot, single_hot
-    real(dp), dimension(lanes, kernels%nc, 2) :: impulse, single_impulse
-    real(dp) :: weight(kernels%nw, 2*lanes), velocity(kernels%nv, 2*lanes), single_velocity(kernels%nv, 2*lanes), sums(2), &
-      & single_sums(2), normal(3)
-    integer :: pair(2, 2*lanes), single_pair(2, 2*lanes), q, point, c, k
-    integer, parameter :: seed(64) = 54321
-
-    call random_seed(put=seed)
-    call random_number(hot)
-    call random_number(velocity)
-    call random_number(impulse)
-    hot(:, :, :) = hot - 0.5_dp
-    weight(:, :) = 0.0_dp
-    weight(1:kernels%nd, :) = 1.0_dp
-    weight(kernels%nd + 1:, :) = 2.0_dp
-    do k = 1, 2*lanes
-      if (kernels%nd == 3) weight(4:9, k) = inertia
-    end do
-    do point = 1, 2
-      do q = 1, lanes
-        normal(:) = 0.0_dp
-        normal(1:kernels%nd) = hot(q, 1:kernels%nd, point)
-        normal(:) = normal/norm2(normal)
-        hot(q, 1:kernels%nd, point) = normal(1:kernels%nd)
-        hot(q, kernels%row%friction, point) = 0.4_dp
-        do k = 2, kernels%nc
-          impulse(q, k, point) = 0.2_dp*(impulse(q, k, point) - 0.5_dp)*impulse(q, 1, point)
-        end do
-        pair(1, (point - 1)*lanes + q) = 2*q - 1
-        pair(2, (point - 1)*lanes + q) = 2*q
-      end do
-    end do
-    call kernels%set_operators(pair, hot, weight, [1.0_dp, 1.0_dp, 1.0_dp])
-    do point = 1, 2
-      do q = 1, lanes
-        c = 2*(q - 1) + point
-        single_pair(:, c) = pair(:, (point - 1)*lanes + q)
-        single_hot(mod(c - 1, lanes) + 1, :, (c - 1)/lanes + 1) = hot(q, :, point)
-        single_impulse(mod(c - 1, lanes) + 1, :, (c - 1)/lanes + 1) = impulse(q, :, point)
-      end do
-    end do
-    single_velocity(:, :) = velocity
-    call kernels%sweep(2*lanes, pair, hot, weight, velocity, impulse, sums)
-    call kernels%sweep(0, single_pair, single_hot, weight, single_velocity, single_impulse, single_sums)
-    call check_close(maxval(abs(velocity - single_velocity)), 0.0_dp, rounding, "velocities of blocks of points")
-    do point = 1, 2
-      do q = 1, lanes
-        c = 2*(q - 1) + point
-        call check_close(maxval(abs(impulse(q, :, point) - single_impulse(mod(c - 1, lanes) + 1, :, (c - 1)/lanes + 1))), 0.0_dp, &
-          & rounding, "impulses of blocks of points")
-      end do
-    end do
-    call check_close(maxval(abs(sums - single_sums)), 0.0_dp, rounding, "sums of blocks of points")
-  end subroutine test_blocks_of_points
 
   subroutine relax(kernels, c, packing)
     type(kernels_t), intent(in) :: kernels

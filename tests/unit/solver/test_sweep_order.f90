@@ -21,7 +21,6 @@ program test_sweep_order
   call test_prescribed()
   call test_chain()
   call test_ring()
-  call test_points()
   call finish_checks()
   call MPI_Finalize()
 
@@ -88,7 +87,7 @@ contains
     end do
     do n = 0, threshold
       order(:) = 0
-      call group_contacts(pair(:, 1:n), 2*threshold, .false., order(1:n), n_grouped)
+      call group_contacts(pair(:, 1:n), 2*threshold, order(1:n), n_grouped)
       call check_order(pair(:, 1:n), 2*threshold, order(1:n), n_grouped, "few")
       call check_equal(n_grouped, merge(n, 0, n == threshold), "few: grouped")
       if (n < threshold) call check(is_natural(order(1:n)), "few: the natural order")
@@ -114,7 +113,7 @@ contains
         end do
       end do
     end do
-    call group_contacts(pair(:, 1:n), edge*edge, .false., order(1:n), n_grouped)
+    call group_contacts(pair(:, 1:n), edge*edge, order(1:n), n_grouped)
     call check_order(pair(:, 1:n), edge*edge, order(1:n), n_grouped, "lattice")
     ! all but what the last window leaves incomplete
     call check(n_grouped > n - window, "lattice: nearly all grouped")
@@ -133,7 +132,7 @@ contains
         pair(1, c) = 1 + int((n_random - 2)*hash_uniform(k, int(c, i8), 1))
         pair(2, c) = 1 + mod(pair(1, c) + int(30*hash_uniform(k, int(c, i8), 2)), n_random)
       end do
-      call group_contacts(pair, n_random - 2, .false., order, n_grouped)
+      call group_contacts(pair, n_random - 2, order, n_grouped)
       call check_order(pair, n_random - 2, order, n_grouped, "random")
       call check(n_grouped > 0, "random: some grouped")
       call check(mean_move(order, n_grouped) <= window, "random: close to the order that contacts came in")
@@ -155,7 +154,7 @@ contains
       if (mod(c, 4) == 0) pair(1, c) = large
       if (mod(c, 4) == 2) pair(2, c) = large
     end do
-    call group_contacts(pair, large, .false., order, n_grouped)
+    call group_contacts(pair, large, order, n_grouped)
     call check_order(pair, large, order, n_grouped, "large body")
     with_large = 0
     do k = n_grouped + 1, n
@@ -177,7 +176,7 @@ contains
       pair(k, c) = c
       pair(3 - k, c) = n + 1 + mod(c, 2)
     end do
-    call group_contacts(pair, n, .false., order, n_grouped)
+    call group_contacts(pair, n, order, n_grouped)
     call check_order(pair, n, order, n_grouped, "prescribed")
     call check_equal(n_grouped, n, "prescribed: all grouped")
     call check(is_natural(order), "prescribed: nothing in the way")
@@ -192,7 +191,7 @@ contains
       pair(1, c) = c
       pair(2, c) = c + 1
     end do
-    call group_contacts(pair, n + 1, .false., order, n_grouped)
+    call group_contacts(pair, n + 1, order, n_grouped)
     call check_order(pair, n + 1, order, n_grouped, "chain")
     call check(n_grouped > n - window, "chain: nearly all grouped")
     ! odd and even contacts fill blocks in turn
@@ -211,75 +210,9 @@ contains
       pair(1, c) = 1 + mod(c, bodies)
       pair(2, c) = 1 + mod(c + 1, bodies)
     end do
-    call group_contacts(pair, bodies, .false., order, n_grouped)
+    call group_contacts(pair, bodies, order, n_grouped)
     call check_order(pair, bodies, order, n_grouped, "ring")
     call check(n_grouped > n - window, "ring: nearly all grouped")
   end subroutine test_ring
-
-  !> Pairs of bodies of a chain that touch in one to four points, some of which share a body with all others: the points of a pair
-  !> stay together, in one lane of blocks that follow each other or, where the pair found no place, one after the other.
-  subroutine test_points()
-    integer, parameter :: n_pairs = 3*window
-    integer, allocatable :: pair(:, :), order(:), points(:), of_pair(:), place(:)
-    integer :: met(n_pairs + 2), u, c, k, side, n_grouped, step
-    logical :: together, in_order, apart
-
-    allocate (points(n_pairs))
-    do u = 1, n_pairs
-      points(u) = 1 + int(4*hash_uniform(9, int(u, i8), 1))
-    end do
-    allocate (pair(2, sum(points)), order(sum(points)), of_pair(sum(points)), place(sum(points)))
-    c = 0
-    do u = 1, n_pairs
-      of_pair(c + 1:c + points(u)) = u
-      pair(1, c + 1:c + points(u)) = u
-      pair(2, c + 1:c + points(u)) = merge(n_pairs + 2, u + 1, mod(u, 9) == 0)
-      c = c + points(u)
-    end do
-    ! the last body moves, and is in each ninth pair
-    call group_contacts(pair, n_pairs + 2, .true., order, n_grouped)
-    call check(n_grouped > size(order)/2 .and. n_grouped < size(order), "points: some grouped, others not")
-    call check_equal(mod(n_grouped, lanes), 0, "points: whole blocks")
-    place(:) = 0
-    do k = 1, size(order)
-      place(order(k)) = k
-    end do
-    call check(all(place > 0), "points: every contact once")
-    together = .true.
-    do c = 2, size(order)
-      if (of_pair(c) /= of_pair(c - 1)) cycle
-      step = merge(lanes, 1, place(c) <= n_grouped)
-      together = together .and. place(c) - place(c - 1) == step .and. (place(c) <= n_grouped .eqv. place(c - 1) <= n_grouped)
-    end do
-    call check(together, "points: those of a pair in one lane of blocks that follow each other")
-    ! all lanes of a block begin and end their pairs together, and share no body
-    in_order = .true.
-    do k = 1, n_grouped
-      c = order(k)
-      u = order((k - 1)/lanes*lanes + 1)
-      in_order = in_order .and. points(of_pair(c)) == points(of_pair(u)) .and. &
-        & (is_first(of_pair, c) .eqv. is_first(of_pair, u))
-    end do
-    call check(in_order, "points: pairs of a block have as many points")
-    apart = .true.
-    met(:) = 0
-    do k = 1, n_grouped
-      do side = 1, 2
-        u = pair(side, order(k))
-        apart = apart .and. met(u) /= (k - 1)/lanes + 1
-        met(u) = (k - 1)/lanes + 1
-      end do
-    end do
-    call check(apart, "points: no moving body twice in a block")
-
-  end subroutine test_points
-
-  !> Whether contact `c` is the first point of its pair.
-  pure logical function is_first(of_pair, c)
-    integer, intent(in) :: of_pair(:), c
-
-    is_first = c == 1
-    if (.not. is_first) is_first = of_pair(c - 1) /= of_pair(c)
-  end function is_first
 
 end program test_sweep_order
