@@ -232,13 +232,15 @@ contains
     integer :: c
 
     overlap = 0.0_dp
-    if (.not. allocated(self%spring)) then
-      if (self%n_contacts > 0 .and. .not. yielding) overlap = max(overlap, -minval(self%gap))
-      return
+    if (allocated(self%spring)) then
+      do c = 1, self%n_contacts
+        if (self%yields(c) .eqv. yielding) overlap = max(overlap, -self%gap(c))
+      end do
+    else if (self%n_contacts > 0 .and. .not. yielding) then
+      overlap = max(overlap, -minval(self%gap))
     end if
-    do c = 1, self%n_contacts
-      if (self%yields(c) .eqv. yielding) overlap = max(overlap, -self%gap(c))
-    end do
+    ! a zero without a sign, whichever of two zeros was larger
+    if (overlap <= 0.0_dp) overlap = 0.0_dp
   end function subproblem_overlap
 
   !> Impulse of all contacts on body `b`, component `d` of H r = H r~ - H h F n, once `evaluate` was called [N s, N m s].
