@@ -14,11 +14,11 @@ module gravier_neighbour_rule
   type :: neighbour_rule_t
     !> pairs whose gap is at most this are contacts [m]
     real(dp) :: alert_distance = 0.0_dp
-    !> pairs stay listed while no two bodies have come nearer than by this [m], and farther where bodies are fast
+    !> lists last until a body has moved by half of this, or by more where it is fast [m]
     real(dp) :: skin = 0.0_dp
-    !> time for which lists are to last where bodies are fast [s], and the farthest that they leave a body to go for that [m]
+    !> time for which lists are to last where bodies are fast [s], and the largest margin that a body is given for that [m]
     real(dp) :: duration = 0.0_dp, most_travel = 0.0_dp
-    !> largest radius with the way that lists leave to go, of all bodies; found when lists are made [m]
+    !> largest extent of all bodies; found when lists are made [m]
     real(dp) :: largest_extent = 0.0_dp
     !> largest and mean radius of the scene [m]
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
@@ -29,6 +29,7 @@ module gravier_neighbour_rule
   contains
     procedure :: range => rule_range
     procedure :: margin => rule_margin
+    procedure :: extent => rule_extent
     procedure :: reach => rule_reach
     procedure :: cell_edge => rule_cell_edge
     procedure :: sweep_edge => rule_sweep_edge
@@ -50,13 +51,21 @@ contains
     margin = max(0.5_dp*self%skin, min(self%duration*speed, self%most_travel))
   end function rule_margin
 
+  !> Radius of a body with its margin [m].
+  pure real(dp) function rule_extent(self, radius, speed) result(extent)
+    class(neighbour_rule_t), intent(in) :: self
+    !> of the body [m], and when the lists are made [m/s]
+    real(dp), intent(in) :: radius, speed
+    extent = radius + self%margin(speed)
+  end function rule_extent
+
   !> How far from its centre a grain's pairs may have the point that decides their owner, or the candidate whose owner
   !> needs it [m].
   pure real(dp) function rule_reach(self, radius, speed) result(reach)
     class(neighbour_rule_t), intent(in) :: self
     !> of the grain [m], [m/s]
     real(dp), intent(in) :: radius, speed
-    reach = radius + self%margin(speed) + self%largest_extent + self%alert_distance
+    reach = self%extent(radius, speed) + self%largest_extent + self%alert_distance
     if (self%kind /= rule_primal) reach = 0.5_dp*reach
   end function rule_reach
 

@@ -117,7 +117,7 @@ contains
     if (bodies%n > 0) then
       allocate (extent(bodies%n))
       do k = 1, bodies%n
-        extent(k) = bodies%radius(k) + self%rule%margin(norm2(bodies%velocity(1:bodies%nd, k)))
+        extent(k) = self%rule%extent(bodies%radius(k), norm2(bodies%velocity(1:bodies%nd, k)))
       end do
       call make_entries(bodies, extent, self%period, self%rule, entries)
       call hash_entries(entries, extent, self%rule)
@@ -131,7 +131,7 @@ contains
   !> Sort entries into the cells of their classes.
   subroutine hash_entries(entries, extent, rule)
     type(entries_t), intent(inout) :: entries
-    !> of the bodies: radius with the way that lists leave to go [m]
+    !> of the bodies [m]
     real(dp), intent(in), contiguous :: extent(:)
     type(neighbour_rule_t), intent(in) :: rule
     integer(i8), allocatable :: keys(:)

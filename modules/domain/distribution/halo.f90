@@ -82,7 +82,7 @@ contains
     self%builds = self%builds + 1
   end subroutine halo_build
 
-  !> Collective.
+  !> The largest extent of all bodies, into the rule. Collective.
   subroutine find_largest_extent(decomposition, rule)
     type(decomposition_t), intent(in) :: decomposition
     type(neighbour_rule_t), intent(inout) :: rule
@@ -92,13 +92,14 @@ contains
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          rule%largest_extent = max(rule%largest_extent, owned%radius(k) + rule%margin(norm2(owned%velocity(1:owned%nd, k))))
+          rule%largest_extent = max(rule%largest_extent, rule%extent(owned%radius(k), norm2(owned%velocity(1:owned%nd, k))))
         end do
       end associate
     end do
     rule%largest_extent = decomposition%comm%highest(rule%largest_extent)
   end subroutine find_largest_extent
 
+  !> Keep what tells later whether the lists are still valid.
   subroutine note_reference(owned, reference)
     type(body_set_t), intent(in) :: owned
     type(reference_t), intent(out) :: reference
