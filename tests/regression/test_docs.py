@@ -242,6 +242,11 @@ class Reference(unittest.TestCase):
 
 class Words(unittest.TestCase):
 
+    def test_formulas_by_themselves_are_blocks_of_math(self):
+        """The site draws blocks ```math and formulas within a line; it knows no pair of double dollars."""
+        for page in PAGES:
+            self.assertNotIn("$$", read(page)[1], f"{page.name}: a formula between $$: write it as a block ```math")
+
     def test_no_promises(self):
         for page in PAGES:
             text = page.read_text(encoding="utf-8")
