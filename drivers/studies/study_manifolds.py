@@ -14,8 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-#: column of the program's table: what is accepted
-ACCEPTED = {"duality": 1e-12, "distance": 1e-12, "normal": 1e-9}
+#: column of the program's table: what is accepted (of duality: in parts of what rounding allows, 1e-12 of the size and more for short ways)
+ACCEPTED = {"duality": 1.0, "distance": 1e-12, "normal": 1e-9}
 #: share of the lines along which what the points carry may jump
 JUMPS = 0.005
 

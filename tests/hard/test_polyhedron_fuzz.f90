@@ -21,7 +21,8 @@ program test_polyhedron_fuzz
   type :: tally_t
     !> pairs, overlaps, steps and the most of them, points
     integer(i8) :: pairs = 0, overlaps = 0, steps = 0, most_steps = 0, points = 0, contacts = 0
-    !> largest gap of duality, error of distance and of the normal times the distance, in parts of the size
+    !> largest gap of duality in parts of what rounding allows, error of distance and of the normal times the distance in parts of the
+    !> size
     real(dp) :: duality = 0.0_dp, distance = 0.0_dp, normal = 0.0_dp
   end type tally_t
   type(fuzz_library_t) :: library
@@ -130,9 +131,9 @@ contains
       high = max(high, dot_product(core%normal, u))
     end do
     associate (scale => pair%radius_a + pair%radius_b)
-      found%duality = max(found%duality, (core%distance - (low - high))/scale)
       ! of a way of less than 1e-7 of the size rounding tells the direction less well
       room = exact*scale + 1.0e-19_dp*scale**2/core%distance
+      found%duality = max(found%duality, abs(core%distance - (low - high))/room)
       if (.not. abs(core%distance - (low - high)) <= room) call check_close(core%distance, low - high, room, &
         & trim(name)//": width of the slab")
       if (minval(core%share(1:core%n)) < -exact .or. abs(total - 1.0_dp) > exact) call check(.false., trim(name)//": shares")

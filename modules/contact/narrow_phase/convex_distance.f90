@@ -168,19 +168,13 @@ contains
     !> the nearest difference
     real(dp), intent(inout) :: v(3)
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: part(2)
     integer :: k
 
-    if (found%n > 1) then
-      call make_normal(w, found%n, v, part)
-      found%share(2:found%n) = found%share(2:found%n) + part(1:found%n - 1)
-      found%share(1) = 1.0_dp - sum(found%share(2:found%n))
-    end if
+    call make_normal(w, found%n, v)
+    call settle_shares(w, v, found)
     found%normal(:) = v/sqrt(dot_product(v, v))
-    if (found%n > 1) then
-      call make_normal(w, found%n, found%normal, part)
-      found%normal(:) = found%normal/sqrt(dot_product(found%normal, found%normal))
-    end if
+    call make_normal(w, found%n, found%normal)
+    found%normal(:) = found%normal/sqrt(dot_product(found%normal, found%normal))
     ! the vertex with the largest share is the nearest to the foot
     k = maxloc(found%share(1:found%n), 1)
     found%distance = dot_product(found%normal, w(:, k))
@@ -191,22 +185,21 @@ contains
     found%point_b(:) = found%point_a - found%distance*found%normal
   end subroutine finish
 
-  !> v := v + part(1) u + part(2) t, normal to the sides u and t of a simplex.
-  pure subroutine make_normal(w, n, v, part)
+  !> Make v normal to the sides u and t of a simplex.
+  pure subroutine make_normal(w, n, v)
     real(dp), intent(in) :: w(:, :)
-    !> corners: 2 or 3
+    !> corners: 1 to 3
     integer, intent(in) :: n
     real(dp), intent(inout) :: v(3)
-    real(dp), intent(out) :: part(2)
-    real(dp) :: u(3), t(3), uu, ut, tt, det
+    real(dp) :: u(3), t(3), uu, ut, tt, det, along_u, along_t
 
-    part(:) = 0.0_dp
+    if (n == 1) return
     u(:) = w(:, 2) - w(:, 1)
     uu = dot_product(u, u)
     if (.not. uu > 0.0_dp) return
+    along_u = dot_product(u, v)
     if (n == 2) then
-      part(1) = -dot_product(u, v)/uu
-      v(:) = v + part(1)*u
+      v(:) = v - along_u/uu*u
       return
     end if
     t(:) = w(:, 3) - w(:, 1)
@@ -215,10 +208,42 @@ contains
     det = uu*tt - ut*ut
     ! of a thin triangle the search knows the normal better than squares of its sides
     if (det <= thin*uu*tt) return
-    part(1) = -(tt*dot_product(u, v) - ut*dot_product(t, v))/det
-    part(2) = -(uu*dot_product(t, v) - ut*dot_product(u, v))/det
-    v(:) = v + part(1)*u + part(2)*t
+    along_t = dot_product(t, v)
+    v(:) = v - (tt*along_u - ut*along_t)/det*u - (uu*along_t - ut*along_u)/det*t
   end subroutine make_normal
+
+  !> Change the shares so that they give v: what they miss is taken along one side of the simplex and then across it, which thin
+  !> triangles stand too.
+  pure subroutine settle_shares(w, v, found)
+    real(dp), intent(in) :: w(:, :)
+    real(dp), intent(in) :: v(3)
+    type(core_distance_t), intent(inout) :: found
+    real(dp) :: u(3), t(3), missing(3), part, along, squared
+    integer :: k
+
+    if (found%n == 1) return
+    u(:) = w(:, 2) - w(:, 1)
+    squared = dot_product(u, u)
+    if (.not. squared > 0.0_dp) return
+    missing(:) = v - w(:, 1)
+    do k = 2, found%n
+      missing(:) = missing - found%share(k)*(w(:, k) - w(:, 1))
+    end do
+    if (found%n == 3) then
+      t(:) = w(:, 3) - w(:, 1)
+      along = dot_product(u, t)/squared
+      t(:) = t - along*u
+      part = dot_product(t, t)
+      if (part > 0.0_dp) then
+        part = dot_product(t, missing)/part
+        found%share(3) = found%share(3) + part
+        found%share(2) = found%share(2) - part*along
+        missing(:) = missing - part*t
+      end if
+    end if
+    found%share(2) = found%share(2) + dot_product(u, missing)/squared
+    found%share(1) = 1.0_dp - sum(found%share(2:found%n))
+  end subroutine settle_shares
 
   !> The vertex of a that is farthest along -v.
   pure subroutine support_a(a, v, walk, i)

@@ -248,19 +248,24 @@ contains
     call h5dclose_f(dataset, stat)
   end function can_grow
 
-  !> Rows of a chunk of a dataset, 1 at least.
+  !> Rows of a chunk of a dataset, 1 at least. HDF5 is asked for as many dimensions as the dataset has: in the place of one more it
+  !> would leave what was there by chance.
   integer(i8) function chunk_rows(dataset) result(rows)
     integer(hid_t), intent(in) :: dataset
-    integer(hid_t) :: creation
+    integer(hid_t) :: creation, space
     integer(hsize_t) :: chunk(2)
-    integer :: n_dims, ignored
+    integer :: n_dims, found, ignored
 
-    chunk(:) = 1
-    call h5dget_create_plist_f(dataset, creation, ignored)
-    call h5pget_chunk_f(creation, size(chunk), chunk, n_dims)
-    call h5pclose_f(creation, ignored)
     rows = 1
-    if (n_dims == 1 .or. n_dims == 2) rows = max(1_i8, int(chunk(n_dims), i8))
+    n_dims = 0
+    call h5dget_space_f(dataset, space, ignored)
+    call h5sget_simple_extent_ndims_f(space, n_dims, ignored)
+    call h5sclose_f(space, ignored)
+    if (n_dims < 1 .or. n_dims > size(chunk)) return
+    call h5dget_create_plist_f(dataset, creation, ignored)
+    call h5pget_chunk_f(creation, n_dims, chunk, found)
+    call h5pclose_f(creation, ignored)
+    if (found == n_dims) rows = max(1_i8, int(chunk(n_dims), i8))
   end function chunk_rows
 
   !> Class of the elements of a dataset, one of the H5T_ class constants.

@@ -4,8 +4,10 @@ program test_io_hdf5_file
   use gravier_errors, only: error_t, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_hdf5_file, only: h5_file_t
+  use gravier_hdf5_datasets, only: chunk_rows
+  use gravier_hdf5_file, only: h5_file_t, table_integer, table_double
   use gravier_check, only: check, check_equal, finish_checks
+  use hdf5, only: hid_t, h5fopen_f, h5fclose_f, h5dopen_f, h5dclose_f, H5F_ACC_RDONLY_F
   implicit none
   type(communicator_t) :: comm
   character(len=:), allocatable :: path
@@ -14,6 +16,7 @@ program test_io_hdf5_file
   call comm%init()
   path = scratch("io_hdf5_file_"//to_text(comm%size)//".h5")
   call test_rows()
+  call test_chunks()
   call test_attributes()
   call test_groups()
   call test_refused_reads()
@@ -158,6 +161,44 @@ contains
     call check(all(same(x_found, x)), "reals read")
     call check(all(same(xyz_found, xyz)), "columns of reals read")
   end subroutine read_and_check
+
+  !> The rows of a chunk of a vector, of a table and of a dataset without chunks, as they were asked for, on every rank.
+  subroutine test_chunks()
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    integer(hid_t) :: raw
+    integer(i8) :: rows(3)
+    real(dp) :: value(1)
+    integer :: k, stat
+    character(len=*), parameter :: name(3) = [character(len=6) :: "vector", "table", "fixed"]
+
+    call file%create(comm, path, error)
+    call file%make_table("/vector", 0, table_integer, 1000_i8, error)
+    call file%make_table("/table", 3, table_double, 70_i8, error)
+    value(1) = comm%rank
+    call file%write_rows("/fixed", value, error)
+    call file%close(error)
+    call expect_none(error, "tables")
+    call h5fopen_f(path, H5F_ACC_RDONLY_F, raw, stat)
+    do k = 1, size(name)
+      rows(k) = rows_of_chunk(raw, trim(name(k)))
+    end do
+    call h5fclose_f(raw, stat)
+    call check_equal(rows(1), 1000_i8, "rows of a chunk of a vector")
+    call check_equal(rows(2), 70_i8, "rows of a chunk of a table")
+    call check_equal(rows(3), 1_i8, "rows of a chunk where there are none")
+  end subroutine test_chunks
+
+  integer(i8) function rows_of_chunk(raw, name) result(rows)
+    integer(hid_t), intent(in) :: raw
+    character(len=*), intent(in) :: name
+    integer(hid_t) :: dataset
+    integer :: stat
+
+    call h5dopen_f(raw, name, dataset, stat)
+    rows = chunk_rows(dataset)
+    call h5dclose_f(dataset, stat)
+  end function rows_of_chunk
 
   subroutine test_attributes()
     type(h5_file_t) :: file

@@ -31,6 +31,7 @@ program test_convex_contact
   call test_support()
   call test_distance()
   call test_turned_distance()
+  call test_needle()
   call test_beyond()
   call test_overlap()
   call test_overlap_of_rods()
@@ -204,6 +205,48 @@ contains
     call check_close(found%distance, 3.0_dp, tight, "two rods across each other")
     call check_close(found%point_b(3), 0.5_dp, tight, "the nearest point is where they cross")
   end subroutine test_distance
+
+  !> Short edges beside long ones, as a pair of random hulls had them: the triangle of their differences is a needle, of which the
+  !> shares must give the nearest points as exactly as those of other triangles do.
+  subroutine test_needle()
+    real(dp), parameter :: short = 1.0e-5_dp
+    type(convex_piece_t) :: a, b
+    type(placed_pair_t) :: pair
+    type(core_distance_t) :: found
+    type(draws_t) :: draws
+    type(vector_t) :: way
+    real(dp) :: x(3), y(3), u(3), worst
+    integer :: k, trial, needles
+
+    draws%seed = 5
+    allocate (a%vertex(3, 2), b%vertex(3, 2))
+    pair%rotation(:, :) = straight
+    worst = 0.0_dp
+    needles = 0
+    do trial = 1, 20000
+      way = draws%direction()
+      a%vertex(:, 1) = 0.0_dp
+      a%vertex(:, 2) = short*way%x
+      way = draws%direction()
+      b%vertex(:, 1) = 10*short*way%x
+      way = draws%direction()
+      b%vertex(:, 2) = 2*way%x
+      call find_core_distance(a, b, pair, huge(1.0_dp), found)
+      if (found%overlap .or. found%n < 3) cycle
+      needles = needles + 1
+      x(:) = 0.0_dp
+      y(:) = 0.0_dp
+      do k = 1, found%n
+        call place_a(a, pair, found%vertex_a(k), u)
+        x(:) = x + found%share(k)*u
+        call place_b(b, pair, found%vertex_b(k), u)
+        y(:) = y + found%share(k)*u
+      end do
+      worst = max(worst, norm2(x - found%point_a), norm2(y - found%point_b))
+    end do
+    call check(needles > 50, "triangles that are needles")
+    call check_close(worst, 0.0_dp, 1.0e-14_dp, "the nearest points of needles")
+  end subroutine test_needle
 
   !> Seen from the other piece, the distance is the same and the normal is turned.
   subroutine test_turned_distance()
