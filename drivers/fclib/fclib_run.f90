@@ -10,7 +10,7 @@ module gravier_fclib_run
   use gravier_output_lock, only: output_lock_t
   use gravier_csv_writer, only: csv_writer_t
   use gravier_fclib_file, only: name_of_solution, name_of_guess
-  use gravier_fclib_writer, only: write_fclib_local
+  use gravier_fclib_writer, only: write_fclib_local, fclib_origin_t
   use gravier_friction_solver, only: friction_control_t, verdict_no_solution
   use gravier_fclib_options, only: options_t
   use gravier_fclib_outputs, only: written_path, check_outputs
@@ -152,7 +152,7 @@ contains
     call problem%multipliers%evaluate(r, l)
     problem%local%r = r
     call write_fclib_local(comm, written_path(options%directory, path), problem%local, error, velocity=v, multipliers=l, &
-      & origin=path, same_matrix=problem%same_matrix)
+      & origin=fclib_origin_t(path, problem%same_matrix))
   end subroutine solve_problem
 
 end module gravier_fclib_run

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Examples of LMGC90 by LMGC90 itself and by Gravier, side by side: the same DATBOX, step, number of steps and law.
 
-    python3 drivers/studies/study_side_by_side.py EXAMPLE... --out DIR --pylmgc90 PATH [--steps N]
+    python3 drivers/studies/study_side_by_side.py EXAMPLE... --out DIR --pylmgc90 PATH [--steps N] [--settle M]
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
-LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. Displacements
+LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. With --settle
+LMGC90 makes M steps first, and its last state is the DATBOX of both: what is at rest there has to stay at rest here. Displacements
 are compared body by body in the last step, over the radius of the ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
 those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. Exit status: 0; 2 LMGC90 is not there."""
 import os
@@ -67,16 +68,31 @@ def play_lmgc90(steps):
         pass
     dimension = 2 if len(record["place"][0][0]) == 3 else 3
     np.savez("record.npz", dimension=dimension, **{key: np.array(value) for key, value in record.items()})
+    chipy.WriteLastDof()
+    chipy.WriteLastVlocRloc()
     # its own end may leave with an error where files are closed that are not open
     sys.stdout.flush()
     os._exit(0)
 
 
-def by_lmgc90(example, place, options):
+def settled(example, place, options):
+    """A copy of an example that begins where LMGC90 is after the steps of --settle."""
+    by_lmgc90(example, place, options, options.settle)
+    for name in ("DOF", "Vloc_Rloc"):
+        shutil.copy(place / f"OUTBOX/{name}.LAST", place / f"DATBOX/{name}.INI")
+    for name in ("record.npz", "said.txt"):
+        (place / name).unlink()
+    return place
+
+
+def by_lmgc90(example, place, options, steps):
     shutil.rmtree(place, ignore_errors=True)
     shutil.copytree(example, place)
+    for script in [*place.glob("command*.py"), *place.glob("run*.py")]:
+        text = script.read_text(encoding="latin-1")
+        script.write_text(re.sub(r"^(\s*nb_?steps?\s*=\s*)\d+", rf"\g<1>{steps}", text, flags=re.MULTILINE), encoding="latin-1")
     with open(place / "said.txt", "w", encoding="utf-8") as said:
-        subprocess.run([sys.executable, str(Path(__file__).resolve()), "--play", str(options.steps)], cwd=place, stdout=said, stderr=said, check=False,
+        subprocess.run([sys.executable, str(Path(__file__).resolve()), "--play", str(steps)], cwd=place, stdout=said, stderr=said, check=False,
                        stdin=subprocess.DEVNULL,
                        env={**os.environ, "PYTHONPATH": str(options.pylmgc90.resolve()), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
     text = (place / "said.txt").read_text(encoding="latin-1")
@@ -110,7 +126,9 @@ def by_gravier(example, place, options):
 def compare(example, options):
     name = example.name
     ours, theirs = options.out / name / "gravier", options.out / name / "lmgc90"
-    record = by_lmgc90(example, theirs, options)
+    if options.settle:
+        example = settled(example, options.out / name / "settled", options)
+    record = by_lmgc90(example, theirs, options, options.steps)
     seconds = by_gravier(example, ours, options)
     d = int(record["dimension"])
     steps = [(number, time_of, {key: group[f"bodies/{key}"][:] for key in ("id", "position", "velocity", "mass")}, group["boundaries/force"][:]
@@ -139,7 +157,8 @@ def compare(example, options):
     history = read_history(ours / "full")
     row = {"example": name, "bodies": int(free.sum()), "steps": count, "largest_difference_over_size": float((drift[-1] / size).max()),
            "median_difference_over_size": float(np.median(drift[-1] / size)),
-           "largest_way_over_size": float((np.linalg.norm(place[count - 1] - place[0], axis=1) / size).max()),
+           "largest_way_over_size_lmgc90": float((np.linalg.norm(place[count - 1] - place[0], axis=1) / size).max()),
+           "largest_way_over_size_gravier": float((np.linalg.norm(moved[first + count - 1] - moved[first], axis=1)[free] / size).max()),
            "mass_ratio": float((theirs_mass / mass).mean()),
            "energy_lmgc90": float(theirs_energy[-1]), "energy_gravier": float(ours_energy[-1]),
            "mean_force_on_ground_over_weight_lmgc90": float(theirs_force / weight), "mean_force_on_ground_over_weight_gravier": float(ours_force / weight),
@@ -189,6 +208,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True, help="directory of the tables, the picture and the runs")
     parser.add_argument("--pylmgc90", type=Path, required=True, help="directory that holds the Python package pylmgc90")
     parser.add_argument("--steps", type=int, default=100, help="steps (100)")
+    parser.add_argument("--settle", type=int, default=0, help="steps that LMGC90 makes before (0)")
     options = parser.parse_args()
     options.out = options.out.resolve()
     there = subprocess.run([sys.executable, "-c", "from pylmgc90 import chipy; chipy.Initialize"], capture_output=True, text=True, check=False,

@@ -33,7 +33,9 @@ contains
       do b = 1, size(scene%boundaries)
         associate (boundary => scene%boundaries(b))
           if (boundary%is_glued()) then
-            if (turns_across(boundary, d)) call check_glued(b)
+            if (turns_across(boundary, d) .and. .not. room_for_glued(scene, b, d, reach)) call refuse(boundary, &
+              & "turning grains nearer to an image of the pivot than half the period of "//to_text(scene%period%length(d), 4)// &
+              & " m, less a radius and the range of the lists, along")
             cycle
           end if
           features = boundary%surface%features()
@@ -81,22 +83,6 @@ contains
       call check_width(boundary)
     end subroutine check_cylinder
 
-    !> Grains that turn with their boundary stay within half a period of its pivot.
-    subroutine check_glued(b)
-      integer, intent(in) :: b
-      real(dp) :: arm, length
-      integer :: k
-
-      length = scene%period%length(d)
-      do k = 1, scene%grains%n
-        if (scene%grains%glued(k) /= b) cycle
-        arm = scene%grains%position(d, k) - scene%boundaries(b)%pivot(d)
-        arm = abs(arm - length*anint(arm/length)) + 0.5_dp*reach
-        if (arm >= 0.5_dp*length) call refuse(scene%boundaries(b), "turning grains nearer to an image of the pivot "// &
-          & "than half the period of "//to_text(length, 4)//" m, less a radius and the range of the lists, along")
-      end do
-    end subroutine check_glued
-
     subroutine refuse(boundary, expected)
       type(boundary_t), intent(in) :: boundary
       character(len=*), intent(in) :: expected
@@ -106,6 +92,25 @@ contains
     end subroutine refuse
 
   end subroutine check_in_period
+
+  !> Whether the grains of this rank that are glued to boundary b stay within half a period along axis d of its pivot.
+  pure logical function room_for_glued(scene, b, d, reach) result(has_room)
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: b, d
+    !> diameter of the largest grain and range of the lists [m]
+    real(dp), intent(in) :: reach
+    real(dp) :: arm, length
+    integer :: k
+
+    has_room = .true.
+    length = scene%period%length(d)
+    do k = 1, scene%grains%n
+      if (scene%grains%glued(k) /= b) cycle
+      arm = scene%grains%position(d, k) - scene%boundaries(b)%pivot(d)
+      arm = abs(arm - length*anint(arm/length)) + 0.5_dp*reach
+      has_room = has_room .and. arm < 0.5_dp*length
+    end do
+  end function room_for_glued
 
   !> Whether a boundary turns, now or later, so that places along axis `d` count.
   pure logical function turns_across(boundary, d)

@@ -3,7 +3,7 @@ module gravier_rotation
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: cross, make_rotation, rotate
+  public :: cross, make_rotation, rotate, rigid_velocity
 
 contains
 
@@ -58,5 +58,18 @@ contains
     turn(2, 3) = turn(2, 3) - sin(angle)*u(1)
     turn(3, 2) = turn(3, 2) + sin(angle)*u(1)
   end subroutine make_rotation
+
+  !> Velocity of the point x of a body that turns about a pivot.
+  pure subroutine rigid_velocity(x, pivot, translation, spin, velocity)
+    !> places [m], velocity of the pivot [m/s], spin [rad/s]
+    real(dp), intent(in) :: x(3), pivot(3), translation(3), spin(3)
+    !> (nd) [m/s]
+    real(dp), intent(out) :: velocity(:)
+    real(dp) :: arm(3), turned(3)
+
+    arm(:) = x - pivot
+    turned(:) = cross(spin, arm)
+    velocity(:) = translation(1:size(velocity)) + turned(1:size(velocity))
+  end subroutine rigid_velocity
 
 end module gravier_rotation

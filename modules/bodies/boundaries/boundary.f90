@@ -2,7 +2,7 @@
 !> are few of them, and every rank knows them all.
 module gravier_boundary
   use gravier_kinds, only: dp, i8
-  use gravier_rotation, only: cross, make_rotation, rotate
+  use gravier_rotation, only: make_rotation, rotate, rigid_velocity
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_time_table, only: time_table_t
   use gravier_surface, only: surface_t
@@ -311,17 +311,6 @@ contains
     call find_image(self, x, image)
     call rigid_velocity(image, self%pivot, self%last_velocity, self%last_spin, velocity)
   end subroutine boundary_last_velocity_at
-
-  pure subroutine rigid_velocity(x, pivot, translation, spin, velocity)
-    real(dp), intent(in) :: x(3), pivot(3), translation(3), spin(3)
-    !> (nd)
-    real(dp), intent(out) :: velocity(:)
-    real(dp) :: arm(3), turned(3)
-
-    arm(:) = x - pivot
-    turned(:) = cross(spin, arm)
-    velocity(:) = translation(1:size(velocity)) + turned(1:size(velocity))
-  end subroutine rigid_velocity
 
   !> Set the prescribed velocity and spin of a time; free components are left.
   pure subroutine boundary_prescribe(self, nd, time)

@@ -10,13 +10,20 @@ module gravier_fclib_writer
     & matrix_info
   implicit none
   private
-  public :: write_fclib_local, write_fclib_global
+  public :: write_fclib_local, write_fclib_global, fclib_origin_t
+
+  !> The file that a problem was read from, whose `info` a new one keeps.
+  type :: fclib_origin_t
+    character(len=:), allocatable :: path
+    !> W is the same, so that what the file says of it is kept, too
+    logical :: same_matrix = .false.
+  end type fclib_origin_t
 
 contains
 
   !> Write a local problem without constraints, W by compressed rows, and its solution if there is one. Collective, the same on all
   !> ranks.
-  subroutine write_fclib_local(comm, path, local, error, velocity, multipliers, origin, same_matrix)
+  subroutine write_fclib_local(comm, path, local, error, velocity, multipliers, origin)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
     !> where `r` is allocated it is written as the solution
@@ -26,9 +33,7 @@ contains
     real(dp), intent(in), contiguous, optional :: velocity(:, :)
     !> of the constraints that the problem was rid of; none is not written (p)
     real(dp), intent(in), contiguous, optional :: multipliers(:)
-    !> the file that the problem was read from, whose `info` is kept; and what it says of W, where W is the same
-    character(len=*), intent(in), optional :: origin
-    logical, intent(in), optional :: same_matrix
+    type(fclib_origin_t), intent(in), optional :: origin
     type(h5_file_t) :: file
     integer(i8) :: bytes
     logical :: mine
@@ -39,7 +44,7 @@ contains
     bytes = 16_i8*size(local%w%value) + 40_i8*size(local%q) + 65536_i8
     if (present(multipliers)) bytes = bytes + 8_i8*size(multipliers)
     ! what is kept of a file is not longer than the file
-    if (present(origin)) bytes = bytes + file_length(origin)
+    if (present(origin)) bytes = bytes + file_length(origin%path)
     call file%reserve(bytes, error)
     call write_integer("/fclib_local/spacedim", local%dimension)
     call write_integer("/fclib_local/W/m", local%w%n_rows)
@@ -56,30 +61,10 @@ contains
     if (present(multipliers)) then
       if (size(multipliers) > 0) call write_reals("/solution/l", multipliers)
     end if
-    if (present(origin)) call keep_info(origin)
+    if (present(origin)) call keep_info(comm, origin, file, error)
     call file%close(error)
 
   contains
-
-    !> What the file of origin says of the problem and of W.
-    subroutine keep_info(origin)
-      character(len=*), intent(in) :: origin
-      type(h5_file_t) :: source
-      type(error_t), allocatable :: ignored
-      logical :: same
-      integer :: k
-
-      same = .false.
-      if (present(same_matrix)) same = same_matrix
-      call source%open(comm, origin, error)
-      if (allocated(error)) return
-      call file%take_over(source, local_group//"/info", local_group//"/info", error)
-      if (.not. source%exists(local_group)) call file%take_over(source, global_group//"/info", local_group//"/info", error)
-      do k = 1, merge(size(matrix_info), 0, same)
-        call file%take_over(source, local_group//"/W/"//trim(matrix_info(k)), local_group//"/W/"//trim(matrix_info(k)), error)
-      end do
-      call source%close(ignored)
-    end subroutine keep_info
 
     subroutine write_integer(dataset, value)
       character(len=*), intent(in) :: dataset
@@ -109,17 +94,45 @@ contains
     subroutine write_columns(dataset, values)
       character(len=*), intent(in) :: dataset
       real(dp), intent(in), contiguous :: values(:, :)
-      real(dp), allocatable :: flat(:)
-      integer :: a
+      real(dp), allocatable :: numbers(:)
 
-      allocate (flat(size(values)))
-      do a = 1, size(values, 2)
-        flat((a - 1)*size(values, 1) + 1:a*size(values, 1)) = values(:, a)
-      end do
-      call write_reals(dataset, flat)
+      allocate (numbers(size(values)))
+      call flatten(values, numbers)
+      call write_reals(dataset, numbers)
     end subroutine write_columns
 
   end subroutine write_fclib_local
+
+  !> What the file of origin says of the problem and of W. Collective.
+  subroutine keep_info(comm, origin, file, error)
+    type(communicator_t), intent(in) :: comm
+    type(fclib_origin_t), intent(in) :: origin
+    type(h5_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    type(h5_file_t) :: source
+    type(error_t), allocatable :: ignored
+    integer :: k
+
+    call source%open(comm, origin%path, error)
+    if (allocated(error)) return
+    call file%take_over(source, local_group//"/info", local_group//"/info", error)
+    if (.not. source%exists(local_group)) call file%take_over(source, global_group//"/info", local_group//"/info", error)
+    do k = 1, merge(size(matrix_info), 0, origin%same_matrix)
+      call file%take_over(source, local_group//"/W/"//trim(matrix_info(k)), local_group//"/W/"//trim(matrix_info(k)), error)
+    end do
+    call source%close(ignored)
+  end subroutine keep_info
+
+  !> The numbers of a table, column after column.
+  pure subroutine flatten(table, values)
+    real(dp), intent(in), contiguous :: table(:, :)
+    real(dp), intent(out), contiguous :: values(:)
+    integer :: a
+
+    do a = 1, size(table, 2)
+      values((a - 1)*size(table, 1) + 1:a*size(table, 1)) = table(:, a)
+    end do
+  end subroutine flatten
 
   !> Write a global problem, M by compressed rows and H by compressed columns, with its solution. Collective; errors are the same
   !> on all ranks.

@@ -315,7 +315,6 @@ contains
   !> Whether the proximal point is not in reach.
   pure logical function is_stuck(self)
     class(newton_t), intent(in) :: self
-
     is_stuck = self%inner == most_inner_steps
     if (self%inner > stall) is_stuck = is_stuck .or. self%reached(self%inner) > some_gain*self%reached(self%inner - stall)
   end function is_stuck
@@ -461,8 +460,7 @@ contains
     if (residual <= progress_made*self%mark) then
       self%mark = residual
       self%taken = 0
-    else if (self%taken >= merge(first_patience*2**min(self%turn, accelerated_turns), late_patience, &
-        & self%acceleration%on)) then
+    else if (self%taken >= merge(first_patience*2**min(self%turn, accelerated_turns), late_patience, self%acceleration%on)) then
       self%turn = self%turn + 1
       call begin_sweeps(self)
       return

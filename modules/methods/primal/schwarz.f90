@@ -5,7 +5,8 @@ module gravier_schwarz
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_body_mass, only: add_inverse_mass, inverse_product
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_method, only: method_t, take_options, work_t, acceleration_t, start_sweeps, sweep_all, extrapolate
+  use gravier_acceleration, only: acceleration_t, extrapolate
+  use gravier_method, only: method_t, take_options, work_t, start_sweeps, sweep_all
   use gravier_method_options, only: method_features_t, method_options_t
   implicit none
   private

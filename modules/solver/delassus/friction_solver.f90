@@ -94,7 +94,7 @@ contains
 
   !> Sweeps and Newton's steps in turn. A proof that there is no solution ends them; growth with friction in it is no proof: it
   !> has to be met by both methods, or by one of them over and over, before Newton's method tries for the last time. When some turns
-  !> have brought no result, a proof is sought.
+  !> have brought no result, a proof is sought. The routine is long by the procedures within it, which share the state of the turns.
   subroutine solve_in_turn(problem, control, r, report, error)
     type(delassus_t), intent(in) :: problem
     type(friction_control_t), intent(in) :: control

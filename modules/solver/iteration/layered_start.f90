@@ -18,7 +18,8 @@ module gravier_layered_start
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: add_inverse_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_method, only: acceleration_t, work_t
+  use gravier_acceleration, only: acceleration_t
+  use gravier_method, only: work_t
   use gravier_sweep_order, only: group_contacts
   use gravier_supports, only: supports_t, find_supports
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached

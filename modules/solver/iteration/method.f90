@@ -6,24 +6,11 @@ module gravier_method
   use gravier_communicator, only: communicator_t
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_acceleration, only: acceleration_t, start_acceleration, change_relaxation_factors, extrapolate
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   implicit none
   private
-  public :: method_t, take_options, work_t, acceleration_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, &
-    & end_sweeps, extrapolate
-
-  !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
-  real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)
-  !> growth of |r - y|^2 between iterations that shortens the memory, and what is left of t then
-  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.7_dp
-  !> least 1 - beta: at the start, after an idle phase, ever; its factor after a window that grew, and after one that shrank
-  real(dp), parameter :: first_margin = 0.1_dp, wary_margin = 0.3_dp, least_margin = 0.02_dp, widen = 3.0_dp, narrow = 0.7_dp
-  !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
-  integer, parameter :: window = 10, idle_limit = 20
-  real(dp), parameter :: progress_made = 0.8_dp
-  !> relaxation factors of local solves in accelerated sweeps after the first window, of the normal, tangential and rolling
-  !> part, of disks and of spheres
-  real(dp), parameter :: relaxation_2d(3) = [1.0_dp, 0.7_dp, 1.0_dp], relaxation_3d(3) = [1.1_dp, 0.7_dp, 1.0_dp]
+  public :: method_t, take_options, work_t, start_sweeps, sweep_all, sweep_and_pass, begin_sweeps, sweep_once, end_sweeps
 
   !> What a method has done since it was made, for the closing table of a run.
   type :: work_t
@@ -40,40 +27,6 @@ module gravier_method
     integer(i8) :: relaxed = 0
     real(dp) :: least_factor = 1.0_dp
   end type work_t
-
-  !> What extrapolation keeps of the last iteration, for one subdomain.
-  type :: acceleration_part_t
-    !> impulses (lanes, nc, blocks) [N s]
-    real(dp), allocatable :: impulse(:, :, :)
-    !> velocities under them (nv, n_columns) [m/s, rad/s]
-    real(dp), allocatable :: velocity(:, :)
-  end type acceleration_part_t
-
-  !> Nesterov's extrapolation between iterations: iteration k starts from y = r_k + beta (r_k - r_k-1) with
-  !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
-  !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 22: growth from one iteration to the next shortens the
-  !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
-  !> without progress come as many plain iterations as the solve has had.
-  type :: acceleration_t
-    logical :: on = .false.
-    !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
-    logical :: resting = .false.
-    !> the local operators in place are those of whole local solves
-    logical :: whole_in_place = .true.
-    !> times that the memory was restarted in this solve
-    integer :: restarted = 0
-    real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
-    !> largest beta
-    real(dp) :: most = 1.0_dp
-    !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
-    real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
-    !> iterations of this solve, windows since `lowest`, plain iterations to come
-    integer :: iterations = 0, idle_windows = 0, plain = 0
-    type(acceleration_part_t), allocatable :: part(:)
-  contains
-    procedure :: steer => acceleration_steer
-    procedure :: whole => acceleration_whole
-  end type acceleration_t
 
   type, abstract :: method_t
     !> whether growth is left to a safeguard of the method, which mends it
@@ -253,42 +206,6 @@ contains
     if (method%acceleration%on) call start_acceleration(method%acceleration, problem)
   end subroutine start_sweeps
 
-  subroutine start_acceleration(acceleration, problem)
-    type(acceleration_t), intent(inout) :: acceleration
-    type(contact_problem_t), intent(in) :: problem
-    integer :: s
-
-    acceleration = acceleration_t(on=.true.)
-    if (problem%kernels%row%compliance_n > 0) acceleration%most = most_extrapolation(problem)
-    allocate (acceleration%part(size(problem%sub)))
-    do s = 1, size(problem%sub)
-      acceleration%part(s)%impulse = problem%sub(s)%impulse
-      acceleration%part(s)%velocity = problem%sub(s)%velocity
-    end do
-  end subroutine start_acceleration
-
-  !> The largest beta that pays where all contacts are compliant, (1 - sqrt(q))/(1 + sqrt(q)) with the least part q that the
-  !> compliance has of a local operator (Nesterov 2004, section 2.2.1, for a problem with curvatures between q and 1): more would
-  !> let friction keep waves alive that plain sweeps damp. 1 where some contact is rigid. Collective.
-  real(dp) function most_extrapolation(problem) result(most)
-    type(contact_problem_t), intent(in) :: problem
-    real(dp) :: least, root
-    integer :: s, c
-
-    least = 1.0_dp
-    do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), row => problem%kernels%row)
-        do c = 1, sub%n_contacts
-          associate (contact => sub%hot(lane_of(c), :, block_of(c)))
-            least = min(least, contact(row%compliance_n)*contact(row%per_wnn), contact(row%compliance_t)*contact(row%per_wtt))
-          end associate
-        end do
-      end associate
-    end do
-    root = sqrt(max(0.0_dp, -problem%comm%highest(-least)))
-    most = (1.0_dp - root)/(1.0_dp + root)
-  end function most_extrapolation
-
   !> The sweeps of one iteration in every subdomain of this rank. Collective where they are accelerated.
   subroutine sweep_all(method, problem)
     class(method_t), intent(inout) :: method
@@ -353,49 +270,6 @@ contains
       call extrapolate(method%acceleration%beta, problem%sub(s)%velocity, method%acceleration%part(s)%velocity)
     end do
   end subroutine begin_sweeps
-
-  !> Set the local operators to the full step of a local solve, or to the relaxation factors with which acceleration gains most.
-  subroutine change_relaxation_factors(acceleration, problem)
-    type(acceleration_t), intent(inout) :: acceleration
-    type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: factors(3)
-    integer :: s
-
-    if (acceleration%whole()) then
-      factors(:) = 1.0_dp
-    else if (problem%kernels%nd == 2) then
-      factors(:) = relaxation_2d
-    else
-      factors(:) = relaxation_3d
-    end if
-    do s = 1, size(problem%sub)
-      call problem%sub(s)%update_local_operator(problem%kernels, factors)
-    end do
-    acceleration%whole_in_place = acceleration%whole()
-  end subroutine change_relaxation_factors
-
-  !> v := v + beta (v - previous), previous := v.
-  pure subroutine extrapolate(beta, velocity, previous)
-    real(dp), intent(in) :: beta
-    !> (nv, n_columns)
-    real(dp), intent(inout), contiguous :: velocity(:, :), previous(:, :)
-    call extrapolate_numbers(size(velocity), beta, velocity, previous)
-  end subroutine extrapolate
-
-  !> The same in one loop over all numbers, which the compiler makes vectors of.
-  pure subroutine extrapolate_numbers(n, beta, velocity, previous)
-    integer, intent(in) :: n
-    real(dp), intent(in) :: beta
-    real(dp), intent(inout) :: velocity(n), previous(n)
-    real(dp) :: v
-    integer :: k
-
-    do k = 1, n
-      v = velocity(k)
-      velocity(k) = v + beta*(v - previous(k))
-      previous(k) = v
-    end do
-  end subroutine extrapolate_numbers
 
   !> Sweep `k` of an iteration in subdomain `s` of this rank; contacts that have woken come after the others.
   subroutine sweep_once(method, problem, s, k, law_velocity)
@@ -467,63 +341,5 @@ contains
     method%work%restarted = method%work%restarted + method%acceleration%restarted - restarted
     if (method%acceleration%plain > plain) method%work%suspended = method%work%suspended + 1
   end subroutine end_sweeps
-
-  !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
-  pure subroutine acceleration_steer(self, change)
-    class(acceleration_t), intent(inout) :: self
-    !> |r - y|^2 of the first sweep, over all subdomains [N^2 s^2]
-    real(dp), intent(in) :: change
-    real(dp) :: t
-
-    if (change > growth_allowed*self%change) then
-      self%t = max(1.0_dp, memory_kept*self%t)
-      self%restarted = self%restarted + 1
-    end if
-    self%change = change
-    self%window_change = self%window_change + change
-    self%iterations = self%iterations + 1
-    if (mod(self%iterations, window) == 0) call close_window(self)
-    self%resting = self%plain > 0
-    self%beta = 0.0_dp
-    if (self%resting) return
-    t = self%t
-    self%t = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
-    self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin, self%most)
-  end subroutine acceleration_steer
-
-  !> Whether the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly,
-  !> and plain ones do.
-  pure logical function acceleration_whole(self) result(whole)
-    class(acceleration_t), intent(in) :: self
-    whole = self%resting .or. self%iterations < window
-  end function acceleration_whole
-
-  !> The end of a window of iterations: the margin, and whether acceleration still pays.
-  pure subroutine close_window(acceleration)
-    type(acceleration_t), intent(inout) :: acceleration
-
-    if (acceleration%window_change > acceleration%last_window_change) then
-      acceleration%margin = min(1.0_dp, widen*acceleration%margin)
-    else
-      acceleration%margin = max(least_margin, narrow*acceleration%margin)
-    end if
-    if (acceleration%plain > 0) then
-      acceleration%plain = acceleration%plain - window
-      if (acceleration%plain <= 0) then
-        acceleration%t = 1.0_dp
-        acceleration%margin = wary_margin
-        acceleration%idle_windows = 0
-        acceleration%lowest = acceleration%window_change
-      end if
-    else if (acceleration%window_change < progress_made*acceleration%lowest) then
-      acceleration%lowest = acceleration%window_change
-      acceleration%idle_windows = 0
-    else
-      acceleration%idle_windows = acceleration%idle_windows + 1
-      if (acceleration%idle_windows >= idle_limit) acceleration%plain = acceleration%iterations
-    end if
-    acceleration%last_window_change = acceleration%window_change
-    acceleration%window_change = 0.0_dp
-  end subroutine close_window
 
 end module gravier_method

@@ -5,8 +5,7 @@
 !> the set of pressing and sticking contacts known, H^T e = -w there, so that any test impulse y gives y . w = -(M^-1 H y, e)_M.
 !>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
 !>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those
-!> one
-!>      iteration before where sweeps are accelerated, which keep them; else those of some iterations before.
+!>      one iteration before where sweeps are accelerated, which keep them; else those of some iterations before.
 !>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
 !>      (gravier_layered_start) long waves are gone, and a = 1.7.
@@ -14,8 +13,7 @@
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
 !> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
-!> law by
-!> much, and no body sink by much onto what is below it. See doc/theory.md, section 24.
+!> law by much, and no body sink by much onto what is below it. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
@@ -242,12 +240,7 @@ contains
     largest(1) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), part => self%part(s))
-        if (.not. allocated(part%local)) then
-          allocate (part%local(problem%kernels%nv, sub%n_columns), part%recent(problem%kernels%nv, sub%n_columns))
-          allocate (self%levels%part(s)%power(lanes, size(sub%hot, 3)))
-        end if
-        part%local(:, :) = 0.0_dp
-        part%recent(:, :) = 0.0_dp
+        call make_room(part, problem%kernels%nv, sub%n_columns, size(sub%hot, 3), self%levels%part(s)%power)
         if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
         if (sub%n_contacts == 0) cycle
         ! without earlier impulses the third test impulse is 0, which tells nothing
@@ -311,6 +304,20 @@ contains
 
   end subroutine velocity_error_assess
 
+  !> H y of a subdomain's tests at 0; the first time room is made for them and for the powers at contacts.
+  subroutine make_room(part, nv, n_columns, n_blocks, power)
+    type(error_part_t), intent(inout) :: part
+    integer, intent(in) :: nv, n_columns, n_blocks
+    real(dp), allocatable, intent(inout) :: power(:, :)
+
+    if (.not. allocated(part%local)) then
+      allocate (part%local(nv, n_columns), part%recent(nv, n_columns))
+      allocate (power(lanes, n_blocks))
+    end if
+    part%local(:, :) = 0.0_dp
+    part%recent(:, :) = 0.0_dp
+  end subroutine make_room
+
   !> Sum H y over the copies of bodies; that of the impulses themselves is the reaction, which is summed. Collective.
   subroutine sum_motions(problem, part)
     type(contact_problem_t), intent(inout) :: problem
@@ -371,8 +378,7 @@ contains
   end function projection_of
 
   !> L, after `assess`; and how fast each body sinks, where all else is within the error allowed and bounds do not tell enough.
-  !> Where few
-  !> heavy bodies have most of the mass, E says little of the others. Collective.
+  !> Where few heavy bodies have most of the mass, E says little of the others. Collective.
   subroutine velocity_error_add_levels(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem

@@ -69,15 +69,11 @@ contains
         end do
       end do
     end if
-    k = n_grouped
-    do c = 1, size(order)
-      if (grouped(c)) cycle
-      k = k + 1
-      order(k) = c
-    end do
+    call append_others(grouped, order, n_grouped)
 
   contains
 
+    !> Give a contact a place in the first open block that holds neither of its bodies, if there is one.
     subroutine place(c)
       integer, intent(in) :: c
       integer(i8) :: taken_by
@@ -94,11 +90,27 @@ contains
       if (pair(2, c) <= n_moving) blocks_of(pair(2, c)) = ibset(blocks_of(pair(2, c)), g)
     end subroutine place
 
+    !> A body is in no open block any more.
     subroutine forget(b)
       integer, intent(in) :: b
       if (b <= n_moving) blocks_of(b) = 0_i8
     end subroutine forget
 
   end subroutine group_contacts
+
+  !> The contacts that are in no block, after those that are.
+  pure subroutine append_others(grouped, order, n_grouped)
+    logical, intent(in), contiguous :: grouped(:)
+    integer, intent(inout), contiguous :: order(:)
+    integer, intent(in) :: n_grouped
+    integer :: c, k
+
+    k = n_grouped
+    do c = 1, size(order)
+      if (grouped(c)) cycle
+      k = k + 1
+      order(k) = c
+    end do
+  end subroutine append_others
 
 end module gravier_sweep_order

@@ -2,7 +2,7 @@
 program test_momentum
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
-  use gravier_method, only: acceleration_t
+  use gravier_acceleration, only: acceleration_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
