@@ -285,7 +285,9 @@ contains
     end do
     if (square > (extent(i) + extent(j) + self%rule%alert_distance)**2) return
     if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
-    if (self%rule%filter%lets_pass(bodies, self%boundaries, i, j)) return
+    if (allocated(self%rule%filter%passes)) then
+      if (self%rule%filter%lets_pass(bodies, self%boundaries, i, j)) return
+    end if
     periodic = self%period%on()
     shift(:) = 0
     if (periodic) then

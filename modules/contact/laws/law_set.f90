@@ -164,8 +164,7 @@ contains
   end function law_set_number_of
 
   !> Place of the default law of pairs of grains, b = 0, or of pairs in which boundary `b` takes part; a boundary that has none is
-  !> under
-  !> that of grains.
+  !> under that of grains.
   pure integer function law_set_default_of(self, b) result(l)
     class(law_set_t), intent(in) :: self
     integer, intent(in) :: b

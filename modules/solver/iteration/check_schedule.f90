@@ -2,8 +2,7 @@
 !>
 !> A residual costs as much as two sweeps, the estimate of the velocity error as much again. What sweeps move impulses by goes with
 !> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from
-!> the
-!> goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence.
+!> the goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence.
 module gravier_check_schedule
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp

@@ -1,6 +1,5 @@
 !> Passes over layers (gravier_layered_start) tried in the course of a solve: where there is much to carry and a long way to carry
-!> it,
-!> and kept only where they have brought something.
+!> it, and kept only where they have brought something.
 module gravier_layer_trial
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -14,8 +13,7 @@ module gravier_layer_trial
   public :: layer_trial_t
 
   !> a pass is tried after the first iterations if the residual at the start, the velocity error over its scale and the way to
-  !> supports
-  !> are above these [1, 1, mean diameters]
+  !> supports are above these [1, 1, mean diameters]
   real(dp), parameter :: unsettled = 0.1_dp, much = 0.5_dp, deep = 25.0_dp
   !> and after a part of the depth, where the way is above another [mean diameters]; the depth is found after so many iterations
   real(dp), parameter :: late = 0.3_dp, very_deep = 60.0_dp

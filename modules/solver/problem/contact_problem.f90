@@ -23,8 +23,7 @@ module gravier_contact_problem
   !>
   !> Attractions F of contacts are loads of the solve, and unilateral contact holds for r~_n = r_n + h F. `impulse`, `reaction` and
   !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what
-  !> belongs
-  !> to it are asked of `normal_impulse`, `contact_reaction`, `free_velocity` and `impulse_on_candidate`.
+  !> belongs to it are asked of `normal_impulse`, `contact_reaction`, `free_velocity` and `impulse_on_candidate`.
   type :: subproblem_t
     !> global number of the subdomain, from 1
     integer :: subdomain = 0

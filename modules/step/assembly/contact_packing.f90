@@ -21,8 +21,7 @@ module gravier_contact_packing
     integer, allocatable :: of_grain(:), of_boundary(:)
   end type numbers_t
 
-  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs,
-  !> its
+  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs, its
   !> candidate and its antagonist, a grain or minus a boundary, and the boundary that takes part, 0 for none.
   type :: packed_t
     integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0

@@ -187,44 +187,38 @@ contains
     type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
     !> [m], (nd)
-    real(dp), intent(in) :: gap, normal(:)
+    real(dp), intent(in) :: gap
+    real(dp), intent(in), contiguous :: normal(:)
+    type(contact_list_t), intent(inout) :: found
+    !> of bodies with shapes
+    type(contact_place_t), intent(in), optional :: place
+    integer :: l
+
+    l = law_of(view, decomposition%boundaries, physics%laws, p)
+    if (physics%laws%varies_at(l)) then
+      call add_by_state(view, decomposition, physics, l, p, gap, normal, found, place)
+    else
+      if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
+      call keep_contact(terms_of(physics%laws, l, gap), p, gap, normal, found, place)
+    end if
+  end subroutine add_contact
+
+  !> The same under law `l`, which asks for more than the gap: its terms, its springs, and the state that it gives the pair.
+  subroutine add_by_state(view, decomposition, physics, l, p, gap, normal, found, place)
+    type(local_bodies_t), intent(inout) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: l, p
+    !> [m], (nd)
+    real(dp), intent(in) :: gap
+    real(dp), intent(in), contiguous :: normal(:)
     type(contact_list_t), intent(inout) :: found
     !> of bodies with shapes
     type(contact_place_t), intent(in), optional :: place
     type(contact_pair_t) :: pair
-
-    call find_terms(view, decomposition, physics, p, gap, normal, pair, place)
-    if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
-    if (gap > 0.0_dp .and. (pair%terms%restitution > 0.0_dp .or. &
-      & pair%terms%tangential_restitution > 0.0_dp)) return
-    found%n = found%n + 1
-    found%source(found%n) = p
-    found%gap(found%n) = gap
-    found%normal(:, found%n) = normal
-    if (size(found%terms) > 0) found%terms(found%n) = pair%terms
-    if (size(found%spring) > 0) found%spring(found%n) = pair%spring
-    if (present(place)) found%place(found%n) = place
-  end subroutine add_contact
-
-  !> What the law of a pair makes of the step: its terms and its springs; and the state that it gives the pair.
-  subroutine find_terms(view, decomposition, physics, p, gap, normal, pair, place)
-    type(local_bodies_t), intent(inout) :: view
-    type(decomposition_t), intent(in) :: decomposition
-    type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    !> [m], (nd)
-    real(dp), intent(in) :: gap, normal(:)
-    type(contact_pair_t), intent(out) :: pair
-    !> of bodies with shapes
-    type(contact_place_t), intent(in), optional :: place
-    integer :: l, row
+    integer :: row, before
 
     row = view%list%memory%law_row
-    l = law_of(view, decomposition%boundaries, physics%laws, p)
-    if (.not. physics%laws%varies_at(l)) then
-      pair%terms = terms_of(physics%laws, l, gap)
-      return
-    end if
     pair%first = physics%first
     pair%h = physics%h
     pair%gap = gap
@@ -235,7 +229,29 @@ contains
       call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, round_place(view, p, gap, normal), normal, pair)
     end if
     if (row > 0) view%list%state(row, p) = pair%state
-  end subroutine find_terms
+    if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
+    before = found%n
+    call keep_contact(pair%terms, p, gap, normal, found, place)
+    if (size(found%spring) > 0 .and. found%n > before) found%spring(found%n) = pair%spring
+  end subroutine add_by_state
+
+  !> Put a contact into the list, but one that is open and would send velocities back.
+  pure subroutine keep_contact(terms, p, gap, normal, found, place)
+    type(contact_terms_t), intent(in) :: terms
+    integer, intent(in) :: p
+    real(dp), intent(in) :: gap
+    real(dp), intent(in), contiguous :: normal(:)
+    type(contact_list_t), intent(inout) :: found
+    type(contact_place_t), intent(in), optional :: place
+
+    if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) return
+    found%n = found%n + 1
+    found%source(found%n) = p
+    found%gap(found%n) = gap
+    found%normal(:, found%n) = normal
+    if (size(found%terms) > 0) found%terms(found%n) = terms
+    if (present(place)) found%place(found%n) = place
+  end subroutine keep_contact
 
   !> Where contact `f` of those found is.
   pure type(contact_place_t) function place_of(view, found, f) result(place)

@@ -153,8 +153,7 @@ contains
   end function square_of
 
   !> Attractions as loads, and the impulses on bodies without them: velocities are the same from both, and the reactions are those
-  !> of
-  !> the impulses that are left. What is asked changes nothing of the problem as it was solved.
+  !> of the impulses that are left. What is asked changes nothing of the problem as it was solved.
   subroutine test_attractions(dimension)
     integer, intent(in) :: dimension
     !> as the roundings of `test_against_one`

@@ -112,8 +112,7 @@ contains
   end subroutine test_ways
 
   !> Nine tenths of the exact impulses: everything falls with a tenth of g h. Y and C are that exactly, because the velocities that
-  !> the
-  !> impulses make are uniform; all sink as one, and the estimate is the smaller of E and C.
+  !> the impulses make are uniform; all sink as one, and the estimate is the smaller of E and C.
   subroutine test_share(n_subdomains)
     integer, intent(in) :: n_subdomains
     integer, parameter :: count = 40

@@ -1,6 +1,5 @@
 !> The step and its parts on scenes of a few disks whose answers are known: motion to the middle and to the end, areas of loads,
-!> when
-!> space is divided, the contact in which a solve failed, the tally of a run.
+!> when space is divided, the contact in which a solve failed, the tally of a run.
 program test_time_stepper
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use gravier_kinds, only: dp, i8
