@@ -116,6 +116,9 @@ module gravier_time_stepper
     integer(i8) :: messages = 0, values = 0
     !> over all steps: solves that missed their tolerance, grains that left by outlets, grains too fast for the step
     integer(i8) :: failed = 0, left = 0, fast = 0
+    !> steps, the last ones, in which the kinetic energy of the grains was at most `rest_energy` [J]
+    integer :: quiet = 0
+    real(dp) :: rest_energy = 0.0_dp
     !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
     real(dp) :: worst_overlap = 0.0_dp
     type(effort_t) :: effort
@@ -293,6 +296,7 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
+    self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy)
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     self%slept = self%slept + figures%asleep
@@ -394,6 +398,7 @@ contains
     self%failed = 0
     self%left = 0
     self%fast = 0
+    self%quiet = 0
     self%slept = 0
     self%woken = 0
     self%worst_overlap = 0.0_dp

@@ -210,6 +210,7 @@ contains
     call expect(report, config%time%step > 0.0_dp, "time", "step", error)
     call expect(report, config%time%steps >= 0, "time", "steps", error)
     call expect(report, config%time%theta >= 0.5_dp .and. config%time%theta <= 1.0_dp, "time", "theta", error)
+    call expect(report, config%time%rest_energy >= 0.0_dp, "time", "rest_energy", error)
   end subroutine check_time
 
   subroutine check_solver(report, config, error)

@@ -260,6 +260,7 @@ contains
     case ("step"); slot%real => config%time%step
     case ("steps"); slot%integer => config%time%steps
     case ("theta"); slot%real => config%time%theta
+    case ("rest_energy"); slot%real => config%time%rest_energy
     end select
   end subroutine time_slot
 

@@ -279,7 +279,10 @@ module gravier_config_table
     [key_t("time", "step", kind_real, "0", "> 0", "length of a time step", unit="s", note="required", required=.true.), &
      key_t("time", "steps", kind_integer, "0", ">= 0", "number of time steps", note="required", required=.true.), &
      key_t("time", "theta", kind_real, "0.5", "in [0.5, 1]", &
-           "factor of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler")]
+           "factor of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler"), &
+     key_t("time", "rest_energy", kind_real, "0.0", ">= 0", &
+           "the run ends when the kinetic energy of the grains was at most this in 10 steps, one after the other; 0: it does not", &
+           unit="J")]
 
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &

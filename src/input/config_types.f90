@@ -83,6 +83,8 @@ module gravier_config_types
     real(dp) :: step
     integer :: steps
     real(dp) :: theta
+    !> J: kinetic energy of the grains at rest, which ends the run; 0: it does not
+    real(dp) :: rest_energy
   end type time_config_t
 
   !> &solver: the method of every step and when it stops.

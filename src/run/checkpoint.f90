@@ -65,6 +65,8 @@ contains
     call file%write_scalar("failed", simulation%failed, error)
     call file%write_scalar("left", simulation%left, error)
     call file%write_scalar("fast", simulation%fast, error)
+    call file%write_scalar("rest_energy", simulation%rest_energy, error)
+    call file%write_scalar("quiet", int(simulation%quiet, i8), error)
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
     call file%write_scalar("lists_made", simulation%halo%builds, error)
     associate (memory => simulation%halo%memory)
@@ -98,8 +100,9 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
-    integer(i8) :: step, last_written, builds
-    integer :: own_step, own_last
+    integer(i8) :: step, last_written, builds, quiet
+    integer :: own_step, own_last, own_quiet
+    real(dp) :: rest_energy
     integer(i8), allocatable :: words(:)
 
     if (allocated(error)) return
@@ -113,6 +116,8 @@ contains
     call file%read_scalar("failed", simulation%failed, error)
     call file%read_scalar("left", simulation%left, error)
     call file%read_scalar("fast", simulation%fast, error)
+    call file%read_scalar("rest_energy", rest_energy, error)
+    call file%read_scalar("quiet", quiet, error)
     call file%read_scalar("last_written", last_written, error)
     call file%read_scalar("lists_made", builds, error)
     call file%read_scalar("imbalance", simulation%imbalance, error)
@@ -120,6 +125,7 @@ contains
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written
     call take_count(last_written + 1, path//": last_written", own_last, error)
+    call take_count(quiet, path//": quiet", own_quiet, error)
     call file%read_array("boundary_impulses", size(simulation%boundary_impulses), &
       & size(simulation%boundary_impulses), words, error)
     if (.not. allocated(error)) call take_reals(words, simulation%boundary_impulses, size(simulation%boundary_impulses))
@@ -129,6 +135,8 @@ contains
     end if
     simulation%step = own_step
     simulation%last_written = own_last - 1
+    ! steps that were at rest by another measure do not count
+    if (.not. abs(rest_energy - simulation%rest_energy) > 0.0_dp) simulation%quiet = own_quiet
     simulation%restarted = .true.
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)

@@ -31,6 +31,8 @@ module gravier_run
 
   !> times overlap_allowed: an overlap that is no longer one of rounding and tolerance
   real(dp), parameter :: worth_a_warning = 5.0_dp
+  !> steps, one after the other, of a scene that has come to rest
+  integer, parameter :: steps_at_rest = 10
 
   !> When a run began and what made it stop early.
   type :: interruption_t
@@ -237,7 +239,7 @@ contains
     keep_last = .true.
     ends = .false.
     if (.not. simulation%restarted) call output%write(of_states, simulation, figures, 0.0_dp, error)
-    do while (simulation%step < simulation%config%time%steps .and. .not. ends .and. .not. allocated(error))
+    do while (.not. is_over(simulation) .and. .not. ends .and. .not. allocated(error))
       step_start = MPI_Wtime()
       call simulation%advance(figures, error, watch=log)
       if (allocated(error)) exit
@@ -248,7 +250,7 @@ contains
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call output%write(of_each_step, simulation, figures, MPI_Wtime() - step_start, error)
       ! the last state comes before the last checkpoint
-      if (keep_last) call output%write(of_states, simulation, figures, 0.0_dp, error)
+      if (keep_last) call output%write(of_states, simulation, figures, 0.0_dp, error, always=has_come_to_rest(simulation))
       call simulation%comm%agree(error)
       if (.not. ends .and. .not. allocated(error)) call attend(simulation, figures, log, output, interruption, error)
       if (interruption%stops) exit
@@ -270,6 +272,9 @@ contains
     if (figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, &
       & error)
     call log%write_end(simulation, MPI_Wtime() - interruption%first_step, error)
+    if (has_come_to_rest(simulation)) call log%line("at rest     after step "//to_text(simulation%step)//" of "// &
+      & to_text(simulation%config%time%steps)//": the kinetic energy of the grains was at most "// &
+      & to_text(simulation%rest_energy, 3)//" J in "//to_text(steps_at_rest)//" steps", error)
     if (simulation%failed > 0) status = status_unconverged
     if (interruption%stops) then
       status = status_failure
@@ -281,6 +286,18 @@ contains
     end if
     call simulation%comm%agree(error)
   end subroutine run_steps
+
+  !> Whether all steps are made, or the scene rests.
+  pure logical function is_over(simulation)
+    type(simulation_t), intent(in) :: simulation
+    is_over = simulation%step >= simulation%config%time%steps .or. has_come_to_rest(simulation)
+  end function is_over
+
+  !> Whether the scene rests, in a run that ends by that.
+  pure logical function has_come_to_rest(simulation) result(rests)
+    type(simulation_t), intent(in) :: simulation
+    rests = simulation%rest_energy > 0.0_dp .and. simulation%quiet >= steps_at_rest
+  end function has_come_to_rest
 
   !> Between two steps: write a checkpoint where one is due by steps, by time, by SIGUSR1, at the end, or because the run
   !> has to stop by SIGTERM or for want of time. Collective.
@@ -310,7 +327,7 @@ contains
       due = asked(2) > 0 .or. requests > interruption%answered
       interruption%answered = requests
       due = due .or. output%due(of_checkpoints, simulation%step)
-      if (simulation%step == simulation%config%time%steps) then
+      if (is_over(simulation)) then
         ! one that may be prolonged
         due = due .or. config%checkpoint_every > 0 .or. config%checkpoint_seconds > 0.0_dp .or. config%walltime > 0.0_dp
       else if (asked(1) > 0) then

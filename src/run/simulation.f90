@@ -163,6 +163,7 @@ contains
       self%physics%laws = scene%laws
       self%physics%h = self%config%time%step
       self%physics%theta = self%config%time%theta
+      self%rest_energy = self%config%time%rest_energy
       associate (solver => self%config%solver)
         self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
       end associate

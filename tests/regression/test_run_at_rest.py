@@ -1,0 +1,95 @@
+"""rest_energy of &time: a run ends when its grains have come to rest, at the same step on any ranks and through restarts, with its
+last state and checkpoint written."""
+import os
+import re
+import unittest
+
+import numpy as np
+
+from gravier_runs import RunTestCase, contents, differences, gravier, merged, namelist, run_case, steps_of, write
+
+STEPS, QUIET = 3000, 10
+#: J; 80 disks of some 0.8 kg that move by a tenth of g h have a third of it
+LOW = 1.0e-4
+
+BOX = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [10, 8], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3},
+    "time": {"step": 1e-3, "steps": STEPS, "rest_energy": LOW},
+    "solver": {"method": "nscdd"},
+    "decomposition": {"subdomains": 2},
+    "output": {"every": 0, "checkpoint_every": 100},
+}
+
+
+def again(directory, ranks=1, **changes):
+    """Change the case and go on from the checkpoint."""
+    write(os.path.join(directory, "case.nml"), namelist(merged(BOX, changes)))
+    return gravier("--restart", "case.nml", ranks=ranks, directory=directory)
+
+
+class AtRest(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.directory = os.path.join(cls.scratch, "straight")
+        cls.straight = run_case(BOX, directory=cls.directory)
+        cls.energy = cls.straight.history()["kinetic_energy"]
+
+    def state(self, directory):
+        found = contents(os.path.join(directory, "results", "checkpoint.h5"))
+        return {name: value for name, value in found.items() if "last_written" not in name}
+
+    def test_ends_after_ten_quiet_steps(self):
+        self.assert_status(self.straight, 0)
+        count = len(self.energy)
+        self.assertLess(count, STEPS)
+        self.assertGreater(count, 100)
+        quiet = self.energy <= LOW
+        self.assertTrue(quiet[-QUIET:].all())
+        self.assertFalse(quiet[-QUIET - 1])
+        runs = "".join("q" if value else "-" for value in quiet)
+        self.assertEqual(runs.find("q" * QUIET), count - QUIET, "it ends the first time")
+        self.assertIn(f"at rest     after step {count} of {STEPS}", self.straight.stdout)
+        self.assertRegex(self.straight.stdout.rstrip().splitlines()[-1], f"^finished    all {count} steps reached the accuracy")
+
+    def test_writes_the_last_state_and_a_checkpoint(self):
+        self.assertEqual(steps_of(self.straight.results()), [len(self.energy)])
+        self.assertRegex(self.straight.stdout, f"checkpoint  of step {len(self.energy)} written")
+
+    def test_two_ranks_end_at_the_same_step(self):
+        place = self.here("two")
+        self.assert_status(run_case(BOX, ranks=2, directory=place), 0)
+        self.assertEqual(differences(self.state(self.directory), self.state(place)), [])
+
+    def test_restarts_count_on(self):
+        """Stopped within the quiet steps, the run goes on to the same end; there it has nothing more to do."""
+        place = self.here("restart")
+        self.assert_status(run_case(merged(BOX, {"time": {"steps": len(self.energy) - QUIET // 2}}), directory=place), 0)
+        for _ in range(2):
+            self.assert_status(again(place, ranks=2), 0)
+            self.assertEqual(differences(self.state(self.directory), self.state(place)), [])
+
+    def test_a_lower_energy_goes_on(self):
+        place = self.here("lower")
+        self.assert_status(run_case(BOX, directory=place), 0)
+        run = again(place, time={"rest_energy": 0.01 * LOW, "steps": len(self.energy) + 2 * QUIET})
+        self.assert_status(run, 0)
+        self.assertGreaterEqual(len(run.history()["step"]), len(self.energy) + QUIET)
+
+    def test_without_the_key_all_steps_are_made(self):
+        run = run_case(merged(BOX, {"time": {"rest_energy": 0.0, "steps": len(self.energy) + QUIET}}), directory=self.here("all"))
+        self.assert_status(run, 0)
+        energy = run.history()["kinetic_energy"]
+        self.assertEqual(len(energy), len(self.energy) + QUIET)
+        np.testing.assert_array_equal(energy[:len(self.energy)], self.energy)
+        self.assertNotIn("at rest ", run.stdout)
+
+    def test_refused(self):
+        run = run_case(merged(BOX, {"time": {"rest_energy": -1.0}}), directory=self.here("bad"))
+        self.assert_status(run, 2)
+        self.assertRegex(run.stderr, re.escape("case.nml: &time rest_energy = -1.0: expected a finite real number >= 0 (J)"))
+
+
+if __name__ == "__main__":
+    unittest.main()
