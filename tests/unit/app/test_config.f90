@@ -128,6 +128,7 @@ contains
     call check_close(config%time%step, 0.0078125_dp, 0.0_dp, "step")
     call check_equal(config%time%steps, 40, "steps")
     call check_close(config%time%theta, 0.75_dp, 0.0_dp, "theta")
+    call check_close(config%time%rest_energy, 0.001_dp, 0.0_dp, "rest_energy")
     call check_whole_methods(config)
   end subroutine test_whole_file
 
@@ -176,7 +177,7 @@ contains
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
       // "  start_overlap = 0.25, list_steps = 12" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
-      // "&time step = 0.0078125, steps = 40, theta = 0.75 /" // newline &
+      // "&time step = 0.0078125, steps = 40, theta = 0.75, rest_energy = 0.001 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
       // "  velocity_scale = 0.1875, check_every = 5, warm_start = .false., on_failure = 'stop'" // newline &
       // "  accuracy = 0.375, layered_start = .false. /" // newline &
@@ -258,6 +259,7 @@ contains
     call check_default_effects(config%scene)
     call check_equal(size(config%boundaries), 0, "no boundary by default")
     call check_close(config%time%theta, 0.5_dp, 0.0_dp, "default theta")
+    call check_close(config%time%rest_energy, 0.0_dp, 0.0_dp, "default rest_energy")
     call check_default_methods(config)
   end subroutine test_defaults
 
@@ -563,10 +565,10 @@ contains
     call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
     call refuse(column // "&time sweeps = 3 /", "group &time is given twice (lines 1 and 1): expected once")
     call refuse("&scene / &time sweeps = 3 /", "unknown key 'sweeps' in &time; it belongs to &solver")
-    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of step steps theta")
-    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of step steps theta")
+    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of step steps theta rest_energy")
+    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of step steps theta rest_energy")
     call refuse("&scene / &time " // repeat("step", 15) // " = 3 /", &
-      "unknown key '" // repeat("step", 15) // "' in &time: expected one of step steps theta")
+      "unknown key '" // repeat("step", 15) // "' in &time: expected one of step steps theta rest_energy")
     call refuse("&scene bodies = 'column' /", "group &time is missing: expected &time ... /")
     call refuse(time, "group &scene is missing: expected &scene ... /")
     call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice', 'file' or 'sample'")
