@@ -11,7 +11,7 @@ KINDS = ("unit", "parallel", "verification")
 #: modules that no test program uses by their own name, and the test of what they do
 EXCEPTIONS = {
     # gravier_hdf5_file is made of them, by extension of types
-    **dict.fromkeys(("gravier_hdf5_tree", "gravier_hdf5_attributes", "gravier_hdf5_datasets", "gravier_hdf5_properties",
+    **dict.fromkeys(("gravier_hdf5_tree", "gravier_hdf5_attributes", "gravier_hdf5_properties",
                      "gravier_hdf5_rows", "gravier_hdf5_storage", "gravier_hdf5_tables"), "parallel/io/test_io_hdf5_file.f90"),
     # gravier_problem_builder is the one that packs contacts
     "gravier_contact_packing": "parallel/step/test_problem_builder.f90",
