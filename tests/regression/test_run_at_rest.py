@@ -53,6 +53,18 @@ class AtRest(RunTestCase):
         self.assertIn(f"at rest     after step {count} of {STEPS}", self.straight.stdout)
         self.assertRegex(self.straight.stdout.rstrip().splitlines()[-1], f"^finished    all {count} steps reached the accuracy")
 
+    def test_a_ball_at_its_apex_is_not_at_rest(self):
+        """It is slow for some steps of each bounce, which do not add up."""
+        place = self.here("ball")
+        os.makedirs(place)
+        write(os.path.join(place, "ball.csv"), "id,shape,x,y,radius,nx,ny\n1,grain,0,0.03,0.01,,\n2,plane,0,0,,0,1\n")
+        run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "ball.csv", "density": 2500.0, "wall_restitution": 0.95},
+                        "time": {"step": 1e-3, "steps": 600, "rest_energy": LOW}, "output": {"every": 0}}, directory=place)
+        self.assert_status(run, 0)
+        energy = run.history()["kinetic_energy"]
+        self.assertEqual(len(energy), 600)
+        self.assertGreater((energy <= LOW).sum(), QUIET)
+
     def test_writes_the_last_state_and_a_checkpoint(self):
         self.assertEqual(steps_of(self.straight.results()), [len(self.energy)])
         self.assertRegex(self.straight.stdout, f"checkpoint  of step {len(self.energy)} written")
