@@ -10,18 +10,25 @@ module gravier_elastic_law
   use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
   implicit none
   private
-  public :: elastic_law_t, spring_keys
+  public :: elastic_law_t, spring_law_t, spring_keys
 
-  type, extends(contact_law_t) :: elastic_law_t
+  !> What laws with springs have in common.
+  type, extends(contact_law_t), abstract :: spring_law_t
     real(dp) :: friction = 0.0_dp
-    !> [N/m]; kappa; [Pa, N/m in 2D]
-    real(dp) :: stiffness = 0.0_dp, number = 0.0_dp, pressure = 0.0_dp
-    !> tangential stiffness over the normal one
-    real(dp) :: ratio = 1.0_dp
     !> what all pairs have in common
     type(spring_t) :: spring
     !> [N]
     real(dp) :: pull_off = 0.0_dp
+  contains
+    procedure :: set_springs => spring_law_set_springs
+    procedure :: begin_pair => spring_law_begin_pair
+  end type spring_law_t
+
+  type, extends(spring_law_t) :: elastic_law_t
+    !> [N/m]; kappa; [Pa, N/m in 2D]
+    real(dp) :: stiffness = 0.0_dp, number = 0.0_dp, pressure = 0.0_dp
+    !> tangential stiffness over the normal one
+    real(dp) :: ratio = 1.0_dp
   contains
     procedure, nopass :: kind => elastic_kind
     procedure, nopass :: keys => elastic_keys
@@ -49,6 +56,35 @@ module gravier_elastic_law
 
 contains
 
+  !> Set what laws with springs have in common.
+  pure subroutine spring_law_set_springs(self, friction, values, exponent)
+    class(spring_law_t), intent(inout) :: self
+    !> friction coefficient; of `spring_keys` and of the two resistances to rolling
+    real(dp), intent(in) :: friction, values(:)
+    !> of the force of the normal spring as a power of its compression: 1 or 3/2
+    real(dp), intent(in) :: exponent
+
+    self%friction = friction
+    self%spring%damping = damping_ratio(values(1), exponent)
+    self%spring%tangential_damping = values(2)
+    self%spring%weight = values(3)
+    self%pull_off = values(4)
+    self%attracts = self%pull_off > 0.0_dp
+    self%yields = .true.
+    self%largest%friction = self%friction
+    call self%set_resistance(values(5), values(6))
+  end subroutine spring_law_set_springs
+
+  !> Give a pair its friction, its attraction and its springs but for their stiffness.
+  pure subroutine spring_law_begin_pair(self, pair)
+    class(spring_law_t), intent(in) :: self
+    type(contact_pair_t), intent(inout) :: pair
+
+    pair%terms%friction = self%friction
+    if (pair%gap <= 0.0_dp) pair%terms%attraction = self%pull_off
+    pair%spring = self%spring
+  end subroutine spring_law_begin_pair
+
   pure function elastic_kind() result(kind)
     character(len=16) :: kind
     kind = "elastic"
@@ -63,19 +99,11 @@ contains
     class(elastic_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
 
-    self%friction = values(1)
     self%stiffness = values(2)
     self%number = values(3)
     self%pressure = values(4)
     self%ratio = values(5)
-    self%spring%damping = damping_ratio(values(6), 1.0_dp)
-    self%spring%tangential_damping = values(7)
-    self%spring%weight = values(8)
-    self%pull_off = values(9)
-    self%attracts = self%pull_off > 0.0_dp
-    self%yields = .true.
-    self%largest%friction = self%friction
-    call self%set_resistance(values(10), values(11))
+    call self%set_springs(values(1), values(6:11), 1.0_dp)
     self%fault_key = ""
     if (self%stiffness > 0.0_dp .eqv. self%number > 0.0_dp) then
       self%fault_key = "normal_stiffness"
@@ -90,9 +118,7 @@ contains
     class(elastic_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
 
-    pair%terms%friction = self%friction
-    if (pair%gap <= 0.0_dp) pair%terms%attraction = self%pull_off
-    pair%spring = self%spring
+    call self%begin_pair(pair)
     pair%spring%stiffness(1) = self%stiffness
     if (self%number > 0.0_dp) pair%spring%stiffness(1) = self%number*self%pressure*pair%breadth
     pair%spring%stiffness(2) = self%ratio*pair%spring%stiffness(1)

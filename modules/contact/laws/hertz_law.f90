@@ -8,9 +8,8 @@
 module gravier_hertz_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
-  use gravier_contact_spring, only: spring_t, damping_ratio
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
-  use gravier_elastic_law, only: spring_keys
+  use gravier_contact_law, only: contact_pair_t, add_resistance_keys
+  use gravier_elastic_law, only: spring_law_t, spring_keys
   implicit none
   private
   public :: hertz_law_t
@@ -18,14 +17,9 @@ module gravier_hertz_law
   !> least compression that a stiffness is taken at, over the radius
   real(dp), parameter :: least = 1.0e-10_dp
 
-  type, extends(contact_law_t) :: hertz_law_t
-    real(dp) :: friction = 0.0_dp
+  type, extends(spring_law_t) :: hertz_law_t
     !> 4/3 E*, 8 G* [Pa]
     real(dp) :: normal = 0.0_dp, tangential = 0.0_dp
-    !> what all pairs have in common
-    type(spring_t) :: spring
-    !> [N]
-    real(dp) :: pull_off = 0.0_dp
   contains
     procedure, nopass :: kind => hertz_kind
     procedure, nopass :: keys => hertz_keys
@@ -55,18 +49,10 @@ contains
     class(hertz_law_t), intent(inout) :: self
     real(dp), intent(in) :: values(:)
 
-    self%friction = values(1)
     self%normal = 4.0_dp/3.0_dp*values(2)/(2.0_dp*(1.0_dp - values(3)**2))
     self%tangential = 8.0_dp*values(2)/(4.0_dp*(1.0_dp + values(3))*(2.0_dp - values(3)))
-    self%spring%damping = damping_ratio(values(4), 1.5_dp)
-    self%spring%tangential_damping = values(5)
-    self%spring%weight = values(6)
-    self%pull_off = values(7)
-    self%attracts = self%pull_off > 0.0_dp
-    self%yields = .true.
     self%of_spheres = .true.
-    self%largest%friction = self%friction
-    call self%set_resistance(values(8), values(9))
+    call self%set_springs(values(1), values(4:9), 1.5_dp)
   end subroutine hertz_set
 
   pure subroutine hertz_evaluate(self, pair)
@@ -74,9 +60,7 @@ contains
     type(contact_pair_t), intent(inout) :: pair
     real(dp) :: depth, approach
 
-    pair%terms%friction = self%friction
-    if (pair%gap <= 0.0_dp) pair%terms%attraction = self%pull_off
-    pair%spring = self%spring
+    call self%begin_pair(pair)
     pair%spring%hertz = self%normal*sqrt(pair%reduced_radius)
     approach = max(0.0_dp, -pair%normal_velocity)
     ! the greatest compression of an impact: m v^2/2 = 2/5 K x^(5/2)

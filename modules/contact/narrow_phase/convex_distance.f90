@@ -212,8 +212,8 @@ contains
     v(:) = v - (tt*along_u - ut*along_t)/det*u - (uu*along_t - ut*along_u)/det*t
   end subroutine make_normal
 
-  !> Change the shares so that they give v: what they miss is taken along one side of the simplex and then across it, which thin
-  !> triangles stand too.
+  !> Correct the shares so that they give v. What they miss is resolved along one side of the simplex and across it, because this is
+  !> accurate for thin triangles too.
   pure subroutine settle_shares(w, v, found)
     real(dp), intent(in) :: w(:, :)
     real(dp), intent(in) :: v(3)

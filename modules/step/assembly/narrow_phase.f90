@@ -203,7 +203,7 @@ contains
     end if
   end subroutine add_contact
 
-  !> The same under law `l`, which asks for more than the gap: its terms, its springs, and the state that it gives the pair.
+  !> The same under law `l`, which asks for more than the gap: it gives the contact its terms and springs, and the pair its state.
   subroutine add_by_state(view, decomposition, physics, l, p, gap, normal, found, place)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
@@ -235,7 +235,7 @@ contains
     if (size(found%spring) > 0 .and. found%n > before) found%spring(found%n) = pair%spring
   end subroutine add_by_state
 
-  !> Put a contact into the list, but one that is open and would send velocities back.
+  !> Put a contact into the list, unless it is open and has restitution.
   pure subroutine keep_contact(terms, p, gap, normal, found, place)
     type(contact_terms_t), intent(in) :: terms
     integer, intent(in) :: p
