@@ -5,7 +5,8 @@ module gravier_config_check
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_config_types, only: config_t
-  use gravier_config_table, only: key_t, keys, kind_real, kind_logical
+  use gravier_config_key, only: key_t, kind_real, kind_logical
+  use gravier_config_table, only: keys
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: features_of, quoted_names, that_decompose, with_sleeping
   use gravier_config_keys, only: choices_text
@@ -14,6 +15,7 @@ module gravier_config_check
   use gravier_config_check_boundary, only: check_boundaries, check_contact
   use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
+  use gravier_config_check_insertion, only: check_insertions
   implicit none
   private
   public :: check_dimension, check_config, grid_product
@@ -45,6 +47,7 @@ contains
     call check_boundaries(report, config, error)
     call check_laws(report, config, error)
     if (config%scene%bodies == "sample") call check_sample(report, config, error)
+    call check_insertions(report, config, error)
     call check_time(report, config, error)
     call check_solver(report, config, error)
     call check_decomposition(report, config, error)

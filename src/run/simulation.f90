@@ -39,6 +39,8 @@ module gravier_simulation
     integer :: n_walls = 0
     !> grains of the scene at its start
     integer(i8) :: n_first = 0
+    !> mass of those that are free [kg]
+    real(dp) :: first_mass = 0.0_dp
     !> step written last in results.h5, -1 for none
     integer :: last_written = -1
     !> the state comes from a checkpoint
@@ -95,6 +97,8 @@ contains
     self%n_grains = scene%n_grains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
+    self%inflow%insertions = scene%insertions
+    self%inflow%next_id = scene%last_id + 1
     call set_physics(self, scene)
     call check_lists_in_period(self, scene, narrow)
     ! lists that last less long have a shorter range
@@ -110,6 +114,7 @@ contains
     call self%decomposition%init(comm, 1, scene%grains, scene%period)
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
+    if (self%inflow%exists()) call prepare_inflow(self)
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
   end subroutine simulation_make
@@ -133,12 +138,33 @@ contains
     call self%decomposition%migrate(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
     call self%start_diagnostics()
+    self%first_mass = self%mass
   end subroutine simulation_start
 
-  !> Prepare the balance of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
+  !> Partitions cover the regions that grains enter in; where there are no grains at the start, the mean grain is that of the first
+  !> insertion.
+  subroutine prepare_inflow(self)
+    class(simulation_t), intent(inout) :: self
+    integer :: d, nd
+
+    nd = self%decomposition%nd
+    allocate (self%decomposition%entry_box(nd, 2))
+    associate (insertions => self%inflow%insertions)
+      do d = 1, nd
+        self%decomposition%entry_box(d, 1) = minval(insertions%lower(d))
+        self%decomposition%entry_box(d, 2) = maxval(insertions%upper(d))
+      end do
+      if (self%velocity_scale%mass > 0.0_dp) return
+      self%velocity_scale%diameter = 2.0_dp*insertions(1)%radii%moment(1)
+      self%velocity_scale%mass = insertions(1)%mean_mass()
+    end associate
+  end subroutine prepare_inflow
+
+  !> Prepare the balances of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
   subroutine simulation_start_diagnostics(self)
     class(simulation_t), intent(inout) :: self
 
+    self%mass = self%decomposition%free_mass()
     call self%balance%begin(self%decomposition, self%physics)
     call self%diagnostics%init(self%decomposition, self%physics, self%config%output%diagnostics)
   end subroutine simulation_start_diagnostics
@@ -248,6 +274,7 @@ contains
     class(simulation_t), intent(inout) :: self
 
     call self%time_stepper_t%free()
+    if (allocated(self%decomposition%entry_box)) deallocate (self%decomposition%entry_box)
     self%last_written = -1
     self%restarted = .false.
   end subroutine simulation_free
