@@ -37,6 +37,7 @@ module gravier_time_stepper
   use gravier_grain_balance, only: grain_balance_t
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
   use gravier_run_tally, only: run_tally_t
+  use gravier_population, only: population_t
   implicit none
   private
   public :: time_stepper_t, step_figures_t
@@ -108,6 +109,8 @@ module gravier_time_stepper
     integer(i8) :: n_grains = 0, n_glued = 0
     !> mass of the free grains of the scene now, and of those that have left [kg]
     real(dp) :: mass = 0.0_dp, left_mass = 0.0_dp
+    !> how many grains there were, at least and at most
+    type(population_t) :: population
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
     !> the same just after space was last divided in a step; 0 before
@@ -321,6 +324,7 @@ contains
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
     self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy)
+    call self%population%note(self%n_grains - self%n_glued, self%mass)
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     self%slept = self%slept + figures%asleep
@@ -425,6 +429,7 @@ contains
     self%failed = 0
     self%left = 0
     self%left_mass = 0.0_dp
+    self%population = population_t()
     self%fast = 0
     self%quiet = 0
     self%slept = 0

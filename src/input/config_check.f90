@@ -214,7 +214,35 @@ contains
     call expect(report, config%time%steps >= 0, "time", "steps", error)
     call expect(report, config%time%theta >= 0.5_dp .and. config%time%theta <= 1.0_dp, "time", "theta", error)
     call expect(report, config%time%rest_energy >= 0.0_dp, "time", "rest_energy", error)
+    call check_stops(report, config, error)
   end subroutine check_time
+
+  !> What ends a run before its last step.
+  subroutine check_stops(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: known
+    integer :: b
+
+    associate (time => config%time)
+      known = time%stop_boundary == ""
+      do b = 1, size(config%boundaries)
+        known = known .or. config%boundaries(b)%name == time%stop_boundary
+      end do
+      call expect(report, known, "time", "stop_boundary", error, "the name of a boundary of the input")
+      if (time%stop_boundary /= "") call miss(report, "time", "stop_displacement", error, &
+                                              shown_text(report, "time", "stop_boundary"))
+      if (time%displacement_given) call miss(report, "time", "stop_boundary", error, "stop_displacement")
+      call expect(report, time%stop_displacement > 0.0_dp .or. .not. time%displacement_given, "time", "stop_displacement", error)
+      call expect(report, time%stop_grains_at_most >= 0, "time", "stop_grains_at_most", error)
+      call expect(report, time%stop_grains_at_least >= 1 .or. .not. time%grains_at_least_given, "time", "stop_grains_at_least", &
+                  error)
+      call expect(report, time%stop_mass_at_most >= 0.0_dp .or. .not. time%mass_at_most_given, "time", "stop_mass_at_most", error)
+      call expect(report, time%stop_mass_at_least > 0.0_dp .or. .not. time%mass_at_least_given, "time", "stop_mass_at_least", &
+                  error)
+    end associate
+  end subroutine check_stops
 
   subroutine check_solver(report, config, error)
     type(report_t), intent(in) :: report

@@ -312,6 +312,19 @@ contains
     case ("steps"); slot%integer => config%time%steps
     case ("theta"); slot%real => config%time%theta
     case ("rest_energy"); slot%real => config%time%rest_energy
+    case ("stop_boundary"); slot%text => config%time%stop_boundary
+    case ("stop_displacement"); slot%real => config%time%stop_displacement
+    case ("stop_grains_at_most"); slot%integer => config%time%stop_grains_at_most
+    case ("stop_grains_at_least"); slot%integer => config%time%stop_grains_at_least
+    case ("stop_mass_at_most"); slot%real => config%time%stop_mass_at_most
+    case ("stop_mass_at_least"); slot%real => config%time%stop_mass_at_least
+    end select
+    select case (name)
+    case ("stop_displacement"); slot%given => config%time%displacement_given
+    case ("stop_grains_at_most"); slot%given => config%time%grains_at_most_given
+    case ("stop_grains_at_least"); slot%given => config%time%grains_at_least_given
+    case ("stop_mass_at_most"); slot%given => config%time%mass_at_most_given
+    case ("stop_mass_at_least"); slot%given => config%time%mass_at_least_given
     end select
   end subroutine time_slot
 

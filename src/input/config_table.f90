@@ -183,7 +183,19 @@ module gravier_config_table
            "factor of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler"), &
      key_t("time", "rest_energy", kind_real, "0.0", ">= 0", &
            "the run ends when the kinetic energy of the grains was at most this in 10 steps, one after the other; 0: it does not", &
-           unit="J")]
+           unit="J"), &
+     key_t("time", "stop_boundary", kind_text, "''", "", &
+           "name of a `&boundary`: the run ends when it is `stop_displacement` away from its place at the start of the scene"), &
+     key_t("time", "stop_displacement", kind_real, "-1", "> 0", "displacement of `stop_boundary` at which the run ends", &
+           unit="m", note="never"), &
+     key_t("time", "stop_grains_at_most", kind_integer, "0", ">= 0", &
+           "the run ends when the scene has come down to so many grains that are not glued", note="never"), &
+     key_t("time", "stop_grains_at_least", kind_integer, "0", ">= 1", &
+           "the run ends when the scene has come up to so many grains that are not glued", note="never"), &
+     key_t("time", "stop_mass_at_most", kind_real, "-1", ">= 0", &
+           "the run ends when the mass of the grains that are not glued has come down to this", unit="kg", note="never"), &
+     key_t("time", "stop_mass_at_least", kind_real, "-1", "> 0", &
+           "the run ends when the mass of the grains that are not glued has come up to this", unit="kg", note="never")]
 
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &

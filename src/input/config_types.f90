@@ -86,6 +86,14 @@ module gravier_config_types
     real(dp) :: theta
     !> J: kinetic energy of the grains at rest, which ends the run; 0: it does not
     real(dp) :: rest_energy
+    !> name of a boundary; blank: none; m: displacement of it that ends the run
+    character(len=text_length) :: stop_boundary
+    real(dp) :: stop_displacement
+    !> free grains, kg: what ends the run when the scene comes down or up to it
+    integer :: stop_grains_at_most, stop_grains_at_least
+    real(dp) :: stop_mass_at_most, stop_mass_at_least
+    logical :: displacement_given = .false., grains_at_most_given = .false., grains_at_least_given = .false.
+    logical :: mass_at_most_given = .false., mass_at_least_given = .false.
   end type time_config_t
 
   !> &solver: the method of every step and when it stops.

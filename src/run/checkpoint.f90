@@ -9,6 +9,7 @@ module gravier_checkpoint
   use gravier_body_store, only: body_record
   use gravier_boundary, only: boundary_words, boundary_record
   use gravier_insertion, only: insertion_words, insertion_record
+  use gravier_population, only: population_words, population_record
   use gravier_impulse_memory, only: pair_record
   use gravier_diagnostics, only: diagnostics_t
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
@@ -33,7 +34,8 @@ contains
 
     text = "grain: "//body_record//" position_now speed_when_listed"//newline//"pair: "//pair_record//newline// &
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
-      & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline
+      & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
+      & "population: "//population_record//", "//to_text(population_words)//" words"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
       associate (features => diagnostics(k)%diagnostic%features())
@@ -51,6 +53,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8), allocatable :: words(:)
+    integer(i8) :: seen(population_words)
 
     if (allocated(error)) return
     call file%create(simulation%comm, path, records_text(), error)
@@ -66,6 +69,7 @@ contains
     call file%write_scalar("glued", simulation%n_glued, error)
     call file%write_scalar("failed", simulation%failed, error)
     call file%write_scalar("left", simulation%left, error)
+    call file%write_scalar("mass", simulation%mass, error)
     call file%write_scalar("left_mass", simulation%left_mass, error)
     call file%write_scalar("first_mass", simulation%first_mass, error)
     call file%write_scalar("fast", simulation%fast, error)
@@ -74,6 +78,8 @@ contains
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
     call file%write_scalar("lists_made", simulation%halo%builds, error)
     call file%write_scalar("next_id", simulation%inflow%next_id, error)
+    call simulation%population%get_state(seen)
+    call file%write_array("population", seen, error)
     call simulation%inflow%get_state(words)
     call file%write_array("insertions", words, error)
     associate (memory => simulation%halo%memory)
@@ -122,6 +128,7 @@ contains
     call file%read_scalar("glued", simulation%n_glued, error)
     call file%read_scalar("failed", simulation%failed, error)
     call file%read_scalar("left", simulation%left, error)
+    call file%read_scalar("mass", simulation%mass, error)
     call file%read_scalar("left_mass", simulation%left_mass, error)
     call file%read_scalar("first_mass", simulation%first_mass, error)
     call file%read_scalar("fast", simulation%fast, error)
@@ -133,6 +140,8 @@ contains
     call file%read_scalar("reached_imbalance", simulation%reached_imbalance, error)
     call file%read_scalar("next_id", simulation%inflow%next_id, error)
     call load_insertions(simulation, file, path, error)
+    call file%read_array("population", population_words, population_words, words, error)
+    if (.not. allocated(error)) call simulation%population%set_state(words)
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written
     call take_count(last_written + 1, path//": last_written", own_last, error)

@@ -39,6 +39,9 @@ module gravier_simulation
     integer :: n_walls = 0
     !> grains of the scene at its start
     integer(i8) :: n_first = 0
+    !> the boundary whose displacement may end the run, 0 for none, and its place at the start of the scene [m]
+    integer :: watched = 0
+    real(dp) :: watched_from(3) = 0.0_dp
     !> mass of those that are free [kg]
     real(dp) :: first_mass = 0.0_dp
     !> step written last in results.h5, -1 for none
@@ -115,6 +118,7 @@ contains
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
     if (self%inflow%exists()) call prepare_inflow(self)
+    call watch_boundary(self)
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
   end subroutine simulation_make
@@ -138,8 +142,22 @@ contains
     call self%decomposition%migrate(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
     call self%start_diagnostics()
+    self%mass = self%decomposition%free_mass()
     self%first_mass = self%mass
+    call self%population%note(self%n_grains - self%n_glued, self%mass)
   end subroutine simulation_start
+
+  !> Find the boundary of stop_boundary and its place at the start of the scene.
+  subroutine watch_boundary(self)
+    class(simulation_t), intent(inout) :: self
+    integer :: b
+
+    self%watched = 0
+    do b = 1, size(self%config%boundaries)
+      if (self%config%boundaries(b)%name == self%config%time%stop_boundary) self%watched = self%n_walls + b
+    end do
+    if (self%watched > 0) call self%decomposition%boundaries(self%watched)%find_place(self%watched_from)
+  end subroutine watch_boundary
 
   !> Partitions cover the regions that grains enter in; where there are no grains at the start, the mean grain is that of the first
   !> insertion.
@@ -160,11 +178,10 @@ contains
     end associate
   end subroutine prepare_inflow
 
-  !> Prepare the balances of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
+  !> Prepare the balance of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
   subroutine simulation_start_diagnostics(self)
     class(simulation_t), intent(inout) :: self
 
-    self%mass = self%decomposition%free_mass()
     call self%balance%begin(self%decomposition, self%physics)
     call self%diagnostics%init(self%decomposition, self%physics, self%config%output%diagnostics)
   end subroutine simulation_start_diagnostics

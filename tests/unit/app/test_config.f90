@@ -8,6 +8,8 @@ program test_config
   use gravier_config, only: config_t, scene_config_t, boundary_config_t, parse_config, write_active, write_key_reference
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
+  character(len=*), parameter :: time_keys = "step steps theta rest_energy stop_boundary stop_displacement stop_grains_at_most "// &
+    & "stop_grains_at_least stop_mass_at_most stop_mass_at_least"
 
   character(len=*), parameter :: newline = achar(10), tab = achar(9), carriage = achar(13)
   !> a group &time that is in order
@@ -565,10 +567,10 @@ contains
     call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
     call refuse(column // "&time sweeps = 3 /", "group &time is given twice (lines 1 and 1): expected once")
     call refuse("&scene / &time sweeps = 3 /", "unknown key 'sweeps' in &time; it belongs to &solver")
-    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of step steps theta rest_energy")
-    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of step steps theta rest_energy")
+    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of "//time_keys)
+    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of "//time_keys)
     call refuse("&scene / &time " // repeat("step", 15) // " = 3 /", &
-      "unknown key '" // repeat("step", 15) // "' in &time: expected one of step steps theta rest_energy")
+      "unknown key '" // repeat("step", 15) // "' in &time: expected one of "//time_keys)
     call refuse("&scene bodies = 'column' /", "group &time is missing: expected &time ... /")
     call refuse(time, "group &scene is missing: expected &scene ... /")
     call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice', 'file', 'sample' or 'none'")
