@@ -3,7 +3,7 @@ module gravier_scene
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_magnitude, only: far_text
+  use gravier_magnitude, only: sharpest, far_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
@@ -141,8 +141,11 @@ contains
     real(dp) :: far, far_off
     integer :: k
 
-    if (scene%n_grains == 0) return
+    if (scene%n_grains == 0 .and. size(scene%insertions) == 0) return
     far = farthest_place(comm, data%radius)
+    do k = 1, size(scene%insertions)
+      far = min(far, sharpest*scene%insertions(k)%radii%smallest())
+    end do
     if (scene%period%on()) call check("period", maxval(abs(scene%period%origin) + scene%period%length))
     do k = 1, size(scene%boundaries)
       associate (boundary => scene%boundaries(k))
@@ -253,6 +256,8 @@ contains
     integer :: nd
 
     if (config%solver%criterion /= "error") return
+    if (size(config%insertions) > 0) call raise(error, status_input, config%file// &
+      & ": &solver criterion = 'error': expected another where grains enter: the impulses of the column alone are known")
     nd = config%scene%dimension
     if (any(abs(config%scene%gravity(1:nd - 1)) > 0.0_dp) .or. config%scene%gravity(nd) >= 0.0_dp) &
       & call raise(error, status_input, config%file//": &scene gravity: criterion = 'error' knows the column under gravity "// &

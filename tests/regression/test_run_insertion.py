@@ -385,6 +385,15 @@ class Insertion(RunTestCase):
         run = run_case(merged(POUR, {"decomposition": {"partition": "metis"}}), directory=self.here("bad"))
         self.assert_status(run, 2)
         self.assertIn("&decomposition partition = 'metis': expected 'grid' where bodies = 'none'", run.stderr)
+        column = merged(POUR, {"scene": {"bodies": "column", "density": None, "friction": None}, "solver": {"method": "nlgs", "criterion": "error"},
+                               "decomposition": {"subdomains": 1}})
+        run = run_case(column, directory=self.here("bad"))
+        self.assert_status(run, 2)
+        self.assertIn("&solver criterion = 'error': expected another where grains enter", run.stderr)
+        far = merged(POUR, {"boundary": BIN[:2] + [{**BIN[2], "point": [1e12, 0.0]}]})
+        run = run_case(far, directory=self.here("bad"))
+        self.assert_status(run, 2)
+        self.assertIn("boundary 'right': a coordinate or length of 1.000E+12 m: expected at most", run.stderr)
         none = merged(POUR)
         del none["insertion"]
         run = run_case(none, directory=self.here("bad"))
