@@ -128,6 +128,15 @@ class Insertion(RunTestCase):
         self.assertGreater(inside.mean(), 0.9)
         self.assertGreater(np.ptp(velocity[inside, 1]), 0.3)
 
+    def test_lists(self):
+        """Of grains that do not move, lists are made in steps in which one enters, and in no other."""
+        run = run_case(merged(changed(rate=100.0, velocity=[0.0, 0.0], velocity_spread=None), {"scene": {"gravity": [0.0, 0.0]}, "time": {"steps": 100}}),
+                       directory=self.here("lists"))
+        self.assert_status(run, 0)
+        history = run.history()
+        self.assertEqual(history["entered"].sum(), 10)
+        np.testing.assert_array_equal(history["listed"][1:], history["entered"][1:])
+
     def test_balances_close(self):
         self.assertIn("grains      0 at the start + 79 entered - 0 left = 79; mass", self.straight.stdout)
         self.assertLess(np.abs(self.history["energy_error"]).max(), 1e-9 * np.abs(self.history["load_work"]).max())
@@ -259,7 +268,8 @@ class Insertion(RunTestCase):
 
     def test_period(self):
         """The region is a whole period wide: grains overlap no image either, and images are counted."""
-        case = merged(changed(lower=[0.0, 0.2], upper=[0.24, 0.24], rate=2000.0), {
+        # many are on their way across the side of the period
+        case = merged(changed(lower=[0.0, 0.2], upper=[0.24, 0.24], rate=2000.0, velocity=[1.5, -0.4]), {
             "scene": {"period": [0.24, 0.0]}, "boundary": BIN[:1], "decomposition": {"subdomains": 3}})
         run = run_case(case, directory=self.here("period"))
         self.assert_status(run, 0)

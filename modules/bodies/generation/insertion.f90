@@ -6,7 +6,7 @@ module gravier_insertion
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
   use gravier_random_turn, only: random_turn
-  use gravier_magnitude, only: is_bounded
+  use gravier_finite, only: is_finite
   use gravier_motion, only: grain_volume
   use gravier_radius_distribution, only: radius_distribution_t
   implicit none
@@ -299,8 +299,8 @@ contains
     self%mass = transfer(words(2), 0.0_dp)
     self%drawn = words(3)
     self%put_off = words(4)
-    sound = minval(words([1, 3, 4])) >= 0 .and. is_bounded(self%mass)
-    if (sound) sound = self%mass >= 0.0_dp
+    ! the word of a mass below 0 is below 0 too
+    sound = minval(words) >= 0 .and. is_finite(self%mass)
   end subroutine insertion_set_state
 
 end module gravier_insertion

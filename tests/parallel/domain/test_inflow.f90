@@ -136,7 +136,8 @@ contains
           call check_equal(decomposition%partition%owner(owned%position(:, k)), decomposition%subdomain_of(s), "owner")
           if (k > 1) call check(owned%id(k) > owned%id(k - 1), "bodies in the order of their identifiers")
           if (owned%id(k) <= 10) cycle
-          call check(is_clear(decomposition%boundaries, owned%radius(k), owned%position(:, k)), "above the floor")
+          call check(owned%position(nd, k) >= owned%radius(k), "above the floor")
+          call check(is_clear(decomposition%boundaries, owned%radius(k), owned%position(:, k)), "clear of boundaries")
           call check_close(owned%velocity(1, k), 0.5_dp, 0.0_dp, "velocity")
           call check(owned%inertia(k) > 0.0_dp, "inertia")
           do d = 1, nd

@@ -29,8 +29,8 @@ contains
 
     insertion%name = "feed"
     insertion%nd = nd
-    insertion%lower(1:nd) = [0.1_dp, 0.2_dp, 0.3_dp]
-    insertion%upper(1:nd) = [0.3_dp, 0.5_dp, 0.7_dp]
+    insertion%lower(:) = [0.1_dp, 0.2_dp, 0.3_dp]
+    insertion%upper(:) = [0.3_dp, 0.5_dp, 0.7_dp]
     insertion%radii%nd = nd
     insertion%radii%radius = 0.01_dp
     insertion%density = 1000.0_dp
