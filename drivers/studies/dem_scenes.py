@@ -218,7 +218,8 @@ class Shear:
         run_gravier(sample, {
             "scene": {"dimension": 3, "bodies": "sample", "density": DENSITY, "friction": 0.3, "period": [*self.period, 0.0]},
             "sample": {"preparation": "compacted", "count": self.count, "radii": "uniform", "radius_min": SMALLEST, "radius_max": LARGEST,
-                       "solid_fraction": 0.32, "pressure": self.pressure, "rest_tolerance": 1.0e-5, "max_steps": 3000, "seed": self.seed, "file": "sample.h5"},
+                       "solid_fraction": 0.32, "pressure": self.pressure, "rest_tolerance": 1.0e-5, "max_steps": 3000,
+                       "seed": self.seed, "file": "sample.h5"},
             "time": {"step": 1.0e-4, "steps": 0}, "solver": {"tolerance": 1.0e-3}}, program="gravier_sample")
         centres, radii, _ = read_bodies(sample / "sample.h5")
         centres[:, :2] %= self.period

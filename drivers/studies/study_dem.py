@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Beside smooth DEM, three processes by Gravier and by LAMMPS: what comes out, and processor seconds on one core.
+"""Three processes beside smooth DEM (LAMMPS): what comes out, and processor seconds on one core.
 
-    ./gravier study dem [--quick] [--parts NAME...] [--lammps PROGRAM] [--out DIR]     25 minutes, quick 2 minutes
+    ./gravier study dem [--quick] [--parts NAME...] [--lammps PROGRAM] [--out DIR]     a quarter of an hour, quick 2 minutes
 
 The processes are spheres that settle in a box, simple shear at a pressure, and the discharge of the box through a slot. LAMMPS is the
 program lmp of PATH unless told; where it is not there, or with --lammps none, what Gravier finds is compared with stored figures of
@@ -67,13 +67,12 @@ class Lammps:
 
     def record(self):
         """The figures into the file of stored ones, in the place of those of the same scenes and processes."""
-        kept = []
-        if STORED.exists():
-            with open(STORED, encoding="ascii", newline="") as file:
-                kept = [row for row in csv.DictReader(file) if (row["scenes"], row["process"]) not in {(self.scenes, name) for name in self.figures}]
+        made = {(self.scenes, name) for name in self.figures}
+        with open(STORED, encoding="ascii", newline="") as file:
+            kept = [row for row in csv.DictReader(file) if (row["scenes"], row["process"]) not in made]
         same = {"program": lammps_version(self.program), "date": datetime.date.today().isoformat(), "machine": processor()}
-        rows = kept + [{"scenes": self.scenes, "process": process, "quantity": quantity, "value": f"{value:.6g}", "error": f"{error:.2g}", **same}
-                       for process, values in self.figures.items() for quantity, (value, error) in values.items()]
+        rows = kept + [{"scenes": self.scenes, "process": process, "quantity": quantity, "value": f"{value:.6g}",
+                        "error": f"{error:.2g}", **same} for process, values in self.figures.items() for quantity, (value, error) in values.items()]
         with open(STORED, "w", encoding="ascii", newline="") as file:
             table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
             table.writeheader()
@@ -117,38 +116,40 @@ class Study:
             name = "gravier" if k == 0 else f"gravier_{k + 1}"
             ours, log = self.measure(process, setting, name, limit or theirs)
             if k == 0:
-                self.compare(process.name, ours, theirs, self.bounds(False))
+                self.compare(process.name, "", ours, theirs, self.bounds(False))
                 if limit:
-                    self.compare(f"{process.name} of stiff grains", ours, limit, self.bounds(False))
+                    self.compare(process.name, f"springs {process.stiffer:g} times as stiff: ", ours, limit, self.bounds(False))
                 if process.name != "discharge":
                     self.at_least(process.name, "sweeps, part of a step", log.share("sweeps"), SWEEPS)
         for k, setting in enumerate(getattr(process, "compliant", ())):
             ours, _ = self.measure(process, setting, f"compliant_{k + 1}", theirs, compliant=True)
             if k < 2:
-                self.compare(f"compliant, h = {1e3 * setting.step:.3g} ms", ours, theirs, self.bounds(True))
+                self.compare("compliant", f"h = {1e3 * setting.step:.3g} ms: ", ours, theirs, self.bounds(True))
         if SECONDS in theirs and not self.quick:
             self.cheapest(process.name)
 
-    def compare(self, label, ours, theirs, bounds):
-        """A row a quantity, and one of the seconds if LAMMPS ran here."""
+    def compare(self, label, case, ours, theirs, bounds):
+        """A row a quantity, and one of the seconds if LAMMPS ran here; `case` begins the name of each quantity."""
         for quantity, (value, error) in ours.items():
             if quantity == SECONDS:
                 continue
             expected, other = theirs[quantity]
             spread = relative_error(error, other, expected)
-            self.table.add(label, quantity + (f" (+- {100 * spread:.1f} %)" if spread > 0.0 else ""), f"{value:.4g}", f"{expected:.4g}",
+            self.table.add(label, case + quantity + (f" (+- {100 * spread:.1f} %)" if spread > 0.0 else ""), f"{value:.4g}", f"{expected:.4g}",
                            abs(value / expected - 1.0), bounds.get(quantity))
         if SECONDS in theirs:
             of_lammps, of_gravier = theirs[SECONDS][0], ours[SECONDS][0]
-            self.at_least(label, f"seconds of LAMMPS, {of_lammps:.1f}, over those of Gravier, {of_gravier:.1f}", of_lammps / of_gravier, FASTER)
+            self.at_least(label, f"{case}seconds of LAMMPS, {of_lammps:.1f}, over those of Gravier, {of_gravier:.1f}",
+                          of_lammps / of_gravier, FASTER)
 
-    def measure(self, process, setting, name, theirs, compliant=False):
+    def measure(self, process, setting, directory, theirs, compliant=False):
         """What Gravier finds with a setting, with its seconds, and its log; a row of the table of settings beside what LAMMPS has."""
         case = process.case(setting, compliant=True) if compliant else process.case(setting)
-        seconds = run_gravier(process.place / name, *case)
-        ours, log = {**process.of_gravier(process.place / name, compliant), SECONDS: (seconds, 0.0)}, Log(process.place / name)
-        within = all(abs(ours[quantity][0] / theirs[quantity][0] - 1.0) <= max(bound, 2.0 * relative_error(ours[quantity][1], *theirs[quantity][::-1]))
-                     for quantity, bound in self.bounds(compliant).items() if quantity in ours)
+        seconds = run_gravier(process.place / directory, *case)
+        ours = {**process.of_gravier(process.place / directory, compliant), SECONDS: (seconds, 0.0)}
+        log = Log(process.place / directory)
+        within = all(abs(ours[name][0] / theirs[name][0] - 1.0) <= max(bound, 2.0 * relative_error(ours[name][1], *theirs[name][::-1]))
+                     for name, bound in self.bounds(compliant).items() if name in ours)
         self.rows.append({
             "process": process.name, "contacts": "compliant" if compliant else "rigid", "step_ms": 1e3 * setting.step,
             "accuracy": setting.accuracy, "other_keys": setting.others, "seconds": round(seconds, 1),
@@ -168,14 +169,15 @@ class Study:
         right = [row for row in self.rows if row["process"] == process and row["contacts"] == "rigid" and row["within"] == "yes"]
         if right:
             row = min(right, key=lambda row: row["seconds"])
-            self.table.add(process, f"seconds of LAMMPS over those of Gravier at h = {row['step_ms']:g} ms, accuracy {row['accuracy']}, the cheapest that is within",
+            self.table.add(process, f"the same of the cheapest setting within, h = {row['step_ms']:g} ms, accuracy {row['accuracy']}",
                            row["lammps_over_gravier"])
 
     def settings(self):
         """The table of settings, as Markdown."""
         names = [name for name in self.rows[0] if any(row[name] != "" for row in self.rows)]
-        lines = ["| " + " | ".join(name.replace("_", " ") for name in names) + " |", "|" + "---|" * len(names)]
-        lines += ["| " + " | ".join(f"{row[name]:g}" if isinstance(row[name], float) else str(row[name]) for name in names) + " |" for row in self.rows]
+        cells = [[name.replace("_", " ") for name in names], ["---"] * len(names)]
+        cells += [[f"{row[name]:g}" if isinstance(row[name], float) else str(row[name]) for name in names] for row in self.rows]
+        lines = ["| " + " | ".join(line) + " |" for line in cells]
         return "\n".join(lines) + "\n"
 
 
@@ -208,8 +210,10 @@ def main():
         place = (options.out or Path(passing)).resolve()
         study = Study(lammps, options.quick)
         settling = Settling(place, options.quick, options.seed)
-        processes = {"settling": settling, "shear": Shear(place, options.quick, options.seed), "discharge": Discharge(place, options.quick, settling)}
-        print(f"Gravier: {version()}\nLAMMPS: {lammps.source}\non {processor()}, {datetime.date.today().isoformat()}, one core, user seconds\n", flush=True)
+        processes = {"settling": settling, "shear": Shear(place, options.quick, options.seed),
+                     "discharge": Discharge(place, options.quick, settling)}
+        print(f"Gravier: {version()}\nLAMMPS: {lammps.source}")
+        print(f"on {processor()}, {datetime.date.today().isoformat()}, one core, user seconds\n", flush=True)
         for name in PARTS:
             if name in options.parts:
                 study.play(processes[name])

@@ -23,9 +23,9 @@ STUDY = os.path.join(SOURCE, "drivers/studies/study_dem.py")
 class Measures(unittest.TestCase):
 
     def test_solid_fraction(self):
-        """A layer through the middle of a sphere and half of one, by the volume of the slice: the integral of pi (r^2 - z^2)."""
+        """A layer through the middle of a sphere, with others above and below it: the integral of pi (r^2 - z^2). A whole sphere."""
         slab = np.pi * (0.5 * 1.0 - 0.5**3 / 3.0)
-        value = codes.solid_fraction(np.array([0.0, 9.0]), np.array([1.0, 1.0]), -0.5, 0.5, 2.0)
+        value = codes.solid_fraction(np.array([0.0, 9.0, -9.0]), np.array([1.0, 1.0, 1.0]), -0.5, 0.5, 2.0)
         self.assertAlmostEqual(value, 2.0 * slab / 2.0, delta=1e-14)
         value = codes.solid_fraction(np.array([1.0]), np.array([1.0]), 0.0, 2.0, 4.0)
         self.assertAlmostEqual(value, 4.0 / 3.0 * np.pi / 8.0, delta=1e-14)
