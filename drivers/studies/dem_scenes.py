@@ -145,8 +145,9 @@ class Discharge:
 
     def __init__(self, place, quick, settling):
         self.place, self.settling = place / self.name, settling
-        self.slot, self.duration = (0.012, 0.15) if quick else (0.014, 0.25)
-        self.begin = 0.05 if quick else 0.1
+        self.slot, self.duration = (0.012, 0.14) if quick else (0.014, 0.25)
+        # what leaves takes 0.08 s down to where it is counted
+        self.begin = 0.085 if quick else 0.1
         alert = {"alert_distance": 2.0e-4}
         self.settings = [Setting(2.0e-4, alert)]
         if not quick:
