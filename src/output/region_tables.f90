@@ -1,6 +1,6 @@
 !> Means over the regions of the input as tables for results.h5, a row a bin.
 module gravier_region_tables
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_field_list, only: field_list_t
   use gravier_region_means, only: region_means_t, region_figures_t, regions_key
   use gravier_simulation, only: simulation_t
@@ -10,8 +10,8 @@ module gravier_region_tables
 
 contains
 
-  !> A table a region, by its name, whose rows are its bins in their order, or the region as a whole: `bin`, `lower` and `upper`, the
-  !> corners (nd) [m], `volume`, `grains`, `solid_fraction`, `velocity` (nd) [m/s], `granular_temperature` [m^2/s^2], `stress`
+  !> A table a region, by its name, whose rows are its bins in their order, or the region as a whole: `bin`, `lower` and `upper`,
+  !> the corners (nd) [m], `volume`, `grains`, `solid_fraction`, `velocity` (nd) [m/s], `granular_temperature` [m^2/s^2], `stress`
   !> (nd**2, row by row) [Pa, N/m in 2D], `contacts_per_grain`. Not allocated where there are no regions, or no step was made yet.
   !> The same on all ranks. Collective.
   subroutine collect_regions(simulation, tables)
@@ -40,6 +40,7 @@ contains
     type(region_figures_t), intent(inout) :: figures
     type(field_list_t), intent(out) :: table
     real(dp), allocatable :: rows(:, :)
+    integer(i8), allocatable :: grains(:, :)
     integer :: a, b, k, nd
 
     nd = size(figures%velocity, 1)
@@ -51,7 +52,9 @@ contains
     call table%add_reals("lower", "m", figures%lower)
     call table%add_reals("upper", "m", figures%upper)
     call add("volume", trim(merge("m^2", "m^3", planar)), figures%volume)
-    call add("grains", "", figures%grains)
+    allocate (grains(1, figures%n))
+    grains(1, :) = nint(figures%grains, i8)
+    call table%add_whole("grains", "", grains, .true.)
     call add("solid_fraction", "", figures%solid_fraction)
     call table%add_reals("velocity", "m/s", figures%velocity)
     call add("granular_temperature", "m^2/s^2", figures%granular_temperature)

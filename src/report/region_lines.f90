@@ -1,5 +1,6 @@
 !> What the log says of regions of means before a run: those in which there is nothing.
 module gravier_region_lines
+  use gravier_kinds, only: dp
   use gravier_region_means, only: region_means_t, regions_key
   use gravier_simulation, only: simulation_t
   implicit none

@@ -39,12 +39,14 @@ contains
     call move_alloc(means, more(1)%diagnostic)
   end subroutine make_region_means
 
-  !> Refuse regions that are longer than a period of the scene: a grain would be in them twice.
+  !> Refuse regions that are longer than a period of the scene, in which a grain would be twice, and those that are farther than a
+  !> period from the cell.
   subroutine check_mean_regions(config, period, error)
     type(config_t), intent(in) :: config
     type(period_t), intent(in) :: period
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: low, high
+    logical :: fits
     integer :: r, d
 
     do r = 1, size(config%regions)
@@ -54,10 +56,11 @@ contains
         high = config%regions(r)%upper(d)
         if (.not. low > -unbounded) low = period%origin(d)
         if (.not. high < unbounded) high = period%origin(d) + period%length(d)
-        if (high > low .and. high - low <= period%length(d)*(1.0_dp + 1.0e-9_dp)) cycle
+        fits = high > low .and. high - low <= period%length(d)*(1.0_dp + 1.0e-9_dp)
+        if (fits .and. abs(low - period%origin(d)) <= 2.0_dp*period%length(d)) cycle
         call raise(error, status_input, config%file//": &region '"//trim(config%regions(r)%name)//"': from "//to_text(low, 4)// &
-          & " m to "//to_text(high, 4)//" m along "//axes(d:d)//": expected a region with an inside and no longer than the "// &
-          & "period, "//to_text(period%length(d), 4)//" m; a side that is left out is that of the cell")
+          & " m to "//to_text(high, 4)//" m along "//axes(d:d)//": expected a region with an inside, no longer than the "// &
+          & "period, "//to_text(period%length(d), 4)//" m, and near the cell; a side that is left out is that of the cell")
         return
       end do
     end do

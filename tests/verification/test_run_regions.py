@@ -123,8 +123,18 @@ class Regions(RunTestCase):
         parts = np.diff([disk_below(min(max(t, -1.0), 1.0)) for t in sides])
         np.testing.assert_allclose(found.solid_fraction * found.volume / (np.pi * R**2), parts, atol=4e-6)
         self.assertAlmostEqual((found.solid_fraction * found.volume).sum() / (np.pi * R**2), 1.0, delta=1e-14)
-        # the mass inside moves, and nothing else does
         np.testing.assert_array_equal(found.velocity, 0.0)
+
+    def test_mass_inside(self):
+        """The velocity of a layer is that of the mass in it: of 27/32 of one ball and half of another."""
+        path = grains(self.here("two.csv"), [[0.0, 0.0, 0.5 * R], [1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0], [0.0, -2.0, 0.0]])
+        run = self.play("two", {**free(path, 3), "region": [{"name": "above", "lower": [-1e30, -1e30, 0.0]}]})
+        parts = np.array([27.0 / 32.0, 0.5])
+        mean = (parts @ [1.0, -2.0]) / parts.sum()
+        self.assertAlmostEqual(run.history()["above_velocity_y"][-1], mean, delta=1e-14)
+        self.assertAlmostEqual(run.history()["above_granular_temperature"][-1],
+                               (parts @ (np.array([1.0, -2.0]) - mean)**2) / parts.sum() / 3.0, delta=1e-14)
+        self.assertEqual(run.history()["above_grains"][-1], 2)
 
     def test_plug_and_shear(self):
         """A plug has one velocity and no temperature; in a shear flow the velocity is linear, and the temperature that of a layer."""
@@ -220,7 +230,12 @@ class Regions(RunTestCase):
             for name in [key for key in history if key.startswith("all_stress")] + ["all_volume", "all_solid_fraction", "all_pressure"]:
                 np.testing.assert_allclose(history[name], history[name[4:]], rtol=1e-12, atol=1e-12 * scale)
             np.testing.assert_array_equal(history["all_grains"], history["grains"])
+            self.assertGreater(np.abs(history["all_stress_xy"] - history["all_stress_yx"]).max(), 1e-6 * scale)
+            axes = AXES[:dimension]
             for step in (20, 40, 60):
+                # a region without bins has the same tensor in both files; that of grains that move is not symmetric
+                stress = self.region(run, "all", step).stress[0]
+                np.testing.assert_array_equal(stress, [[history[f"all_stress_{a}{b}"][step - 1] for b in axes] for a in axes])
                 bins = self.region(run, "bins", step)
                 for key, name in (("solid_fraction", "solid_fraction"), ("pressure", "pressure")):
                     np.testing.assert_allclose((bins[key] * bins.volume).sum() / bins.volume.sum(), history["bins_" + name][step - 1],
@@ -235,6 +250,7 @@ class Regions(RunTestCase):
         case = {**free(path), "region": [{"name": "box", "lower": [0.031, 0.047], "upper": [0.11, 0.13], "axis": "x", "bins": 9}]}
         one, many = (self.play(f"sub{n}", merged(case, {"decomposition": {"subdomains": n}})) for n in (1, 6))
         first, second = self.region(one, "box"), self.region(many, "box")
+        self.assertEqual(first.grains.dtype.kind, "i")
         for key in first:
             np.testing.assert_allclose(second[key], first[key], rtol=1e-12, atol=1e-14, err_msg=key)
 
@@ -287,9 +303,11 @@ class Regions(RunTestCase):
             "bins = 0: expected an integer from 1 to 10000": [{**box, "bins": 0, "axis": "x"}],
             "bins = 10001: expected an integer from 1 to 10000": [{**box, "bins": 10001, "axis": "x"}],
             "axis = 'z': expected 'x' or 'y' in 2D": [{**box, "bins": 3, "axis": "z"}],
-            "&region 'a': from 0.000E+00 m to 5.000E-01 m along x: expected a region with an inside and no longer than the period":
+            "&region 'a': from 0.000E+00 m to 5.000E-01 m along x: expected a region with an inside, no longer than the period, 4.000E-01 m":
                 [{**box, "upper": [0.5, 0.1]}],
             "&region 'a': from 6.000E-01 m to 4.000E-01 m along x: expected a region with an inside": [{"name": "a", "lower": [0.6]}],
+            "&region 'a': from 1.000E+12 m to 1.000E+12 m along x: expected a region with an inside, no longer than the period, 4.000E-01 m, "
+            "and near the cell": [{**box, "lower": [1e12, 0.0], "upper": [1e12 + 0.1, 1.0]}],
         }
         for line, regions in lines.items():
             with self.subTest(line):

@@ -68,7 +68,7 @@ module gravier_results_file
   !> room for the headers of the groups and datasets of one step
   integer(i8), parameter :: bytes_of_headers = 65536
   !> the same for one table of a region
-  integer(i8), parameter :: bytes_of_table = 16384
+  integer(i8), parameter :: bytes_of_table = 32768
   integer, parameter :: bytes_of_word = 8
   !> steps for which /steps has room in one block: up to there a program that dies leaves the file whole
   integer, parameter :: steps_in_block = 1000

@@ -9,8 +9,8 @@ module gravier_contact_branch
 
 contains
 
-  !> The branch of contact `c`, that part of it which lies outside boundaries, from the antagonist to the candidate [m]. Of disks and
-  !> spheres it is along the normal.
+  !> The branch of contact `c`, that part of it which lies outside boundaries, from the antagonist to the candidate [m]. Of disks
+  !> and spheres it is along the normal.
   pure subroutine find_branch(kernels, sub, c, branch)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub

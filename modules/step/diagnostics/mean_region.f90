@@ -1,5 +1,5 @@
-!> A region of means, a box with sides along the axes that may be cut into equal bins along one of them, and which parts of bodies and
-!> of branches of contacts lie in it.
+!> A region of means, a box with sides along the axes that may be cut into equal bins along one of them, and which parts of bodies
+!> and of branches of contacts lie in it.
 module gravier_mean_region
   use gravier_kinds, only: dp
   implicit none
@@ -214,8 +214,8 @@ contains
     if (self%cuts_low(d)) part = part - below(self%lower(d), x, radius, self%nd)
   end function region_grid_cut
 
-  !> The part of a ball, or a disk, on the lower side of a plane: 1/2 + t (3 - t^2)/4, or 1/2 + (t sqrt(1 - t^2) + asin t)/pi, with t
-  !> the distance of the plane from the centre in radii (volumes of segments).
+  !> The part of a ball, or a disk, on the lower side of a plane: 1/2 + t (3 - t^2)/4, or 1/2 + (t sqrt(1 - t^2) + asin t)/pi,
+  !> with t the distance of the plane from the centre in radii (volumes of segments).
   pure real(dp) function below(plane, x, radius, nd) result(part)
     !> [m]
     real(dp), intent(in) :: plane, x, radius
@@ -317,8 +317,8 @@ contains
     within(:, :n) = kept(:, :n)
   end subroutine keep_within
 
-  !> The part of the way from one end to the other, 0 to 1, that lies between two sides; of no length where none does. A way along the
-  !> sides that lies on one of them is above it.
+  !> The part of the way from one end to the other, 0 to 1, that lies between two sides; of no length where none does. A way along
+  !> the sides that lies on one of them is above it.
   pure function part_between(from, to, low, high) result(part)
     !> [m]
     real(dp), intent(in) :: from, to, low, high

@@ -242,8 +242,8 @@ contains
     end associate
   end subroutine add_grains
 
-  !> Add the contacts of a subdomain of this rank: p l^T by the share of the branch l that lies in a bin (Weber 1966), and their ends
-  !> at free grains by the centres of these. Places are those of the middle of the step, at which contacts are found.
+  !> Add the contacts of a subdomain of this rank: p l^T by the share of the branch l that lies in a bin (Weber 1966), and their
+  !> ends at free grains by the centres of these. Places are those of the middle of the step, at which contacts are found.
   subroutine add_contacts(grid, halo, problem, s, bins)
     type(region_grid_t), intent(in) :: grid
     type(halo_t), intent(in) :: halo
