@@ -95,6 +95,7 @@ contains
     self%n_grains = scene%n_grains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
+    self%given = scene%contacts
     call set_physics(self, scene)
     call check_lists_in_period(self, scene, narrow)
     ! lists that last less long have a shorter range
