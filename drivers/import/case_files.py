@@ -49,6 +49,8 @@ def write_bodies(case, path):
             file["bodies/orientation"] = np.array([plain_turn if grain.orientation is None else grain.orientation for grain in case.grains])
         if any(grain.group for grain in case.grains):
             file["bodies/group"] = np.array([grain.group for grain in case.grains], dtype=np.int64)
+        if case.start:
+            case.start.write(file)
 
 
 def texts_of(case, stem, options, contacts):
@@ -79,7 +81,7 @@ def texts_of(case, stem, options, contacts):
     made[".nml"] = "! " + f"made by gravier_import from {options.datbox}\n" + "\n".join(parts)
     if contacts is not None:
         made["_contacts.csv"] = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n" + "".join(
-            ",".join(str(cell) for cell in row) + "\n" for row in contacts)
+            ",".join(str(cell) for cell in contact.row()) + "\n" for contact in contacts)
     return made
 
 

@@ -1,5 +1,6 @@
 """What the files of a DATBOX of LMGC90 say: bodies, materials, laws, the table of visibility, states and contacts."""
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from datbox_text import Refused, entries, number
@@ -128,11 +129,34 @@ def read_initial(path, bodies):
     return time
 
 
+@dataclass
+class Contact:
+    """A contact of Vloc_Rloc: numbers of the candidate and the antagonist, their contactors, forces along n, t and s [N]."""
+    candidate: int
+    contactor: str
+    antagonist: int
+    other: str
+    status: str
+    gap: float
+    along: list
+    #: from the antagonist to the candidate (3)
+    normal: np.ndarray
+    #: on the candidate along the axes of space (3) [N]
+    force: np.ndarray
+    #: (3); NaN where the file has none
+    point: np.ndarray
+
+    def row(self):
+        """Its row in the table of contacts."""
+        return [self.candidate, self.contactor, self.antagonist, self.other, self.status, self.gap, *self.along, *self.normal, *self.force]
+
+
 def read_contacts(path, bodies, laws):
-    """Rows of the contacts: body, contactor, body, contactor, status, gap, forces n, t, s, normal, force on the candidate along the axes
-    of space. The normal is from the antagonist to the candidate; t is (n2, -n1) in 2D and stands in the file in 3D, as s does."""
-    rows, head = [], False
+    """The contacts, and the time at which they are [s]. In 2D t is (n2, -n1); in 3D t and s stand in the file."""
+    contacts, head, time = [], False, 0.0
     for keyword, entry in entries(path):
+        if keyword == "$steps":
+            time = entry.get("time", 0.0)
         if keyword != "$icdan" or not entry.words:
             continue
         if entry.words[0] == "cdbdy":
@@ -145,17 +169,18 @@ def read_contacts(path, bodies, laws):
             pair = [int(words[k + 1]) for k in kinds]
             if not all(1 <= rank <= len(bodies) for rank in pair):
                 entry.refuse(f"bodies {pair[0]} and {pair[1]}", f"bodies of BODIES.DAT, 1 to {len(bodies)}")
-            status = next((word for word in words[kinds[1] + 4:] if not word.isdigit()), "")
+            # polygons name the vertex of the one and the segment of the other, too
+            status = next((word for word in words[kinds[1] + 4:] if not word.isdigit() and word not in ("CDVER", "ANSEG")), "")
             gap = next((entry.values[name] for name in ("gapTT", "gTT", "gap") if name in entry.values), math.nan)
             law = laws.get(words[kinds[1] - 1])
             if law and law.words[1] == "IQS_MOHR_DS_CLB" and not status.startswith("M"):
                 entry.refuse(f"bodies {pair[0]} and {pair[1]} with status {status}, whose bond is broken", "Mstck: near pairs begin bonded here")
-            force = [entry.values.get(f"{name}/H", 0.0) for name in ("rln", "rlt", "rls")]
+            along = [entry.values.get(f"{name}/H", 0.0) for name in ("rln", "rlt", "rls")]
             normal = entry.vector("n", 3, 0.0)
             if bodies[0].dimension == 2:
                 tangents = np.array([[normal[1], -normal[0], 0.0], [0.0] * 3])
             else:
                 tangents = np.stack([entry.vector(name, 3, math.nan) for name in "ts"])
-            rows.append([pair[0], words[kinds[0] + 2], pair[1], words[kinds[1] + 2], status, gap, *force, *normal,
-                         *(force[0] * normal + force[1:] @ tangents)])
-    return rows
+            contacts.append(Contact(pair[0], words[kinds[0] + 2], pair[1], words[kinds[1] + 2], status, gap, along, normal,
+                                    along[0] * normal + along[1:] @ tangents, entry.vector("coo", 3, math.nan)))
+    return contacts, time

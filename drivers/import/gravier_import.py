@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Make a case of Gravier from a DATBOX of LMGC90.
 
-    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V] [--homogeneous] [--drop-g0]
+    gravier_import DATBOX --step H [--steps N] [--out NAME] [--period LX LY [LZ]] [--planes] [--slip V] [--homogeneous] [--drop-g0] [--last]
 
 --period takes two numbers in 2D and three in 3D, 0 along an axis that is not periodic.
 Reads BODIES.DAT, BULK_BEHAV.DAT and TACT_BEHAV.DAT and, where they are there, DRV_DOF.DAT, DOF.INI and Vloc_Rloc.INI; writes NAME.nml,
-NAME.h5 (bodies), NAME.shapes (where bodies have shapes), NAME_drive_K.csv (drives that change in time) and NAME_contacts.csv (the contacts of
-Vloc_Rloc.INI).
+NAME.h5 (bodies, and the forces of Vloc_Rloc.INI, from which the first solve starts), NAME.shapes (where bodies have shapes), NAME_drive_K.csv
+(drives that change in time) and NAME_contacts.csv (the contacts of Vloc_Rloc.INI). With --last the state is that which LMGC90 has left in OUTBOX
+beside DATBOX, DOF.LAST and Vloc_Rloc.LAST or else the last DOF.OUT.n and Vloc_Rloc.OUT.n.
 What has no counterpart is named, with file and line, and refused: status 2, nothing is written. So is a case that `gravier --check`
 refuses: the program of $GRAVIER_PROGRAM, or the one beside this script or in PATH, reads it before its files get their names."""
 import argparse
@@ -28,6 +29,10 @@ from datbox import read_bodies, read_bulk, read_contacts, read_initial, read_law
 from datbox_drives import read_drives  # noqa: E402
 from datbox_text import Refused  # noqa: E402
 from imported_case import Case  # noqa: E402
+from imported_contacts import start_of  # noqa: E402
+
+#: relative difference of times in files of seven digits that are the same
+SAME_TIME = 1e-5
 
 
 def parse():
@@ -45,12 +50,25 @@ def parse():
     parser.add_argument("--homogeneous", action="store_true",
                         help="bodies with shapes have the inertia and the centre of mass of these, where BODIES.DAT says otherwise")
     parser.add_argument("--drop-g0", action="store_true", help="take IQS_CLB_g0 for IQS_CLB: gaps that are open at the start may close")
+    parser.add_argument("--last", action="store_true", help="start from the last state of LMGC90 in OUTBOX beside DATBOX, not from DATBOX/*.INI")
     options = parser.parse_args()
     if not (math.isfinite(options.step) and options.step > 0.0) or options.steps < 0:
         parser.error("--step: expected a finite number > 0, and --steps at least 0")
     if options.slip is not None and not (math.isfinite(options.slip) and options.slip > 0.0):
         parser.error("--slip: expected a finite number > 0")
     return options
+
+
+def state_files(box, last):
+    """The files of the state to start from: places, and contacts."""
+    if not last:
+        return box / "DOF.INI", box / "Vloc_Rloc.INI"
+    out = box.parent / "OUTBOX"
+    numbers = [path.name.removeprefix("DOF.OUT.") for path in out.glob("DOF.OUT.*")]
+    endings = ["LAST"] * (out / "DOF.LAST").is_file() + [f"OUT.{number}" for number in sorted(filter(str.isdigit, numbers), key=int, reverse=True)[:1]]
+    if not endings:
+        raise Refused(f"{out}: no DOF.LAST and no DOF.OUT.n: expected the last state of a run of LMGC90 beside {box.name}")
+    return out / f"DOF.{endings[0]}", out / f"Vloc_Rloc.{endings[0]}"
 
 
 def read(options):
@@ -62,10 +80,11 @@ def read(options):
     bodies = read_bodies(box / "BODIES.DAT")
     density, gravity = read_bulk(box / "BULK_BEHAV.DAT")
     laws, sees = read_laws(box / "TACT_BEHAV.DAT")
-    start = read_initial(box / "DOF.INI", bodies) if (box / "DOF.INI").is_file() else 0.0
+    places, forces = state_files(box, options.last)
+    start = read_initial(places, bodies) if places.is_file() else 0.0
     if (box / "DRV_DOF.DAT").is_file():
         read_drives(box / "DRV_DOF.DAT", bodies, start, start + options.step * options.steps)
-    contacts = read_contacts(box / "Vloc_Rloc.INI", bodies, laws) if (box / "Vloc_Rloc.INI").is_file() else None
+    contacts, time = read_contacts(forces, bodies, laws) if forces.is_file() else (None, start)
     if options.period and len(options.period) != bodies[0].dimension:
         raise Refused(f"--period: {len(options.period)} {'numbers' if options.period[1:] else 'number'}: expected {bodies[0].dimension}, for "
                       f"bodies {bodies[0].kind} in {bodies[0].dimension}D, 0 along an axis that is not periodic")
@@ -73,6 +92,10 @@ def read(options):
         raise Refused(f"--period {' '.join(f'{length:g}' for length in options.period)}: expected finite numbers >= 0")
     case = Case(bodies, density, gravity, laws, sees, options)
     case.build()
+    if abs(time - start) > SAME_TIME * max(abs(time), abs(start)):
+        case.remarks.append(f"{forces.name} is of {time:g} s and {places.name} of {start:g} s: the first solve does not start from its forces")
+    else:
+        case.start = start_of(case, contacts)
     return case, contacts
 
 

@@ -1,5 +1,6 @@
 """The case that a DATBOX becomes: grains, boundaries, materials and laws."""
 import math
+from collections import defaultdict
 
 import numpy as np
 from body_shapes import ROUNDING, ShapeOfBody, turn_of
@@ -22,6 +23,10 @@ class Case:
         self.bodies, self.gravity, self.dimension = bodies, gravity, bodies[0].dimension
         self.planes, self.homogeneous, self.period = options.planes, options.homogeneous, options.period or []
         self.grains, self.boundaries, self.remarks = [], [], []
+        #: contacts from whose forces the first solve starts, where there are some
+        self.start = None
+        #: grains and keys of boundaries that a body of LMGC90, by its number, has become
+        self.parts = defaultdict(list)
         #: bodies whose inertia or centre of mass their shape decides, by --homogeneous
         self.replaced = set()
         #: lines of the file of shapes with their names, which bodies share
@@ -33,12 +38,17 @@ class Case:
         self.bulks = Bulks(density, self.dimension, self.remarks)
         self.centres = np.array([body.place() for body in self.free])
 
+    def keep(self, body, grain):
+        """Take a grain that a body becomes, or a part of it."""
+        self.grains.append(grain)
+        self.parts[body.rank].append(grain)
+
     def add_grain(self, body, contactor, place, group):
         radius = contactor.get("byrd")
         identifier = body.rank if contactor is body.contactors[0] else None
         velocity = body.velocity() if group == 0 else None
-        self.grains.append(Grain(identifier, place, radius, self.bulks.mass(body, self.bulks.ball(radius)),
-                                 self.laws.material(self.laws.thing(contactor)), velocity, group))
+        self.keep(body, Grain(identifier, place, radius, self.bulks.mass(body, self.bulks.ball(radius)),
+                              self.laws.material(self.laws.thing(contactor)), velocity, group))
 
     def is_ball(self, body):
         """Is it one disk or sphere about its centre?"""
@@ -60,8 +70,8 @@ class Case:
             self.remarks.append(f"body {body.rank} JONCx: nothing drives it, it moves freely")
         if any(piece.kind in HULLS for piece in shape.pieces):
             self.remarks.append(f"corners and edges of polygons and polyhedra are round here, with at most {ROUNDING:g} of their size")
-        self.grains.append(Grain(body.rank, body.place() + frame @ shape.centre, 0.0, self.bulks.mass(body, shape.volume),
-                                 self.laws.material(things[0]), velocity, group, name, turn_of(frame)))
+        self.keep(body, Grain(body.rank, body.place() + frame @ shape.centre, 0.0, self.bulks.mass(body, shape.volume),
+                              self.laws.material(things[0]), velocity, group, name, turn_of(frame)))
 
     def check_mass(self, body, shape):
         """Refuse a centre of mass or an inertia that are given and are not those of the shape. The mass is as it is given."""

@@ -119,8 +119,9 @@ def add_wall(case, body):
         name = f"body {body.rank}" + (f" contactor {number_of}" if len(body.contactors) > 1 else "")
         for label, shape in found:
             case.boundaries.append(({"name": name + label, **shape, **keys, "material": material}, columns))
+            case.parts[body.rank].append(case.boundaries[-1][0])
         if ends:
             group = case.new_group()
             for place, radius in ends:
-                case.grains.append(Grain(None, place, radius, case.bulks.ball(radius), material, group=group))
+                case.keep(body, Grain(None, place, radius, case.bulks.ball(radius), material, group=group))
             case.boundaries.append(({"name": name + " ends", "shape": "grains", "group": group, **keys}, columns))
