@@ -8,6 +8,7 @@ module gravier_bench_kernels
   use gravier_text, only: to_text
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_effects, only: effects_t
+  use gravier_contact_data, only: contact_rows_t
   use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: subproblem_t
   use gravier_method, only: start_sweeps
@@ -22,12 +23,12 @@ module gravier_bench_kernels
 
   integer, parameter :: name_length = 32
   character(len=name_length), parameter :: kernel_names(*) = [character(len=name_length) :: &
-    & "2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
+    & "2d_frictionless", "2d_friction", "2d_shaped", "3d_frictionless", "3d_friction", "3d_shaped"]
   !> what effects add to a dimension, and the place in this list of what each is compared with
   character(len=24), parameter :: effect_names(*) = [character(len=24) :: &
     & "frictionless", "frictionless_restitution", "friction", "friction_restitution", "friction_tangential", "friction_rolling", &
-    & "friction_tangential_roll"]
-  integer, parameter :: effect_base(size(effect_names)) = [1, 1, 1, 3, 3, 3, 3]
+    & "friction_tangential_roll", "shaped"]
+  integer, parameter :: effect_base(size(effect_names)) = [1, 1, 1, 3, 3, 3, 3, 3]
   !> versions of a kernel: as it is; recording the velocities which solved the laws; from extrapolated impulses
   integer, parameter :: plain = 1, recording = 2, momentum = 3
   !> what each adds to the name of a kernel
@@ -195,6 +196,8 @@ contains
       associate (sub => simulation%problem%sub(1))
         if (index(name, "restitution") > 0) sub%hot(:, packing%nd + 1, :) = 0.5_dp*sub%hot(:, packing%nd + 1, :)
       end associate
+      if (index(name, "shaped") > 0) call let_touch_anywhere(packing%nd, effects, simulation%problem%kernels, &
+        & simulation%problem%sub(1))
       call start_sweeps(simulation%method, simulation%problem, shared_masses=.false.)
       problem%name = name
       problem%kernels = simulation%problem%kernels
@@ -204,6 +207,47 @@ contains
     call simulation%free()
     call alone%free()
   end subroutine make_problem
+
+  !> The same contacts for the kernels of bodies with shapes, which may touch anywhere on them: the arms are those of the grains, and
+  !> the inverse inertia is a matrix. Each pair touches in one point, so that no two contacts in a row share their bodies.
+  subroutine let_touch_anywhere(nd, effects, kernels, sub)
+    integer, intent(in) :: nd
+    !> of the scene
+    type(effects_t), intent(in) :: effects
+    !> those of the packed contacts on entry, those of shapes on return
+    type(kernels_t), intent(inout) :: kernels
+    type(subproblem_t), intent(inout) :: sub
+    real(dp), allocatable :: round(:, :, :), inverse(:, :)
+    type(contact_rows_t) :: row
+    type(effects_t) :: shaped
+    integer :: d
+
+    row = kernels%row
+    shaped = effects
+    shaped%shapes = .true.
+    call kernels%choose(nd, shaped)
+    call move_alloc(sub%hot, round)
+    allocate (sub%hot(size(round, 1), kernels%nh, size(round, 3)), source=0.0_dp)
+    sub%hot(:, 1:nd, :) = round(:, 1:nd, :)
+    sub%hot(:, kernels%row%shift, :) = round(:, row%shift, :)
+    sub%hot(:, kernels%row%friction, :) = round(:, row%friction, :)
+    if (nd == 2) then
+      sub%hot(:, kernels%row%lever_i, :) = round(:, row%lever_i, :)
+      sub%hot(:, kernels%row%lever_j, :) = round(:, row%lever_j, :)
+      return
+    end if
+    do d = 0, 2
+      sub%hot(:, kernels%row%arm_i + d, :) = -round(:, row%lever_i, :)*round(:, 1 + d, :)
+      sub%hot(:, kernels%row%arm_j + d, :) = round(:, row%lever_j, :)*round(:, 1 + d, :)
+    end do
+    call move_alloc(sub%inverse_mass, inverse)
+    deallocate (sub%weight)
+    allocate (sub%inverse_mass(kernels%nw, size(inverse, 2)), sub%weight(kernels%nw, size(inverse, 2)), source=0.0_dp)
+    sub%inverse_mass(1:3, :) = inverse(1:3, :)
+    do d = 4, 6
+      sub%inverse_mass(d, :) = inverse(4, :)
+    end do
+  end subroutine let_touch_anywhere
 
   !> One round over all problems: rates, and what they are of the bandwidth of this round. Not collective.
   subroutine measure_kernels(options, problems, bandwidth, record)

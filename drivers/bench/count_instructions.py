@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-KERNELS = ["2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
+KERNELS = ["2d_frictionless", "2d_friction", "2d_shaped", "3d_frictionless", "3d_friction", "3d_shaped"]
 #: only what runs inside the sweeps is counted: the start of MPI does not take the same number of instructions each time
 INSIDE = "__gravier_contact_kernels_MOD_sweep*"
 

@@ -6,7 +6,7 @@ module gravier_accuracy_lines
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, goal_name, percent, plain
+  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, creep_lines, goal_name, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
 
@@ -17,7 +17,8 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
-    text = error_line(simulation)//scale_range_line(simulation%tally)//overlap_lines(simulation)//layer_line(simulation%tally)
+    text = error_line(simulation)//scale_range_line(simulation%tally)//overlap_lines(simulation)//layer_line(simulation%tally)// &
+      & creep_lines(simulation%tally)
     if (simulation%restarted) text = text//indent//"these lines are of the "//to_text(simulation%tally%solves)// &
       & " steps since the restart"//newline
   end function accuracy_lines
@@ -139,5 +140,23 @@ contains
     text = "layers      "//counted(tally%tried_layers, "solve")//" made a pass over layers, "//to_text(tally%took_layers)// &
       & " of them continued from it; passes cost as much as "//counted(nint(tally%layered_sweeps, i8), "sweep")//newline
   end function layer_line
+
+  !> What still changed in solves that stagnated; nothing where none did, or no contact has friction.
+  function creep_lines(tally) result(text)
+    type(run_tally_t), intent(in) :: tally
+    character(len=:), allocatable :: text
+
+    text = ""
+    associate (creep => tally%creep)
+      if (creep%contacts == 0) return
+      text = "creep       in solves that stagnate, the impulses of up to "//counted(creep%contacts, "contact")// &
+        & " go on changing; "//percent(real(creep%stuck, dp)/real(creep%contacts, dp))//" of these contacts stick"//newline// &
+        & indent//"the largest group of them joins "//counted(creep%group_grains, "grain")//" by "// &
+        & counted(creep%group_contacts, "contact")//newline// &
+        & indent//"velocities in such a group differ by up to "//to_text(tally%worst_creep, 2)// &
+        & " of U between iterates: neither they nor the forces there are known more exactly"//newline// &
+        & indent//"contacts with springs (&law kind = 'elastic') have one solution"//newline
+    end associate
+  end function creep_lines
 
 end module gravier_accuracy_lines

@@ -11,19 +11,19 @@ from gravier_runs import SOURCE, PROGRAMS, RunTestCase, each, gravier
 
 SMALL = ["--contacts", "3000", "--spheres", "1500", "--rounds", "2", "--seconds", "0.001", "--iterations", "4", "--triad", "5000"]
 PLACES = ["kernel_core_cache", "kernel_last_cache", "kernel_memory"]
-KERNELS = ["2d_frictionless", "2d_friction", "3d_frictionless", "3d_friction"]
+KERNELS = ["2d_frictionless", "2d_friction", "2d_shaped", "3d_frictionless", "3d_friction", "3d_shaped"]
 # rows of hot, components of an impulse, of a velocity and of the weights of a body
-SHAPES = {"2d_frictionless": (4, 1, 2, 2), "2d_friction": (8, 2, 3, 3),
-          "3d_frictionless": (5, 1, 3, 3), "3d_friction": (9, 3, 6, 4)}
+SHAPES = {"2d_frictionless": (4, 1, 2, 2), "2d_friction": (8, 2, 3, 3), "2d_shaped": (11, 2, 3, 3),
+          "3d_frictionless": (5, 1, 3, 3), "3d_friction": (9, 3, 6, 4), "3d_shaped": (15, 3, 6, 9)}
 # what effects make of them: rows of hot, components of an impulse, and the one compared with
 EFFECTS = {"2d_frictionless": (4, 1, "2d_frictionless"), "2d_frictionless_restitution": (4, 1, "2d_frictionless"),
            "2d_friction": (8, 2, "2d_frictionless"), "2d_friction_restitution": (8, 2, "2d_friction"),
            "2d_friction_tangential": (9, 2, "2d_friction"), "2d_friction_rolling": (11, 3, "2d_friction"),
-           "2d_friction_tangential_roll": (12, 3, "2d_friction"),
+           "2d_friction_tangential_roll": (12, 3, "2d_friction"), "2d_shaped": (11, 2, "2d_friction"),
            "3d_frictionless": (5, 1, "3d_frictionless"), "3d_frictionless_restitution": (5, 1, "3d_frictionless"),
            "3d_friction": (9, 3, "3d_frictionless"), "3d_friction_restitution": (9, 3, "3d_friction"),
            "3d_friction_tangential": (11, 3, "3d_friction"), "3d_friction_rolling": (13, 6, "3d_friction"),
-           "3d_friction_tangential_roll": (15, 6, "3d_friction")}
+           "3d_friction_tangential_roll": (15, 6, "3d_friction"), "3d_shaped": (15, 3, "3d_friction")}
 SCENE = ["list_build", "contacts", "iterations", "step", "solve", "solve_per_contact_iteration", "list_build_over_step"]
 SHARES = ["share_" + name for name in ("sweeps", "exchange", "checks", "reductions", "detection", "lists_and_ghosts", "setup", "bodies",
                                        "rest")]

@@ -121,6 +121,12 @@ class LastWords(RunTestCase):
                 stagnated, without = run.stdout.count("gain nothing (stagnation)"), run.stdout.count("loads grow without bound")
                 self.assertEqual(f" {stagnated} stagnated" in line(run, "converged"), stagnated > 0)
                 self.assertEqual(f" {without} found no solution" in line(run, "converged"), without > 0)
+                self.assertEqual("\ncreep " in run.stdout, stagnated > 0)
+                if stagnated > 0:
+                    self.assertRegex(run.stdout, r"\ncreep       in solves that stagnate, the impulses of up to \d+ contacts go on changing; "
+                                                 r"(\d+|more than 99) % of these contacts stick\n"
+                                                 r"            the largest group of them joins \d+ grains by \d+ contacts?\n"
+                                                 r"            velocities in such a group differ by up to \d\.\dE-1\d of U between iterates")
                 self.assertIn("*** 2 of the steps did NOT reach the accuracy: the accuracy of the results is not known", line(run, "finished"))
                 self.assertRegex(run.stdout, "at a tenth of the accuracy not known: 2 solves did not reach the accuracy itself")
                 self.assertNotRegex(line(run, "to halve it"), "ten times|longer|looser|larger &time")

@@ -1,8 +1,8 @@
 !> The direction of least separation of two convex cores that overlap.
 !>
 !> Overlapping convex polyhedra are least separated along the normal of a face of one of them or along the common normal of two
-!> edges. Pairs of edges come into question where the arcs of their normals cross (the Gauss map, Gregorius 2013). This is slow beside
-!> the search for a distance, and is meant for the rare cores that overlap.
+!> edges. Pairs of edges come into question where the arcs of their normals cross (the Gauss map, Gregorius 2013). Its cost grows with
+!> the product of the numbers of edges, so that it is meant for the rare cores that overlap.
 module gravier_core_overlap
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
@@ -14,13 +14,16 @@ module gravier_core_overlap
   !> an axis is better than those before it if the separation is by this part of the sizes greater
   real(dp), parameter :: better = 1.0e-12_dp
 
-  !> A piece's edges, and the normals of the faces at both sides of each.
+  !> the sine of the angle between edges that are taken for parallel
+  real(dp), parameter :: parallel = 1.0e-9_dp
+  !> a cosine whose sign rounding may have changed
+  real(dp), parameter :: doubtful = 1.0e-9_dp
+
+  !> A piece's edges, and the faces at both sides of each.
   type :: edges_t
     integer :: n = 0
-    !> (2, n)
-    integer, allocatable :: vertex(:, :)
-    !> (3, 2, n), 0 where there are no faces
-    real(dp), allocatable :: normal(:, :, :)
+    !> (2, n); of faces 0 where there are none
+    integer, allocatable :: vertex(:, :), face(:, :)
   end type edges_t
 
 contains
@@ -89,54 +92,73 @@ contains
     found%share(1) = 1.0_dp
   end subroutine try_axis
 
-  !> Common normals of edges of both.
+  !> Common normals of edges of both. A normal comes into question where the arcs of the normals of both edges cross, those of b seen
+  !> from behind. Then the two edges are the outermost parts of their pieces along it.
   pure subroutine try_edges(a, b, pair, edges_a, edges_b, found)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair
     type(edges_t), intent(in) :: edges_a, edges_b
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: along_a(3), along_b(3), side(3), n(3), x(3), y(3), bound, normal_b(3, 2), length
-    integer :: i, j
+    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared
+    !> of the edge of b against the faces of a; 0 for an edge that has none
+    real(dp) :: slope(0:size(a%face_normal, 2))
+    integer :: i, j, f, turned
 
+    do i = 1, edges_a%n
+      along_a(:, i) = a%vertex(:, edges_a%vertex(2, i)) - a%vertex(:, edges_a%vertex(1, i))
+    end do
+    slope(0) = 0.0_dp
     do j = 1, edges_b%n
       side(:) = b%vertex(:, edges_b%vertex(2, j)) - b%vertex(:, edges_b%vertex(1, j))
       call turn(pair, side, along_b)
       call place_b(b, pair, edges_b%vertex(1, j), y)
-      call turn(pair, edges_b%normal(:, 1, j), normal_b(:, 1))
-      call turn(pair, edges_b%normal(:, 2, j), normal_b(:, 2))
+      normal_b(:, :) = 0.0_dp
+      do f = 1, 2
+        if (edges_b%face(f, j) > 0) call turn(pair, b%face_normal(:, edges_b%face(f, j)), normal_b(:, f))
+      end do
+      do f = 1, size(a%face_normal, 2)
+        slope(f) = along_b(1)*a%face_normal(1, f) + along_b(2)*a%face_normal(2, f) + along_b(3)*a%face_normal(3, f)
+      end do
       do i = 1, edges_a%n
-        along_a(:) = a%vertex(:, edges_a%vertex(2, i)) - a%vertex(:, edges_a%vertex(1, i))
-        if (.not. arcs_cross(edges_a%normal(:, :, i), normal_b, along_a, along_b)) cycle
-        n(1) = along_a(2)*along_b(3) - along_a(3)*along_b(2)
-        n(2) = along_a(3)*along_b(1) - along_a(1)*along_b(3)
-        n(3) = along_a(1)*along_b(2) - along_a(2)*along_b(1)
-        length = norm2(n)
-        if (length <= 1.0e-9_dp*norm2(along_a)*norm2(along_b)) cycle
-        n(:) = n/length
-        if (dot_product(n, pair%way) > 0.0_dp) n(:) = -n
+        if (slope(edges_a%face(1, i))*slope(edges_a%face(2, i)) > 0.0_dp) cycle
+        if (dot_product(along_a(:, i), normal_b(:, 1))*dot_product(along_a(:, i), normal_b(:, 2)) > 0.0_dp) cycle
+        n(1) = along_a(2, i)*along_b(3) - along_a(3, i)*along_b(2)
+        n(2) = along_a(3, i)*along_b(1) - along_a(1, i)*along_b(3)
+        n(3) = along_a(1, i)*along_b(2) - along_a(2, i)*along_b(1)
+        squared = dot_product(n, n)
+        if (squared <= parallel**2*dot_product(along_a(:, i), along_a(:, i))*dot_product(along_b, along_b)) cycle
+        n(:) = n/sqrt(squared)
         call place_a(a, pair, edges_a%vertex(1, i), x)
-        ! any two points bound the separation from above
-        bound = dot_product(n, x) - dot_product(n, y)
-        if (bound > found%distance) call try_axis(a, b, pair, n, found)
-        n(:) = -n
-        if (-bound > found%distance) call try_axis(a, b, pair, n, found)
+        do turned = 1, 2
+          ! any two points bound the separation from above
+          if (dot_product(n, x) - dot_product(n, y) > found%distance) then
+            if (faces_other(n, a, edges_a%face(:, i), normal_b)) call try_axis(a, b, pair, n, found)
+          end if
+          n(:) = -n
+        end do
       end do
     end do
   end subroutine try_edges
 
-  !> Whether a common normal of two edges may be one of both pieces: each edge crosses the plane between the normals beside the other,
-  !> so that the arcs of these normals cross, or cross the opposite ones. An edge without faces has a full circle of normals.
-  pure logical function arcs_cross(normal_a, normal_b, along_a, along_b)
-    real(dp), intent(in) :: normal_a(3, 2), normal_b(3, 2), along_a(3), along_b(3)
-    logical :: bare_a, bare_b
+  !> Whether the normals of an edge of a point against a common normal and those of an edge of b along it. Otherwise the arc of one
+  !> edge crosses the arc that is opposite to that of the other.
+  pure logical function faces_other(n, a, face, normal_b)
+    !> from b to a, a unit vector
+    real(dp), intent(in) :: n(3)
+    type(convex_piece_t), intent(in) :: a
+    !> of a beside its edge, 0 where there is none
+    integer, intent(in) :: face(2)
+    !> of the faces of b beside its edge, 0 where there is none (3, 2)
+    real(dp), intent(in) :: normal_b(:, :)
+    real(dp) :: outward
+    integer :: f
 
-    bare_a = .not. dot_product(normal_a(:, 1), normal_a(:, 1)) > 0.0_dp
-    bare_b = .not. dot_product(normal_b(:, 1), normal_b(:, 1)) > 0.0_dp
-    arcs_cross = .true.
-    if (.not. bare_a) arcs_cross = dot_product(along_b, normal_a(:, 1))*dot_product(along_b, normal_a(:, 2)) <= 0.0_dp
-    if (.not. (bare_b .or. .not. arcs_cross)) arcs_cross = dot_product(along_a, normal_b(:, 1))*dot_product(along_a, &
-      & normal_b(:, 2)) <= 0.0_dp
-  end function arcs_cross
+    outward = 0.0_dp
+    do f = 1, 2
+      if (face(f) > 0) outward = outward + dot_product(n, a%face_normal(:, face(f)))
+    end do
+    faces_other = outward <= doubtful .and. dot_product(n, normal_b(:, 1)) + dot_product(n, normal_b(:, 2)) >= -doubtful
+  end function faces_other
 
   !> An axis where nothing gives one: across both edges, else from centre to centre, else the third.
   pure subroutine find_any_axis(pair, edges_a, edges_b, a, b, n)
@@ -169,15 +191,14 @@ contains
     n(:) = n/norm2(n)
   end subroutine find_any_axis
 
-  !> Edges of a piece with the normals of the faces beside them.
+  !> Edges of a piece with the faces beside them.
   pure subroutine find_edges(piece, edges)
     type(convex_piece_t), intent(in) :: piece
     type(edges_t), intent(out) :: edges
     integer :: f, k, v, w, e, n, number(size(piece%neighbour))
 
     n = size(piece%neighbour)/2
-    allocate (edges%vertex(2, n), edges%normal(3, 2, n))
-    edges%normal(:, :, :) = 0.0_dp
+    allocate (edges%vertex(2, n), edges%face(2, n), source=0)
     number(:) = 0
     do v = 1, size(piece%vertex, 2)
       do k = piece%neighbour_first(v), piece%neighbour_first(v + 1) - 1
@@ -193,7 +214,7 @@ contains
         v = piece%face_vertex(k)
         w = piece%face_vertex(merge(piece%face_first(f), k + 1, k + 1 == piece%face_first(f + 1)))
         do e = piece%neighbour_first(min(v, w)), piece%neighbour_first(min(v, w) + 1) - 1
-          if (piece%neighbour(e) == max(v, w)) edges%normal(:, merge(1, 2, v < w), number(e)) = piece%face_normal(:, f)
+          if (piece%neighbour(e) == max(v, w)) edges%face(merge(1, 2, v < w), number(e)) = f
         end do
       end do
     end do

@@ -10,6 +10,7 @@ module gravier_solve
   use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_check_schedule, only: check_schedule_t, growth_limit
   use gravier_stagnation, only: stagnation_t
+  use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
   use gravier_vain_impulses, only: normals_are_in_vain
   implicit none
@@ -82,6 +83,8 @@ module gravier_solve
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
+    !> of a solve that stagnated
+    type(creep_t) :: creep
     !> how the figure came down
     type(convergence_history_t) :: history
     !> on this rank: the whole solve, and what comes before its first check [s]
@@ -426,7 +429,8 @@ contains
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
     if (.not. due) return
     if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)
-    call state%stagnation%judge(problem, report%iterations, state%velocity%levels%most_depth, has_stagnated, in_vain)
+    call state%stagnation%judge(problem, report%iterations, state%velocity%levels%most_depth, has_stagnated, in_vain, &
+      & report%creep)
     if (in_vain) then
       report%status = solve_unbounded
     else

@@ -7,6 +7,7 @@ module gravier_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
   use gravier_vain_impulses, only: kept_impulses_t, are_in_vain
+  use gravier_creeping_groups, only: creep_t, find_creep
   implicit none
   private
   public :: stagnation_t
@@ -76,18 +77,21 @@ contains
 
   !> Where stagnation is due, look whether the solve has really stagnated, because no solution is to be found or because the method
   !> finds none; else it is looked at again later. Collective.
-  subroutine stagnation_judge(self, problem, iteration, depth, stagnates, in_vain)
+  subroutine stagnation_judge(self, problem, iteration, depth, stagnates, in_vain, creep)
     class(stagnation_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: iteration
     !> of the problem, in contacts
     integer, intent(in) :: depth
     logical, intent(out) :: stagnates, in_vain
+    !> what still changes where the method finds no solution
+    type(creep_t), intent(out) :: creep
 
     in_vain = .false.
     stagnates = iteration >= waves*depth
     if (.not. stagnates) return
     in_vain = are_in_vain(problem, self%kept)
+    if (.not. in_vain) call find_creep(problem, self%kept, creep)
     self%next_look = iteration + patience
     call keep_impulses(self, problem, iteration)
   end subroutine stagnation_judge

@@ -180,7 +180,7 @@ contains
     if (is_far .and. list%memory%law_row > 0) is_far = list%state(list%memory%law_row, p) == 0
   end function is_far
 
-  !> Add the contact at place `p` of the list, if it is one under its law.
+  !> Add the contact at place `p` of the list, within the alert distance or with something to remember, if it is one under its law.
   subroutine add_contact(view, decomposition, physics, p, gap, normal, found, place)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
@@ -192,23 +192,25 @@ contains
     type(contact_list_t), intent(inout) :: found
     !> of bodies with shapes
     type(contact_place_t), intent(in), optional :: place
-    integer :: l
 
-    l = law_of(view, decomposition%boundaries, physics%laws, p)
-    if (physics%laws%varies_at(l)) then
-      call add_by_state(view, decomposition, physics, l, p, gap, normal, found, place)
+    if (physics%laws%varies) then
+      call add_with_terms(view, decomposition, physics, p, gap, normal, found, place)
     else
-      if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
-      call keep_contact(terms_of(physics%laws, l, gap), p, gap, normal, found, place)
+      ! the law of a contact that is closed is looked up where its terms are packed
+      if (gap > 0.0_dp) then
+        if (is_closed_under(terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, p), gap))) return
+      end if
+      call keep_contact(p, gap, normal, found, place)
     end if
   end subroutine add_contact
 
-  !> The same under law `l`, which asks for more than the gap: it gives the contact its terms and springs, and the pair its state.
-  subroutine add_by_state(view, decomposition, physics, l, p, gap, normal, found, place)
+  !> The same in a scene where some law has other terms for each pair. Such a law asks for more than the gap: it gives the contact its
+  !> terms and springs, and the pair its state.
+  subroutine add_with_terms(view, decomposition, physics, p, gap, normal, found, place)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    integer, intent(in) :: l, p
+    integer, intent(in) :: p
     !> [m], (nd)
     real(dp), intent(in) :: gap
     real(dp), intent(in), contiguous :: normal(:)
@@ -216,40 +218,50 @@ contains
     !> of bodies with shapes
     type(contact_place_t), intent(in), optional :: place
     type(contact_pair_t) :: pair
-    integer :: row, before
+    integer :: l, row
 
-    row = view%list%memory%law_row
-    pair%first = physics%first
-    pair%h = physics%h
-    pair%gap = gap
-    if (row > 0) pair%state = view%list%state(row, p)
-    if (present(place)) then
-      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, place, normal, pair)
+    l = law_of(view, decomposition%boundaries, physics%laws, p)
+    if (physics%laws%varies_at(l)) then
+      row = view%list%memory%law_row
+      pair%first = physics%first
+      pair%h = physics%h
+      pair%gap = gap
+      if (row > 0) pair%state = view%list%state(row, p)
+      if (present(place)) then
+        call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, place, normal, pair)
+      else
+        call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, round_place(view, p, gap, normal), normal, pair)
+      end if
+      if (row > 0) view%list%state(row, p) = pair%state
     else
-      call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, round_place(view, p, gap, normal), normal, pair)
+      pair%terms = terms_of(physics%laws, l, gap)
     end if
-    if (row > 0) view%list%state(row, p) = pair%state
     if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
-    before = found%n
-    call keep_contact(pair%terms, p, gap, normal, found, place)
-    if (size(found%spring) > 0 .and. found%n > before) found%spring(found%n) = pair%spring
-  end subroutine add_by_state
+    if (gap > 0.0_dp .and. is_closed_under(pair%terms)) return
+    call keep_contact(p, gap, normal, found, place)
+    found%terms(found%n) = pair%terms
+    if (size(found%spring) > 0) found%spring(found%n) = pair%spring
+  end subroutine add_with_terms
 
-  !> Put a contact into the list, unless it is open and has restitution.
-  pure subroutine keep_contact(terms, p, gap, normal, found, place)
+  !> Whether what is open is no contact under these terms: what has restitution acts from the moment of touching on.
+  pure logical function is_closed_under(terms)
     type(contact_terms_t), intent(in) :: terms
+
+    is_closed_under = terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp
+  end function is_closed_under
+
+  !> Put a contact into the list.
+  pure subroutine keep_contact(p, gap, normal, found, place)
     integer, intent(in) :: p
     real(dp), intent(in) :: gap
     real(dp), intent(in), contiguous :: normal(:)
     type(contact_list_t), intent(inout) :: found
     type(contact_place_t), intent(in), optional :: place
 
-    if (gap > 0.0_dp .and. (terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp)) return
     found%n = found%n + 1
     found%source(found%n) = p
     found%gap(found%n) = gap
     found%normal(:, found%n) = normal
-    if (size(found%terms) > 0) found%terms(found%n) = terms
     if (present(place)) found%place(found%n) = place
   end subroutine keep_contact
 

@@ -3,6 +3,7 @@
 !> from a checkpoint.
 module gravier_run_tally
   use gravier_kinds, only: dp, i8
+  use gravier_creeping_groups, only: creep_t
   use gravier_solve, only: solve_report_t, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   implicit none
   private
@@ -43,6 +44,9 @@ module gravier_run_tally
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
     !> steps in which cores of bodies with shapes overlapped, and the most pairs of pieces in one
     integer(i8) :: steps_with_cores = 0, most_cores = 0
+    !> of the solve that stagnated with most contacts that creep, and the largest change over the velocity scale of all such solves
+    type(creep_t) :: creep
+    real(dp) :: worst_creep = 0.0_dp
   contains
     procedure :: add_solve => run_tally_add_solve
     procedure :: add_step => run_tally_add_step
@@ -71,6 +75,8 @@ contains
     select case (solve%status)
     case (solve_stagnated)
       self%stagnated = self%stagnated + 1
+      if (solve%creep%contacts > self%creep%contacts) self%creep = solve%creep
+      if (solve%velocity_scale > 0.0_dp) self%worst_creep = max(self%worst_creep, solve%creep%change/solve%velocity_scale)
     case (solve_unbounded)
       self%unbounded = self%unbounded + 1
     case (solve_exhausted)

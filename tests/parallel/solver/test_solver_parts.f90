@@ -21,6 +21,7 @@ program test_solver_parts
   use gravier_check_schedule, only: check_schedule_t
   use gravier_stagnation, only: stagnation_t
   use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, normals_are_in_vain
+  use gravier_creeping_groups, only: creep_t, find_creep
   use gravier_proximal_law, only: proximal_law_t
   use gravier_newton, only: newton_t
   use gravier_enriched_matrix, only: enriched_matrix_t
@@ -50,6 +51,8 @@ program test_solver_parts
   call test_schedule(.true.)
   call check_vain_impulses()
   call check_stagnation()
+  call check_creep(1)
+  call check_creep(2)
   call check_law(2)
   call check_law(3)
   call check_newton()
@@ -328,19 +331,77 @@ contains
 
   !> A solve has stagnated when waves have run to and fro, six times the depth, and not before; the impulses of a column are not in
   !> vain.
+  !> Two groups in a column of ten: the impulses of the contacts below disks 3 and 4 have grown by 1, the upper one slides, and that
+  !> below disk 9 by 0.8; all others by so little that they do not count. The impulse below disk 3 changes the velocity of disk 2 by
+  !> -1, that below disk 4 that of disk 4 by 1, and disk 3 between them stays.
+  subroutine check_creep(subdomains)
+    integer, intent(in) :: subdomains
+    integer, parameter :: n = 10
+    type(simulation_t) :: sim
+    type(kept_impulses_t), allocatable :: earlier(:), now(:)
+    type(creep_t) :: creep
+    integer :: s, c
+
+    call make_column(n, subdomains, "&solver method = 'nscdd' /", sim)
+    allocate (earlier(size(sim%problem%sub)), now(size(sim%problem%sub)))
+    do s = 1, size(earlier)
+      associate (sub => sim%problem%sub(s))
+        do c = 1, sub%n_contacts
+          sub%impulse(lane_of(c), 1, block_of(c)) = 10.0_dp
+        end do
+        earlier(s)%value = sub%impulse
+        do c = 1, sub%n_contacts
+          associate (r => sub%impulse(lane_of(c), :, block_of(c)))
+            select case (upper_of(sub, c))
+            case (3)
+              r(1) = r(1) + 1.0_dp
+            case (4)
+              r(1) = r(1) + 1.0_dp
+              r(2) = 0.3_dp*r(1)
+              earlier(s)%value(lane_of(c), 2, block_of(c)) = r(2)
+            case (9)
+              r(1) = r(1) + 0.8_dp
+            case default
+              r(1) = r(1) + 1.0e-3_dp
+            end select
+          end associate
+        end do
+        now(s)%value = sub%impulse
+      end associate
+    end do
+    call find_creep(sim%problem, earlier, creep)
+    call check(creep%contacts == 3, "contacts that creep")
+    call check(creep%stuck == 2, "those of them that stick")
+    if (subdomains == 1) then
+      call check(creep%group_contacts == 2, "contacts of the largest group")
+      call check(creep%group_grains == 3, "its grains")
+      call check_close(creep%change, sqrt(2.0_dp/3.0_dp)*(1.0_dp - 1.0e-3_dp), 1.0e-12_dp, "what their velocities change by")
+    else
+      call check(creep%group_contacts >= 1 .and. creep%group_contacts <= 2, "a group is looked for in each subdomain")
+    end if
+    do s = 1, size(now)
+      call check(all(abs(sim%problem%sub(s)%impulse - now(s)%value) <= 0.0_dp), "impulses stay as they are")
+    end do
+    call find_creep(sim%problem, now, creep)
+    call check(creep%contacts == 0, "nothing changes, nothing creeps")
+    call sim%free()
+  end subroutine check_creep
+
   subroutine check_stagnation()
     type(simulation_t) :: sim
     type(stagnation_t) :: stagnation
+    type(creep_t) :: creep
     logical :: due, stagnates, in_vain
 
     call make_column(3, 2, "&solver method = 'nscdd' /", sim)
     call stagnation%note(sim%problem, 10, 1.0_dp, .true., 0.0_dp, due)
     call check(.not. due, "the first figure is a gain")
     call stagnation%note(sim%problem, 5000, 1.0_dp, .true., 0.0_dp, due)
-    call stagnation%judge(sim%problem, 5000, 834, stagnates, in_vain)
+    call stagnation%judge(sim%problem, 5000, 834, stagnates, in_vain, creep)
     call check(.not. stagnates, "5000 iterations are too few for a depth of 834")
-    call stagnation%judge(sim%problem, 5000, 833, stagnates, in_vain)
+    call stagnation%judge(sim%problem, 5000, 833, stagnates, in_vain, creep)
     call check(stagnates .and. .not. in_vain, "and enough for one of 833")
+    call check(creep%contacts == 0, "impulses that stay do not creep")
     call sim%free()
   end subroutine check_stagnation
 

@@ -1,5 +1,5 @@
-!> What contacts of convex pieces are made of: nearest points of simplices, distances and overlaps of cores, polygons cut out of
-!> each other, and the points of edges and faces that lie on each other.
+!> What contacts of convex pieces are made of: nearest points of simplices, distances of cores, polygons cut out of each
+!> other, and the points of edges and faces that lie on each other.
 program test_convex_contact
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -7,7 +7,6 @@ program test_convex_contact
   use gravier_nearest_simplex, only: find_nearest
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, find_support, support_a, support_b, &
     & place_a, place_b
-  use gravier_core_overlap, only: find_least_separation
   use gravier_polygon_clip, only: clip_polygon, room_for_clip
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, edge_number
   use gravier_contact_patch, only: patch_point_t
@@ -33,8 +32,6 @@ program test_convex_contact
   call test_turned_distance()
   call test_needle()
   call test_beyond()
-  call test_overlap()
-  call test_overlap_of_rods()
   call test_clip()
   call test_clip_segment()
   call test_faces()
@@ -295,59 +292,6 @@ contains
     call find_core_distance(box%piece(1), box%piece(1), pair, 4.0_dp, found)
     call check(found%overlap, "cubes that overlap")
   end subroutine test_beyond
-
-  !> Cubes one within the other by a face, and by an edge on an edge.
-  subroutine test_overlap()
-    real(dp), parameter :: depth = 0.2_dp
-    type(core_distance_t) :: found
-    type(placed_pair_t) :: pair
-    type(turn_t) :: turn
-    real(dp) :: way(3)
-
-    way(:) = [0.3_dp, 2*half - depth, 0.1_dp]
-    call put(box, box, way, turn_t(straight), pair)
-    call find_least_separation(box%piece(1), box%piece(1), pair, found)
-    call check_close(found%distance, -depth, tight, "faces: the depth")
-    call check_close(found%normal(2), -1.0_dp, tight, "faces: the normal from the second to the first")
-    call check_close(found%point_a(2) - found%point_b(2), depth, tight, "faces: both ends of the overlap")
-    call check_close(0.5_dp*(found%point_a(2) + found%point_b(2)), half - 0.5_dp*depth, tight, "faces: their middle")
-    ! the second is turned so that an edge of it meets a face of the first
-    turn = about(vec(0.0_dp, 0.0_dp, 1.0_dp), 0.25_dp*pi)
-    call put(box, box, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
-    pair%rotation(:, :) = turn%m
-    way(:) = 0.0_dp
-    way(1) = half + sqrt(2.0_dp)*half - depth
-    pair%way(:) = way
-    call find_least_separation(box%piece(1), box%piece(1), pair, found)
-    call check_close(found%distance, -depth, tight, "an edge in a face: the depth")
-    call check_close(found%normal(1), -1.0_dp, tight, "an edge in a face: the normal")
-    ! edges across each other, each half-way between two faces
-    turn = about(vec(1.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi)
-    pair%rotation(:, :) = turn%m
-    pair%way(1:2) = 2*half - depth/sqrt(2.0_dp)
-    call find_least_separation(box%piece(1), box%piece(1), pair, found)
-    call check_close(found%distance, -depth, 10*tight, "edges: the depth")
-    call check_close(found%normal(1), -sqrt(0.5_dp), tight, "edges: the normal")
-    call check_close(found%normal(2), -sqrt(0.5_dp), tight, "edges: is between the faces")
-  end subroutine test_overlap
-
-  !> Cores without faces.
-  subroutine test_overlap_of_rods()
-    type(core_distance_t) :: found
-    type(placed_pair_t) :: pair
-
-    call put(rod, rod, [0.0_dp, 0.0_dp, 0.0_dp], about(vec(1.0_dp, 0.0_dp, 0.0_dp), 0.5_dp*pi), pair)
-    call find_least_separation(rod%piece(1), rod%piece(1), pair, found)
-    call check_close(found%distance, 0.0_dp, tight, "rods that cross")
-    call check_close(abs(found%normal(1)), 1.0_dp, tight, "are pushed across both")
-    call put(rod, ball, [0.0_dp, 0.0_dp, 0.5_dp], turn_t(straight), pair)
-    call find_least_separation(rod%piece(1), ball%piece(1), pair, found)
-    call check_close(norm2(found%normal), 1.0_dp, tight, "a ball on a rod has a normal")
-    call check_close(found%normal(3), 0.0_dp, tight, "across the rod")
-    call put(ball, ball, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
-    call find_least_separation(ball%piece(1), ball%piece(1), pair, found)
-    call check_close(found%normal(3), 1.0_dp, tight, "balls at one place: the third axis")
-  end subroutine test_overlap_of_rods
 
   !> Area of a polygon, above 0 where it is anticlockwise.
   pure real(dp) function area_of(n, place) result(area)

@@ -1,0 +1,211 @@
+!> The direction in which two convex cores that overlap are least separated: cubes and rods by formulas, random hulls by trying all
+!> axes that can be it.
+program test_core_overlap
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, place_a, place_b
+  use gravier_core_overlap, only: find_least_separation
+  use gravier_polyhedron, only: make_box, make_capsule, make_polyhedron
+  use gravier_shape_library, only: body_shape_t
+  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec
+  use gravier_check, only: check, check_close, finish_checks
+  implicit none
+  real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
+  !> of a cube of edge 2, and the half-edge of its core
+  real(dp), parameter :: rounding = 0.1_dp, half = 1.0_dp - rounding
+  real(dp), parameter :: straight(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
+  type(body_shape_t) :: box, rod, ball
+
+  call make_shapes()
+  call test_overlap()
+  call test_overlap_of_rods()
+  call test_all_axes()
+  call finish_checks()
+
+contains
+
+  !> A cube of edge 2, a capsule of length 2 and radius 0.25 along the third axis, a ball of radius 1.
+  subroutine make_shapes()
+    type(error_t), allocatable :: error
+
+    call make_box("box", [2.0_dp, 2.0_dp, 2.0_dp], rounding, box, error)
+    call make_capsule("rod", 2.0_dp, 0.25_dp, rod, error)
+    call make_capsule("ball", 0.0_dp, 1.0_dp, ball, error)
+    call check(.not. allocated(error), "shapes")
+  end subroutine make_shapes
+
+  subroutine put(shape_a, shape_b, way, turn, pair)
+    type(body_shape_t), intent(in) :: shape_a, shape_b
+    real(dp), intent(in) :: way(3)
+    type(turn_t), intent(in) :: turn
+    type(placed_pair_t), intent(out) :: pair
+
+    pair%radius_a = shape_a%size
+    pair%radius_b = shape_b%size
+    pair%rotation(:, :) = turn%m
+    pair%way(:) = way
+  end subroutine put
+
+  !> Cubes one within the other by a face, and by an edge on an edge.
+  subroutine test_overlap()
+    real(dp), parameter :: depth = 0.2_dp
+    type(core_distance_t) :: found
+    type(placed_pair_t) :: pair
+    type(turn_t) :: turn
+    real(dp) :: way(3)
+
+    way(:) = [0.3_dp, 2*half - depth, 0.1_dp]
+    call put(box, box, way, turn_t(straight), pair)
+    call find_least_separation(box%piece(1), box%piece(1), pair, found)
+    call check_close(found%distance, -depth, tight, "faces: the depth")
+    call check_close(found%normal(2), -1.0_dp, tight, "faces: the normal from the second to the first")
+    call check_close(found%point_a(2) - found%point_b(2), depth, tight, "faces: both ends of the overlap")
+    call check_close(0.5_dp*(found%point_a(2) + found%point_b(2)), half - 0.5_dp*depth, tight, "faces: their middle")
+    ! the second is turned so that an edge of it meets a face of the first
+    turn = about(vec(0.0_dp, 0.0_dp, 1.0_dp), 0.25_dp*pi)
+    call put(box, box, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    pair%rotation(:, :) = turn%m
+    way(:) = 0.0_dp
+    way(1) = half + sqrt(2.0_dp)*half - depth
+    pair%way(:) = way
+    call find_least_separation(box%piece(1), box%piece(1), pair, found)
+    call check_close(found%distance, -depth, tight, "an edge in a face: the depth")
+    call check_close(found%normal(1), -1.0_dp, tight, "an edge in a face: the normal")
+    ! edges across each other, each half-way between two faces
+    turn = about(vec(1.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi)
+    pair%rotation(:, :) = turn%m
+    pair%way(1:2) = 2*half - depth/sqrt(2.0_dp)
+    call find_least_separation(box%piece(1), box%piece(1), pair, found)
+    call check_close(found%distance, -depth, 10*tight, "edges: the depth")
+    call check_close(found%normal(1), -sqrt(0.5_dp), tight, "edges: the normal")
+    call check_close(found%normal(2), -sqrt(0.5_dp), tight, "edges: is between the faces")
+  end subroutine test_overlap
+
+  !> Cores without faces.
+  subroutine test_overlap_of_rods()
+    type(core_distance_t) :: found
+    type(placed_pair_t) :: pair
+
+    call put(rod, rod, [0.0_dp, 0.0_dp, 0.0_dp], about(vec(1.0_dp, 0.0_dp, 0.0_dp), 0.5_dp*pi), pair)
+    call find_least_separation(rod%piece(1), rod%piece(1), pair, found)
+    call check_close(found%distance, 0.0_dp, tight, "rods that cross")
+    call check_close(abs(found%normal(1)), 1.0_dp, tight, "are pushed across both")
+    call put(rod, ball, [0.0_dp, 0.0_dp, 0.5_dp], turn_t(straight), pair)
+    call find_least_separation(rod%piece(1), ball%piece(1), pair, found)
+    call check_close(norm2(found%normal), 1.0_dp, tight, "a ball on a rod has a normal")
+    call check_close(found%normal(3), 0.0_dp, tight, "across the rod")
+    call put(ball, ball, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call find_least_separation(ball%piece(1), ball%piece(1), pair, found)
+    call check_close(found%normal(3), 1.0_dp, tight, "balls at one place: the third axis")
+  end subroutine test_overlap_of_rods
+
+  !> Random hulls that overlap, beside all axes: normals of faces, and common normals of every two edges in both directions.
+  !> Where the hulls are apart the axis of least separation may be another one.
+  subroutine test_all_axes()
+    type(draws_t) :: draws
+    type(vector_t) :: u
+    type(error_t), allocatable :: error
+    type(body_shape_t) :: hull(6), bar
+    type(placed_pair_t) :: pair
+    type(core_distance_t) :: found
+    real(dp) :: points(3, 14), way(3), best, worst
+    integer :: k, p, trial, by_edges
+    logical :: edges
+
+    draws%seed = 11
+    do k = 1, size(hull)
+      do p = 1, size(points, 2)
+        u = draws%direction()
+        points(1, p) = u%x(1)
+        points(2, p) = 0.8_dp*u%x(2)
+        points(3, p) = 0.5_dp*u%x(3)
+      end do
+      call make_polyhedron("hull", points(:, 1:4 + 2*k - 2), 0.01_dp, hull(k), error)
+      call check(.not. allocated(error), "hulls")
+    end do
+    call make_capsule("bar", 1.2_dp, 0.05_dp, bar, error)
+    worst = 0.0_dp
+    by_edges = 0
+    do trial = 1, 600
+      u = draws%direction()
+      associate (a => hull(1 + modulo(trial, 6)), b => hull(1 + modulo(trial/6, 6)))
+        way(:) = draws%between(0.0_dp, 0.6_dp)*u%x
+        call put(a, b, way, random_turn(draws), pair)
+        call find_least_separation(a%piece(1), b%piece(1), pair, found)
+        call try_all_axes(a%piece(1), b%piece(1), pair, best, edges)
+        if (best < 0.0_dp) worst = max(worst, abs(found%distance - best))
+        if (edges .and. best < 0.0_dp) by_edges = by_edges + 1
+        way(:) = 0.3_dp*u%x
+        call put(a, bar, way, random_turn(draws), pair)
+        call find_least_separation(a%piece(1), bar%piece(1), pair, found)
+        call try_all_axes(a%piece(1), bar%piece(1), pair, best, edges)
+        if (best < 0.0_dp) worst = max(worst, abs(found%distance - best))
+      end associate
+    end do
+    call check_close(worst, 0.0_dp, 1.0e-12_dp, "no axis separates more")
+    call check(by_edges > 50, "some of them are common normals of edges")
+  end subroutine test_all_axes
+
+  !> The greatest separation of all axes that can be it.
+  subroutine try_all_axes(a, b, pair, best, edges)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    real(dp), intent(out) :: best
+    !> whether it is that of two edges, clearly more than that of any face
+    logical, intent(out) :: edges
+    real(dp) :: u(3), v(3), n(3), of_faces
+    integer :: f, i, j, k, l
+
+    best = -huge(1.0_dp)
+    do f = 1, size(a%face_normal, 2)
+      n(:) = -a%face_normal(:, f)
+      best = max(best, separation(a, b, pair, n))
+    end do
+    do f = 1, size(b%face_normal, 2)
+      n(:) = matmul(pair%rotation, b%face_normal(:, f))
+      best = max(best, separation(a, b, pair, n))
+    end do
+    of_faces = best
+    do i = 1, size(a%vertex, 2)
+      do k = a%neighbour_first(i), a%neighbour_first(i + 1) - 1
+        u(:) = a%vertex(:, a%neighbour(k)) - a%vertex(:, i)
+        do j = 1, size(b%vertex, 2)
+          do l = b%neighbour_first(j), b%neighbour_first(j + 1) - 1
+            n(:) = b%vertex(:, b%neighbour(l)) - b%vertex(:, j)
+            v(:) = matmul(pair%rotation, n)
+            n(1) = u(2)*v(3) - u(3)*v(2)
+            n(2) = u(3)*v(1) - u(1)*v(3)
+            n(3) = u(1)*v(2) - u(2)*v(1)
+            if (norm2(n) <= 1.0e-6_dp*norm2(u)*norm2(v)) cycle
+            n(:) = n/norm2(n)
+            best = max(best, separation(a, b, pair, n))
+          end do
+        end do
+      end do
+    end do
+    edges = best > of_faces + 1.0e-6_dp
+  end subroutine try_all_axes
+
+  !> How far a lies beyond b along an axis, below 0 where they overlap.
+  real(dp) function separation(a, b, pair, n)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    real(dp), intent(in) :: n(3)
+    real(dp) :: x(3), low, high
+    integer :: v
+
+    low = huge(1.0_dp)
+    do v = 1, size(a%vertex, 2)
+      call place_a(a, pair, v, x)
+      low = min(low, dot_product(n, x))
+    end do
+    high = -huge(1.0_dp)
+    do v = 1, size(b%vertex, 2)
+      call place_b(b, pair, v, x)
+      high = max(high, dot_product(n, x))
+    end do
+    separation = low - high
+  end function separation
+
+end program test_core_overlap
