@@ -35,6 +35,9 @@ program test_given_impulses
     call test_round_trip(dimension, 7, "friction = 0.3")
     call test_round_trip(dimension, 7, "friction = 0.0")
     call test_round_trip(dimension, 5, "friction = 0.3, rolling_friction = 0.1")
+    ! attractions of 0.25 N s, so that some forces pull
+    call test_round_trip(dimension, 3, "&"//newline//"&material name = 'wet' /"//newline// &
+      & "&law materials = 'wet', 'wet', kind = 'adhesive', friction = 0.3, adhesion = 0.5, adhesion_range = 0.07 /")
     call test_no_match(dimension)
   end do
   call finish_checks()
@@ -51,12 +54,19 @@ contains
     type(config_t) :: config
     type(error_t), allocatable :: error
     type(step_figures_t) :: figures
-    character(len=:), allocatable :: lattice
+    character(len=:), allocatable :: lattice, keys, groups
 
+    ! keys of &scene, or further groups
+    keys = law
+    groups = ""
+    if (law(1:1) == "&") then
+      keys = "friction = 0.0"
+      groups = law(2:)
+    end if
     lattice = "lattice_count = 9, 8, gravity = 0, 0"
     if (dimension == 3) lattice = "lattice_count = 5, 4, 4, gravity = 0, 0, 0"
     call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', "//lattice// &
-      & ", radius_min = 0.05, radius_max = 0.1, alert_distance = 0.07, "//law//" /"//newline// &
+      & ", radius_min = 0.05, radius_max = 0.1, alert_distance = 0.07, "//keys//" /"//groups//newline// &
       & "&time step = 0.5, steps = 2 / &solver method = 'nscdd' /"//newline// &
       & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
     call check(.not. allocated(error), "configuration")
