@@ -64,7 +64,7 @@ def one_step(place, groups, momentum, layered, method="nlgs", subdomains=1, most
     history = read_history(place / "results")
     scale = float(history["velocity_scale"][0])
     if not looks:
-        layers = re.search(r"passes cost as much as (\d+) sweeps", (place / "results/run.log").read_text(encoding="utf-8"))
+        layers = re.search(r"the passes took as much work as (\d+) sweeps", (place / "results/run.log").read_text(encoding="utf-8"))
         return {"iterations": int(history["iterations"][0]), "pass": int(layers.group(1)) if layers else 0,
                 "error": float(history["velocity_error"][0]) / scale,
                 "residual": float(history["residual"][0]), "converged": int(history["converged"][0])}

@@ -64,7 +64,7 @@ contains
     if (bytes < 0) amount = amount + 2.0_dp**bit_size(bytes)
     call get_command_argument(0, program_name)
     write (error_unit, "(a)") trim(program_name(index(program_name, "/", back=.true.) + 1:))//": error: out of memory: "// &
-      & bytes_text(amount)//" cannot be had; more ranks on more machines share a scene out"
+      & bytes_text(amount)//" could not be allocated; use more ranks on more machines"
     flush (error_unit)
     n_ranks = 1
     call MPI_Initialized(started)

@@ -91,8 +91,8 @@ contains
         text = text//newline
       end if
       if (tally%steps_with_cores > 0) text = text//indent//"in "//to_text(tally%steps_with_cores)//" of "//to_text(tally%steps)// &
-        & " steps bodies lay in each other by more than their roundings, at most "// &
-        & to_text(tally%most_cores)//" pairs in one"//newline
+        & " steps bodies overlapped by more than their roundings, in one step at most "// &
+        & to_text(tally%most_cores)//" pairs"//newline
     end associate
   end function overlap_lines
 
@@ -138,7 +138,7 @@ contains
     text = ""
     if (tally%tried_layers == 0) return
     text = "layers      "//counted(tally%tried_layers, "solve")//" made a pass over layers, "//to_text(tally%took_layers)// &
-      & " of them continued from it; passes cost as much as "//counted(nint(tally%layered_sweeps, i8), "sweep")//newline
+      & " of them continued from it; the passes took as much work as "//counted(nint(tally%layered_sweeps, i8), "sweep")//newline
   end function layer_line
 
   !> What still changed in solves that stagnated; nothing where none did, or no contact has friction.

@@ -101,7 +101,7 @@ contains
       if (simulation%failed > 0) then
         text = text//": "//counted(int(simulation%failed, i8), "solve")//" did not reach the "//goal_name(simulation)//" itself"
       else if (least < 0.0_dp) then
-        text = text//": the solves do not show how errors decay"
+        text = text//": the solves ended too soon to show how errors decrease"
       else
         text = text//", if solves reach it"
       end if

@@ -364,7 +364,7 @@ contains
     associate (scale => simulation%velocity_scale)
       if (scale%kind == self%scale_kind) return
       self%scale_kind = scale%kind
-      call warn(self, note_scale, 1_i8, "scale       from step "//to_text(simulation%step)//" on the error of a solve is "// &
+      call warn(self, note_scale, 1_i8, "scale       from step "//to_text(simulation%step)//" on velocity errors are "// &
         & "compared with U = "//to_text(scale%value, 3)//" m/s ("//trim(scale%kind)//")", error)
     end associate
   end subroutine note_velocity_scale
@@ -379,7 +379,7 @@ contains
     if (figures%divided) call warn(self, note_balance, 1_i8, "balance     "// &
       & balance_text(figures%rank_balance, figures%subdomain_balance)//", until this partition", error)
     if (figures%refused) call warn(self, warn_partition, 1_i8, "warning     the grains fill fewer cells than there are "// &
-      & "subdomains: the old partition stays", error)
+      & "subdomains, and the old partition is kept", error)
     if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "//to_text(figures%fast)// &
       & " grains move by more than their radius in step "//to_text(simulation%step), error)
     if (simulation%tally%stiffest > 2.0_dp*self%told_stiffest) then

@@ -172,15 +172,15 @@ contains
       rest = seconds - effort%seconds
       if (simulation%comm%size > simulation%decomposition%n_subdomains) then
         text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
-          & to_text(simulation%comm%size)//" ranks own no subdomain and wait: as many &decomposition subdomains, now "// &
-          & to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
+          & to_text(simulation%comm%size)//" ranks own no subdomain and wait: choose as many &decomposition "// &
+          & "subdomains as ranks, now "//to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
       else if (phases(phase_output) > half .and. config%output%every > 0) then
-        text = "output takes most of it: a larger &output every, now "//to_text(config%output%every)
+        text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
-        text = "solves that give up take most iterations: another &solver method or a smaller &time step may let them reach "// &
-          & "the "//goal_name(simulation)
+        text = "solves that do not converge take most of the iterations: another &solver method or a smaller "// &
+          & "&time step may let them reach the "//goal_name(simulation)
       else if (overlaps_grew(simulation)) then
-        text = "nothing yet: overlaps grow, and need a smaller &time step or &solver "//goal_name(simulation)//" first"
+        text = "nothing yet: overlaps grow; first choose a smaller &time step or &solver "//goal_name(simulation)
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then
         text = "ten times the "//goal_name(simulation)//": "//duration_text(rest + looser_seconds(2))//" to "// &
           & duration_text(rest + looser_seconds(3))//" in all (estimated)"

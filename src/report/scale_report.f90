@@ -62,7 +62,7 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
-    text = "            error of a solve is compared with U = "//figure(simulation%velocity_scale%value)//" m/s ("// &
+    text = "            velocity errors are compared with U = "//figure(simulation%velocity_scale%value)//" m/s ("// &
       & trim(simulation%velocity_scale%kind)//")"//newline
   end function error_scale_line
 

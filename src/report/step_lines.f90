@@ -104,7 +104,7 @@ contains
     if (solver%criterion == "error") then
       text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solver%criterion == "residual" .and. solve%status == solve_unbounded .and. solve%residual <= solver%tolerance) then
-      text = "impulses larger than any loads can make"
+      text = "impulses exceed what any loads can cause"
     else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
       text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solve%violation > solve%violation_allowed .and. (solve%status == solve_unbounded .or. &

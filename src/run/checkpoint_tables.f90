@@ -132,7 +132,7 @@ contains
     call file%read_table("cells", simulation%decomposition%n_subdomains, 1, records, counts, error)
     if (allocated(error)) return
     if (.not. is_sound_head(head, simulation%decomposition%nd, simulation%decomposition%n_subdomains)) &
-      & call raise(error, status_input, path//": the array partition is none of this scene in "// &
+      & call raise(error, status_input, path//": the array partition does not fit this scene in "// &
       & to_text(simulation%decomposition%n_subdomains)//" subdomains: the file is damaged")
     if (allocated(error)) return
     words = records(1, :)

@@ -111,9 +111,9 @@ class Found(RunTestCase):
                 file[name].attrs["checksum"] = np.int64(checksum.checksum(values))
             return damage
         nan = np.array(np.nan).view("i8")
-        self.refuse("checkpoint.h5", changed("arrays/partition", 4, 2**31), "partition is none of this scene in 2 subdomains")
-        self.refuse("checkpoint.h5", changed("arrays/partition", 7, 2**31 - 1), "partition is none of this scene in 2 subdomains")
-        self.refuse("checkpoint.h5", changed("arrays/partition", 12, nan), "partition is none of this scene")
+        self.refuse("checkpoint.h5", changed("arrays/partition", 4, 2**31), "partition does not fit this scene in 2 subdomains")
+        self.refuse("checkpoint.h5", changed("arrays/partition", 7, 2**31 - 1), "partition does not fit this scene in 2 subdomains")
+        self.refuse("checkpoint.h5", changed("arrays/partition", 12, nan), "partition does not fit this scene")
         self.refuse("checkpoint.h5", changed("arrays/boundaries", 3, nan), "the array boundaries: a number of at most 1e30", " was expected: the file is damaged")
         self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 3), 99), "table grains: grain")
         self.refuse("checkpoint.h5", changed("tables/grains/records", (0, 6), nan), "table grains: grain", "a value of position that no grain has", "the file is damaged")

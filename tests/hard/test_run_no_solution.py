@@ -60,7 +60,7 @@ class NoSolution(RunTestCase):
         for (name, method, ranks, *_), run in zip(jobs, each(self.play, jobs)):
             with self.subTest(name, method=method, ranks=ranks):
                 self.assert_status(run, 3)
-                self.assertIn("NOT CONVERGED: impulses larger than any loads can make", run.stdout)
+                self.assertIn("NOT CONVERGED: impulses exceed what any loads can cause", run.stdout)
                 self.assertIn("no solution found: loads grow without bound in step", run.stdout)
                 self.assertEqual(run.history()["converged"][-1], 0)
 

@@ -149,7 +149,7 @@ class TooLarge(RunTestCase):
                 with self.subTest(ranks=ranks, at=at):
                     said = [line for line in ended.stderr.splitlines() if "gravier: error: " in line]
                     self.assertEqual((ended.returncode, len(said)), (4, 1), ended)
-                    self.assertRegex(said[0], r"gravier: error: out of memory: [\d.]+ kB cannot be had; ")
+                    self.assertRegex(said[0], r"gravier: error: out of memory: [\d.]+ kB could not be allocated; ")
                     self.assertNotIn("Segmentation", ended.stderr)
 
 

@@ -163,7 +163,7 @@ class LastWords(RunTestCase):
         run = run_case(merged(self.rest, {"time": {"steps": 200}, "scene": {"overlap_projection": False},
                                           "solver": {"criterion": "residual", "tolerance": 0.3, "warm_start": False}}), 1, self.here("sinks"))
         self.assert_status(run, 0)
-        self.assertRegex(line(run, "to halve it"), r"^to halve it nothing yet: overlaps grow, and need a smaller &time step or &solver tolerance first$")
+        self.assertRegex(line(run, "to halve it"), r"^to halve it nothing yet: overlaps grow; first choose a smaller &time step or &solver tolerance$")
 
     def test_scales(self):
         """The log names the velocity scale after the first step and when another kind comes; the end has the range. In free fall loads
@@ -173,7 +173,7 @@ class LastWords(RunTestCase):
                         "boundary": {"shape": "plane", "normal": [0.0, 1.0], "velocity": [0.0, 0.0]},
                         "time": {"step": 1e-3, "steps": 400}, "output": {"directory": "results", "every": 0}}, 1, self.here("scales"))
         self.assert_status(run, 0)
-        said = re.findall(r"^scale       from step (\d+) on the error of a solve is compared with U = (\S+) m/s \((.*?)\)", run.stdout, re.M)
+        said = re.findall(r"^scale       from step (\d+) on velocity errors are compared with U = (\S+) m/s \((.*?)\)", run.stdout, re.M)
         self.assertEqual((said[0][0], said[0][2]), ("1", "load of a step"))
         self.assertAlmostEqual(float(said[0][1]), 9.81e-3, delta=1e-5)
         self.assertIn("motion of the bodies", [kind for _, _, kind in said])
@@ -207,7 +207,7 @@ class LastWords(RunTestCase):
                  "time": {"step": 1e-3, "steps": 3}, "solver": {"warm_start": False}, "output": {"directory": "results"}}
         write(self.here("tower.csv"), "id,x,y,radius\n" + "".join(f"{k},0,{0.1 * k - 0.05},0.05\n" for k in range(1, 61)))
         run = run_case(tower, 1, self.here("layers"))
-        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, [0-3] of them continued from it; passes cost as much as \d+ sweeps\n")
+        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, [0-3] of them continued from it; the passes took as much work as \d+ sweeps\n")
         none = run_case(merged(tower, {"solver": {"layered_start": False}}), 1, self.here("no layers"))
         self.assertNotIn("\nlayers  ", none.stdout)
 

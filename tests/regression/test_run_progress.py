@@ -152,12 +152,12 @@ class Progress(RunTestCase):
         idle = run_case(residual, 2, self.here("idle"))
         self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-04; [\d.]+ iterations a solve\n")
         self.assertRegex(idle.stdout, r"\ntime        [\d.]+ s, [\d.]+ m?s a step: [a-z]+.* \d+ %")
-        self.assertIn("\nto halve it 1 of 2 ranks own no subdomain and wait: as many &decomposition subdomains, now 1, or fewer ranks", idle.stdout)
+        self.assertIn("\nto halve it 1 of 2 ranks own no subdomain and wait: choose as many &decomposition subdomains as ranks, now 1, or fewer ranks", idle.stdout)
         lost = run_case(merged(residual, {"time": {"steps": 5}, "solver": {"tolerance": 1e-16, "max_iterations": 3000},
                                           "output": {"every": 0}}), 1, self.here("lost"))
         said = re.search(r"\nconverged   NO: 5 of 5 solves did not reach the tolerance 1.00E-16; at worst (\S+); ", lost.stdout)
         self.assertTrue(said, lost.stdout)
         self.assertAlmostEqual(float(said[1]) / lost.history()["residual"].max(), 1.0, delta=0.01)
-        self.assertIn("\nto halve it solves that give up take most iterations: another &solver method or a smaller &time step may let them "
+        self.assertIn("\nto halve it solves that do not converge take most of the iterations: another &solver method or a smaller &time step may let them "
                       "reach the tolerance\n", lost.stdout)
         self.assertRegex(lost.stdout, r"(?m)^case        case\.nml$")

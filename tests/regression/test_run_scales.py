@@ -69,7 +69,7 @@ class Scales(RunTestCase):
         text = self.check_case(LATTICE)
         self.figures(text, rf"scales      mean diameter d = {NUMBER} m; g h = {NUMBER} m/s, {NUMBER} mean diameters a step; sqrt\(g d\) = {NUMBER} m/s",
                      2 * RADIUS, G * 1e-3, G * 1e-6 / (2 * RADIUS), math.sqrt(2 * G * RADIUS))
-        self.figures(text, rf"error of a solve is compared with U = {NUMBER} m/s \(load of a step\)", G * 1e-3)
+        self.figures(text, rf"velocity errors are compared with U = {NUMBER} m/s \(load of a step\)", G * 1e-3)
         self.assertEqual(self.warnings(text), [])
         # what the libraries of a process take differs from time to time
         memory = r"about \d+ MiB at most on a rank"
@@ -83,7 +83,7 @@ class Scales(RunTestCase):
         self.figures(text, rf"rate {NUMBER} 1/s by 'lid', rate d = {NUMBER} m/s; inertial number I = {NUMBER}",
                      rate, rate * 2 * RADIUS, rate * 2 * RADIUS / speed)
         self.figures(text, rf"fastest boundary 'lid': {NUMBER} m/s, {NUMBER} mean radii a step", 2e-3, 2e-3 * 1e-3 / RADIUS)
-        self.figures(text, rf"error of a solve is compared with U = {NUMBER} m/s \(drive\)", 2e-3)
+        self.figures(text, rf"velocity errors are compared with U = {NUMBER} m/s \(drive\)", 2e-3)
         self.assertNotIn("g h", text)
 
     def test_ranks(self):

@@ -87,7 +87,7 @@ class Estimates(RunTestCase):
         self.check("shear", case, (1.0, 0.1), 1, acceleration="none")
         self.assert_most_hold()
         run = run_case(merged(case, {"solver": {"accuracy": 0.1, "tolerance": 0.01, "acceleration": "none"}}), directory=self.here("fast"))
-        self.assertIn("at a tenth of the accuracy not known: the solves do not show how errors decay\n", run.stdout)
+        self.assertIn("at a tenth of the accuracy not known: the solves ended too soon to show how errors decrease\n", run.stdout)
 
 
 class Lines(RunTestCase):

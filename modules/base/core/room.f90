@@ -59,7 +59,7 @@ contains
     if (allocated(error)) return
     trial = c_calloc(int(n, c_size_t), int(bytes_each, c_size_t))
     if (n > 0 .and. .not. c_associated(trial)) then
-      call raise(error, status_failure, what//": out of memory: "//bytes_text(real(n, dp)*bytes_each)//" cannot be had")
+      call raise(error, status_failure, what//": out of memory: "//bytes_text(real(n, dp)*bytes_each)//" could not be allocated")
       return
     end if
     call c_free(trial)

@@ -9,7 +9,7 @@ module gravier_contact_feature
 
   !> Where a piece is: its lengths times a radius, its axes as columns, its centre [m].
   type :: placement_t
-    real(dp) :: radius, rotation(3, 3), centre(3)
+    real(dp) :: radius = 1.0_dp, rotation(3, 3) = 0.0_dp, centre(3) = 0.0_dp
   end type placement_t
 
   !> A part of a piece: a vertex, an edge or a face.
@@ -20,11 +20,15 @@ module gravier_contact_feature
     integer :: vertex = 0, other = 0
     !> corners
     integer :: n = 1
+    !> where its piece is; `find_feature` leaves it to its caller
+    type(placement_t) :: at
   end type feature_t
 
-  !> Axes across a common normal, and where their origin is.
+  !> Axes across a common normal, where their origin is, and up to which gap points count in it.
   type :: frame_t
     real(dp) :: origin(3), normal(3), first(3), second(3)
+    !> points whose gap is this or more are no contacts [m]
+    real(dp) :: alert = 0.0_dp
   end type frame_t
 
   !> a face or edge within this angle of the plane of contact is one that the other piece touches as a whole: its sine and cosine
@@ -117,9 +121,8 @@ contains
 
   !> Corners of a face or an edge in the axes of a frame, blended: between those of the core and the sharp ones, the nearer to these the
   !> more a side lies in the plane of contact.
-  pure subroutine lay_out_feature(piece, at, feature, frame, m, vertex, place)
+  pure subroutine lay_out_feature(piece, feature, frame, m, vertex, place)
     type(convex_piece_t), intent(in) :: piece
-    type(placement_t), intent(in) :: at
     type(feature_t), intent(in) :: feature
     type(frame_t), intent(in) :: frame
     !> corners: those of the feature, but for some that blending has put inside
@@ -138,7 +141,7 @@ contains
       vertex(1) = min(feature%vertex, feature%other)
       vertex(2) = max(feature%vertex, feature%other)
     end if
-    call turn_back(at, frame%normal, along)
+    call turn_back(feature%at, frame%normal, along)
     do k = 1, m
       side(:, k) = piece%vertex(:, vertex(mod(k, m) + 1)) - piece%vertex(:, vertex(k))
       sine(k) = sine_of(side(:, k), along)
@@ -153,7 +156,7 @@ contains
           call blend_along(piece, vertex(k), side(:, k), sine(k), x)
         end if
       end if
-      call place_point(at, x, y)
+      call place_point(feature%at, x, y)
       y(:) = y - frame%origin
       place(1, k) = dot_product(y, frame%first)
       place(2, k) = dot_product(y, frame%second)

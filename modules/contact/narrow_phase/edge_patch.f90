@@ -2,7 +2,7 @@
 module gravier_edge_patch
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
-  use gravier_contact_feature, only: placement_t, feature_t, frame_t, lay_out_feature, edge_number
+  use gravier_contact_feature, only: feature_t, frame_t, lay_out_feature, edge_number
   use gravier_contact_patch, only: patch_point_t, add_point
   use gravier_manifold, only: feature_base
   implicit none
@@ -18,20 +18,18 @@ contains
 
   !> Both ends of the stretch where the edges lie side by side, with the gaps that they have there. No point where edges cross at a
   !> large angle or lie one behind the other.
-  pure subroutine add_edge_points(a, b, at_a, at_b, feature_a, feature_b, frame, alert, n, point)
+  pure subroutine add_edge_points(a, b, feature_a, feature_b, frame, n, point)
     type(convex_piece_t), intent(in) :: a, b
-    type(placement_t), intent(in) :: at_a, at_b
     !> edges
     type(feature_t), intent(in) :: feature_a, feature_b
     type(frame_t), intent(in) :: frame
-    real(dp), intent(in) :: alert
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
     real(dp) :: x(3, 2), y(3, 2), along(2), s(2), t(2), ends(2), room, sense
     integer :: v(2), w(2), k, p, q, key
 
-    call lay_out_feature(a, at_a, feature_a, frame, k, v, x)
-    call lay_out_feature(b, at_b, feature_b, frame, k, w, y)
+    call lay_out_feature(a, feature_a, frame, k, v, x)
+    call lay_out_feature(b, feature_b, frame, k, w, y)
     call find_common_line(x, y, along)
     if (.not. dot_product(along, along) > 0.0_dp) return
     do k = 1, 2
@@ -40,7 +38,7 @@ contains
     end do
     ends(1) = max(minval(s), minval(t))
     ends(2) = min(maxval(s), maxval(t))
-    room = equal*min(at_a%radius, at_b%radius)
+    room = equal*min(feature_a%at%radius, feature_b%at%radius)
     if (ends(2) - ends(1) <= room) return
     do k = 1, 2
       sense = 2*k - 3
@@ -52,7 +50,7 @@ contains
       else
         key = edge_number(a, v(1), v(2))*feature_base + w(q) - 1
       end if
-      call add_point(point_at(ends(k), key), alert, min(at_a%radius, at_b%radius), n, point)
+      call add_point(point_at(ends(k), key), frame%alert, min(feature_a%at%radius, feature_b%at%radius), n, point)
     end do
 
   contains
@@ -67,8 +65,8 @@ contains
       on_a(:) = x(:, 1) + (place - s(1))/(s(2) - s(1))*(x(:, 2) - x(:, 1))
       on_b(:) = y(:, 1) + (place - t(1))/(t(2) - t(1))*(y(:, 2) - y(:, 1))
       way(:) = on_a - on_b
-      reach_a = at_a%radius*a%rounding
-      reach_b = at_b%radius*b%rounding
+      reach_a = feature_a%at%radius*a%rounding
+      reach_b = feature_b%at%radius*b%rounding
       ! what of the way is along the normal may be below 0: by blending, or where cores overlap
       new%gap = sqrt(way(1)**2 + way(2)**2 + max(way(3), 0.0_dp)**2) + min(way(3), 0.0_dp) - reach_a - reach_b
       new%place(:) = 0.5_dp*(on_a + on_b)

@@ -2,7 +2,7 @@
 module gravier_face_patch
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
-  use gravier_contact_feature, only: placement_t, feature_t, frame_t, lay_out_feature, edge_number, face_number
+  use gravier_contact_feature, only: feature_t, frame_t, lay_out_feature, edge_number, face_number
   use gravier_contact_patch, only: patch_point_t, add_point
   use gravier_manifold, only: feature_base
   use gravier_polygon_clip, only: clip_polygon, room_for_clip
@@ -24,12 +24,10 @@ module gravier_face_patch
 contains
 
   !> Add the corners of the common part of two features, of which one at least is a face and the other an edge or a face.
-  pure subroutine add_face_points(a, b, at_a, at_b, feature_a, feature_b, frame, alert, n, point)
+  pure subroutine add_face_points(a, b, feature_a, feature_b, frame, n, point)
     type(convex_piece_t), intent(in) :: a, b
-    type(placement_t), intent(in) :: at_a, at_b
     type(feature_t), intent(in) :: feature_a, feature_b
     type(frame_t), intent(in) :: frame
-    real(dp), intent(in) :: alert
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
     real(dp) :: x(3, feature_a%n), y(3, feature_b%n), room
@@ -38,10 +36,10 @@ contains
     type(laid_out_t) :: plane_a, plane_b
     type(patch_point_t) :: new
 
-    call lay_out_feature(a, at_a, feature_a, frame, na, v, x)
-    call lay_out_feature(b, at_b, feature_b, frame, nb, w, y)
-    call find_plane(a, at_a, feature_a, frame, x, plane_a)
-    call find_plane(b, at_b, feature_b, frame, y, plane_b)
+    call lay_out_feature(a, feature_a, frame, na, v, x)
+    call lay_out_feature(b, feature_b, frame, nb, w, y)
+    call find_plane(a, feature_a, frame, x, plane_a)
+    call find_plane(b, feature_b, frame, y, plane_b)
     ! seen along the normal, faces of a turn the other way round than those of b
     if (feature_b%n > 2) then
       call clip_polygon(x(:, 1:na), y(:, 1:nb), 1.0_dp, m, place, label)
@@ -49,9 +47,9 @@ contains
       call clip_polygon(y(:, 1:nb), x(:, 1:na), -1.0_dp, m, place, label)
       label(1:m) = -label(1:m)
     end if
-    room = equal*min(at_a%radius, at_b%radius)
-    reach_a = at_a%radius*a%rounding
-    reach_b = at_b%radius*b%rounding
+    room = equal*min(feature_a%at%radius, feature_b%at%radius)
+    reach_a = feature_a%at%radius*a%rounding
+    reach_b = feature_b%at%radius*b%rounding
     do k = 1, m
       call name_corner(label(merge(m, k - 1, k == 1)), label(k), x(:, 1:na), y(:, 1:nb), room, place(:, k), key)
       if (key(1) > 0 .and. key(2) > 0) then
@@ -62,16 +60,15 @@ contains
       new%place(1:2) = place(:, k)
       new%place(3) = 0.5_dp*(height_a - reach_a + height_b + reach_b)
       new%gap = height_a - height_b - reach_a - reach_b
-      if (.not. new%gap < alert) cycle
+      if (.not. new%gap < frame%alert) cycle
       new%key = number_of(a, v(1:na), plane_a, key(1))*feature_base + number_of(b, w(1:nb), plane_b, key(2))
-      call add_point(new, alert, min(at_a%radius, at_b%radius), n, point)
+      call add_point(new, frame%alert, min(feature_a%at%radius, feature_b%at%radius), n, point)
     end do
   end subroutine add_face_points
 
   !> Height and slope of the plane of a face, or of the line of an edge.
-  pure subroutine find_plane(piece, at, feature, frame, x, plane)
+  pure subroutine find_plane(piece, feature, frame, x, plane)
     type(convex_piece_t), intent(in) :: piece
-    type(placement_t), intent(in) :: at
     type(feature_t), intent(in) :: feature
     type(frame_t), intent(in) :: frame
     !> corners in the frame (3, n)
@@ -81,19 +78,17 @@ contains
     integer :: k
 
     if (feature%face > 0) then
-      associate (u => piece%face_normal(:, feature%face))
+      associate (u => piece%face_normal(:, feature%face), x => piece%vertex(:, feature%vertex), at => feature%at)
         do k = 1, 3
           normal(k) = at%rotation(k, 1)*u(1) + at%rotation(k, 2)*u(2) + at%rotation(k, 3)*u(3)
+          ! the vertex of the nearest points lies in the face, so that the gap there is exact
+          core(k) = at%centre(k) - frame%origin(k) + at%radius*(at%rotation(k, 1)*x(1) + at%rotation(k, 2)*x(2) + &
+            & at%rotation(k, 3)*x(3))
         end do
       end associate
       plane%slope(1) = -dot_product(normal, frame%first)/dot_product(normal, frame%normal)
       plane%slope(2) = -dot_product(normal, frame%second)/dot_product(normal, frame%normal)
       plane%number = face_number(piece, feature%face)
-      ! the vertex of the nearest points lies in the face, so that the gap there is exact
-      do k = 1, 3
-        core(k) = at%centre(k) - frame%origin(k) + at%radius*(at%rotation(k, 1)*piece%vertex(1, feature%vertex) + &
-          & at%rotation(k, 2)*piece%vertex(2, feature%vertex) + at%rotation(k, 3)*piece%vertex(3, feature%vertex))
-      end do
       way(1) = dot_product(core, frame%first)
       way(2) = dot_product(core, frame%second)
       plane%height = dot_product(core, frame%normal) - dot_product(plane%slope, way)

@@ -86,7 +86,8 @@ contains
     call make_facet_piece(sheet)
     along(:) = -found%normal
     call find_feature(a, along, found%vertex_a(1:found%n), feature_a)
-    call make_frame(found, frame)
+    feature_a%at = at
+    call make_frame(found, alert, frame)
     n = 0
     do f = 1, size(corner, 3)
       call set_facet_piece(corner(:, :, f), radius, sheet)
@@ -99,7 +100,8 @@ contains
       if (feature_a%n == 1) exit
       if (feature_b%face == 0) cycle
       m = 0
-      call add_face_points(a, sheet, at, at, feature_a, feature_b, frame, alert, m, part)
+      feature_b%at = at
+      call add_face_points(a, sheet, feature_a, feature_b, frame, m, part)
       do k = 1, m
         part(k)%key = name_in_plane(part(k)%key, f)
         call add_point(part(k), alert, radius, n, point)

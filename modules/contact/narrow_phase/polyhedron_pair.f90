@@ -71,29 +71,30 @@ contains
     real(dp), intent(in) :: alert
     integer, intent(in) :: most
     type(manifold_t), intent(inout) :: manifold
-    type(placement_t) :: at_a, at_b
+    type(placement_t) :: at_b
     type(feature_t) :: feature_a, feature_b
     type(frame_t) :: frame
     type(patch_point_t) :: point(2*(largest_face(a) + largest_face(b)) + 1), exact
     real(dp) :: along(3), rounding(2)
     integer :: n
 
-    at_a = placement_t(pair%radius_a, unturned, origin)
-    at_b = placement_t(pair%radius_b, pair%rotation, pair%way)
     rounding(1) = pair%radius_a*a%rounding
     rounding(2) = pair%radius_b*b%rounding
     along(:) = -found%normal
     call find_feature(a, along, found%vertex_a(1:found%n), feature_a)
+    feature_a%at = placement_t(pair%radius_a, unturned, origin)
+    at_b = placement_t(pair%radius_b, pair%rotation, pair%way)
     call turn_back(at_b, found%normal, along)
     call find_feature(b, along, found%vertex_b(1:found%n), feature_b)
-    call make_frame(found, frame)
+    feature_b%at = at_b
+    call make_frame(found, alert, frame)
     n = 0
     associate (scale => min(pair%radius_a, pair%radius_b))
       if (feature_a%n > 1 .and. feature_b%n > 1) then
         if (feature_a%n == 2 .and. feature_b%n == 2) then
-          call add_edge_points(a, b, at_a, at_b, feature_a, feature_b, frame, alert, n, point)
+          call add_edge_points(a, b, feature_a, feature_b, frame, n, point)
         else
-          call add_face_points(a, b, at_a, at_b, feature_a, feature_b, frame, alert, n, point)
+          call add_face_points(a, b, feature_a, feature_b, frame, n, point)
         end if
       end if
       exact%gap = found%distance - rounding(1) - rounding(2)
@@ -142,12 +143,15 @@ contains
   end function number_of
 
   !> A frame with the normal of the nearest points, from half-way between them.
-  pure subroutine make_frame(found, frame)
+  pure subroutine make_frame(found, alert, frame)
     type(core_distance_t), intent(in) :: found
+    !> [m]
+    real(dp), intent(in) :: alert
     type(frame_t), intent(out) :: frame
 
     frame%origin(:) = 0.5_dp*(found%point_a + found%point_b)
     frame%normal(:) = found%normal
+    frame%alert = alert
     call find_tangents(frame)
   end subroutine make_frame
 
@@ -202,8 +206,9 @@ contains
     lowest(1) = 1
     call find_support(a, along, .false., lowest(1))
     call find_feature(a, along, lowest, feature)
+    feature%at = at
     if (feature%n > 1) then
-      call lay_out_feature(a, at, feature, frame, m, vertex, place)
+      call lay_out_feature(a, feature, frame, m, vertex, place)
     else
       m = 0
     end if

@@ -415,8 +415,11 @@ contains
     call find_feature(box%piece(1), down, known_a, feature_a)
     call find_feature(box%piece(1), frame%normal, known_b, feature_b)
     call check_equal(feature_a%n + feature_b%n, 8, "faces of cubes")
+    feature_a%at = at_a
+    feature_b%at = at_b
+    frame%alert = 0.01_dp
     n = 0
-    call add_face_points(box%piece(1), box%piece(1), at_a, at_b, feature_a, feature_b, frame, 0.01_dp, n, point)
+    call add_face_points(box%piece(1), box%piece(1), feature_a, feature_b, frame, n, point)
     call check_equal(n, 4, "a cube on a cube: four points")
     low(:) = huge(1.0_dp)
     high(:) = -huge(1.0_dp)
@@ -432,8 +435,9 @@ contains
     call check_close(low(2), -0.5_dp, tight, "in both directions")
     call check_close(high(1), 1.0_dp, tight, "it ends with the lower cube")
     call check_close(high(2), 1.0_dp, tight, "in both directions too")
+    frame%alert = 0.5_dp*gap
     n = 0
-    call add_face_points(box%piece(1), box%piece(1), at_a, at_b, feature_a, feature_b, frame, 0.5_dp*gap, n, point)
+    call add_face_points(box%piece(1), box%piece(1), feature_a, feature_b, frame, n, point)
     call check_equal(n, 0, "no points where the gap is too large")
   end subroutine test_faces
 
@@ -456,8 +460,11 @@ contains
     known_b(1) = farthest(box%piece(1), 0.1_dp, 0.1_dp, 1.0_dp)
     call find_feature(box%piece(1), frame%normal, known_b, feature_b)
     call check_equal(feature_a%n, 2, "a rod has an edge")
+    feature_a%at = at_a
+    feature_b%at = at_b
+    frame%alert = 0.01_dp
     n = 0
-    call add_face_points(rod%piece(1), box%piece(1), at_a, at_b, feature_a, feature_b, frame, 0.01_dp, n, point)
+    call add_face_points(rod%piece(1), box%piece(1), feature_a, feature_b, frame, n, point)
     call check_equal(n, 2, "a rod on a cube: two points")
     call check_close(minval(point(1:2)%place(1)), -0.25_dp, tight, "the end of the rod")
     call check_close(maxval(point(1:2)%place(1)), 1.0_dp, tight, "the side of the cube")
@@ -469,25 +476,27 @@ contains
   !> Rods above each other: side by side, and across.
   subroutine test_edges()
     real(dp), parameter :: gap = 0.004_dp
-    type(placement_t) :: at_a, at_b
     type(frame_t) :: frame
-    type(feature_t) :: feature
+    type(feature_t) :: feature_a, feature_b
     type(patch_point_t) :: point(most_points)
     integer :: n, edge
 
-    feature%vertex = 1
-    feature%other = 2
-    feature%n = 2
+    feature_a%vertex = 1
+    feature_a%other = 2
+    feature_a%n = 2
+    feature_b = feature_a
     edge = edge_number(rod%piece(1), 1, 2)
     call check(edge > 1, "edges come behind vertices")
     ! along the second axis for the normal, so that the third lies along the rods
-    call put_above(rod, rod, [0.0_dp, 0.5_dp + gap, 1.5_dp], turn_t(straight), 0.0_dp, at_a, at_b, frame)
+    call put_above(rod, rod, [0.0_dp, 0.5_dp + gap, 1.5_dp], turn_t(straight), 0.0_dp, &
+      & feature_a%at, feature_b%at, frame)
     frame%normal(:) = straight(:, 2)
     frame%first(:) = straight(:, 3)
     frame%second(:) = straight(:, 1)
+    frame%alert = 0.01_dp
     frame%origin(2) = 0.25_dp
     n = 0
-    call add_edge_points(rod%piece(1), rod%piece(1), at_a, at_b, feature, feature, frame, 0.01_dp, n, point)
+    call add_edge_points(rod%piece(1), rod%piece(1), feature_a, feature_b, frame, n, point)
     call check_equal(n, 2, "rods side by side: two points")
     call check_close(minval(point(1:2)%place(1)), 0.5_dp, tight, "where the upper one begins")
     call check_close(maxval(point(1:2)%place(1)), 1.0_dp, tight, "where the lower one ends")
@@ -495,15 +504,17 @@ contains
     call check_close(maxval(abs(point(1:2)%place(3) - 0.5_dp*gap)), 0.0_dp, tight, "half-way between")
     call check(any(point(1:2)%key/feature_base == edge) .and. any(mod(point(1:2)%key, feature_base) == edge), &
       & "each is an end of one on the edge of the other")
-    at_a%centre(3) = 2.5_dp
+    feature_a%at%centre(3) = 2.5_dp
     n = 0
-    call add_edge_points(rod%piece(1), rod%piece(1), at_a, at_b, feature, feature, frame, 0.01_dp, n, point)
+    call add_edge_points(rod%piece(1), rod%piece(1), feature_a, feature_b, frame, n, point)
     call check_equal(n, 0, "rods one behind the other")
-    call put_above(rod, rod, [0.0_dp, 0.5_dp + gap, 0.0_dp], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp), 0.0_dp, at_a, at_b, frame)
+    call put_above(rod, rod, [0.0_dp, 0.5_dp + gap, 0.0_dp], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp), 0.0_dp, &
+      & feature_a%at, feature_b%at, frame)
     frame%normal(:) = straight(:, 2)
     frame%first(:) = straight(:, 3)
     frame%second(:) = straight(:, 1)
-    call add_edge_points(rod%piece(1), rod%piece(1), at_a, at_b, feature, feature, frame, 0.01_dp, n, point)
+    frame%alert = 0.01_dp
+    call add_edge_points(rod%piece(1), rod%piece(1), feature_a, feature_b, frame, n, point)
     call check_equal(n, 0, "rods across each other")
   end subroutine test_edges
 
