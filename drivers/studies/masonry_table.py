@@ -1,4 +1,4 @@
-"""The table of study_masonry.py: a row an oracle, with what was measured beside what is accepted."""
+"""The table of study_masonry.py and study_dem.py: a row an oracle, with what was measured beside what is accepted."""
 import sys
 
 
@@ -18,7 +18,7 @@ class Table:
         # nan is a miss
         good = accepted is None or off <= accepted
         row = (oracle, quantity, text(measured), text(expected), "" if off is None else f"{off:.1e}",
-               "" if accepted is None else f"{accepted:.0e}", "" if accepted is None else "yes" if good else "NO")
+               "" if accepted is None else bound(accepted), "" if accepted is None else "yes" if good else "NO")
         self.rows.append(row)
         if not self.quiet:
             print("  ".join(f"{cell:<{width}}" for cell, width in zip(row, (10, 70, 14, 14, 9, 9, 3))).rstrip(), flush=True)
@@ -31,6 +31,11 @@ class Table:
     def markdown(self):
         lines = ["| " + " | ".join(self.HEADER) + " |", "|---|---|---:|---:|---:|---:|---|"]
         return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in self.rows]) + "\n"
+
+
+def bound(value):
+    """One digit, or two where one is not all of it."""
+    return f"{value:.0e}" if float(f"{value:.0e}") == value else f"{value:.1e}"
 
 
 def text(value):

@@ -3,10 +3,13 @@ module gravier_polyhedra
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
   use gravier_rotation, only: make_rotation
+  use gravier_convex_distance, only: placed_pair_t
+  use gravier_shape_library, only: body_shape_t
   implicit none
   private
   public :: tetrahedron, cube, octahedron, dodecahedron, icosahedron, golden
   public :: draws_t, random_turn
+  public :: put_pair
   public :: vector_t, turn_t, vec, about, back, on, between, inverse
 
   real(dp), parameter :: golden = (1.0_dp + sqrt(5.0_dp))/2
@@ -183,5 +186,18 @@ contains
     axis = draws%direction()
     turn = about(axis, draws%between(0.0_dp, acos(-1.0_dp)))
   end function random_turn
+
+  !> Two bodies, the second turned and at a way from the first, in the axes of the first.
+  subroutine put_pair(shape_a, shape_b, way, turn, pair)
+    type(body_shape_t), intent(in) :: shape_a, shape_b
+    real(dp), intent(in) :: way(3)
+    type(turn_t), intent(in) :: turn
+    type(placed_pair_t), intent(out) :: pair
+
+    pair%radius_a = shape_a%size
+    pair%radius_b = shape_b%size
+    pair%rotation(:, :) = turn%m
+    pair%way(:) = way
+  end subroutine put_pair
 
 end module gravier_polyhedra

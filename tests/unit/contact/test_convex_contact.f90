@@ -15,7 +15,7 @@ program test_convex_contact
   use gravier_manifold, only: feature_base, most_points
   use gravier_polyhedron, only: make_box, make_capsule
   use gravier_shape_library, only: body_shape_t
-  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec
+  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
@@ -123,18 +123,6 @@ contains
   end subroutine test_random_simplices
 
   !> The place of one shape beside another, their lengths being those that the shapes were made with.
-  subroutine put(shape_a, shape_b, way, turn, pair)
-    type(body_shape_t), intent(in) :: shape_a, shape_b
-    real(dp), intent(in) :: way(3)
-    type(turn_t), intent(in) :: turn
-    type(placed_pair_t), intent(out) :: pair
-
-    pair%radius_a = shape_a%size
-    pair%radius_b = shape_b%size
-    pair%rotation(:, :) = turn%m
-    pair%way(:) = way
-  end subroutine put
-
   subroutine test_support()
     type(draws_t) :: draws
     type(vector_t) :: along
@@ -145,7 +133,7 @@ contains
 
     farthest = .true.
     same = .true.
-    call put(box, box, [3.0_dp, 1.0_dp, -2.0_dp], random_turn(draws), pair)
+    call put_pair(box, box, [3.0_dp, 1.0_dp, -2.0_dp], random_turn(draws), pair)
     do trial = 1, 200
       along = draws%direction()
       best = 1
@@ -178,26 +166,26 @@ contains
     type(core_distance_t) :: found
     type(placed_pair_t) :: pair
 
-    call put(box, box, [3.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call put_pair(box, box, [3.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
     call find_core_distance(box%piece(1), box%piece(1), pair, huge(1.0_dp), found)
     call check(.not. (found%overlap .or. found%beyond), "two cubes are apart")
     call check_close(found%distance, 3.0_dp - 2*half, tight, "from face to face")
     call check_close(found%normal(1), -1.0_dp, tight, "the normal is from the second to the first")
     call check_close(found%point_a(1), half, tight, "the nearest point of the first")
     call check_close(found%point_b(1), 3.0_dp - half, tight, "the nearest point of the second")
-    call put(box, box, [3.0_dp, 3.0_dp, 0.0_dp], turn_t(straight), pair)
+    call put_pair(box, box, [3.0_dp, 3.0_dp, 0.0_dp], turn_t(straight), pair)
     call find_core_distance(box%piece(1), box%piece(1), pair, huge(1.0_dp), found)
     call check_close(found%distance, sqrt(2.0_dp)*(3.0_dp - 2*half), tight, "from edge to edge")
-    call put(box, box, [3.0_dp, 3.0_dp, 3.0_dp], turn_t(straight), pair)
+    call put_pair(box, box, [3.0_dp, 3.0_dp, 3.0_dp], turn_t(straight), pair)
     call find_core_distance(box%piece(1), box%piece(1), pair, huge(1.0_dp), found)
     call check_close(found%distance, sqrt(3.0_dp)*(3.0_dp - 2*half), tight, "from corner to corner")
     call check_equal(found%n, 1, "of which each has one vertex")
-    call put(box, ball, [0.25_dp, 0.5_dp, 5.0_dp], turn_t(straight), pair)
+    call put_pair(box, ball, [0.25_dp, 0.5_dp, 5.0_dp], turn_t(straight), pair)
     call find_core_distance(box%piece(1), ball%piece(1), pair, huge(1.0_dp), found)
     call check_close(found%distance, 5.0_dp - half, tight, "from a face to the centre of a ball")
     call check_close(found%point_a(1), 0.25_dp, tight, "the nearest point is below it")
     call check_close(sum(found%share(1:found%n)), 1.0_dp, tight, "shares of vertices sum to 1")
-    call put(rod, rod, [0.0_dp, 3.0_dp, 0.5_dp], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi), pair)
+    call put_pair(rod, rod, [0.0_dp, 3.0_dp, 0.5_dp], about(vec(0.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi), pair)
     call find_core_distance(rod%piece(1), rod%piece(1), pair, huge(1.0_dp), found)
     call check_close(found%distance, 3.0_dp, tight, "two rods across each other")
     call check_close(found%point_b(3), 0.5_dp, tight, "the nearest point is where they cross")
@@ -261,7 +249,7 @@ contains
       way = draws%direction()
       turn = random_turn(draws)
       u(:) = 3.6_dp*way%x
-      call put(box, rod, u, turn, pair)
+      call put_pair(box, rod, u, turn, pair)
       turned = pair
       turned%radius_a = pair%radius_b
       turned%radius_b = pair%radius_a
@@ -283,12 +271,12 @@ contains
     type(core_distance_t) :: found
     type(placed_pair_t) :: pair
 
-    call put(box, box, [5.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call put_pair(box, box, [5.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
     call find_core_distance(box%piece(1), box%piece(1), pair, 1.0_dp, found)
     call check(found%beyond, "cubes farther than what was asked about")
     call find_core_distance(box%piece(1), box%piece(1), pair, 4.0_dp, found)
     call check(.not. found%beyond, "and within it")
-    call put(box, box, [1.0_dp, 0.5_dp, 0.0_dp], turn_t(straight), pair)
+    call put_pair(box, box, [1.0_dp, 0.5_dp, 0.0_dp], turn_t(straight), pair)
     call find_core_distance(box%piece(1), box%piece(1), pair, 4.0_dp, found)
     call check(found%overlap, "cubes that overlap")
   end subroutine test_beyond

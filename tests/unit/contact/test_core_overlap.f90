@@ -8,7 +8,7 @@ program test_core_overlap
   use gravier_core_overlap, only: find_least_separation
   use gravier_polyhedron, only: make_box, make_capsule, make_polyhedron
   use gravier_shape_library, only: body_shape_t
-  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec
+  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair
   use gravier_check, only: check, check_close, finish_checks
   implicit none
   real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
@@ -35,18 +35,6 @@ contains
     call check(.not. allocated(error), "shapes")
   end subroutine make_shapes
 
-  subroutine put(shape_a, shape_b, way, turn, pair)
-    type(body_shape_t), intent(in) :: shape_a, shape_b
-    real(dp), intent(in) :: way(3)
-    type(turn_t), intent(in) :: turn
-    type(placed_pair_t), intent(out) :: pair
-
-    pair%radius_a = shape_a%size
-    pair%radius_b = shape_b%size
-    pair%rotation(:, :) = turn%m
-    pair%way(:) = way
-  end subroutine put
-
   !> Cubes one within the other by a face, and by an edge on an edge.
   subroutine test_overlap()
     real(dp), parameter :: depth = 0.2_dp
@@ -56,7 +44,7 @@ contains
     real(dp) :: way(3)
 
     way(:) = [0.3_dp, 2*half - depth, 0.1_dp]
-    call put(box, box, way, turn_t(straight), pair)
+    call put_pair(box, box, way, turn_t(straight), pair)
     call find_least_separation(box%piece(1), box%piece(1), pair, found)
     call check_close(found%distance, -depth, tight, "faces: the depth")
     call check_close(found%normal(2), -1.0_dp, tight, "faces: the normal from the second to the first")
@@ -64,7 +52,7 @@ contains
     call check_close(0.5_dp*(found%point_a(2) + found%point_b(2)), half - 0.5_dp*depth, tight, "faces: their middle")
     ! the second is turned so that an edge of it meets a face of the first
     turn = about(vec(0.0_dp, 0.0_dp, 1.0_dp), 0.25_dp*pi)
-    call put(box, box, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call put_pair(box, box, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
     pair%rotation(:, :) = turn%m
     way(:) = 0.0_dp
     way(1) = half + sqrt(2.0_dp)*half - depth
@@ -87,15 +75,15 @@ contains
     type(core_distance_t) :: found
     type(placed_pair_t) :: pair
 
-    call put(rod, rod, [0.0_dp, 0.0_dp, 0.0_dp], about(vec(1.0_dp, 0.0_dp, 0.0_dp), 0.5_dp*pi), pair)
+    call put_pair(rod, rod, [0.0_dp, 0.0_dp, 0.0_dp], about(vec(1.0_dp, 0.0_dp, 0.0_dp), 0.5_dp*pi), pair)
     call find_least_separation(rod%piece(1), rod%piece(1), pair, found)
     call check_close(found%distance, 0.0_dp, tight, "rods that cross")
     call check_close(abs(found%normal(1)), 1.0_dp, tight, "are pushed across both")
-    call put(rod, ball, [0.0_dp, 0.0_dp, 0.5_dp], turn_t(straight), pair)
+    call put_pair(rod, ball, [0.0_dp, 0.0_dp, 0.5_dp], turn_t(straight), pair)
     call find_least_separation(rod%piece(1), ball%piece(1), pair, found)
     call check_close(norm2(found%normal), 1.0_dp, tight, "a ball on a rod has a normal")
     call check_close(found%normal(3), 0.0_dp, tight, "across the rod")
-    call put(ball, ball, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
+    call put_pair(ball, ball, [0.0_dp, 0.0_dp, 0.0_dp], turn_t(straight), pair)
     call find_least_separation(ball%piece(1), ball%piece(1), pair, found)
     call check_close(found%normal(3), 1.0_dp, tight, "balls at one place: the third axis")
   end subroutine test_overlap_of_rods
@@ -131,13 +119,13 @@ contains
       u = draws%direction()
       associate (a => hull(1 + modulo(trial, 6)), b => hull(1 + modulo(trial/6, 6)))
         way(:) = draws%between(0.0_dp, 0.6_dp)*u%x
-        call put(a, b, way, random_turn(draws), pair)
+        call put_pair(a, b, way, random_turn(draws), pair)
         call find_least_separation(a%piece(1), b%piece(1), pair, found)
         call try_all_axes(a%piece(1), b%piece(1), pair, best, edges)
         if (best < 0.0_dp) worst = max(worst, abs(found%distance - best))
         if (edges .and. best < 0.0_dp) by_edges = by_edges + 1
         way(:) = 0.3_dp*u%x
-        call put(a, bar, way, random_turn(draws), pair)
+        call put_pair(a, bar, way, random_turn(draws), pair)
         call find_least_separation(a%piece(1), bar%piece(1), pair, found)
         call try_all_axes(a%piece(1), bar%piece(1), pair, best, edges)
         if (best < 0.0_dp) worst = max(worst, abs(found%distance - best))

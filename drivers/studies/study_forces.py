@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""The distribution of forces between disks in biaxial compression, rigid and with springs, against published simulations: Radjai, Jean, Moreau
+and Roux, Physical Review Letters 77 (1996) 274.
+
+    python3 drivers/studies/study_forces.py OUT [--quick]
+
+The shipped scene data/scenes/biaxial.nml is run with rigid contacts and with springs of kappa = 10 000. Of the normal forces f between disks
+over their mean in each state while the sample yields, the study takes the distribution P: above the mean it falls as exp(-beta f), with
+beta = 1.4 in the publication; well below the mean it goes as f^alpha, with alpha = -0.3; some two fifths of the forces are above the mean.
+Rigid forces are one of many possible sets, and those of springs are unique: their distributions should not differ.
+
+Leaves OUT/study_forces.csv, OUT/study_forces.png and the runs. Exit status: 0 all rows are within their bounds; 1 one is not."""
+import sys
+from pathlib import Path
+
+import numpy as np
+from masonry_table import Table
+from study_support import SOURCE, plt, run, states, write_csv
+
+from one_line import OneLineParser
+from whole_file import save_figure
+
+#: exponents of the publication
+BETA, ALPHA = 1.4, -0.3
+#: forces over their mean of which each exponent is fitted
+STRONG, WEAK = (1.0, 5.0), (0.02, 0.5)
+PRESSURE = 1000.0  # N/m
+STEP = 1.0e-3  # s
+#: the sample yields from this step on
+YIELDS = 1500
+SIDES = {"floor": ([0.0, 0.0], [0.0, 1.0], {}), "left": ([0.0, 0.0], [1.0, 0.0], {}),
+         "right": ([0.3567266, 0.0], [-1.0, 0.0], {"free": [True, False], "pressure": PRESSURE, "mass": 1.0}),
+         "lid": ([0.0, 0.6218765], [0.0, -1.0], {"velocity": [0.0, -0.03]})}
+
+
+def compress(folder, compliant, steps):
+    """Run the scene; the forces over their mean, of all states while it yields."""
+    groups = {"scene": {"dimension": 2, "gravity": [0.0, 0.0], "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/biaxial.csv"),
+                        "density": 2500.0, "friction": 0.5, "wall_friction": 0.0},
+              "time": {"step": STEP, "steps": steps}, "solver": {"max_iterations": 5000},
+              "output": {"directory": ".", "every": 40, "contacts": True}}
+    if compliant:
+        groups["scene"]["wall_material"] = "wall"
+        groups["material"] = [{"name": "disk", "density": 2500.0}, {"name": "wall"}]
+        spring = {"kind": "elastic", "stiffness_number": 1.0e4, "stiffness_pressure": PRESSURE, "spring_restitution": 0.3}
+        groups["law"] = [{"materials": ["disk"], "friction": 0.5, **spring}, {"materials": ["disk", "wall"], **spring}]
+    run(folder, groups, [{"name": name, "shape": "plane", "point": point, "normal": normal, **more}
+                         for name, (point, normal, more) in SIDES.items()])
+    found = []
+    for number, _, state in states(folder / "results.h5"):
+        if number >= YIELDS:
+            forces = state["contacts/impulse"][:, 0]
+            forces = forces[(forces > 0.0) & (state["contacts/antagonist"][:] <= len(state["bodies/id"]))]
+            found.append(forces / forces.mean())
+    return np.concatenate(found)
+
+
+def exponents(forces):
+    """beta, alpha and the share of forces above the mean. beta is that of largest likelihood of an exponential between both ends of STRONG; alpha is
+    the slope of the histogram in the logarithm, in equal bins of the logarithm."""
+    low, high = STRONG
+    x = forces[(forces >= low) & (forces < high)] - low
+    trial = np.linspace(0.3, 5.0, 4701)
+    # mean of an exponential that is cut at the width
+    width = high - low
+    expected = 1.0 / trial - width / np.expm1(trial * width)
+    beta = trial[np.argmin(np.abs(expected - x.mean()))]
+    edges = np.geomspace(*WEAK, 11)
+    density = np.histogram(forces, edges)[0] / np.diff(edges)
+    alpha = np.polyfit(np.log(np.sqrt(edges[1:] * edges[:-1])), np.log(density), 1)[0]
+    return beta, alpha, np.mean(forces > 1.0)
+
+
+def draw(path, found):
+    figure, axes = plt.subplots(figsize=(5.0, 3.6), layout="constrained")
+    edges = np.linspace(0.0, 6.0, 31)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    for (name, forces), colour, mark in zip(found.items(), ("#0072B2", "#D55E00"), "os"):
+        axes.semilogy(middle, np.histogram(forces, edges, density=True)[0], mark, color=colour, markersize=4, label=name)
+    line = np.linspace(1.0, 6.0, 2)
+    axes.semilogy(line, 0.55 * np.exp(-BETA * (line - 1.0)), "k-", linewidth=0.8, label=f"exp(-{BETA} f), Radjai et al. 1996")
+    axes.set_xlabel("normal force over its mean, f")
+    axes.set_ylabel("probability density")
+    axes.legend()
+    save_figure(figure, path)
+
+
+def main():
+    parser = OneLineParser(description=__doc__)
+    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--quick", action="store_true", help="half of the strain")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    table, found, values = Table(), {}, {}
+    for name in ("rigid", "springs"):
+        found[name] = compress(options.out / name, name == "springs", 2000 if options.quick else 4000)
+        values[name] = exponents(found[name])
+        beta, alpha, share = values[name]
+        table.add(name, f"beta, of {np.sum(found[name] > STRONG[0])} forces above the mean", beta, BETA, None, 0.3)
+        table.add(name, f"alpha, of {np.sum((found[name] > WEAK[0]) & (found[name] < WEAK[1]))} forces well below it", alpha, ALPHA, None, 0.2)
+        table.add(name, "share of forces above the mean", share, 0.4, None, 0.05)
+    for k, what in enumerate(("beta", "alpha", "share above the mean")):
+        table.add("both", f"{what}, springs against rigid", values["springs"][k], values["rigid"][k], None, (0.15, 0.1, 0.02)[k])
+    write_csv(options.out / "study_forces.csv", {name: [row[k] for row in table.rows] for k, name in enumerate(table.HEADER)})
+    draw(options.out / "study_forces.png", found)
+    sys.exit(1 if table.misses else 0)
+
+
+if __name__ == "__main__":
+    main()
