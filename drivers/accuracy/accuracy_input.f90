@@ -19,7 +19,7 @@ module gravier_accuracy_input
   !> those that a solve has no use for
   character(len=*), parameter :: run_keys = "vary values reference samples quantities knee"
   !> groups that have no place in a variant: where results go, and those that stand several times or are made before
-  character(len=*), parameter :: other_groups = "output boundary sample material law"
+  character(len=*), parameter :: other_groups = "output boundary sample material law insertion"
 
 contains
 
@@ -159,7 +159,7 @@ contains
       call take_text(study, item, study%vary, error)
       study%vary_group = group_of(study%vary)
       if (study%vary_group == "" .or. study%vary == "steps" .or. study%vary == "title") call refuse(study, item, &
-        & "a key of a case, but of &boundary, &sample or &output, and not 'steps', which follow from 'step'", error)
+        & "a key of a case, but of &boundary, &sample, &insertion or &output, and not 'steps', which follow from 'step'", error)
     case ("values")
       call split(item%value, study%values)
       if (size(study%values) == 0) call refuse(study, item, "values, with commas between", error)

@@ -7,7 +7,7 @@ module gravier_communicator
     & MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_Comm_dup, MPI_Comm_free, &
     & MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Ibarrier, MPI_Test, MPI_Get_library_version, &
     & MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, MPI_SUM, &
-    & MPI_MIN, MPI_MAX, MPI_LOR, MPI_BXOR
+    & MPI_MIN, MPI_MAX, MPI_LOR, MPI_BOR, MPI_BXOR
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, status_failure
@@ -37,6 +37,7 @@ module gravier_communicator
     procedure :: highest_of => communicator_highest_of
     procedure :: largest => communicator_largest
     procedure :: exclusive_or => communicator_exclusive_or
+    procedure :: union_of => communicator_union_of
     procedure :: any_true => communicator_any_true
     procedure :: sum_parts => communicator_sum_parts
     procedure :: sum_real => communicator_sum_real
@@ -190,6 +191,16 @@ contains
     integer(i8), intent(in) :: word
     call MPI_Allreduce(word, combined, 1, MPI_INTEGER8, MPI_BXOR, self%mpi)
   end function communicator_exclusive_or
+
+  !> The bits that words have on some rank, word by word, in place. Collective.
+  subroutine communicator_union_of(self, words)
+    class(communicator_t), intent(in) :: self
+    integer(i8), intent(inout), contiguous :: words(:)
+    integer(i8) :: own(size(words))
+
+    own(:) = words
+    call MPI_Allreduce(own, words, size(words), MPI_INTEGER8, MPI_BOR, self%mpi)
+  end subroutine communicator_union_of
 
   logical function communicator_any_true(self, flag) result(any_true)
     class(communicator_t), intent(in) :: self

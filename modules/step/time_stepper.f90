@@ -15,6 +15,7 @@ module gravier_time_stepper
     & solve_diverged, solve_unbounded
   use gravier_decomposition, only: decomposition_t
   use gravier_removal, only: some_leave, remove_grains
+  use gravier_inflow, only: inflow_t
   use gravier_halo, only: halo_t
   use gravier_repartition, only: repartition_rule_t, repartition, repartition_is_due
   use gravier_interface, only: interface_statistics_t
@@ -38,6 +39,7 @@ module gravier_time_stepper
   use gravier_grain_balance, only: grain_balance_t
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
   use gravier_run_tally, only: run_tally_t
+  use gravier_population, only: population_t
   implicit none
   private
   public :: time_stepper_t, step_figures_t
@@ -53,6 +55,9 @@ module gravier_time_stepper
     integer(i8) :: contacts = 0
     !> grains that left by an outlet; grains that move by more than their radius in a step
     integer(i8) :: left = 0, fast = 0
+    !> grains that have entered, and their mass [kg]
+    integer(i8) :: entered = 0
+    real(dp) :: entered_mass = 0.0_dp
     !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
     logical :: listed = .false., divided = .false., refused = .false.
     !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
@@ -91,6 +96,8 @@ module gravier_time_stepper
     real(dp) :: overlap_left = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
     type(repartition_rule_t) :: division
+    !> grains that enter
+    type(inflow_t) :: inflow
     class(method_t), allocatable :: method
     type(solve_control_t) :: control
     !> where it is known
@@ -106,6 +113,10 @@ module gravier_time_stepper
     real(dp) :: time = 0.0_dp
     !> grains of the scene now, and those of them that are glued to boundaries
     integer(i8) :: n_grains = 0, n_glued = 0
+    !> mass of the free grains of the scene now, and of those that have left [kg]
+    real(dp) :: mass = 0.0_dp, left_mass = 0.0_dp
+    !> how many grains there were, at least and at most
+    type(population_t) :: population
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
     !> the same just after space was last divided in a step; 0 before
@@ -188,6 +199,7 @@ contains
     call move_to_middle(self%decomposition, self%physics, self%physics%theta, self%time, self%n_glued > 0, listed)
     call drive(self%decomposition, self%physics, self%gravity_table, self%time, changed)
     if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%halo)
+    if (self%inflow%exists()) call let_in(self, figures, listed)
     figures%fast = count_fast(self%decomposition, self%physics)
     call stop_timer(phase_bodies)
     call start_timer(phase_neighbourhood)
@@ -226,6 +238,21 @@ contains
     end if
     call measure_velocity_scale(self)
   end subroutine time_stepper_assemble
+
+  !> Let grains enter, for which lists are made anew. Collective.
+  subroutine let_in(self, figures, listed)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    logical, intent(inout) :: listed
+
+    figures%entered = self%inflow%entered()
+    figures%entered_mass = self%inflow%mass()
+    call self%inflow%enter(self%decomposition, self%time, self%physics%h)
+    figures%entered = self%inflow%entered() - figures%entered
+    figures%entered_mass = self%inflow%mass() - figures%entered_mass
+    self%n_grains = self%n_grains + figures%entered
+    listed = listed .or. figures%entered > 0
+  end subroutine let_in
 
   !> The largest deformation of compliant contacts, and how stiff they are for the step. Collective.
   subroutine measure_springs(self)
@@ -271,7 +298,7 @@ contains
     solved%boundary_impulses => self%boundary_impulses
     solved%time = self%time
     solved%n_free = self%n_grains - self%n_glued
-    solved%some_left = figures%left > 0
+    solved%others = figures%left > 0 .or. figures%entered > 0
   end function solved_step_of
 
   !> Note how a solve ended, and the contact where it failed. Collective.
@@ -311,6 +338,7 @@ contains
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
     self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy)
+    call self%population%note(self%n_grains - self%n_glued, self%mass)
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     self%slept = self%slept + figures%asleep
@@ -335,13 +363,16 @@ contains
     type(step_figures_t), intent(inout) :: figures
     integer(i8), allocatable :: records(:, :)
     integer(i8) :: n_glued
+    real(dp) :: left_mass
     logical :: remembered
 
     if (self%halo%builds > 0) call self%halo%refresh(self%decomposition)
     if (.not. figures%listed) return
     remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
     if (remembered) call gather_impulses(self%decomposition, self%halo, records)
-    call remove_grains(self%decomposition, self%n_glued > 0, figures%left, n_glued)
+    call remove_grains(self%decomposition, self%n_glued > 0, figures%left, n_glued, left_mass)
+    self%left_mass = self%left_mass + left_mass
+    if (figures%left > 0 .or. figures%entered > 0) self%mass = self%decomposition%free_mass()
     self%n_grains = self%n_grains - figures%left - n_glued
     self%n_glued = self%n_glued - n_glued
     if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refused)
@@ -412,6 +443,8 @@ contains
     self%time = 0.0_dp
     self%failed = 0
     self%left = 0
+    self%left_mass = 0.0_dp
+    self%population = population_t()
     self%fast = 0
     self%quiet = 0
     self%slept = 0

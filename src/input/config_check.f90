@@ -5,7 +5,8 @@ module gravier_config_check
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
   use gravier_config_types, only: config_t
-  use gravier_config_table, only: key_t, keys, kind_real, kind_logical
+  use gravier_config_key, only: key_t, kind_real, kind_logical
+  use gravier_config_table, only: keys
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: features_of, quoted_names, that_decompose, with_sleeping
   use gravier_config_keys, only: choices_text
@@ -14,6 +15,7 @@ module gravier_config_check
   use gravier_config_check_boundary, only: check_boundaries, check_contact
   use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
+  use gravier_config_check_insertion, only: check_insertions
   implicit none
   private
   public :: check_dimension, check_config, grid_product
@@ -45,6 +47,7 @@ contains
     call check_boundaries(report, config, error)
     call check_laws(report, config, error)
     if (config%scene%bodies == "sample") call check_sample(report, config, error)
+    call check_insertions(report, config, error)
     call check_time(report, config, error)
     call check_solver(report, config, error)
     call check_decomposition(report, config, error)
@@ -211,7 +214,35 @@ contains
     call expect(report, config%time%steps >= 0, "time", "steps", error)
     call expect(report, config%time%theta >= 0.5_dp .and. config%time%theta <= 1.0_dp, "time", "theta", error)
     call expect(report, config%time%rest_energy >= 0.0_dp, "time", "rest_energy", error)
+    call check_stops(report, config, error)
   end subroutine check_time
+
+  !> What ends a run before its last step.
+  subroutine check_stops(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: known
+    integer :: b
+
+    associate (time => config%time)
+      known = time%stop_boundary == ""
+      do b = 1, size(config%boundaries)
+        known = known .or. config%boundaries(b)%name == time%stop_boundary
+      end do
+      call expect(report, known, "time", "stop_boundary", error, "the name of a boundary of the input")
+      if (time%stop_boundary /= "") call miss(report, "time", "stop_displacement", error, &
+                                              shown_text(report, "time", "stop_boundary"))
+      if (time%displacement_given) call miss(report, "time", "stop_boundary", error, "stop_displacement")
+      call expect(report, time%stop_displacement > 0.0_dp .or. .not. time%displacement_given, "time", "stop_displacement", error)
+      call expect(report, time%stop_grains_at_most >= 0, "time", "stop_grains_at_most", error)
+      call expect(report, time%stop_grains_at_least >= 1 .or. .not. time%grains_at_least_given, "time", "stop_grains_at_least", &
+                  error)
+      call expect(report, time%stop_mass_at_most >= 0.0_dp .or. .not. time%mass_at_most_given, "time", "stop_mass_at_most", error)
+      call expect(report, time%stop_mass_at_least > 0.0_dp .or. .not. time%mass_at_least_given, "time", "stop_mass_at_least", &
+                  error)
+    end associate
+  end subroutine check_stops
 
   subroutine check_solver(report, config, error)
     type(report_t), intent(in) :: report

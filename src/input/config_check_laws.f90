@@ -5,7 +5,8 @@ module gravier_config_check_laws
   use gravier_text, only: to_text
   use gravier_law_set, only: law_set_t
   use gravier_config_types, only: config_t
-  use gravier_config_table, only: key_t, keys, kind_real
+  use gravier_config_key, only: key_t, kind_real
+  use gravier_config_table, only: keys
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, belongs
   use gravier_config_report, only: report_t, expect, is_given, ordinal

@@ -2,9 +2,8 @@
 module gravier_config_check_sample
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text
-  use gravier_config_names, only: count_names
-  use gravier_config_types, only: config_t, sample_config_t
+  use gravier_config_types, only: config_t
+  use gravier_config_check_grains, only: check_grains
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text
   implicit none
   private
@@ -19,8 +18,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     call expect(report, config%sample%count >= 1, "sample", "count", error)
-    call check_radii(report, config%sample, error)
-    call check_grain_shapes(report, config, error)
+    call check_grains(report, config, "sample", config%sample%grains_config_t, error)
     call check_box(report, config, error)
     call check_preparation(report, config, error)
     call expect(report, config%sample%file /= "", "sample", "file", error)
@@ -35,50 +33,6 @@ contains
     has_ending = .false.
     if (n > len(ending)) has_ending = file(n - len(ending) + 1:n) == ending
   end function has_ending
-
-  subroutine check_radii(report, sample, error)
-    type(report_t), intent(in) :: report
-    type(sample_config_t), intent(in) :: sample
-    type(error_t), allocatable, intent(inout) :: error
-
-    select case (sample%radii)
-    case ("single")
-      call expect(report, sample%radius > 0.0_dp, "sample", "radius", error)
-    case ("table")
-      call expect(report, sample%radius_table /= "", "sample", "radius_table", error)
-    case default
-      call expect(report, sample%radius_min > 0.0_dp, "sample", "radius_min", error)
-      call expect(report, sample%radius_max > 0.0_dp, "sample", "radius_max", error)
-      call expect(report, sample%radius_min <= sample%radius_max, "sample", "radius_min", error, &
-                  "at most radius_max, here "//shown_text(report, "sample", "radius_max"))
-    end select
-    if (sample%radii /= "log_normal") return
-    call expect(report, sample%radius_mean > 0.0_dp, "sample", "radius_mean", error)
-    call expect(report, sample%radius_mean >= sample%radius_min .and. sample%radius_mean <= sample%radius_max, &
-                "sample", "radius_mean", error, "a radius from radius_min to radius_max, here " &
-                //shown_text(report, "sample", "radius_min")//" and "//shown_text(report, "sample", "radius_max"))
-    call expect(report, sample%radius_deviation > 0.0_dp, "sample", "radius_deviation", error)
-  end subroutine check_radii
-
-  !> Names of shapes need a file of shapes, and shares names.
-  subroutine check_grain_shapes(report, config, error)
-    type(report_t), intent(in) :: report
-    type(config_t), intent(in) :: config
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: n
-
-    associate (sample => config%sample)
-      n = count_names(sample%grain_shapes)
-      call expect(report, n == 0 .or. config%scene%shapes /= "", "sample", "grain_shapes", error, &
-                  "shapes of &scene, the path of the file that has them")
-      if (.not. is_given(report, "sample", "grain_shares")) return
-      call expect(report, n > 0 .and. n <= size(sample%grain_shares), "sample", "grain_shares", error, &
-                  "it where grain_shapes names one shape to "//to_text(size(sample%grain_shares)))
-      n = min(n, size(sample%grain_shares))
-      call expect(report, all(sample%grain_shares(:n) > 0.0_dp) .and. .not. any(abs(sample%grain_shares(n + 1:)) > 0.0_dp), &
-                  "sample", "grain_shares", error, "a share above 0 for each of the "//to_text(n)//" grain_shapes")
-    end associate
-  end subroutine check_grain_shapes
 
   !> The box fits the period; what it leaves open is its last size, which another key or the grains give.
   subroutine check_box(report, config, error)

@@ -2,7 +2,8 @@
 module gravier_config_keys
   use gravier_text, only: to_text
   use gravier_config_types, only: text_length
-  use gravier_config_table, only: key_t, groups, keys, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_key, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_table, only: groups, keys
   implicit none
   private
   public :: find_group, find_key, nearest_group, nearest_key, has_word, choices_text, expected_text

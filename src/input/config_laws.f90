@@ -3,7 +3,8 @@ module gravier_config_laws
   use gravier_kinds, only: dp
   use gravier_law_set, only: law_set_t
   use gravier_config_types, only: config_t
-  use gravier_config_table, only: keys, kind_real
+  use gravier_config_key, only: kind_real
+  use gravier_config_table, only: keys
   implicit none
   private
   public :: material_number, density_of, collect_laws

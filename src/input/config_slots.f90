@@ -3,8 +3,9 @@ module gravier_config_slots
   use gravier_kinds, only: dp
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_diagnostic_registry, only: diagnostic_place
-  use gravier_config_types, only: config_t, text_length, choice_length
-  use gravier_config_table, only: key_t, groups, keys, surface_rows
+  use gravier_config_types, only: config_t, grains_config_t, text_length, choice_length
+  use gravier_config_key, only: key_t
+  use gravier_config_table, only: groups, keys, surface_rows
   use gravier_config_keys, only: find_group, find_key, has_word
   implicit none
   private
@@ -42,6 +43,8 @@ contains
       call boundary_slot(config, instance, key%name, slot)
     case ("sample")
       call sample_slot(config, key%name, slot)
+    case ("insertion")
+      call insertion_slot(config, instance, key%name, slot)
     case ("material")
       call material_slot(config, instance, key%name, slot)
     case ("law")
@@ -59,7 +62,8 @@ contains
     end select
   end function slot_of
 
-  !> How many groups of a name count: each &boundary, &material and &law of the file, &sample where it belongs, one of any other.
+  !> How many groups of a name count: each &boundary, &insertion, &material and &law of the file, &sample where it belongs, one of
+  !> any other.
   pure integer function group_count(config, group)
     type(config_t), intent(in) :: config
     character(len=*), intent(in) :: group
@@ -69,6 +73,7 @@ contains
     group_count = 1
     if (groups(g)%bodies /= "" .and. groups(g)%bodies /= config%scene%bodies) group_count = 0
     if (group == "boundary") group_count = size(config%boundaries)
+    if (group == "insertion") group_count = size(config%insertions)
     if (group == "material") group_count = size(config%materials)
     if (group == "law") group_count = size(config%laws)
   end function group_count
@@ -204,24 +209,70 @@ contains
     case ("arrangement"); slot%choice => config%sample%arrangement
     case ("preparation"); slot%choice => config%sample%preparation
     case ("count"); slot%integer => config%sample%count
-    case ("radii"); slot%choice => config%sample%radii
-    case ("radius"); slot%real => config%sample%radius
-    case ("radius_min"); slot%real => config%sample%radius_min
-    case ("radius_max"); slot%real => config%sample%radius_max
-    case ("radius_mean"); slot%real => config%sample%radius_mean
-    case ("radius_deviation"); slot%real => config%sample%radius_deviation
-    case ("radius_table"); slot%text => config%sample%radius_table
-    case ("grain_shapes"); slot%text => config%sample%grain_shapes
-    case ("grain_shares"); slot%reals => config%sample%grain_shares
     case ("box"); slot%reals => config%sample%box
     case ("solid_fraction"); slot%real => config%sample%solid_fraction
-    case ("seed"); slot%integer => config%sample%seed
     case ("pressure"); slot%real => config%sample%pressure
     case ("rest_tolerance"); slot%real => config%sample%rest_tolerance
     case ("max_steps"); slot%integer => config%sample%max_steps
     case ("file"); slot%text => config%sample%file
     end select
+    call grains_slot(config%sample%grains_config_t, name, slot)
   end subroutine sample_slot
+
+  !> What groups that draw grains at random have in common.
+  subroutine grains_slot(grains, name, slot)
+    type(grains_config_t), target, intent(inout) :: grains
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("radii"); slot%choice => grains%radii
+    case ("radius"); slot%real => grains%radius
+    case ("radius_min"); slot%real => grains%radius_min
+    case ("radius_max"); slot%real => grains%radius_max
+    case ("radius_mean"); slot%real => grains%radius_mean
+    case ("radius_deviation"); slot%real => grains%radius_deviation
+    case ("radius_table"); slot%text => grains%radius_table
+    case ("grain_shapes"); slot%text => grains%grain_shapes
+    case ("grain_shares"); slot%reals => grains%grain_shares
+    case ("seed"); slot%integer => grains%seed
+    end select
+  end subroutine grains_slot
+
+  subroutine insertion_slot(config, instance, name, slot)
+    type(config_t), target, intent(inout) :: config
+    !> number of the insertion
+    integer, intent(in) :: instance
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("name"); slot%text => config%insertions(instance)%name
+    case ("region"); slot%choice => config%insertions(instance)%region
+    case ("lower"); slot%reals => config%insertions(instance)%lower
+    case ("upper"); slot%reals => config%insertions(instance)%upper
+    case ("centre"); slot%reals => config%insertions(instance)%centre
+    case ("region_radius"); slot%real => config%insertions(instance)%region_radius
+    case ("rate"); slot%real => config%insertions(instance)%rate
+    case ("mass_rate"); slot%real => config%insertions(instance)%mass_rate
+    case ("count"); slot%integer => config%insertions(instance)%count
+    case ("mass"); slot%real => config%insertions(instance)%mass
+    case ("start"); slot%real => config%insertions(instance)%start
+    case ("end"); slot%real => config%insertions(instance)%end
+    case ("velocity"); slot%reals => config%insertions(instance)%velocity
+    case ("velocity_spread"); slot%reals => config%insertions(instance)%velocity_spread
+    case ("material"); slot%text => config%insertions(instance)%material
+    end select
+    select case (name)
+    case ("rate"); slot%given => config%insertions(instance)%rate_given
+    case ("mass_rate"); slot%given => config%insertions(instance)%mass_rate_given
+    case ("count"); slot%given => config%insertions(instance)%count_given
+    case ("mass"); slot%given => config%insertions(instance)%mass_given
+    case ("end"); slot%given => config%insertions(instance)%end_given
+    case ("material"); slot%given => config%insertions(instance)%material_given
+    end select
+    call grains_slot(config%insertions(instance)%grains_config_t, name, slot)
+  end subroutine insertion_slot
 
   subroutine material_slot(config, instance, name, slot)
     type(config_t), target, intent(inout) :: config
@@ -261,6 +312,19 @@ contains
     case ("steps"); slot%integer => config%time%steps
     case ("theta"); slot%real => config%time%theta
     case ("rest_energy"); slot%real => config%time%rest_energy
+    case ("stop_boundary"); slot%text => config%time%stop_boundary
+    case ("stop_displacement"); slot%real => config%time%stop_displacement
+    case ("stop_grains_at_most"); slot%integer => config%time%stop_grains_at_most
+    case ("stop_grains_at_least"); slot%integer => config%time%stop_grains_at_least
+    case ("stop_mass_at_most"); slot%real => config%time%stop_mass_at_most
+    case ("stop_mass_at_least"); slot%real => config%time%stop_mass_at_least
+    end select
+    select case (name)
+    case ("stop_displacement"); slot%given => config%time%displacement_given
+    case ("stop_grains_at_most"); slot%given => config%time%grains_at_most_given
+    case ("stop_grains_at_least"); slot%given => config%time%grains_at_least_given
+    case ("stop_mass_at_most"); slot%given => config%time%mass_at_most_given
+    case ("stop_mass_at_least"); slot%given => config%time%mass_at_least_given
     end select
   end subroutine time_slot
 

@@ -3,6 +3,8 @@
 !> shapes of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
 module gravier_config_table
   use gravier_declared_keys, only: collected_key_t, collected_keys_t, kind_length
+  use gravier_config_key, only: group_t, key_t, kind_integer, kind_real, kind_logical, kind_choice, kind_text
+  use gravier_config_table_grains, only: made_keys, source_keys, prepared_keys, where_keys, material_keys
   use gravier_law_registry, only: collect_law_keys => law_keys
   use gravier_surface, only: surface_features_t
   use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
@@ -12,69 +14,19 @@ module gravier_config_table
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   implicit none
   private
-  public :: group_t, key_t, groups, keys, surface_rows, fill_keys
-  public :: kind_integer, kind_real, kind_logical, kind_choice, kind_text
-
-  !> what a value is
-  integer, parameter :: kind_integer = 1
-  integer, parameter :: kind_real = 2
-  integer, parameter :: kind_logical = 3
-  !> one of a few words, in quotes
-  integer, parameter :: kind_choice = 4
-  !> any text, in quotes
-  integer, parameter :: kind_text = 5
-
-  !> A namelist group.
-  type :: group_t
-    character(len=16) :: name
-    !> must the file have it?
-    logical :: required
-    character(len=120) :: meaning
-    !> may it stand more than once?
-    logical :: repeated = .false.
-    !> the kind of bodies (&scene bodies) to which the group belongs, and which requires it; blank: all
-    character(len=16) :: bodies = ""
-  end type group_t
-
-  !> A key of a group.
-  type :: key_t
-    character(len=16) :: group
-    character(len=28) :: name
-    !> one of the kind_ constants
-    integer :: kind
-    !> the default, as it would be typed after the equal sign
-    character(len=16) :: default
-    !> a choice: the words, separated by blanks; otherwise a rule that follows "a finite real number", "an integer"
-    character(len=kind_length) :: allowed
-    character(len=400) :: meaning
-    !> number of entries
-    integer :: count = 1
-    !> of several reals or logicals: the entries that may differ from 0 and .false. in 2D
-    integer :: planar = 2
-    character(len=24) :: unit = ""
-    !> replaces the default in the reference where no constant can say it
-    character(len=56) :: note = ""
-    !> the choice of the same group on which it hangs whether the key may be given; blank: always
-    character(len=16) :: chooser = ""
-    !> the words of that choice to which the key belongs, separated by blanks
-    character(len=kind_length) :: chosen = ""
-    !> must each group give it? with the note "required" only: a key that has the note and a chooser, where it belongs
-    logical :: required = .false.
-  end type key_t
+  public :: groups, keys, surface_rows, fill_keys
 
   !> stands for the shapes of a boundary that carry forces, until the table is complete
   character(len=*), parameter :: solid_shapes = "(solid)"
   !> stands for the shapes whose facets a file has, until the table is complete
   character(len=*), parameter :: faceted_shapes = "(faceted)"
-  !> distributions of the radii that have bounds
-  character(len=*), parameter :: bounded_radii = "uniform uniform_volume log_normal"
-
   ! fprettify leaves the tables as they are laid out here
   !&<
   type(group_t), parameter :: groups(*) = &
     [group_t("scene", .true., "The bodies, their loads and their contact laws."), &
      group_t("boundary", .false., "A boundary: a wall of some shape, glued grains, or an outlet.", repeated=.true.), &
      group_t("sample", .false., "The grains that are generated.", bodies="sample"), &
+     group_t("insertion", .false., "Grains that enter the scene while the run goes on.", repeated=.true.), &
      group_t("material", .false., "A material of grains and boundaries: the first one is that of all grains unless the "// &
              "bodies file says another.", repeated=.true.), &
      group_t("law", .false., "The law of contact between two materials, in the place of friction and restitution of "// &
@@ -97,22 +49,23 @@ module gravier_config_table
            "its rows, constant outside"), &
      key_t("scene", "body_force", kind_real, "3*0", "", "force on each volume of the grains; its third component is 0 in 2D", &
            count=3, unit="N/m^3, N/m^2 in 2D"), &
-     key_t("scene", "bodies", kind_choice, "''", "column lattice file sample", &
-           "where the bodies come from: a column of equal bodies, a loose lattice of random radii, a bodies file, or `&sample`", &
+     key_t("scene", "bodies", kind_choice, "''", "column lattice file sample none", &
+           "where the bodies come from: a column of equal bodies, a loose lattice of random radii, a bodies file, or "// &
+           "`&sample`; `none`: all grains enter by `&insertion`", &
            note="required", required=.true.), &
      key_t("scene", "bodies_file", kind_text, "''", "not empty", "path of the bodies file", &
            note="required", chooser="bodies", chosen="file"), &
      key_t("scene", "shapes", kind_text, "''", "", &
-           "path of a [file of shapes](shapes.md#2-the-file-of-shapes), which bodies of the bodies file or of the sample "// &
-           "may have in the place of disks and spheres", &
-           chooser="bodies", chosen="file sample"), &
+           "path of a [file of shapes](shapes.md#2-the-file-of-shapes), which bodies of the bodies file, of the sample or of "// &
+           "insertions may have in the place of disks and spheres", &
+           chooser="bodies", chosen="file sample none"), &
      key_t("scene", "column_count", kind_integer, "3", ">= 1", "number of bodies in the column", &
            chooser="bodies", chosen="column"), &
      key_t("scene", "radius", kind_real, "1.0", "> 0", "radius of each body", unit="m", chooser="bodies", chosen="column"), &
      key_t("scene", "mass", kind_real, "1.0", "> 0", "mass of each body", unit="kg", chooser="bodies", chosen="column"), &
      key_t("scene", "density", kind_real, "2500", "> 0", &
            "density of the bodies; with `bodies = 'file'`, where the file gives no masses", &
-           unit="kg/m^3, kg/m^2 in 2D", chooser="bodies", chosen="lattice file sample"), &
+           unit="kg/m^3, kg/m^2 in 2D", chooser="bodies", chosen="lattice file sample none"), &
      key_t("scene", "lattice_count", kind_integer, "3*0", ">= 1", &
            "number of bodies along each axis: two entries in 2D, three in 3D", &
            count=3, note="required", chooser="bodies", chosen="lattice"), &
@@ -217,58 +170,6 @@ module gravier_config_table
      key_t("boundary", "remove_at", kind_real, "-1", ">= 0", "time at which the boundary is removed", &
            unit="s", note="never")]
 
-  type(key_t), parameter :: sample_keys(*) = &
-    [key_t("sample", "arrangement", kind_choice, "'loose'", "lattice loose", &
-           "grains in the cells of a lattice, or at random without touching"), &
-     key_t("sample", "preparation", kind_choice, "'none'", "none settled compacted", &
-           "what `gravier_sample` does with the grains: nothing, let gravity settle them, or compact them"), &
-     key_t("sample", "count", kind_integer, "0", ">= 1", "number of grains", note="required", required=.true.), &
-     key_t("sample", "radii", kind_choice, "'single'", "single uniform uniform_volume log_normal table", &
-           "distribution of the radii: one radius, uniform by number, uniform by volume, log-normal, or from a table"), &
-     key_t("sample", "radius", kind_real, "0", "> 0", "radius of all grains", &
-           unit="m", note="required", chooser="radii", chosen="single"), &
-     key_t("sample", "radius_min", kind_real, "0", "> 0", "smallest radius", &
-           unit="m", note="required", chooser="radii", chosen=bounded_radii), &
-     key_t("sample", "radius_max", kind_real, "0", "> 0", "largest radius, at least `radius_min`", &
-           unit="m", note="required", chooser="radii", chosen=bounded_radii), &
-     key_t("sample", "radius_mean", kind_real, "0", "> 0", &
-           "radius whose logarithm is the mean of the logarithms, from `radius_min` to `radius_max`", &
-           unit="m", note="required", chooser="radii", chosen="log_normal"), &
-     key_t("sample", "radius_deviation", kind_real, "0", "> 0", "standard deviation of ln(radius/`radius_mean`)", &
-           note="required", chooser="radii", chosen="log_normal"), &
-     key_t("sample", "radius_table", kind_text, "''", "not empty", "path of a CSV file with columns `radius,share`", &
-           note="required", chooser="radii", chosen="table"), &
-     key_t("sample", "grain_shapes", kind_text, "''", "", &
-           "names of the shapes that grains have, of the file `shapes` of `&scene`, with commas between; `disk` in 2D and "// &
-           "`sphere` in 3D stand for themselves. Radii are those of the balls about the centres of mass that enclose the grains", &
-           note="all shapes of the file"), &
-     key_t("sample", "grain_shares", kind_real, "8*0", "> 0", &
-           "fractions by number of the first eight `grain_shapes`, to any scale", &
-           count=8, planar=8, note="equal fractions"), &
-     key_t("sample", "box", kind_real, "3*0", ">= 0", &
-           "size of the box along each axis; if the last is 0, the lattice or `solid_fraction` determines it; "// &
-           "the third is 0 in 2D", &
-           count=3, unit="m", note="the period, along an axis that is periodic"), &
-     key_t("sample", "solid_fraction", kind_real, "0.35", "in (0, 0.6)", &
-           "fraction of the box that the grains fill, or the balls that enclose those with shapes, if its last size is 0; "// &
-           "random positions reach about 0.53 in 2D and 0.35 in 3D for grains of one radius; a larger fraction is refused", &
-           note="`0.35` in 2D, `0.2` in 3D", chooser="arrangement", chosen="loose"), &
-     key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii and places"), &
-     key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &
-           unit="Pa, N/m in 2D", note="required", chooser="preparation", chosen="compacted"), &
-     key_t("sample", "rest_tolerance", kind_real, "1e-6", "> 0", &
-           "mean kinetic energy of a grain at rest, over m g R (settled) or over `pressure` R^`dimension` (compacted)", &
-           chooser="preparation", chosen="settled compacted"), &
-     key_t("sample", "max_steps", kind_integer, "100000", ">= 1", "steps after which the preparation gives up", &
-           chooser="preparation", chosen="settled compacted"), &
-     key_t("sample", "file", kind_text, "'sample.h5'", "not empty", &
-           "the bodies file that `gravier_sample` writes, with the ending .h5 or .hdf5")]
-
-  type(key_t), parameter :: material_keys(*) = &
-    [key_t("material", "name", kind_text, "''", "not empty", "a name of its own", note="required", required=.true.), &
-     key_t("material", "density", kind_real, "-1", "> 0", "density of its grains, where the bodies file gives no masses", &
-           unit="kg/m^3, kg/m^2 in 2D", note="the value of `density` of `&scene`")]
-
   !> those of all laws; `kind` comes with its words, and each law has its own
   type(key_t), parameter :: law_keys(*) = &
     [key_t("law", "materials", kind_text, "''", "", &
@@ -282,7 +183,19 @@ module gravier_config_table
            "factor of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler"), &
      key_t("time", "rest_energy", kind_real, "0.0", ">= 0", &
            "the run ends when the kinetic energy of the grains was at most this in 10 steps, one after the other; 0: it does not", &
-           unit="J")]
+           unit="J"), &
+     key_t("time", "stop_boundary", kind_text, "''", "", &
+           "name of a `&boundary`: the run ends when it is `stop_displacement` away from its place at the start of the scene"), &
+     key_t("time", "stop_displacement", kind_real, "-1", "> 0", "displacement of `stop_boundary` at which the run ends", &
+           unit="m", note="never"), &
+     key_t("time", "stop_grains_at_most", kind_integer, "0", ">= 0", &
+           "the run ends when the scene has come down to so many grains that are not glued", note="never"), &
+     key_t("time", "stop_grains_at_least", kind_integer, "0", ">= 1", &
+           "the run ends when the scene has come up to so many grains that are not glued", note="never"), &
+     key_t("time", "stop_mass_at_most", kind_real, "-1", ">= 0", &
+           "the run ends when the mass of the grains that are not glued has come down to this", unit="kg", note="never"), &
+     key_t("time", "stop_mass_at_least", kind_real, "-1", "> 0", &
+           "the run ends when the mass of the grains that are not glued has come up to this", unit="kg", note="never")]
 
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &
@@ -395,7 +308,11 @@ contains
     end do
     call add(boundary_keys)
     call complete_boundary_keys()
-    call add(sample_keys)
+    call add(made_keys)
+    call add(source_keys, "sample")
+    call add(prepared_keys)
+    call add(where_keys)
+    call add(source_keys, "insertion")
     call add(material_keys)
     call add(law_keys)
     call collect_law_keys(own)
@@ -420,13 +337,16 @@ contains
 
   contains
 
-    subroutine add(more)
+    subroutine add(more, group)
       type(key_t), intent(in) :: more(:)
+      !> of keys that have none
+      character(len=*), intent(in), optional :: group
       type(key_t), allocatable :: longer(:)
 
       allocate (longer(size(keys) + size(more)))
       longer(:size(keys)) = keys
       longer(size(keys) + 1:) = more
+      if (present(group)) longer(size(keys) + 1:)%group = group
       call move_alloc(longer, keys)
     end subroutine add
 

@@ -7,7 +7,8 @@ module gravier_config_types
   implicit none
   private
   public :: scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t
-  public :: output_config_t, boundary_config_t, sample_config_t, material_config_t, law_config_t, config_t
+  public :: output_config_t, boundary_config_t, grains_config_t, sample_config_t, insertion_config_t, material_config_t
+  public :: law_config_t, config_t
   public :: given_coefficients_t, text_length, choice_length
 
   !> longest title or path
@@ -28,7 +29,7 @@ module gravier_config_types
     integer :: dimension
     !> m/s^2; the third component is 0 in 2D
     real(dp) :: gravity(3)
-    !> column, lattice, file or sample
+    !> column, lattice, file, sample or none
     character(len=choice_length) :: bodies
     !> blank unless bodies is file
     character(len=text_length) :: bodies_file
@@ -85,6 +86,14 @@ module gravier_config_types
     real(dp) :: theta
     !> J: kinetic energy of the grains at rest, which ends the run; 0: it does not
     real(dp) :: rest_energy
+    !> name of a boundary; blank: none; m: displacement of it that ends the run
+    character(len=text_length) :: stop_boundary
+    real(dp) :: stop_displacement
+    !> free grains, kg: what ends the run when the scene comes down or up to it
+    integer :: stop_grains_at_most, stop_grains_at_least
+    real(dp) :: stop_mass_at_most, stop_mass_at_least
+    logical :: displacement_given = .false., grains_at_most_given = .false., grains_at_least_given = .false.
+    logical :: mass_at_most_given = .false., mass_at_least_given = .false.
   end type time_config_t
 
   !> &solver: the method of every step and when it stops.
@@ -215,14 +224,8 @@ module gravier_config_types
     logical :: remove_given = .false.
   end type boundary_config_t
 
-  !> &sample: the sample that is generated where bodies is sample. What does not belong to the choices keeps the default.
-  type :: sample_config_t
-    !> lattice or loose
-    character(len=choice_length) :: arrangement
-    !> none, settled or compacted
-    character(len=choice_length) :: preparation
-    !> grains
-    integer :: count
+  !> What grains are drawn from at random. What does not belong to the choices keeps the default.
+  type :: grains_config_t
     !> single, uniform, uniform_volume, log_normal or table
     character(len=choice_length) :: radii
     !> m: of single radii; bounds of the others
@@ -234,11 +237,21 @@ module gravier_config_types
     !> names of shapes, with commas or blanks between; shares by number, all 0 for equal ones
     character(len=text_length) :: grain_shapes
     real(dp) :: grain_shares(8)
+    integer :: seed
+  end type grains_config_t
+
+  !> &sample: the sample that is generated where bodies is sample. What does not belong to the choices keeps the default.
+  type, extends(grains_config_t) :: sample_config_t
+    !> lattice or loose
+    character(len=choice_length) :: arrangement
+    !> none, settled or compacted
+    character(len=choice_length) :: preparation
+    !> grains
+    integer :: count
     !> m; the period along a periodic axis; the last may be 0: found from solid_fraction; the third is 0 in 2D
     real(dp) :: box(3)
     !> of a loose sample whose last size is 0
     real(dp) :: solid_fraction
-    integer :: seed
     !> Pa (N/m in 2D): compacted
     real(dp) :: pressure
     !> kinetic energy of a grain at rest, in m g R (settled) or pressure R^dimension (compacted)
@@ -248,6 +261,31 @@ module gravier_config_types
     !> the bodies file that gravier_sample writes
     character(len=text_length) :: file
   end type sample_config_t
+
+  !> &insertion: grains that enter while the run goes on.
+  type, extends(grains_config_t) :: insertion_config_t
+    !> unique; 'insertion K', K its number, when not given
+    character(len=text_length) :: name
+    !> box or ball
+    character(len=choice_length) :: region
+    !> m: corners of the box, centre and radius of the ball
+    real(dp) :: lower(3), upper(3), centre(3), region_radius
+    !> 1/s, kg/s; at most one of them is given
+    real(dp) :: rate, mass_rate
+    logical :: rate_given = .false., mass_rate_given = .false.
+    !> grains after which it ends; kg beyond which no grain enters
+    integer :: count
+    real(dp) :: mass
+    logical :: count_given = .false., mass_given = .false.
+    !> s
+    real(dp) :: start, end
+    logical :: end_given = .false.
+    !> m/s
+    real(dp) :: velocity(3), velocity_spread(3)
+    !> name; blank: the first, if there is one
+    character(len=text_length) :: material
+    logical :: material_given = .false.
+  end type insertion_config_t
 
   !> &material: one material.
   type :: material_config_t
@@ -283,6 +321,7 @@ module gravier_config_types
     !> in the order of the file; shapes (0) when it has none
     type(material_config_t), allocatable :: materials(:)
     type(law_config_t), allocatable :: laws(:)
+    type(insertion_config_t), allocatable :: insertions(:)
     !> defaults unless bodies is sample
     type(sample_config_t) :: sample
   end type config_t

@@ -4,7 +4,7 @@ module gravier_config_value
   use gravier_text, only: lower
   use gravier_number_text, only: number_size, is_integer, size_usual, size_tiny
   use gravier_config_types, only: text_length, choice_length
-  use gravier_config_table, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_key, only: key_t, kind_integer, kind_real, kind_logical, kind_choice
   use gravier_config_keys, only: has_word
   use gravier_config_slots, only: slot_t
   implicit none

@@ -4,7 +4,8 @@ module gravier_config_write
   use gravier_text, only: to_text, growing_text_t
   use gravier_number_text, only: read_real
   use gravier_config_types, only: config_t
-  use gravier_config_table, only: group_t, key_t, groups, keys, fill_keys, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_key, only: group_t, key_t, kind_integer, kind_real, kind_logical, kind_choice
+  use gravier_config_table, only: groups, keys, fill_keys
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs
   implicit none
@@ -96,14 +97,17 @@ contains
     type(key_t), intent(in) :: key
     !> which of the groups of that name
     integer, intent(in) :: instance
+    type(slot_t) :: slot
 
     in_force = belongs(config, key, instance)
     if (key%group == "boundary" .and. key%name == "mass") in_force = any(config%boundaries(instance)%free)
     if (key%group == "scene" .and. key%name == "gravity") in_force = config%scene%gravity_table == ""
     if (key%group == "sample" .and. key%name == "solid_fraction") &
       in_force = in_force .and. config%sample%box(config%scene%dimension) <= 0.0_dp
-    if (key%group == "sample" .and. key%name == "grain_shapes") in_force = config%sample%grain_shapes /= ""
-    if (key%group == "sample" .and. key%name == "grain_shares") in_force = any(config%sample%grain_shares > 0.0_dp)
+    if (key%name /= "grain_shapes" .and. key%name /= "grain_shares") return
+    slot = slot_of(config, key, instance)
+    if (associated(slot%text)) in_force = slot%text /= ""
+    if (associated(slot%reals)) in_force = any(slot%reals > 0.0_dp)
   end function in_force
 
   !> The value of a key as it would be typed after the equal sign; reading it back gives the same value.
@@ -229,7 +233,7 @@ contains
            //"A list takes blanks or commas between its entries, `2*0.5` for `0.5, 0.5`, and `grid(2) = 4` for one entry." &
            //newline &
            //"A group or a key that is not on this page is refused, and so is one that is given twice;"//newline &
-           //"`&boundary`, `&material` and `&law` may stand any number of times."//newline//newline &
+           //"`&boundary`, `&insertion`, `&material` and `&law` may stand any number of times."//newline//newline &
            //"The shortest input:"//newline//newline &
            //"    &scene bodies = 'column' /"//newline &
            //"    &time  step = 0.01, steps = 10 /"//newline

@@ -23,8 +23,9 @@ module gravier_history_output
   end type history_output_t
 
   !> with which the history has columns more
-  type(csv_option_t), parameter :: column_options(4) = [csv_option_t("kinetic_translation", "&output energy"), &
-    & csv_option_t("stress_", "&output stress"), csv_option_t("coordination", "&output structure"), &
+  type(csv_option_t), parameter :: column_options(5) = [csv_option_t("entered", "&insertion"), &
+    & csv_option_t("kinetic_translation", "&output energy"), csv_option_t("stress_", "&output stress"), &
+    & csv_option_t("coordination", "&output structure"), &
     & csv_option_t("force_x:", "&output boundary_forces")]
 
 contains
@@ -72,6 +73,7 @@ contains
     header = "step,time,contacts,iterations,sweeps,residual,velocity_error,velocity_scale,jump,max_overlap,"// &
       & "kinetic_energy,wall_seconds,interface_bodies,converged,grains,left,fast,listed,divided,projected,"// &
       & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds,sleeping,woken"
+    if (simulation%inflow%exists()) header = header//",entered,entered_mass"
     do k = 1, simulation%diagnostics%n_columns
       if (simulation%diagnostics%in_history(k)) header = header//","//trim(simulation%diagnostics%name(k))
     end do
@@ -116,6 +118,10 @@ contains
       call table%add(solve%seconds)
       call table%add(figures%asleep)
       call table%add(merge(1, 0, solve%woken))
+      if (simulation%inflow%exists()) then
+        call table%add(figures%entered)
+        call table%add(figures%entered_mass)
+      end if
       do k = 1, simulation%diagnostics%n_columns
         if (simulation%diagnostics%in_history(k)) call table%add(simulation%diagnostics%value(k))
       end do

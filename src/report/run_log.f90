@@ -17,6 +17,7 @@ module gravier_run_log
     & warn_relaxation, warn_partition, warn_springs, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
+  use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
   use gravier_start_lines, only: banner_text, start_lines
@@ -239,11 +240,14 @@ contains
     logical, intent(in) :: lines
     integer, intent(out) :: warnings
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: text, more
+    integer :: number
 
     if (lines) call write_lines(self, scale_lines(simulation, scales)//error_scale_line(simulation), "", error)
     call scale_warnings(simulation, scales, text, warnings)
-    call write_lines(self, text, "", error)
+    call inflow_warnings(simulation, more, number)
+    warnings = warnings + number
+    call write_lines(self, text//more, "", error)
   end subroutine run_log_write_scales
 
   !> What is kept in memory, array by array, and what a rank holds at most. Collective.
@@ -265,6 +269,7 @@ contains
     end do
     call self%line("  "//to_text(report%total/1024 + 1)//" KiB in all, "//to_text(report%most/1024 + 1)// &
       & " KiB on the rank with most", error)
+    call write_lines(self, entering_lines(simulation, report%items(4)%bytes + report%items(5)%bytes), "", error)
     call self%line("  about "//to_text(nint(report%peak))//" MiB at most on a rank while it runs, with libraries, copies of "// &
       & "what is written and work space of solves", error)
   end subroutine run_log_write_memory
@@ -431,6 +436,7 @@ contains
     call write_lines(self, work_lines(self%comm, simulation), "", error)
     call write_lines(self, accuracy_lines(simulation), "", error)
     call write_lines(self, cost_lines(self%comm, simulation), "", error)
+    call write_lines(self, population_lines(simulation), "", error)
     warnings = self%progress%warnings()
     if (warnings /= "") call self%line("warnings    "//warnings, error)
     call write_lines(self, summary_lines(self%comm, simulation, phases, seconds), "", error)

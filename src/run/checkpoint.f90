@@ -2,12 +2,14 @@
 !> any number of ranks.
 module gravier_checkpoint
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
+  use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_narrow, only: take_count
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_body_store, only: body_record
   use gravier_boundary, only: boundary_words, boundary_record
+  use gravier_insertion, only: insertion_words, insertion_record
+  use gravier_population, only: population_words, population_record
   use gravier_impulse_memory, only: pair_record
   use gravier_diagnostics, only: diagnostics_t
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
@@ -31,7 +33,9 @@ contains
     integer :: k
 
     text = "grain: "//body_record//" position_now speed_when_listed"//newline//"pair: "//pair_record//newline// &
-      & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline
+      & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
+      & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
+      & "population: "//population_record//", "//to_text(population_words)//" words"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
       associate (features => diagnostics(k)%diagnostic%features())
@@ -49,6 +53,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8), allocatable :: words(:)
+    integer(i8) :: seen(population_words)
 
     if (allocated(error)) return
     call file%create(simulation%comm, path, records_text(), error)
@@ -64,11 +69,19 @@ contains
     call file%write_scalar("glued", simulation%n_glued, error)
     call file%write_scalar("failed", simulation%failed, error)
     call file%write_scalar("left", simulation%left, error)
+    call file%write_scalar("mass", simulation%mass, error)
+    call file%write_scalar("left_mass", simulation%left_mass, error)
+    call file%write_scalar("first_mass", simulation%first_mass, error)
     call file%write_scalar("fast", simulation%fast, error)
     call file%write_scalar("rest_energy", simulation%rest_energy, error)
     call file%write_scalar("quiet", int(simulation%quiet, i8), error)
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
     call file%write_scalar("lists_made", simulation%halo%builds, error)
+    call file%write_scalar("next_id", simulation%inflow%next_id, error)
+    call simulation%population%get_state(seen)
+    call file%write_array("population", seen, error)
+    call simulation%inflow%get_state(words)
+    call file%write_array("insertions", words, error)
     associate (memory => simulation%halo%memory)
       call file%write_scalar("impulse_entries", int(memory%n_impulse, i8), error)
       call file%write_scalar("spring_entries", int(memory%n_spring, i8), error)
@@ -115,6 +128,9 @@ contains
     call file%read_scalar("glued", simulation%n_glued, error)
     call file%read_scalar("failed", simulation%failed, error)
     call file%read_scalar("left", simulation%left, error)
+    call file%read_scalar("mass", simulation%mass, error)
+    call file%read_scalar("left_mass", simulation%left_mass, error)
+    call file%read_scalar("first_mass", simulation%first_mass, error)
     call file%read_scalar("fast", simulation%fast, error)
     call file%read_scalar("rest_energy", rest_energy, error)
     call file%read_scalar("quiet", quiet, error)
@@ -122,6 +138,10 @@ contains
     call file%read_scalar("lists_made", builds, error)
     call file%read_scalar("imbalance", simulation%imbalance, error)
     call file%read_scalar("reached_imbalance", simulation%reached_imbalance, error)
+    call file%read_scalar("next_id", simulation%inflow%next_id, error)
+    call load_insertions(simulation, file, path, error)
+    call file%read_array("population", population_words, population_words, words, error)
+    if (.not. allocated(error)) call simulation%population%set_state(words)
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written
     call take_count(last_written + 1, path//": last_written", own_last, error)
@@ -145,6 +165,24 @@ contains
     call load_diagnostics(simulation%diagnostics, file, error)
     call file%close(error)
   end subroutine load_checkpoint
+
+  !> The accounts of the insertions. Failure (status_input): accounts that no run has.
+  subroutine load_insertions(simulation, file, path, error)
+    type(simulation_t), intent(inout) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: words(:)
+    logical :: sound
+    integer :: n
+
+    n = insertion_words*size(simulation%inflow%insertions)
+    call file%read_array("insertions", n, n, words, error)
+    if (allocated(error)) return
+    call simulation%inflow%set_state(words, sound)
+    if (.not. sound) call raise(error, status_input, path// &
+      & ": the array insertions has an account that no run has: the file is damaged")
+  end subroutine load_insertions
 
   !> The states of all diagnostics that have one; no words of those that are not asked for.
   subroutine save_diagnostics(diagnostics, file, error)

@@ -14,7 +14,7 @@ module gravier_checkpoint_scene
 
   character(len=*), parameter :: newline = achar(10)
   !> groups of the input that a run must go on with as it began
-  character(len=*), parameter :: fixed_groups = "&scene &boundary &sample &material &law"
+  character(len=*), parameter :: fixed_groups = "&scene &boundary &sample &insertion &material &law"
 
 contains
 
@@ -126,6 +126,10 @@ contains
     end do
     if (simulation%decomposition%shapes%n > 0) call add_contents(trim(simulation%config%scene%shapes), &
       & library_digest(simulation%decomposition%shapes))
+    do b = 1, size(simulation%inflow%insertions)
+      if (simulation%config%insertions(b)%radii == "table") call add_contents(trim(simulation%config%insertions(b)%radius_table), &
+        & simulation%inflow%insertions(b)%radii%digest())
+    end do
     call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
     do b = 1, size(simulation%config%boundaries)
       associate (boundary => simulation%decomposition%boundaries(simulation%n_walls + b), given => simulation%config%boundaries(b))

@@ -26,14 +26,13 @@ module gravier_run
   use gravier_accuracy_lines, only: goal_name
   use gravier_output, only: after_solve, of_each_step, of_states, of_checkpoints
   use gravier_run_output, only: run_output_t
+  use gravier_run_end, only: has_ended, end_line
   implicit none
   private
   public :: run_case, check_case, read_config, read_input, report_error
 
   !> times overlap_allowed: an overlap that is no longer one of rounding and tolerance
   real(dp), parameter :: worth_a_warning = 5.0_dp
-  !> steps, one after the other, of a scene that has come to rest
-  integer, parameter :: steps_at_rest = 10
 
   !> When a run began and what made it stop early.
   type :: interruption_t
@@ -254,7 +253,7 @@ contains
       call judge(simulation, figures, ends, keep_last)
       if (keep_last) call output%write(of_each_step, simulation, figures, MPI_Wtime() - step_start, error)
       ! the last state comes before the last checkpoint
-      if (keep_last) call output%write(of_states, simulation, figures, 0.0_dp, error, always=has_come_to_rest(simulation))
+      if (keep_last) call output%write(of_states, simulation, figures, 0.0_dp, error, always=has_ended(simulation))
       call simulation%comm%agree(error)
       if (.not. ends .and. .not. allocated(error)) call attend(simulation, figures, log, output, interruption, error)
       if (interruption%stops) exit
@@ -276,9 +275,7 @@ contains
     if (figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, &
       & error)
     call log%write_end(simulation, MPI_Wtime() - interruption%first_step, error)
-    if (has_come_to_rest(simulation)) call log%line("at rest     after step "//to_text(simulation%step)//" of "// &
-      & to_text(simulation%config%time%steps)//": the kinetic energy of the grains was at most "// &
-      & to_text(simulation%rest_energy, 3)//" J in "//to_text(steps_at_rest)//" steps", error)
+    if (has_ended(simulation)) call log%line(end_line(simulation), error)
     if (simulation%failed > 0) status = status_unconverged
     if (interruption%stops) then
       status = status_failure
@@ -291,17 +288,12 @@ contains
     call simulation%comm%agree(error)
   end subroutine run_steps
 
-  !> Whether all steps are made, or the scene rests.
-  pure logical function is_over(simulation)
+  !> Whether all steps are made, or a rule of &time ends the run.
+  logical function is_over(simulation)
     type(simulation_t), intent(in) :: simulation
-    is_over = simulation%step >= simulation%config%time%steps .or. has_come_to_rest(simulation)
+    is_over = simulation%step >= simulation%config%time%steps
+    if (.not. is_over) is_over = has_ended(simulation)
   end function is_over
-
-  !> Whether the scene rests, in a run that ends by that.
-  pure logical function has_come_to_rest(simulation) result(rests)
-    type(simulation_t), intent(in) :: simulation
-    rests = simulation%rest_energy > 0.0_dp .and. simulation%quiet >= steps_at_rest
-  end function has_come_to_rest
 
   !> Between two steps: write a checkpoint where one is due by steps, by time, by SIGUSR1, at the end, or because the run
   !> has to stop by SIGTERM or for want of time. Collective.

@@ -6,10 +6,11 @@ module gravier_run_memory
   use gravier_communicator, only: communicator_t
   use gravier_memory_need, only: check_memory
   use gravier_bodies_data, only: data_bytes
+  use gravier_insertion, only: insertion_t
   use gravier_config_types, only: config_t
   implicit none
   private
-  public :: check_planned_grains, check_read_grains
+  public :: check_planned_grains, check_read_grains, check_entering_grains
 
   !> bytes of a grain that touches no other, with its copies on the way from the scene to the first step, in 2D and 3D, without spin
   !> and with it. The peaks of runs grow by 611, 739, 739 and 995 a grain (test_run_memory.py)
@@ -54,6 +55,24 @@ contains
     call check_memory(comm, trim(config%scene%bodies_file)//": "//to_text(number)//" grains", real(number, dp), &
       & bytes_of_grain(config) - data_bytes(config%scene%dimension), error)
   end subroutine check_read_grains
+
+  !> The same for grains that are to enter until the end of the run, as far as their number is bounded. Collective.
+  subroutine check_entering_grains(comm, config, insertions, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(insertion_t), intent(in) :: insertions(:)
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: number
+    integer :: i
+
+    do i = 1, size(insertions)
+      if (allocated(error)) return
+      number = insertions(i)%planned(config%time%steps*config%time%step)
+      if (.not. number < huge(1.0_dp)) cycle
+      call check_memory(comm, config%file//": &insertion '"//insertions(i)%name//"': "//number_text(number)//" grains", number, &
+        & bytes_of_grain(config), error)
+    end do
+  end subroutine check_entering_grains
 
   !> The least bytes that a run takes for a grain.
   pure integer function bytes_of_grain(config) result(least)

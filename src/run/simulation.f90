@@ -39,6 +39,11 @@ module gravier_simulation
     integer :: n_walls = 0
     !> grains of the scene at its start
     integer(i8) :: n_first = 0
+    !> the boundary whose displacement may end the run, 0 for none, and its place at the start of the scene [m]
+    integer :: watched = 0
+    real(dp) :: watched_from(3) = 0.0_dp
+    !> mass of those that are free [kg]
+    real(dp) :: first_mass = 0.0_dp
     !> step written last in results.h5, -1 for none
     integer :: last_written = -1
     !> the state comes from a checkpoint
@@ -96,6 +101,8 @@ contains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
     self%given = scene%contacts
+    self%inflow%insertions = scene%insertions
+    self%inflow%next_id = scene%last_id + 1
     call set_physics(self, scene)
     call check_lists_in_period(self, scene, narrow)
     ! lists that last less long have a shorter range
@@ -111,6 +118,8 @@ contains
     call self%decomposition%init(comm, 1, scene%grains, scene%period)
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
+    if (self%inflow%exists()) call prepare_inflow(self)
+    call watch_boundary(self)
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
   end subroutine simulation_make
@@ -134,7 +143,41 @@ contains
     call self%decomposition%migrate(grains)
     if (self%n_glued > 0) call set_glued_velocities(self%decomposition)
     call self%start_diagnostics()
+    self%mass = self%decomposition%free_mass()
+    self%first_mass = self%mass
+    call self%population%note(self%n_grains - self%n_glued, self%mass)
   end subroutine simulation_start
+
+  !> Find the boundary of stop_boundary and its place at the start of the scene.
+  subroutine watch_boundary(self)
+    class(simulation_t), intent(inout) :: self
+    integer :: b
+
+    self%watched = 0
+    do b = 1, size(self%config%boundaries)
+      if (self%config%boundaries(b)%name == self%config%time%stop_boundary) self%watched = self%n_walls + b
+    end do
+    if (self%watched > 0) call self%decomposition%boundaries(self%watched)%find_place(self%watched_from)
+  end subroutine watch_boundary
+
+  !> Partitions cover the regions that grains enter in; where there are no grains at the start, the mean grain is that of the first
+  !> insertion.
+  subroutine prepare_inflow(self)
+    class(simulation_t), intent(inout) :: self
+    integer :: d, nd
+
+    nd = self%decomposition%nd
+    allocate (self%decomposition%entry_box(nd, 2))
+    associate (insertions => self%inflow%insertions)
+      do d = 1, nd
+        self%decomposition%entry_box(d, 1) = minval(insertions%lower(d))
+        self%decomposition%entry_box(d, 2) = maxval(insertions%upper(d))
+      end do
+      if (self%velocity_scale%mass > 0.0_dp) return
+      self%velocity_scale%diameter = 2.0_dp*insertions(1)%radii%moment(1)
+      self%velocity_scale%mass = insertions(1)%mean_mass()
+    end associate
+  end subroutine prepare_inflow
 
   !> Prepare the balance of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
   subroutine simulation_start_diagnostics(self)
@@ -249,6 +292,7 @@ contains
     class(simulation_t), intent(inout) :: self
 
     call self%time_stepper_t%free()
+    if (allocated(self%decomposition%entry_box)) deallocate (self%decomposition%entry_box)
     self%last_written = -1
     self%restarted = .false.
   end subroutine simulation_free

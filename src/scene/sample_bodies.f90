@@ -11,13 +11,13 @@ module gravier_sample_bodies
   use gravier_radius_distribution, only: radius_distribution_t
   use gravier_lattice_packing, only: lattice_t, cell_edge
   use gravier_loose_packing, only: place_loosely
-  use gravier_config_types, only: config_t
+  use gravier_config_types, only: config_t, grains_config_t
   use gravier_config_laws, only: density_of
   use gravier_shape_library, only: shape_library_t
   use gravier_sample_shapes, only: draw_shapes
   implicit none
   private
-  public :: make_lattice, make_sample, farthest_place
+  public :: make_lattice, make_sample, set_radii, farthest_place
 
 contains
 
@@ -114,7 +114,7 @@ contains
     type(radius_distribution_t) :: radii
     type(sample_box_t) :: box
 
-    call set_radii(comm, config, radii, error)
+    call set_radii(comm, config%sample%grains_config_t, config%scene%dimension, radii, error)
     if (allocated(error)) return
     data%total = config%sample%count
     call draw_grains(comm, radii, density_of(config, 1), config%sample%seed, data, error)
@@ -142,23 +142,23 @@ contains
     data%period(:) = config%scene%period
   end subroutine make_sample
 
-  !> The distribution of radii that &sample asks for. Collective.
-  subroutine set_radii(comm, config, radii, error)
+  !> The distribution of radii that &sample or &insertion asks for. Collective.
+  subroutine set_radii(comm, grains, nd, radii, error)
     type(communicator_t), intent(in) :: comm
-    type(config_t), intent(in) :: config
+    type(grains_config_t), intent(in) :: grains
+    !> space dimension
+    integer, intent(in) :: nd
     type(radius_distribution_t), intent(out) :: radii
     type(error_t), allocatable, intent(inout) :: error
 
-    associate (sample => config%sample)
-      radii%nd = config%scene%dimension
-      radii%kind = sample%radii
-      radii%radius = sample%radius
-      radii%radius_min = sample%radius_min
-      radii%radius_max = sample%radius_max
-      radii%radius_mean = sample%radius_mean
-      radii%radius_deviation = sample%radius_deviation
-      if (sample%radii == "table") call radii%read_table(comm, trim(sample%radius_table), error)
-    end associate
+    radii%nd = nd
+    radii%kind = grains%radii
+    radii%radius = grains%radius
+    radii%radius_min = grains%radius_min
+    radii%radius_max = grains%radius_max
+    radii%radius_mean = grains%radius_mean
+    radii%radius_deviation = grains%radius_deviation
+    if (grains%radii == "table") call radii%read_table(comm, trim(grains%radius_table), error)
   end subroutine set_radii
 
   !> Identifiers, radii and masses of the grains of this rank, of `data%total` in all, at rest.

@@ -8,12 +8,12 @@ module gravier_sample_shapes
   use gravier_shape_library, only: shape_library_t
   use gravier_shape_names, only: find_shape, shape_names
   use gravier_random_turn, only: random_turn
-  use gravier_config_types, only: config_t
+  use gravier_config_types, only: config_t, grains_config_t
   use gravier_config_names, only: count_names, get_name
   use gravier_config_laws, only: density_of
   implicit none
   private
-  public :: draw_shapes
+  public :: draw_shapes, choose_shapes
 
   !> stream of random numbers that shapes are drawn from; those of radii and places are 0 and above, those of turns below
   integer, parameter :: stream_of_shapes = -1
@@ -35,7 +35,7 @@ contains
     real(dp), allocatable :: bound(:)
     integer :: k
 
-    call choose_shapes(config, shapes, number, bound, error)
+    call choose_shapes(config, config%file//": &sample", config%sample%grains_config_t, shapes, number, bound, error)
     call allocate_shapes(data, "the grains to be made", error)
     call comm%agree(error)
     if (allocated(error)) return
@@ -48,22 +48,28 @@ contains
   end subroutine draw_shapes
 
   !> The shapes to draw from by their numbers in the library, 0 for a disk or a sphere, and the cumulative fraction of each.
-  subroutine choose_shapes(config, shapes, number, bound, error)
+  subroutine choose_shapes(config, label, grains, shapes, number, bound, error)
     type(config_t), intent(in) :: config
+    !> file and group, for messages
+    character(len=*), intent(in) :: label
+    type(grains_config_t), intent(in) :: grains
     type(shape_library_t), intent(in) :: shapes
     integer, allocatable, intent(out) :: number(:)
     real(dp), allocatable, intent(out) :: bound(:)
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name
     integer :: k, n
 
-    n = count_names(config%sample%grain_shapes)
+    n = count_names(grains%grain_shapes)
     allocate (number(merge(n, shapes%n, n > 0)), bound(merge(n, shapes%n, n > 0)))
     do k = 1, size(number)
       number(k) = k
-      if (n > 0) call find_number(config, shapes, k, number(k), error)
+      if (n == 0) cycle
+      call get_name(trim(grains%grain_shapes), k, name)
+      call find_number(config, label, shapes, name, number(k), error)
     end do
     bound(:) = 1.0_dp
-    associate (shares => config%sample%grain_shares)
+    associate (shares => grains%grain_shares)
       if (any(shares > 0.0_dp)) bound(:) = shares(:n)/maxval(shares)
     end associate
     do k = 2, size(bound)
@@ -72,19 +78,19 @@ contains
     bound(:) = bound/bound(size(bound))
   end subroutine choose_shapes
 
-  !> The number of a shape by the place of its name.
-  subroutine find_number(config, shapes, place, number, error)
+  !> The number of a shape by its name.
+  subroutine find_number(config, label, shapes, name, number, error)
     type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: label
     type(shape_library_t), intent(in) :: shapes
-    integer, intent(in) :: place
+    character(len=*), intent(in) :: name
     integer, intent(out) :: number
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: ball, name
+    character(len=:), allocatable :: ball
 
-    call get_name(trim(config%sample%grain_shapes), place, name)
     ball = trim(merge("disk  ", "sphere", config%scene%dimension == 2))
     number = find_shape(shapes, name)
-    if (number == 0 .and. name /= ball) call raise(error, status_input, config%file//": &sample grain_shapes: '"//name// &
+    if (number == 0 .and. name /= ball) call raise(error, status_input, label//" grain_shapes: '"//name// &
       & "': expected "//ball//" or one of the shapes of "//trim(config%scene%shapes)//", "//shape_names(shapes, ", "))
   end subroutine find_number
 

@@ -3,9 +3,9 @@ module gravier_scene
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
-  use gravier_magnitude, only: far_text
+  use gravier_magnitude, only: sharpest, far_text
   use gravier_communicator, only: communicator_t
-  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
+  use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
   use gravier_given_contacts, only: given_contacts_t, check_pulls
   use gravier_pair_places, only: has_facets
@@ -15,6 +15,7 @@ module gravier_scene
   use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_boundary, only: boundary_t
+  use gravier_insertion, only: insertion_t
   use gravier_effects, only: effects_t
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_law_set, only: law_set_t
@@ -23,15 +24,16 @@ module gravier_scene
   use gravier_method_registry, only: features_of, quoted_names, with_moments
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_laws, only: density_of, collect_laws
-  use gravier_run_memory, only: check_planned_grains, check_read_grains
+  use gravier_run_memory, only: check_planned_grains, check_read_grains, check_entering_grains
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
   use gravier_scene_boundaries, only: make_boundaries
+  use gravier_scene_insertions, only: make_insertions, check_regions
   implicit none
   private
   public :: scene_t, make_scene
 
-  !> what make_column makes, for messages
-  character(len=*), parameter :: column = "the grains of the column"
+  !> what make_column and make_nothing make, for messages
+  character(len=*), parameter :: column = "the grains of the column", nothing = "no grains"
 
   !> A scene as it starts. Grains are spread over the ranks in any way; boundaries are on all of them.
   type :: scene_t
@@ -43,10 +45,15 @@ module gravier_scene
     integer :: n_walls = 0
     !> that the bodies file gives
     type(given_contacts_t) :: contacts
+    !> of grains that enter
+    type(insertion_t), allocatable :: insertions(:)
     type(period_t) :: period
     !> grains of all ranks, and those of them that are glued to boundaries
     integer(i8) :: n_grains = 0, n_glued = 0
-    !> of all ranks [m]; 0 without grains
+    !> the largest identifier of grains and boundaries
+    integer(i8) :: last_id = 0
+    !> of all ranks, of the grains that enter too [m]; 0 without grains. The mean is that of the grains at the start, or of those of
+    !> an insertion where it is smaller
     real(dp) :: largest_radius = 0.0_dp, mean_radius = 0.0_dp
     !> of the edges and corners of all bodies; huge without shapes [m]
     real(dp) :: least_rounding = huge(1.0_dp)
@@ -70,6 +77,10 @@ contains
     if (allocated(error)) return
     if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, scene%shapes, error)
     if (allocated(error)) return
+    call make_insertions(comm, config, scene%shapes, scene%insertions, error)
+    if (allocated(error)) return
+    call check_entering_grains(comm, config, scene%insertions, error)
+    if (allocated(error)) return
     select case (config%scene%bodies)
     case ("column")
       call make_column(comm, config%scene, data, error)
@@ -77,6 +88,8 @@ contains
       call make_lattice(comm, config, data, error)
     case ("sample")
       call make_sample(comm, config, scene%shapes, data, error)
+    case ("none")
+      call make_nothing(config%scene%dimension, data, error)
     case default
       call read_bodies(comm, trim(config%scene%bodies_file), config%scene%dimension, data, error, scene%shapes)
       call check_read_grains(comm, config, data%total, error)
@@ -90,9 +103,16 @@ contains
     do b = 1, size(scene%boundaries)
       scene%boundaries(b)%period(:) = scene%period%length
     end do
+    call check_regions(config, scene%insertions, scene%period, scene%boundaries, error)
+    call comm%agree(error)
+    if (allocated(error)) return
     call collect_laws(config, scene%laws)
     call set_default_laws(scene%laws, config%scene%contact, scene%boundaries)
     call check_data(comm, config, data, error)
+    if (allocated(error)) return
+    if (scene%shapes%n > 0 .and. size(scene%insertions) > 0 .and. .not. allocated(data%shape)) &
+      & call allocate_shapes(data, "the bodies", error)
+    call comm%agree(error)
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
     call check_moments(config, scene%effects, error)
@@ -126,8 +146,11 @@ contains
     real(dp) :: far, far_off
     integer :: k
 
-    if (scene%n_grains == 0) return
+    if (scene%n_grains == 0 .and. size(scene%insertions) == 0) return
     far = farthest_place(comm, data%radius)
+    do k = 1, size(scene%insertions)
+      far = min(far, sharpest*scene%insertions(k)%radii%smallest())
+    end do
     if (scene%period%on()) call check("period", maxval(abs(scene%period%origin) + scene%period%length))
     do k = 1, size(scene%boundaries)
       associate (boundary => scene%boundaries(k))
@@ -254,6 +277,8 @@ contains
     integer :: nd
 
     if (config%solver%criterion /= "error") return
+    if (size(config%insertions) > 0) call raise(error, status_input, config%file// &
+      & ": &solver criterion = 'error': expected another where grains enter: the impulses of the column alone are known")
     nd = config%scene%dimension
     if (any(abs(config%scene%gravity(1:nd - 1)) > 0.0_dp) .or. config%scene%gravity(nd) >= 0.0_dp) &
       & call raise(error, status_input, config%file//": &scene gravity: criterion = 'error' knows the column under gravity "// &
@@ -288,6 +313,17 @@ contains
     data%wall_normal(scene%dimension, 1) = 1.0_dp
   end subroutine make_column
 
+  !> A scene without grains and planes: all grains enter.
+  subroutine make_nothing(nd, data, error)
+    integer, intent(in) :: nd
+    type(bodies_data_t), intent(out) :: data
+    type(error_t), allocatable, intent(inout) :: error
+
+    data%total = 0
+    call allocate_bodies(data, nd, 0, .true., nothing, error)
+    call allocate_walls(data, nd, 0, nothing, error)
+  end subroutine make_nothing
+
   !> Find out what the scene has, from its laws, bodies, boundaries and loads. What no pair can feel is off: a law between grains
   !> where there are no two, one of an outlet, rolling friction where nothing turns. Collective.
   subroutine deduce_effects(comm, config, data, scene)
@@ -300,7 +336,7 @@ contains
 
     nd = config%dimension
     associate (effects => scene%effects)
-      if (data%total > 1) call add_law(config%contact)
+      if (data%total > 1 .or. size(scene%insertions) > 0) call add_law(config%contact)
       do k = 1, size(scene%boundaries)
         associate (boundary => scene%boundaries(k))
           effects%drives = effects%drives .or. moves(boundary)
@@ -318,8 +354,12 @@ contains
       effects%friction = effects%friction .or. effects%rolling
       turning = comm%any_true(any(abs(data%velocity(nd + 1:, :)) > 0.0_dp)) .and. config%rotation
       if (allocated(data%shape)) effects%shapes = comm%any_true(any(data%shape > 0))
+      do k = 1, size(scene%insertions)
+        if (allocated(scene%insertions(k)%shape)) effects%shapes = effects%shapes .or. any(scene%insertions(k)%shape > 0)
+      end do
       effects%rotation = effects%friction .or. turning .or. effects%shapes .or. effects%compliance
       effects%periodic = scene%period%on()
+      effects%insertion = size(scene%insertions) > 0
       effects%glued = comm%any_true(any(data%group > 0))
       effects%gravity = any(abs(config%gravity) > 0.0_dp) .or. config%gravity_table /= ""
       effects%body_force = any(abs(config%body_force) > 0.0_dp)
@@ -381,6 +421,18 @@ contains
     if (data%n > 0) scene%largest_radius = maxval(data%radius)
     scene%largest_radius = comm%highest(scene%largest_radius)
     if (data%total > 0) scene%mean_radius = comm%sum_real(data%radius)/real(data%total, dp)
+    do k = 1, size(scene%insertions)
+      associate (radii => scene%insertions(k)%radii)
+        scene%largest_radius = max(scene%largest_radius, radii%largest())
+        if (scene%mean_radius > 0.0_dp) scene%mean_radius = min(scene%mean_radius, radii%moment(1))
+        if (.not. scene%mean_radius > 0.0_dp) scene%mean_radius = radii%moment(1)
+      end associate
+    end do
+    if (data%n > 0) scene%last_id = maxval(data%id)
+    do k = 1, size(scene%boundaries)
+      scene%last_id = max(scene%last_id, scene%boundaries(k)%id)
+    end do
+    scene%last_id = comm%largest(scene%last_id)
     if (scene%effects%shapes) call find_least_rounding(comm, scene)
   end subroutine take_data
 
@@ -404,6 +456,16 @@ contains
       associate (rounding => of_shape(scene%grains%shape(k)))
         if (rounding < huge(1.0_dp)) scene%least_rounding = min(scene%least_rounding, rounding*scene%grains%radius(k))
       end associate
+    end do
+    do p = 1, size(scene%insertions)
+      if (.not. allocated(scene%insertions(p)%shape)) cycle
+      do k = 1, size(scene%insertions(p)%shape)
+        if (scene%insertions(p)%shape(k) == 0) cycle
+        associate (rounding => of_shape(scene%insertions(p)%shape(k)))
+          if (rounding < huge(1.0_dp)) scene%least_rounding = min(scene%least_rounding, &
+            & rounding*scene%insertions(p)%radii%smallest())
+        end associate
+      end do
     end do
     scene%least_rounding = -comm%highest(-scene%least_rounding)
   end subroutine find_least_rounding

@@ -127,6 +127,15 @@ class Messages(RunTestCase):
         self.refuse(bad({"scene": {"bodies": "sample", "lattice_count": None, "radius_min": None, "radius_max": None},
                          "sample": {"count": 10, "radius": 0.01, "box": [0.01, 0.0]}}), "&sample box", "the largest grain has a diameter")
         self.refuse(bad({"boundary": {**PLANE, "free": [False, True], "mass": 0.0}}), "mass = 0.0", "expected a finite real number > 0")
+        feed = {"lower": [0.0, 0.0], "upper": [1.0, 1.0]}
+        for given in ({"radii": "table", "radius_table": ""}, {"radii": "uniform", "radius_min": 0.0, "radius_max": 1.0},
+                      {"radii": "uniform", "radius_min": 1.0, "radius_max": 0.0},
+                      {"radii": "log_normal", "radius_min": 1.0, "radius_max": 1.0, "radius_deviation": 0.1, "radius_mean": 0.0},
+                      {"radii": "log_normal", "radius_min": 1.0, "radius_max": 1.0, "radius_mean": 1.0, "radius_deviation": 0.0}):
+            name, value = next((name, value) for name, value in given.items() if value in ("", 0.0))
+            self.refuse(bad({"insertion": {**feed, **given}}), f"&insertion (the 1st) {name} = {value!r}: expected")
+        self.refuse(bad({"insertion": {"lower": [1e9, 0.0], "upper": [1.1e9, 1.0], "radius": 0.01}}),
+                    "&insertion 'insertion 1': a region as far as 1.100E+09 m from the origin: expected at most")
         write(self.here("radii.csv"), "radius,share\n1e-200,1\n")
         self.refuse(bad({"scene": {"bodies": "sample", "lattice_count": None, "radius_min": None, "radius_max": None},
                          "sample": {"count": 10, "radii": "table", "radius_table": "radii.csv", "box": [1.0, 0.0]}}),

@@ -190,7 +190,7 @@ FILES = [
     ("huge circle", case({"boundary": {"shape": "circle", "radius": 1e20}}), ("a coordinate or length of 1.000E+20 m",)),
     key("output", "directory", "''", "not empty"),
     # the choice
-    key("scene", "bodies", "'cubes'", "'column', 'lattice', 'file' or 'sample'"),
+    key("scene", "bodies", "'cubes'", "'column', 'lattice', 'file', 'sample' or 'none'"),
     key("solver", "method", "'jacobi'", "'nlgs', 'schwarz', 'schwarz_ec', 'nscdd', 'nscdd_ep' or 'newton'"),
     key("solver", "criterion", "'energy'", "'residual' or 'error'"),
     key("solver", "on_failure", "'panic'", "'continue', 'stop' or 'discard'"),

@@ -102,7 +102,7 @@ REFUSED = [
     ("an unknown shape", {}, SHAPES, changed(BODIES, "pill", "pile"), ("bodies.csv: line 5: column shape", '"pile"', "brick, ell, pill")),
     ("shapes without a library", {"scene": {"shapes": None}}, SHAPES, BODIES, ("bodies.csv: column scale is unknown in 2D",)),
     ("a library without a bodies file", {"scene": {"bodies": "lattice", "bodies_file": None, "lattice_count": [2, 2], "radius_min": 0.01,
-                                                  "radius_max": 0.01}}, SHAPES, BODIES, ("shapes belongs to bodies = 'file' or 'sample'",)),
+                                                  "radius_max": 0.01}}, SHAPES, BODIES, ("shapes belongs to bodies = 'file', 'sample' or 'none'",)),
     ("no rotation", {"scene": {"rotation": False}}, SHAPES, BODIES,
      ("case.nml: &scene rotation = .false.: expected .true. where bodies have shapes",)),
     ("rolling friction", {"scene": {"rolling_friction": 0.1}}, SHAPES, BODIES,

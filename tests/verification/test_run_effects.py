@@ -267,6 +267,9 @@ class Neutral(SmallScene):
                 "gravity": (weightless, {"gravity": tiny * along}),
                 "rotation": ({"friction": 0.0}, {"spin": [tiny] * (2 * dimension - 3)}),
                 "removal": (plain, {"extra": {"boundary": [outlet]}}),
+                # no grain of the mean radius or more enters before the end
+                "insertion": (plain, {"extra": {"insertion": [{"lower": [0.0] * dimension, "upper": [9.0] * dimension, "radius": 0.049,
+                                                               "start": 1e6}]}}),
                 "sleeping": (plain, {"extra": {"solver": {"sleeping": True, "sleep_after": 1, "sleep_speed": tiny}}}),
             }
             for name, (common, more) in pairs.items():

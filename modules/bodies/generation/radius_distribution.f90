@@ -4,7 +4,7 @@ module gravier_radius_distribution
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_magnitude, only: is_size, size_text
-  use gravier_random_hash, only: hash_uniform
+  use gravier_random_hash, only: hash_uniform, hash_words
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
   use gravier_motion, only: grain_mass
@@ -43,6 +43,7 @@ module gravier_radius_distribution
     procedure :: mean_volume => distribution_mean_volume
     procedure :: smallest => distribution_smallest
     procedure :: largest => distribution_largest
+    procedure :: digest => distribution_digest
     procedure, private :: density
   end type radius_distribution_t
 
@@ -308,5 +309,22 @@ contains
     radius = self%radius_max
     if (self%kind == "single") radius = self%radius
   end function distribution_largest
+
+  !> A number that tells tables from each other.
+  pure integer(i8) function distribution_digest(self) result(digest)
+    class(radius_distribution_t), intent(in) :: self
+    integer(i8), allocatable :: words(:)
+    integer :: k, n
+
+    digest = 0
+    if (.not. allocated(self%table_radius)) return
+    n = size(self%table_radius)
+    allocate (words(2*n))
+    do k = 1, n
+      words(k) = transfer(self%table_radius(k), 0_i8)
+      words(n + k) = transfer(self%cumulated_share(k), 0_i8)
+    end do
+    digest = hash_words(words)
+  end function distribution_digest
 
 end module gravier_radius_distribution

@@ -32,6 +32,8 @@ module gravier_decomposition
     !> the shapes of the bodies, the same on every rank
     type(shape_library_t) :: shapes
     type(body_figures_t) :: figures
+    !> corners of the box that grains enter in, which partitions cover (nd, 2) [m]; not allocated where none enter
+    real(dp), allocatable :: entry_box(:, :)
   contains
     procedure :: init => decomposition_init
     procedure :: migrate => decomposition_migrate
@@ -41,6 +43,7 @@ module gravier_decomposition
     procedure :: subdomain_of => decomposition_subdomain_of
     procedure :: layout => decomposition_layout
     procedure :: find_owned => decomposition_find_owned
+    procedure :: free_mass => decomposition_free_mass
   end type decomposition_t
 
 contains
@@ -97,8 +100,20 @@ contains
     place = find_sorted(self%owned(h)%id, key(2))
   end subroutine decomposition_find_owned
 
-  !> Corners of the box that holds all grains, radii included [m], and along periodic axes just the period; an empty
-  !> scene has the unit box. Collective.
+  !> Mass of the grains that are not glued to boundaries [kg]. Collective.
+  real(dp) function decomposition_free_mass(self) result(mass)
+    class(decomposition_t), intent(in) :: self
+    real(dp) :: parts(size(self%owned))
+    integer :: s
+
+    do s = 1, size(self%owned)
+      parts(s) = sum(self%owned(s)%mass, mask=self%owned(s)%glued == 0)
+    end do
+    mass = self%comm%sum_real(parts)
+  end function decomposition_free_mass
+
+  !> Corners of the box that holds all grains, radii included [m], and the regions that grains enter in; along periodic axes just
+  !> the period. An empty scene has the unit box. Collective.
   subroutine decomposition_bounding_box(self, bodies, lower, upper)
     class(decomposition_t), intent(in) :: self
     !> grains of this rank, however grouped
@@ -117,6 +132,10 @@ contains
         far(nd + d) = max(far(nd + d), maxval(bodies(s)%position(d, :) + bodies(s)%radius))
       end do
     end do
+    if (allocated(self%entry_box)) then
+      far(1:nd) = max(far(1:nd), -self%entry_box(:, 1))
+      far(nd + 1:) = max(far(nd + 1:), self%entry_box(:, 2))
+    end if
     call self%comm%highest_of(far)
     lower(:) = -far(1:nd)
     upper(:) = far(nd + 1:)

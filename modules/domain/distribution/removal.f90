@@ -57,18 +57,22 @@ contains
   end function some_leave
 
   !> Take the grains that leave out of the scene. Collective.
-  subroutine remove_grains(decomposition, has_glued, n_free, n_glued)
+  subroutine remove_grains(decomposition, has_glued, n_free, n_glued, mass)
     type(decomposition_t), intent(inout) :: decomposition
     !> some grain of the scene is glued to a boundary
     logical, intent(in) :: has_glued
     !> grains of all ranks that leave
     integer(i8), intent(out) :: n_free, n_glued
+    !> of the free ones that leave [kg]
+    real(dp), intent(out) :: mass
     logical, allocatable :: mask(:)
     integer(i8) :: counts(2)
+    real(dp) :: parts(size(decomposition%owned))
     integer :: s, k
 
     n_free = 0
     n_glued = 0
+    mass = 0.0_dp
     if (.not. has_outlet(decomposition) .and. (.not. has_glued .or. all(decomposition%boundaries%present))) return
     counts(:) = 0
     do s = 1, size(decomposition%owned)
@@ -79,6 +83,7 @@ contains
         end do
         counts(2) = counts(2) + count(.not. mask .and. owned%glued > 0)
         counts(1) = counts(1) + count(.not. mask .and. owned%glued == 0)
+        parts(s) = sum(owned%mass, mask=.not. mask .and. owned%glued == 0)
         if (.not. all(mask)) call owned%keep_only(mask)
         deallocate (mask)
       end associate
@@ -86,6 +91,7 @@ contains
     call decomposition%comm%sum_counts(counts)
     n_free = counts(1)
     n_glued = counts(2)
+    if (n_free > 0) mass = decomposition%comm%sum_real(parts)
   end subroutine remove_grains
 
 end module gravier_removal

@@ -4,7 +4,7 @@ module gravier_effects
   private
   public :: effects_t, n_effects, effect_name_length
 
-  integer, parameter :: n_effects = 16, effect_name_length = 24
+  integer, parameter :: n_effects = 17, effect_name_length = 24
 
   !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
   type :: effects_t
@@ -15,8 +15,8 @@ module gravier_effects
     logical :: pivoting = .false., restitution = .false., cohesion = .false.
     !> some grain turns; some axis is periodic; some boundary moves as prescribed, or is moved by forces; some grain is glued
     logical :: rotation = .false., periodic = .false., drives = .false., forces = .false., glued = .false.
-    !> loads; grains are taken out
-    logical :: gravity = .false., body_force = .false., removal = .false.
+    !> loads; grains are taken out; grains enter
+    logical :: gravity = .false., body_force = .false., removal = .false., insertion = .false.
   contains
     procedure :: list => effects_list
   end type effects_t
@@ -61,6 +61,8 @@ contains
     on(15) = self%body_force
     names(16) = "removal"
     on(16) = self%removal
+    names(17) = "insertion"
+    on(17) = self%insertion
   end subroutine effects_list
 
 end module gravier_effects

@@ -50,8 +50,8 @@ module gravier_diagnostic
     real(dp) :: time = 0.0_dp
     !> free grains of the scene
     integer(i8) :: n_free = 0
-    !> grains were taken out of the scene in this step
-    logical :: some_left = .false.
+    !> grains were taken out of the scene in this step, or have entered it
+    logical :: others = .false.
   end type solved_step_t
 
   !> Columns of a table: names and values.

@@ -164,7 +164,7 @@ contains
       parts(in_springs + 1:in_springs + 3, s) = springs
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
-    if (step%some_left) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
+    if (step%others) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
     self%translation = sums(in_translation)
     self%rotation = sums(in_rotation)
     self%load_work = self%load_work + sums(in_load)

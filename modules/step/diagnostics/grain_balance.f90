@@ -20,7 +20,7 @@ module gravier_grain_balance
     real(dp) :: kinetic = 0.0_dp, start = 0.0_dp
     !> done on them by gravity and body force, and by the contacts
     real(dp) :: load_work = 0.0_dp, contact_work = 0.0_dp
-    !> kinetic energy of grains that were taken out of the scene
+    !> kinetic energy of grains that were taken out of the scene, less that of grains that entered
     real(dp) :: carried_away = 0.0_dp
     !> sum of their speeds now [m/s]
     real(dp) :: speeds = 0.0_dp
@@ -66,7 +66,7 @@ contains
     integer :: s, nd
 
     nd = step%decomposition%nd
-    if (step%some_left) then
+    if (step%others) then
       kinetic = self%kinetic
       parts(:, :) = 0.0_dp
       do s = 1, size(parts, 2)

@@ -619,6 +619,7 @@ contains
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
     integer(i8) :: n_free, n_glued
+    real(dp) :: mass
 
     call add_grain(1, 1.0_dp, 0, 0.0_dp, 0.3_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     call add_grain(2, 2.0_dp, 0, 1.0_dp, 0.003_dp, 0.0_dp, -1.0_dp, 3.0_dp)
@@ -631,10 +632,12 @@ contains
       & "&boundary shape = 'outlet', point = 0, 0, normal = 0, 1 /"//newline//"&boundary shape = 'grains', group = 1 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /"//newline//all_figures)
     call check(.not. some_leave(sim%decomposition), "nobody is behind the outlet, and glued grains stay there")
-    call remove_grains(sim%decomposition, .true., n_free, n_glued)
+    call remove_grains(sim%decomposition, .true., n_free, n_glued, mass)
     call check_equal(n_free + n_glued, 0_i8, "nobody leaves")
     call advance(sim, figures)
     call check_equal(figures%left, 1_i8, "the falling grain leaves")
+    call check_close(sim%left_mass, 2.0_dp, 0.0_dp, "with its mass")
+    call check_close(sim%mass, 3.0_dp, 0.0_dp, "and the free ones keep theirs")
     call check(grain(sim, 2, 2) <= -huge(1.0_dp), "it is the one that is behind the outlet")
     call check(grain(sim, 1, 2) > -1.0_dp, "a free grain stays")
     call check(grain(sim, 3, 2) > -1.0_dp, "and another one")
@@ -646,8 +649,9 @@ contains
     call check_close(sim%balance%error(), 0.0_dp, solved, "balance of grains: it closes")
     sim%decomposition%boundaries(2)%present = .false.
     call check(some_leave(sim%decomposition), "glued grains leave with their boundary")
-    call remove_grains(sim%decomposition, .true., n_free, n_glued)
+    call remove_grains(sim%decomposition, .true., n_free, n_glued, mass)
     call check_equal(n_free, 0_i8, "no free one leaves")
+    call check_close(mass, 0.0_dp, 0.0_dp, "and no mass of free ones")
     call check_equal(n_glued, 2_i8, "both glued ones leave")
     call sim%free()
   end subroutine check_departures

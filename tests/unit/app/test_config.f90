@@ -8,6 +8,8 @@ program test_config
   use gravier_config, only: config_t, scene_config_t, boundary_config_t, parse_config, write_active, write_key_reference
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
+  character(len=*), parameter :: time_keys = "step steps theta rest_energy stop_boundary stop_displacement stop_grains_at_most "// &
+    & "stop_grains_at_least stop_mass_at_most stop_mass_at_least"
 
   character(len=*), parameter :: newline = achar(10), tab = achar(9), carriage = achar(13)
   !> a group &time that is in order
@@ -559,19 +561,19 @@ contains
   subroutine test_refused_names()
     call refuse(column // "&solvr /", "unknown group &solvr; did you mean &solver?")
     call refuse(column // "&physics /", &
-      "unknown group &physics: expected one of &scene &boundary &sample &material &law &time &solver &decomposition " &
+      "unknown group &physics: expected one of &scene &boundary &sample &insertion &material &law &time &solver &decomposition " &
       // "&enriched &output")
     call refuse(column // "&solver methd = 'nlgs' /", "unknown key 'methd' in &solver; did you mean 'method'?")
     call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
     call refuse(column // "&time sweeps = 3 /", "group &time is given twice (lines 1 and 1): expected once")
     call refuse("&scene / &time sweeps = 3 /", "unknown key 'sweeps' in &time; it belongs to &solver")
-    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of step steps theta rest_energy")
-    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of step steps theta rest_energy")
+    call refuse("&scene / &time length = 3 /", "unknown key 'length' in &time: expected one of "//time_keys)
+    call refuse("&scene / &time sweep = 3 /", "unknown key 'sweep' in &time: expected one of "//time_keys)
     call refuse("&scene / &time " // repeat("step", 15) // " = 3 /", &
-      "unknown key '" // repeat("step", 15) // "' in &time: expected one of step steps theta rest_energy")
+      "unknown key '" // repeat("step", 15) // "' in &time: expected one of "//time_keys)
     call refuse("&scene bodies = 'column' /", "group &time is missing: expected &time ... /")
     call refuse(time, "group &scene is missing: expected &scene ... /")
-    call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse("&scene /" // time, "&scene bodies is missing: expected 'column', 'lattice', 'file', 'sample' or 'none'")
     call refuse("&scene bodies = 'column' / &time steps = 1 /", &
       "&time step is missing: expected a finite real number > 0 (s)")
     call refuse("&scene bodies = 'column' / &time step = 1 /", "&time steps is missing: expected an integer >= 0")
@@ -591,12 +593,12 @@ contains
 
   !> Values that are not of the key's kind.
   subroutine test_refused_kinds()
-    call refuse(scene("bodies = column"), "&scene bodies = column: expected 'column', 'lattice', 'file' or 'sample'")
-    call refuse(scene("bodies = 'columns'"), "&scene bodies = 'columns': expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse(scene("bodies = column"), "&scene bodies = column: expected 'column', 'lattice', 'file', 'sample' or 'none'")
+    call refuse(scene("bodies = 'columns'"), "&scene bodies = 'columns': expected 'column', 'lattice', 'file', 'sample' or 'none'")
     call refuse(scene("bodies = 'column lattice'"), &
-      "&scene bodies = 'column lattice': expected 'column', 'lattice', 'file' or 'sample'")
-    call refuse(scene("bodies = ''"), "&scene bodies = '': expected 'column', 'lattice', 'file' or 'sample'")
-    call refuse(scene("bodies = 3"), "&scene bodies = 3: expected 'column', 'lattice', 'file' or 'sample'")
+      "&scene bodies = 'column lattice': expected 'column', 'lattice', 'file', 'sample' or 'none'")
+    call refuse(scene("bodies = ''"), "&scene bodies = '': expected 'column', 'lattice', 'file', 'sample' or 'none'")
+    call refuse(scene("bodies = 3"), "&scene bodies = 3: expected 'column', 'lattice', 'file', 'sample' or 'none'")
     call refuse(scene("bodies = 'column' title = 3"), "&scene title = 3: expected a text in quotes, at most 4096 characters")
     call refuse(scene("bodies = 'column' title = 'a', 'b'"), &
       "&scene title = 'a', 'b': expected a text in quotes, at most 4096 characters")
@@ -704,7 +706,7 @@ contains
   !> Keys that belong to another kind of bodies.
   subroutine test_rules_of_bodies()
     call refuse_stranger("column", "", "bodies_file = 'a.h5'", "'file'")
-    call refuse_stranger("column", "", "density = 1", "'lattice', 'file' or 'sample'")
+    call refuse_stranger("column", "", "density = 1", "'lattice', 'file', 'sample' or 'none'")
     call refuse_stranger("column", "", "lattice_count = 1, 1", "'lattice'")
     call refuse_stranger("column", "", "radius_min = 1", "'lattice'")
     call refuse_stranger("column", "", "radius_max = 1", "'lattice'")
@@ -1179,7 +1181,8 @@ contains
       "group &sample is missing: expected &sample ... /, required by bodies = 'sample'")
     call refuse(sample("count = 1 radius = 1 box = 1") // "&sample /", &
       "group &sample is given twice (lines 1 and 1): expected once")
-    call refuse("&scene /" // time // "&sample /", "&scene bodies is missing: expected 'column', 'lattice', 'file' or 'sample'")
+    call refuse("&scene /" // time // "&sample /", &
+      "&scene bodies is missing: expected 'column', 'lattice', 'file', 'sample' or 'none'")
     call refuse(sample("radius = 1 box = 1"), "&sample count is missing: expected an integer >= 1")
     call refuse(sample("count = 1 box = 1"), "&sample radius is missing: " // positive // " (m), required by radii = 'single'")
     call refuse(sample("count = 1 box = 1 radii = 'uniform' radius_max = 1"), &

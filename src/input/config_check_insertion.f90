@@ -1,0 +1,102 @@
+!> Rules of the &insertion groups. What asks for radii of a table, for shapes or for boundaries is for the scene.
+module gravier_config_check_insertion
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_config_types, only: config_t, insertion_config_t
+  use gravier_config_report, only: report_t, expect, is_given, shown_text, ordinal
+  use gravier_config_check_grains, only: check_grains
+  use gravier_config_laws, only: material_number
+  implicit none
+  private
+  public :: check_insertions
+
+contains
+
+  !> Fails (status_input) with the first rule that an insertion breaks, and on a scene without grains in which none enter.
+  subroutine check_insertions(report, config, error)
+    !> its instance comes back as 1
+    type(report_t), intent(inout) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i
+
+    if (config%scene%bodies == "none" .and. size(config%insertions) == 0) call raise(error, status_input, report%file// &
+      ": group &insertion is missing: expected &insertion ... /, required by bodies = 'none'")
+    call expect(report, config%scene%bodies /= "none" .or. config%decomposition%partition == "grid" .or. &
+                config%decomposition%subdomains == 1, "decomposition", "partition", error, &
+                "'grid' where bodies = 'none': METIS finds no grains to distribute")
+    do i = 1, size(config%insertions)
+      report%instance = i
+      call check_name(report, config%insertions(:i), error)
+      call check_region(report, config, config%insertions(i), error)
+      call check_rate(report, config%insertions(i), error)
+      call expect(report, all(config%insertions(i)%velocity_spread >= 0.0_dp), "insertion", "velocity_spread", error)
+      call check_material(report, config, config%insertions(i), error)
+      call check_grains(report, config, "insertion", config%insertions(i)%grains_config_t, error)
+      if (allocated(error)) return
+    end do
+    report%instance = 1
+  end subroutine check_insertions
+
+  !> The last of some insertions has a name of its own.
+  subroutine check_name(report, insertions, error)
+    type(report_t), intent(in) :: report
+    type(insertion_config_t), intent(in) :: insertions(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n, i
+
+    n = size(insertions)
+    call expect(report, insertions(n)%name /= "", "insertion", "name", error)
+    do i = 1, n - 1
+      call expect(report, insertions(i)%name /= insertions(n)%name, "insertion", "name", error, &
+                  "a name of its own, but the "//ordinal(i)//" has it too")
+    end do
+  end subroutine check_name
+
+  !> A region has an inside.
+  subroutine check_region(report, config, insertion, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(insertion_config_t), intent(in) :: insertion
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: nd
+
+    nd = config%scene%dimension
+    if (insertion%region == "box") then
+      call expect(report, all(insertion%upper(:nd) > insertion%lower(:nd)), "insertion", "upper", error, &
+                  "components above those of lower, here "//shown_text(report, "insertion", "lower"))
+    else
+      call expect(report, insertion%region_radius > 0.0_dp, "insertion", "region_radius", error)
+    end if
+  end subroutine check_region
+
+  !> How much enters, and when.
+  subroutine check_rate(report, insertion, error)
+    type(report_t), intent(in) :: report
+    type(insertion_config_t), intent(in) :: insertion
+    type(error_t), allocatable, intent(inout) :: error
+
+    call expect(report, insertion%rate > 0.0_dp .or. .not. insertion%rate_given, "insertion", "rate", error)
+    call expect(report, insertion%mass_rate > 0.0_dp .or. .not. insertion%mass_rate_given, "insertion", "mass_rate", error)
+    call expect(report, .not. (insertion%rate_given .and. insertion%mass_rate_given), "insertion", "mass_rate", error, &
+                "it in the place of rate, here "//shown_text(report, "insertion", "rate"))
+    call expect(report, insertion%count >= 1 .or. .not. insertion%count_given, "insertion", "count", error)
+    call expect(report, insertion%mass > 0.0_dp .or. .not. insertion%mass_given, "insertion", "mass", error)
+    call expect(report, insertion%start >= 0.0_dp, "insertion", "start", error)
+    call expect(report, insertion%end > insertion%start .or. .not. insertion%end_given, "insertion", "end", error, &
+                "a time later than start, here "//shown_text(report, "insertion", "start"))
+  end subroutine check_rate
+
+  subroutine check_material(report, config, insertion, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(insertion_config_t), intent(in) :: insertion
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: known
+
+    if (.not. insertion%material_given) return
+    known = material_number(config, insertion%material) > 0
+    call expect(report, known, "insertion", "material", error, "the name of a &material")
+  end subroutine check_material
+
+end module gravier_config_check_insertion

@@ -1,0 +1,131 @@
+!> What the log says of grains that enter: rates that a region cannot hold before a run, the balance of grains and of mass after it.
+module gravier_inflow_lines
+  use gravier_kinds, only: dp, i8
+  use gravier_text, only: to_text, counted
+  use gravier_insertion, only: insertion_t
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: inflow_warnings, entering_lines, population_lines
+
+  character(len=*), parameter :: newline = new_line("a")
+  !> fraction of a region that grains placed at random fill without much searching, in 2D and 3D
+  real(dp), parameter :: easily_filled(2:3) = [0.35_dp, 0.2_dp]
+
+contains
+
+  !> Warnings, each a line ended by a newline, and their number: rates at which grains enter faster than they leave the region.
+  subroutine inflow_warnings(simulation, text, number)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: number
+    real(dp) :: rate, stay, most
+    integer :: i
+
+    text = ""
+    number = 0
+    do i = 1, size(simulation%inflow%insertions)
+      associate (insertion => simulation%inflow%insertions(i))
+        rate = insertion%rate
+        if (insertion%mass_rate < huge(1.0_dp)) rate = insertion%mass_rate/insertion%mean_mass()
+        if (.not. rate < huge(1.0_dp)) cycle
+        stay = min(time_in_region(insertion, simulation%physics%gravity), simulation%config%time%steps*simulation%physics%h)
+        if (.not. stay > 0.0_dp) cycle
+        most = easily_filled(insertion%nd)*insertion%volume()/(insertion%radii%mean_volume()*stay)
+        if (.not. rate > most .or. most*stay > insertion%most_grains) cycle
+        number = number + 1
+        text = text//"warning     &insertion '"//insertion%name//"': "//to_text(rate, 3)//" grains a second are more than its "// &
+          & "region has places for before those that entered have left it, about "//to_text(most, 3)//" a second: a larger "// &
+          & "region or velocity lets them enter"//newline
+      end associate
+    end do
+  end subroutine inflow_warnings
+
+  !> Time in which a grain crosses a region along its velocity, or along gravity; huge where neither moves it [s].
+  pure real(dp) function time_in_region(insertion, gravity) result(time)
+    type(insertion_t), intent(in) :: insertion
+    !> [m/s^2]
+    real(dp), intent(in) :: gravity(3)
+    real(dp) :: way(3), speed, along, length
+
+    time = huge(1.0_dp)
+    speed = norm2(insertion%velocity)
+    way(:) = insertion%velocity
+    if (.not. speed > 0.0_dp) way(:) = gravity
+    if (.not. norm2(way) > 0.0_dp) return
+    way(:) = way/norm2(way)
+    length = dot_product(abs(way), insertion%upper - insertion%lower)
+    along = max(dot_product(gravity, way), 0.0_dp)
+    ! length = speed t + along t^2/2
+    time = 2.0_dp*length/(speed + sqrt(speed**2 + 2.0_dp*along*length))
+  end function time_in_region
+
+  !> How many grains are to enter, a line each insertion, and the bytes that they take at least.
+  function entering_lines(simulation, bytes) result(text)
+    type(simulation_t), intent(in) :: simulation
+    !> of a grain
+    integer(i8), intent(in) :: bytes
+    character(len=:), allocatable :: text
+    real(dp) :: number
+    integer :: i
+
+    text = ""
+    do i = 1, size(simulation%inflow%insertions)
+      associate (insertion => simulation%inflow%insertions(i))
+        number = insertion%planned(simulation%config%time%steps*simulation%physics%h)
+        if (number < huge(1.0_dp)) then
+          text = text//"  insertion '"//insertion%name//"': about "//to_text(nint(min(number, 1.0e18_dp), i8))// &
+            & " grains enter until the end, and take at least "//to_text(int(min(number*bytes/1024.0_dp, 1.0e18_dp), i8) + 1)// &
+            & " KiB more of all ranks"//newline
+        else
+          text = text//"  insertion '"//insertion%name//"': as many grains enter as find places; each takes at least "// &
+            & to_text(bytes)//" bytes more"//newline
+        end if
+      end associate
+    end do
+  end function entering_lines
+
+  !> The balance of free grains and of their mass, and how each insertion kept its rate; nothing in scenes that
+  !> grains neither enter nor leave.
+  function population_lines(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    integer(i8) :: entered
+    integer :: i
+
+    text = ""
+    if (.not. (simulation%inflow%exists() .or. simulation%effects%removal)) return
+    entered = simulation%inflow%entered()
+    text = "grains      "//to_text(simulation%n_grains - simulation%n_glued + simulation%left - entered)//" at the start + "// &
+      & to_text(entered)//" entered - "//to_text(simulation%left)//" left = "//to_text(simulation%n_grains - simulation%n_glued)// &
+      & "; mass "//to_text(simulation%first_mass, 7)//" + "//to_text(simulation%inflow%mass(), 7)//" - "// &
+      & to_text(simulation%left_mass, 7)//" = "//to_text(simulation%mass, 7)//" kg"//newline
+    do i = 1, size(simulation%inflow%insertions)
+      text = text//insertion_line(simulation%inflow%insertions(i), simulation%time)//newline
+    end do
+  end function population_lines
+
+  !> What an insertion has let in, and what it owes.
+  function insertion_line(insertion, time) result(text)
+    type(insertion_t), intent(in) :: insertion
+    !> [s]
+    real(dp), intent(in) :: time
+    character(len=:), allocatable :: text
+    integer(i8) :: grains
+    real(dp) :: mass
+
+    text = "insertion   '"//insertion%name//"': "//counted(insertion%entered, "grain")//" of "//to_text(insertion%mass, 7)// &
+      & " kg entered"
+    grains = insertion%grains_behind(time)
+    mass = insertion%mass_behind(time)
+    if (grains > 0) then
+      text = text//", *** "//to_text(grains)//" fewer than its rate owes: they found no place"
+    else if (mass > 0.0_dp) then
+      text = text//", *** "//to_text(mass, 3)//" kg less than its rate owes: grains found no place"
+    else if (insertion%rate < huge(1.0_dp) .or. insertion%mass_rate < huge(1.0_dp)) then
+      text = text//", all that its rate owes"
+    end if
+    if (insertion%put_off > 0) text = text//"; grains were put off in "//counted(insertion%put_off, "step")
+  end function insertion_line
+
+end module gravier_inflow_lines
