@@ -7,7 +7,7 @@ module gravier_scene
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
-  use gravier_given_contacts, only: given_contacts_t, check_pulls
+  use gravier_given_contacts, only: given_contacts_t, check_pulls, check_points
   use gravier_pair_places, only: has_facets
   use gravier_shape_library, only: shape_library_t
   use gravier_shapes_file, only: read_shapes
@@ -118,7 +118,9 @@ contains
     call check_moments(config, scene%effects, error)
     call check_shapes(config, scene, error)
     call check_places(comm, config, data, scene, error)
-    call take_contacts(comm, config, data, scene, error)
+    if (config%solver%warm_start) scene%contacts = data%contacts
+    if (.not. scene%laws%attracts) call check_pulls(comm, scene%contacts, error)
+    if (scene%effects%shapes .or. has_facets(scene%boundaries)) call check_points(scene%contacts, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
 
@@ -199,22 +201,6 @@ contains
     end do
     call comm%agree(error)
   end subroutine check_data
-
-  !> Take over the contacts that the bodies file gives, where solves start from impulses. Errors are the same on all ranks. Collective.
-  subroutine take_contacts(comm, config, data, scene, error)
-    type(communicator_t), intent(in) :: comm
-    type(config_t), intent(in) :: config
-    type(bodies_data_t), intent(in) :: data
-    type(scene_t), intent(inout) :: scene
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error) .or. data%contacts%total == 0 .or. .not. config%solver%warm_start) return
-    if (.not. scene%laws%attracts) call check_pulls(comm, data%contacts, error)
-    if (.not. allocated(data%contacts%point) .and. (scene%effects%shapes .or. has_facets(scene%boundaries))) &
-      & call raise(error, status_input, data%contacts%path//": /contacts/point: missing; the places of the contacts were "// &
-      & "expected where bodies have shapes or boundaries facets")
-    scene%contacts = data%contacts
-  end subroutine take_contacts
 
   !> Glue the grains of a group to the boundary of that group. Errors are the same on all ranks. Collective.
   subroutine glue(comm, config, data, scene, error)

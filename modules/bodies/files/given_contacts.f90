@@ -11,7 +11,7 @@ module gravier_given_contacts
   use gravier_sorting, only: argsort, find_sorted
   implicit none
   private
-  public :: given_contacts_t, name_length, check_given, check_known_bodies, check_pulls, find_ranks
+  public :: given_contacts_t, name_length, check_given, check_known_bodies, check_pulls, check_points, find_ranks
 
   !> of the name of a boundary
   integer, parameter :: name_length = 64
@@ -212,5 +212,15 @@ contains
     end if
     call comm%agree(error)
   end subroutine check_pulls
+
+  !> Refuse contacts without places, where two bodies may touch in several points. Errors are the same on all ranks.
+  subroutine check_points(contacts, error)
+    type(given_contacts_t), intent(in) :: contacts
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (allocated(error) .or. contacts%total == 0 .or. allocated(contacts%point)) return
+    call raise(error, status_input, contacts%path//": /contacts/point: missing; the places of the contacts were expected where "// &
+      & "bodies have shapes or boundaries facets")
+  end subroutine check_points
 
 end module gravier_given_contacts
