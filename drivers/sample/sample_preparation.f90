@@ -65,7 +65,7 @@ contains
     if (.not. allocated(error)) call write_summary(simulation, log, rest, error)
     if (keep) then
       if (rest%reached()) call stop_grains(simulation)
-      call write_final_bodies(simulation, trim(config%sample%file), error)
+      call write_final_bodies(simulation, trim(config%sample%file), .true., error)
     end if
     call check_own_files(error)
     call comm%agree(error)

@@ -5,7 +5,8 @@
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
 LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. With --settle
-LMGC90 makes M steps first, and its last state is the DATBOX of both: what is at rest there has to stay at rest here. Displacements
+LMGC90 makes M steps first, and its last state with its forces is the DATBOX of both: what is at rest there has to stay at rest here. Gravier then
+runs once more without these forces. A body counts as moved that is farther than 2 % of its size from its start after 100 steps. Displacements
 are compared body by body in the last step, over the radius of the ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
 those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. Exit status: 0; 2 LMGC90 is not there."""
 import os
@@ -18,12 +19,17 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 from study_support import BINARIES, ENVIRONMENT, plt, read_history, states, write_csv
 
 import gravier
 from one_line import OneLineParser
 from study_lmgc90 import convert
+
+
+#: a body has moved that is farther from its start than this part of its size, after so many steps
+MOVED, AFTER = 0.02, 100
 
 
 class Enough(Exception):
@@ -104,15 +110,23 @@ def by_lmgc90(example, place, options, steps):
 
 
 def by_gravier(example, place, options):
-    """Run with every step written, then once for the seconds."""
+    """Run with every step written, then once for the seconds; with forces to start from once more without them."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     _, _, _, refused, _ = convert(example, place, options)
     if refused:
         sys.exit(f"study_side_by_side: {example.name} does not import: {refused}")
     text = (place / "case.nml").read_text(encoding="utf-8")
+    runs = [("start", 0, 0), ("bare", 0, options.steps), ("full", 1, options.steps)]
+    with h5py.File(place / "case.h5") as file:
+        if "contacts" in file:
+            runs.append(("cold", 1, options.steps))
+            with h5py.File(place / "cold.h5", "w") as cold:
+                file.copy("bodies", cold)
     spent = []
-    for name, every, steps in (("start", 0, 0), ("bare", 0, options.steps), ("full", 1, options.steps)):
+    for name, every, steps in runs:
+        if name == "cold":
+            text = text.replace("'case.h5'", "'cold.h5'")
         changed = re.sub(r"every = \d+", f"every = {every}", text).replace("'case_results'", f"'{name}'")
         (place / f"{name}.nml").write_text(re.sub(r"steps = \d+", f"steps = {steps}", changed), encoding="utf-8")
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -121,6 +135,17 @@ def by_gravier(example, place, options):
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     return (spent[1] - spent[0]) / options.steps
+
+
+def count_moved(ways, size):
+    """How many bodies have moved by ways (steps, bodies) that count from the first one."""
+    return int((ways[min(AFTER, len(ways)) - 1] > MOVED * size).sum())
+
+
+def ways_here(folder, free):
+    """Ways of the free bodies after each step of a run (steps, bodies)."""
+    places = np.array([group["bodies/position"][:] for number, _, group in states(folder / "results.h5")])
+    return np.linalg.norm(places[1:] - places[0], axis=2)[:, free]
 
 
 def compare(example, options):
@@ -159,6 +184,10 @@ def compare(example, options):
            "median_difference_over_size": float(np.median(drift[-1] / size)),
            "largest_way_over_size_lmgc90": float((np.linalg.norm(place[count - 1] - place[0], axis=1) / size).max()),
            "largest_way_over_size_gravier": float((np.linalg.norm(moved[first + count - 1] - moved[first], axis=1)[free] / size).max()),
+           "moved_lmgc90": count_moved(np.linalg.norm(place - place[0], axis=2), size),
+           "moved_gravier": count_moved(ways_here(ours / "full", free), size),
+           "moved_gravier_without_forces": count_moved(ways_here(ours / "cold", free), size) if (ours / "cold").is_dir() else float("nan"),
+           "forces_found": forces_found(ours),
            "mass_ratio": float((theirs_mass / mass).mean()),
            "energy_lmgc90": float(theirs_energy[-1]), "energy_gravier": float(ours_energy[-1]),
            "mean_force_on_ground_over_weight_lmgc90": float(theirs_force / weight), "mean_force_on_ground_over_weight_gravier": float(ours_force / weight),
@@ -166,6 +195,12 @@ def compare(example, options):
            "iterations_gravier": float(np.mean(history["iterations"])),
            "seconds_lmgc90": float(np.nanmean(record["seconds"])), "seconds_gravier": float(seconds)}
     return row, (d, theirs_energy, np.array(ours_energy), record, identifier, free, ours / "full", count, first, size)
+
+
+def forces_found(folder):
+    """Which part of the contacts with forces the first step has found; NaN where none are given."""
+    found = re.search(r"^start  .*: (\d+) of its (\d+) contacts", (folder / "full/run.log").read_text(encoding="utf-8"), re.MULTILINE)
+    return int(found[1]) / int(found[2]) if found else float("nan")
 
 
 def draw(rows, kept, path):

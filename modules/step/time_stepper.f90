@@ -31,6 +31,8 @@ module gravier_time_stepper
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
   use gravier_impulse_memory, only: keep_impulses, recall_impulses, gather_impulses, spread_impulses
+  use gravier_given_contacts, only: given_contacts_t
+  use gravier_given_impulses, only: take_given_impulses, started_t
   use gravier_schedule, only: schedule_t
   use gravier_diagnostic, only: solved_step_t
   use gravier_diagnostics, only: diagnostics_t
@@ -63,6 +65,8 @@ module gravier_time_stepper
     real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
     !> contacts that slept at the start of the solve; where they can
     integer(i8) :: asleep = 0
+    !> of the first step, where a file gives contacts with forces: what the solve started from
+    type(started_t) :: started
     !> places were projected, because some overlap exceeded what is allowed
     logical :: projected = .false.
     !> of rigid contacts [m], 0 where nothing overlaps; [J]
@@ -84,6 +88,8 @@ module gravier_time_stepper
     ! ---- how a step is made
     !> solves start from the impulses of the step before
     logical :: warm_start = .true.
+    !> contacts that the first solve starts from, where the bodies file has some; none afterwards
+    type(given_contacts_t) :: given
     !> overlap beyond which places are projected; huge where that is off [m]
     real(dp) :: overlap_allowed = huge(1.0_dp)
     !> what a projection leaves of it [m]
@@ -154,11 +160,15 @@ contains
     !> is told how the solve goes on
     class(solve_watch_t), intent(inout), optional :: watch
     type(solved_step_t) :: solved
+    type(solve_control_t) :: control
     real(dp) :: shifts
 
     if (allocated(error)) return
     call self%assemble(figures)
-    call solve_contacts(self%problem, self%method, self%control, figures%solve, error, self%exact, watch)
+    control = self%control
+    ! a pass over layers would replace the impulses that were given
+    control%layered = control%layered .and. figures%started%matched == 0
+    call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
     call note_solve(self, figures, error)
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
@@ -202,6 +212,10 @@ contains
     call build_problem(self%decomposition, self%halo, self%problem%kernels, self%physics, self%problem, &
       & figures%interface_statistics)
     call start_timer(phase_setup)
+    if (self%given%total > 0) then
+      call take_given_impulses(self%given, self%decomposition, self%physics%h, self%problem, self%halo, figures%started)
+      self%given = given_contacts_t()
+    end if
     if (self%warm_start) call recall_impulses(self%halo, self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
@@ -423,6 +437,7 @@ contains
     if (allocated(self%exact)) deallocate (self%exact)
     if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
     if (allocated(self%halo%view)) deallocate (self%halo%view)
+    self%given = given_contacts_t()
     self%halo%builds = 0
     self%step = 0
     self%time = 0.0_dp

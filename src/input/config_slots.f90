@@ -403,6 +403,7 @@ contains
     case ("contacts"); slot%logical => config%output%contacts
     case ("trace"); slot%logical => config%output%trace
     case ("final_bodies"); slot%logical => config%output%final_bodies
+    case ("final_forces"); slot%logical => config%output%final_forces
     case ("checkpoint_every"); slot%integer => config%output%checkpoint_every
     case ("fclib_step"); slot%integer => config%output%fclib_step
     case ("checkpoint_seconds"); slot%real => config%output%checkpoint_seconds

@@ -274,6 +274,8 @@ module gravier_config_table
      key_t("output", "trace", kind_logical, ".false.", "", "write the convergence of every solve, check by check"), &
      key_t("output", "final_bodies", kind_logical, ".false.", "", &
            "write `final_bodies.h5`, a bodies file from which another scene starts"), &
+     key_t("output", "final_forces", kind_logical, ".false.", "", &
+           "write the forces of the contacts to `final_bodies.h5`, too: the first solve of the other scene starts from them"), &
      key_t("output", "checkpoint_every", kind_integer, "0", ">= 0", "steps between two checkpoints; 0: never"), &
      key_t("output", "fclib_step", kind_integer, "0", ">= 0", &
            "step whose contact problem is written to `step_N.hdf5` in the format of FCLIB; 0: none"), &

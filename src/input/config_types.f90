@@ -167,7 +167,7 @@ module gravier_config_types
     character(len=text_length) :: directory
     !> steps; 0 writes the last state only
     integer :: every
-    logical :: contacts, trace, final_bodies
+    logical :: contacts, trace, final_bodies, final_forces
     !> steps; 0 never
     integer :: checkpoint_every
     !> step whose problem is written as a file of FCLIB; 0 none

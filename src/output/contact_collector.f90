@@ -2,6 +2,7 @@
 module gravier_contact_collector
   use gravier_kinds, only: dp, i8
   use gravier_contact_kernels, only: contact_arms, lane_of, block_of
+  use gravier_contact_places, only: find_contact_place
   use gravier_contact_law, only: unused
   use gravier_contact_problem, only: subproblem_t
   use gravier_field_list, only: field_list_t
@@ -229,22 +230,17 @@ contains
     end associate
   end subroutine take_points
 
-  !> Where bodies with shapes touch, by the arm of the candidate or, where it is glued, that of the antagonist.
+  !> Where the bodies of the contacts of a subdomain of this rank touch.
   subroutine take_places(simulation, s, place)
     type(simulation_t), intent(in) :: simulation
     integer, intent(in) :: s
     !> (nd, contacts)
     real(dp), intent(out) :: place(:, :)
-    real(dp) :: arm_i(simulation%problem%kernels%nd), arm_j(simulation%problem%kernels%nd)
-    integer :: c, i, j
+    integer :: c
 
-    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
-      do c = 1, sub%n_contacts
-        i = view%list%candidate(sub%source(c))
-        j = view%list%antagonist(sub%source(c))
-        call contact_arms(simulation%problem%kernels, sub%hot, c, arm_i, arm_j)
-        place(:, c) = view%bodies%position(:, i) + arm_i
-        if (view%bodies%glued(i) > 0 .and. j > 0) place(:, c) = view%bodies%position(:, max(j, 1)) + arm_j
+    associate (problem => simulation%problem)
+      do c = 1, problem%sub(s)%n_contacts
+        call find_contact_place(problem%kernels, simulation%halo%view(s), problem%sub(s), c, place(:, c))
       end do
     end associate
   end subroutine take_places

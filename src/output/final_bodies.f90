@@ -1,10 +1,11 @@
-!> final_bodies.h5: the bodies of a simulation as a bodies file from which another scene starts.
+!> final_bodies.h5: the bodies of a simulation and the forces between them as a bodies file from which another scene starts.
 module gravier_final_bodies
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_config_types, only: config_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls
   use gravier_bodies_hdf5, only: write_bodies_hdf5
+  use gravier_contact_forces, only: list_forces
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_output, only: output_t, of_end
   implicit none
@@ -48,14 +49,17 @@ contains
 
     associate (unused => figures, unused_seconds => seconds)
     end associate
-    call write_final_bodies(simulation, self%path, error)
+    call write_final_bodies(simulation, self%path, simulation%config%output%final_forces, error)
   end subroutine final_bodies_write
 
-  !> Write grains with their shapes, the walls that came with them and the period. Boundaries of the input file are not written: the next
-  !> input file has its own. Collective; errors are the same on all ranks.
-  subroutine write_final_bodies(simulation, path, error)
+  !> Write grains with their shapes, the walls that came with them, the period and, on request, the contacts that press, with
+  !> their forces. Boundaries of the input file are not written: the next input file has its own. Contacts name them. Collective;
+  !> errors are the same on all ranks.
+  subroutine write_final_bodies(simulation, path, with_forces, error)
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: path
+    !> those of the last step, where this run has made one
+    logical, intent(in) :: with_forces
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
     integer :: s, k, n, nd, nv, w
@@ -97,6 +101,8 @@ contains
       data%has_box = decomposition%period%on()
       data%origin(:) = decomposition%period%origin
       data%period(:) = decomposition%period%length
+      if (with_forces .and. allocated(simulation%problem%sub)) call list_forces(simulation%problem, decomposition, &
+        & simulation%halo, simulation%physics%h, data%contacts)
       call write_bodies_hdf5(simulation%comm, path, data, error, decomposition%shapes)
     end associate
   end subroutine write_final_bodies

@@ -64,6 +64,7 @@ module gravier_run_log
     procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
     procedure :: look => run_log_look
+    procedure :: write_started => run_log_write_started
     procedure :: write_interface => run_log_write_interface
     procedure :: write_scales => run_log_write_scales
     procedure :: write_memory => run_log_write_memory
@@ -203,6 +204,24 @@ contains
     call self%line("    step       time [s]    contacts  iterations   residual  error/scale    overlap [m]  "// &
       & "energy [J]  wall [s]  remaining", error)
   end subroutine run_log_write_head
+
+  !> What the first solve starts from, where the bodies file gives contacts with forces.
+  subroutine run_log_write_started(self, figures, error)
+    class(run_log_t), intent(inout) :: self
+    type(step_figures_t), intent(in) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+
+    integer(i8) :: per_mille
+
+    associate (started => figures%started)
+      if (started%given == 0) return
+      ! rounded down, so that 100.0 are all
+      per_mille = int(1000.0_dp*started%share*(1.0_dp + epsilon(1.0_dp)), i8)
+      call self%line("start       from forces of the bodies file: "//to_text(started%matched)//" of its "// &
+        & to_text(started%given)//" contacts touch in the first step, with "//to_text(per_mille/10)//"."// &
+        & to_text(mod(per_mille, 10_i8))//" % of its normal forces", error)
+    end associate
+  end subroutine run_log_write_started
 
   !> Contacts and interface as the partition makes them now.
   subroutine run_log_write_interface(self, figures, subdomains, error)

@@ -9,6 +9,7 @@ module gravier_run
   use gravier_signals, only: catch_signals, take_signals
   use gravier_timers, only: reset_timers
   use gravier_body_store, only: body_set_t
+  use gravier_given_contacts, only: given_contacts_t
   use gravier_file_system, only: make_directory
   use gravier_input_text, only: read_input_text
   use gravier_own_files, only: check_own_files
@@ -132,6 +133,7 @@ contains
     if (restart .and. simulation%comm%rank == 0) inquire (file=path, exist=exists)
     if (simulation%comm%any_true(exists)) then
       call load_checkpoint(simulation, path, error)
+      simulation%given = given_contacts_t()
     else
       call simulation%start(grains, error)
       call check_start_overlap(simulation, error)
@@ -161,6 +163,7 @@ contains
     call log%write_start(simulation, error)
     call scales%find(simulation)
     call simulation%assemble(figures)
+    call log%write_started(figures, error)
     call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
     call log%write_scales(simulation, scales, .true., warnings, error)
     call log%write_memory(simulation, libraries, error)
@@ -242,6 +245,7 @@ contains
       step_start = MPI_Wtime()
       call simulation%advance(figures, error, watch=log)
       if (allocated(error)) exit
+      call log%write_started(figures, error)
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)

@@ -102,6 +102,7 @@ contains
     self%n_grains = scene%n_grains
     self%n_glued = scene%n_glued
     self%n_walls = scene%n_walls
+    self%given = scene%contacts
     self%inflow%insertions = scene%insertions
     self%inflow%next_id = scene%last_id + 1
     call set_physics(self, scene)

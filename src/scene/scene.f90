@@ -7,6 +7,8 @@ module gravier_scene
   use gravier_communicator, only: communicator_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows
   use gravier_bodies_file, only: read_bodies
+  use gravier_given_contacts, only: given_contacts_t, check_pulls, check_points
+  use gravier_pair_places, only: has_facets
   use gravier_shape_library, only: shape_library_t
   use gravier_shapes_file, only: read_shapes
   use gravier_periodic, only: period_t
@@ -42,6 +44,8 @@ module gravier_scene
     !> that bodies may have
     type(shape_library_t) :: shapes
     integer :: n_walls = 0
+    !> that the bodies file gives
+    type(given_contacts_t) :: contacts
     !> of grains that enter
     type(insertion_t), allocatable :: insertions(:)
     type(period_t) :: period
@@ -116,6 +120,9 @@ contains
     call check_moments(config, scene%effects, error)
     call check_shapes(config, scene, error)
     call check_places(comm, config, data, scene, error)
+    if (config%solver%warm_start) scene%contacts = data%contacts
+    if (.not. scene%laws%attracts) call check_pulls(comm, scene%contacts, error)
+    if (scene%effects%shapes .or. has_facets(scene%boundaries)) call check_points(scene%contacts, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
 

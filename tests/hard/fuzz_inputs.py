@@ -336,6 +336,12 @@ class Kinds:
         write(os.path.join(place, "on.nml"), namelist(merged(case, {"time": {"steps": 6}})))
         self.must(alone([program("gravier"), "case.nml"], place))
         shutil.copy(os.path.join(place, "results/final_bodies.h5"), os.path.join(place, "bodies.h5"))
+        with h5py.File(os.path.join(place, "bodies.h5"), "a") as file:
+            # of neighbours and of a wall, whether they touch or not
+            file["contacts/candidate"], file["contacts/antagonist"] = file["bodies/id"][:3], [*file["bodies/id"][1:3], -1]
+            file["contacts/boundaries"] = np.array([f"wall {file['walls/id'][0]}".encode()])
+            for name, row in (("normal", [0.0, 1.0]), ("force", [0.1, 1.0]), ("point", [0.0, 0.0])):
+                file[f"contacts/{name}"] = [row] * 3
         cases = os.path.join(self.directory, "cases")
         for name, dimension, bodies in (("h2", 2, "csv2"), ("h3", 3, "csv3")):
             self.must(alone([program("gravier"), bodies + ".nml"], cases))

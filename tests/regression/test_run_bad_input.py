@@ -73,6 +73,7 @@ FILES = [
     ("quote not closed", GOOD.replace("'results'", "'results"), ("&output directory", "expected a quote that closes")),
     ("no equal sign", GOOD + "&solver sweeps 2 /\n", ("&solver", "expected key = value", "sweeps 2")),
     ("word without quotes", GOOD + "&solver method = nscdd /\n", ("&solver method = nscdd", "'nscdd_ep'")),
+    key("output", "final_forces", ".true.", "without final_bodies = .true."),
     # the type
     key("time", "step", "'fast'", "expected a finite real number > 0 (s)"),
     key("time", "step", "1e-3 s", "expected a finite real number > 0 (s)"),

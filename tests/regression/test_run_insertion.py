@@ -361,7 +361,8 @@ class Insertion(RunTestCase):
 
     def test_refused(self):
         lines = {
-            "&insertion 'feed': expected a region in which boundaries and outlets leave room for grains": {"lower": [0.02, -0.2], "upper": [0.22, -0.1]},
+            "&insertion 'feed': expected a region in which boundaries and outlets leave room for grains: in 1000 places of it the smallest "
+            "grain overlaps one": {"lower": [0.02, -0.2], "upper": [0.22, -0.1]},
             "&insertion 'feed': expected a region with room for the largest grain, of diameter 1.200E-02 m": {"upper": [0.22, 0.21]},
             "&insertion (the 1st, 'feed') upper = 0.02, 0.26: expected components above those of lower": {"upper": [0.02, 0.26]},
             "&insertion (the 1st, 'feed') rate = 0.0: expected a finite real number > 0 (1/s)": {"rate": 0.0},

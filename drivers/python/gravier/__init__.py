@@ -9,8 +9,9 @@ needs numpy and h5py; `Table.frame()` needs pandas too.
 from . import blocks
 from .case import CaseError, namelist, parse_namelist, run, study, value_text
 from .checksum import seal
+from .restarts import write_bodies
 from .results import BodiesFile, ResultsError, Run, Table, read_table
 from .shapes import Piece, Shape
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Table", "blocks", "namelist", "parse_namelist", "read_table", "run",
-           "seal", "study", "value_text"]
+           "seal", "study", "value_text", "write_bodies"]

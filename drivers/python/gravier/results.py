@@ -383,7 +383,7 @@ class BodiesFile(Run):
         self.find_step(step)
 
     def contacts(self, step=None):
-        """None: a bodies file has no contacts."""
+        """None: the forces to start from that a bodies file may have are no contacts of a run."""
         self.find_step(step)
 
     def _contacts_or_error(self, step):

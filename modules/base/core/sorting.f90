@@ -3,7 +3,7 @@ module gravier_sorting
   use gravier_kinds, only: i4, i8
   implicit none
   private
-  public :: argsort, argsort_rows, find_sorted
+  public :: argsort, argsort_rows, find_sorted, first_not_before
 
   !> bits of a digit; it divides those of a key
   integer, parameter :: digit = 8
@@ -62,6 +62,39 @@ contains
       end if
     end do
   end function find_sorted
+
+  !> The first place in the order of argsort_rows whose item is not before `key`; one more than there are items where all are.
+  pure integer function first_not_before(keys, order, key) result(low)
+    !> (number of keys, number of items)
+    integer(i8), intent(in), contiguous :: keys(:, :)
+    integer, intent(in), contiguous :: order(:)
+    !> its first numbers count, as many as it has
+    integer(i8), intent(in) :: key(:)
+    integer :: high, middle
+
+    low = 1
+    high = size(order) + 1
+    do while (low < high)
+      middle = low + (high - low)/2
+      if (is_before(keys(1:size(key), order(middle)), key)) then
+        low = middle + 1
+      else
+        high = middle
+      end if
+    end do
+  end function first_not_before
+
+  !> Whether numbers come before others of the same count in lexicographic order.
+  pure logical function is_before(one, other)
+    integer(i8), intent(in) :: one(:), other(:)
+    integer :: k
+
+    is_before = .false.
+    do k = 1, size(one)
+      is_before = one(k) < other(k)
+      if (one(k) /= other(k)) return
+    end do
+  end function is_before
 
   !> Rearrange `order` so that keys(order) ascends, stably: by one digit after the other, from the lowest; those that all
   !> keys have in common take no pass (radix sort).

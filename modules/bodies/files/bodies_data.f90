@@ -9,6 +9,7 @@ module gravier_bodies_data
   use gravier_memory_need, only: check_memory
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_sorting, only: argsort
+  use gravier_given_contacts, only: given_contacts_t
   implicit none
   private
   public :: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, data_bytes, make_unit, check_unique_ids
@@ -48,6 +49,8 @@ module gravier_bodies_data
     !> whether the file has a periodic box, its lower corner and its lengths; an axis of length 0 is not periodic
     logical :: has_box = .false.
     real(dp) :: origin(3) = 0, period(3) = 0
+    !> from which the first solve starts; none where the file has none
+    type(given_contacts_t) :: contacts
   end type bodies_data_t
 
 contains

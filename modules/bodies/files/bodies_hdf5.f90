@@ -1,5 +1,5 @@
 !> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group, material, shape, scale, orientation},
-!> /walls/{id, point, normal} and /box/{origin, period}.
+!> /walls/{id, point, normal}, /box/{origin, period} and /contacts (gravier_bodies_contacts).
 module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow, take_count
@@ -13,6 +13,8 @@ module gravier_bodies_hdf5
   use gravier_bodies_checks, only: check_ids, check_own_ids, check_numbers, check_own_numbers, check_whole, check_box, &
     & refuse_bad_numbers, direction, quantity, extent
   use gravier_bodies_shapes, only: read_body_shapes, write_body_shapes
+  use gravier_given_contacts, only: check_known_bodies
+  use gravier_bodies_contacts, only: contact_sets, read_contacts, write_contacts, contact_words
   implicit none
   private
   public :: read_bodies_hdf5, write_bodies_hdf5
@@ -51,11 +53,16 @@ contains
     end if
     if (file%exists("/walls")) call check_members(file, path, "/walls", wall_sets, error)
     if (file%exists("/box")) call check_members(file, path, "/box", box_sets, error)
+    if (file%exists("/contacts")) call check_members(file, path, "/contacts", contact_sets, error)
     call read_grains(comm, file, path, dimension, shapes, bodies, error)
     call comm%agree(error)
     call read_walls(file, path, dimension, bodies, error)
     call read_box(file, path, dimension, bodies, error)
     call comm%agree(error)
+    if (file%exists("/contacts") .and. .not. allocated(error)) then
+      call read_contacts(comm, file, path, dimension, bodies%contacts, error)
+      call check_known_bodies(comm, bodies%id, bodies%contacts, error)
+    end if
     call file%close(error)
   end subroutine read_bodies_hdf5
 
@@ -265,8 +272,10 @@ contains
     call file%create(comm, path, error)
     words = 5 + 4*sorted%dimension
     if (allocated(sorted%shape)) words = words + 2 + size(sorted%orientation, 1)
-    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*words + sorted%n_walls*(1_i8 + 2*sorted%dimension)), error)
+    call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*words + sorted%n_walls*(1_i8 + 2*sorted%dimension) + &
+      & bodies%contacts%total*contact_words(sorted%dimension)), error)
     call write_groups(comm, file, sorted, error)
+    if (bodies%contacts%total > 0) call write_contacts(comm, file, bodies%contacts, error)
     if (present(shapes) .and. allocated(sorted%shape)) call write_body_shapes(file, sorted, shapes, error)
     call file%close(error)
   end subroutine write_bodies_hdf5

@@ -8,7 +8,7 @@ module gravier_hdf5_datasets
     & h5pcreate_f, h5pget_chunk_f, h5pset_alloc_time_f, h5pset_chunk_f, h5pset_dxpl_mpio_f, h5pset_fill_time_f, &
     & h5pset_obj_track_times_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
     & h5sget_simple_extent_npoints_f, h5sselect_all_f, h5sselect_hyperslab_f, h5sselect_none_f, h5tclose_f, h5tget_class_f, &
-    & h5tget_size_f, hid_t, hsize_t, size_t
+    & h5tget_size_f, h5tis_variable_str_f, hid_t, hsize_t, size_t
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_text, only: to_text
@@ -16,7 +16,7 @@ module gravier_hdf5_datasets
   implicit none
   private
   public :: rows_t, rows_of, create_dataset, transfer_rows, get_shape, get_extent, can_grow, chunk_rows, class_of, type_of, &
-    & columns_text
+    & is_fixed_text, columns_text
 
   !> Rows of this rank in memory.
   type :: rows_t
@@ -287,6 +287,28 @@ contains
     end if
     call h5dclose_f(dataset, stat)
   end function class_of
+
+  !> Whether a dataset holds texts of one length, as write_rows writes them.
+  logical function is_fixed_text(self, path) result(is_fixed)
+    class(h5_tree_t), intent(in) :: self
+    character(len=*), intent(in) :: path
+    integer(hid_t) :: place, dataset, type
+    character(len=:), allocatable :: name
+    integer :: stat
+    logical :: varies
+
+    is_fixed = class_of(self, path) == H5T_STRING_F
+    if (.not. is_fixed) return
+    call self%locate(path, place, name)
+    call h5dopen_f(place, name, dataset, stat)
+    if (stat < 0) return
+    call h5dget_type_f(dataset, type, stat)
+    varies = .true.
+    if (stat == 0) call h5tis_variable_str_f(type, varies, stat)
+    is_fixed = stat == 0 .and. .not. varies
+    call h5tclose_f(type, stat)
+    call h5dclose_f(dataset, stat)
+  end function is_fixed_text
 
   !> The shape of a dataset of n_columns, for messages.
   pure function columns_text(n_columns) result(text)

@@ -10,7 +10,8 @@ module gravier_hdf5_rows
   use gravier_random_hash, only: hash_rows
   use gravier_hdf5_properties, only: text_type, is_ascii
   use gravier_hdf5_attributes, only: h5_attributes_t
-  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_extent, class_of, type_of, columns_text
+  use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_extent, class_of, type_of, &
+    & is_fixed_text, columns_text
   implicit none
   private
   public :: h5_rows_t
@@ -298,7 +299,11 @@ contains
     if (allocated(error)) return
     columns = self%columns(path)
     kind_found = class_of(self, path)
-    if (total /= 1 .or. columns /= 0 .or. kind_found /= H5T_STRING_F) call self%fail(path, "not one text", error)
+    if (total /= 1 .or. columns /= 0 .or. kind_found /= H5T_STRING_F) then
+      call self%fail(path, "not one text", error)
+    else if (.not. is_fixed_text(self, path)) then
+      call self%fail(path, "a text of variable length, but one of fixed length was expected", error)
+    end if
     call check_whole(self, path, error)
     if (allocated(error)) return
     call self%locate(path, place, name)

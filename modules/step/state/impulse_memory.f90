@@ -3,7 +3,7 @@
 module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
-  use gravier_sorting, only: argsort_rows
+  use gravier_sorting, only: argsort_rows, first_not_before
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, project_tangential, tangential_vectors, &
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
@@ -279,20 +279,12 @@ contains
     integer, intent(in), contiguous :: order(:)
     integer(i8), intent(in) :: candidate, antagonist
     integer, intent(in) :: repeated
-    integer :: low, high, middle
+    integer(i8) :: key(2)
+    integer :: low
 
-    ! the first record that is not before the pair
-    low = 1
-    high = size(order) + 1
-    do while (low < high)
-      middle = (low + high)/2
-      place = order(middle)
-      if (keys(1, place) < candidate .or. (keys(1, place) == candidate .and. keys(2, place) < antagonist)) then
-        low = middle + 1
-      else
-        high = middle
-      end if
-    end do
+    key(1) = candidate
+    key(2) = antagonist
+    low = first_not_before(keys, order, key)
     place = 0
     if (low + repeated > size(order)) return
     if (keys(1, order(low + repeated)) == candidate .and. keys(2, order(low + repeated)) == antagonist) &

@@ -3,7 +3,7 @@ program test_sorting
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_sorting, only: argsort, argsort_rows, find_sorted
+  use gravier_sorting, only: argsort, argsort_rows, find_sorted, first_not_before
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   integer, parameter :: sizes(*) = [0, 1, 2, 3, 4, 5, 7, 8, 9, 31, 64, 65, 1000]
@@ -16,6 +16,7 @@ program test_sorting
     call test_ties(sizes(k), 100000)
     call test_runs(sizes(k))
     call test_rows(sizes(k))
+    call test_first_not_before(sizes(k))
     call test_search(sizes(k))
   end do
   call test_extreme_keys()
@@ -44,6 +45,31 @@ contains
     call argsort(keys, order)
     call check_order(keys, order, "random keys")
   end subroutine test_ties
+
+  !> As many items come before a key as are less than it, by two numbers or by the first one alone.
+  subroutine test_first_not_before(n)
+    integer, intent(in) :: n
+    integer(i8) :: keys(2, n), key(2)
+    integer :: order(n), i, a, b
+    logical :: right
+
+    do i = 1, n
+      keys(1, i) = dice(i, 1, 5)
+      keys(2, i) = dice(i, 2, 5) - 3
+    end do
+    call argsort_rows(keys, order)
+    right = .true.
+    do a = 0, 6
+      do b = -3, 3
+        key(1) = a
+        key(2) = b
+        right = right .and. first_not_before(keys, order, key) == &
+          & 1 + count(keys(1, :) < a .or. (keys(1, :) == a .and. keys(2, :) < b))
+        right = right .and. first_not_before(keys, order, key(1:1)) == 1 + count(keys(1, :) < a)
+      end do
+    end do
+    call check(right, "the first place not before a key")
+  end subroutine test_first_not_before
 
   !> Keys that ascend already, and keys that descend in pairs.
   subroutine test_runs(n)

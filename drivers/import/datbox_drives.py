@@ -1,0 +1,55 @@
+"""What drives bodies of a DATBOX: DRV_DOF.DAT."""
+import math
+
+import numpy as np
+from datbox_text import Refused, entries, number
+
+
+#: rows to a period of a drive that oscillates
+ROWS_PER_PERIOD = 200
+
+
+class Function:
+    """A driven value against time: constant, or its table of (time, value)."""
+
+    def __init__(self, constant=0.0, table=None):
+        self.constant, self.table = constant, table
+
+    @staticmethod
+    def of(entry, start, end):
+        """[CT + AMP cos(OMEGA t + PHI)] min(1, RAMPI + RAMP t), or a file of times and values; times from `start` on."""
+        if "evolution" in entry.words:
+            path = entry.path.parent / entry.words[entry.words.index("evolution") + 1]
+            try:
+                table = np.loadtxt(path, ndmin=2)
+            except (OSError, ValueError) as problem:
+                raise Refused(f"{entry.path}: line {entry.line}: {path}: {problem}: expected a file of times and values") from None
+            return Function(table=table[:, :2] - [start, 0.0])
+        ct, amp, omega, phi, rampi, ramp = (number(word) for word in entry.words[2:8])
+        if (amp == 0.0 or omega == 0.0) and ramp == 0.0:
+            return Function((ct + amp * math.cos(phi)) * min(1.0, rampi))
+        times = [0.0, end - start]
+        if ramp != 0.0 and 0.0 < (1.0 - rampi) / ramp - start < end - start:
+            times.append((1.0 - rampi) / ramp - start)
+        if amp * omega != 0.0:
+            times += list(np.arange(0.0, end - start, 2.0 * math.pi / abs(omega) / ROWS_PER_PERIOD))
+        times = np.unique(times)
+        values = (ct + amp * np.cos(omega * (times + start) + phi)) * np.minimum(1.0, rampi + ramp * (times + start))
+        return Function(table=np.stack([times, values], axis=1))
+
+    def at(self, times):
+        return np.full(len(times), self.constant) if self.table is None else np.interp(times, *self.table.T)
+
+
+def read_drives(path, bodies, start, end):
+    body = None
+    for keyword, entry in entries(path):
+        if keyword == "$bdyty" and entry.words:
+            rank = int(entry.words[1])
+            if entry.words[0] != bodies[0].kind or not 1 <= rank <= len(bodies):
+                entry.refuse(f"body {' '.join(entry.words[:2])}", f"a body of BODIES.DAT, {bodies[0].kind} 1 to {len(bodies)}")
+            body = bodies[rank - 1]
+        elif keyword == "$dofty" and entry.words and body and entry.words[0] in ("vlocy", "force"):
+            body.drives[int(entry.words[1])] = (entry.words[0], Function.of(entry, start, end), entry)
+        elif keyword == "$dofty" and entry.words and entry.words[0] not in ("numbr",) and not entry.words[0].startswith("["):
+            entry.refuse(f"a driven degree of freedom {entry.words[0]}", "vlocy or force")

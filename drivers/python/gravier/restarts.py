@@ -1,0 +1,62 @@
+"""Bodies files from states of a run, from which other runs start."""
+import numpy as np
+
+from .results import ResultsError
+
+
+def axes_of_contacts(normal):
+    """The tangents t, and in 3D s, of unit normals (n, d), as modules/contact/local/find_frame.fypi makes them: (n, d) each."""
+    if normal.shape[1] == 2:
+        return [np.stack([-normal[:, 1], normal[:, 0]], axis=1)]
+    x, y, z = normal.T
+    side = np.copysign(1.0, z)
+    a = -1.0 / (side + z)
+    b = x * y * a
+    return [np.stack([1.0 + side * x * x * a, side * b, -side * x], axis=1), np.stack([b, side + y * y * a, -y], axis=1)]
+
+
+def given_contacts(run, step=None):
+    """Contacts of a state with their forces, as the group /contacts of a bodies file has them: (datasets by name, names of boundaries).
+    Forces are impulses over the time step."""
+    bodies, contacts, boundaries = run.bodies(step), run._contacts_or_error(step), run.boundaries(step)
+    axes = [contacts.normal, *axes_of_contacts(contacts.normal)]
+    force = sum(part[:, None] * axis for part, axis in zip(contacts.impulse.T, axes)) / run.time_step()
+    known = np.isin(contacts.antagonist, bodies.id)
+    place = {number: -1 - k for k, number in enumerate(boundaries.id)}
+    antagonist = np.array([other if body else place[other] for other, body in zip(contacts.antagonist, known)], dtype=np.int64)
+    rows, _ = run._rows(bodies, contacts)
+    point = contacts.point if "point" in contacts else \
+        bodies.position[rows] - (bodies.radius[rows] + 0.5 * contacts.gap)[:, None] * contacts.normal
+    found = {"candidate": contacts.candidate, "antagonist": antagonist, "normal": contacts.normal, "force": force, "point": point}
+    if "moment" in contacts:
+        moment = np.reshape(contacts.moment, (len(antagonist), -1))
+        found["moment"] = (moment if run.dimension == 2 else sum(part[:, None] * axis for part, axis in zip(moment.T, axes))) / run.time_step()
+    # what bears nothing starts from nothing
+    bears = np.any(force != 0.0, axis=1)
+    return {name: values[bears] for name, values in found.items()}, list(boundaries.name)
+
+
+def write_bodies(run, path, step=None):
+    """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
+    and periods are those of its input; walls of a bodies file are in this one."""
+    import h5py
+
+    if run.shapes() or any(boundary.get("shape") == "grains" for boundary in run.case.get("boundary", [])):
+        raise ResultsError(f"{run.path}: bodies with shapes or grains glued to boundaries: expected disks or spheres; final_forces = .true. of "
+                           "&output writes such a file of the last state")
+    bodies, boundaries = run.bodies(step), run.boundaries(step)
+    contacts, names = given_contacts(run, step)
+    with h5py.File(path, "w") as file:
+        for name in ("id", "position", "radius", "mass", "material"):
+            if name in bodies:
+                file[f"bodies/{name}"] = bodies[name]
+        spins = 2 * run.dimension - 3
+        spin = bodies.spin if bodies.spin.size else np.zeros((len(bodies), spins))
+        file["bodies/velocity"] = np.concatenate([bodies.velocity, spin], axis=1)
+        walls = [k for k, name in enumerate(boundaries.name) if name == f"wall {boundaries.id[k]}"]
+        if walls:
+            file["walls/id"], file["walls/point"], file["walls/normal"] = (boundaries[key][walls] for key in ("id", "position", "normal"))
+        if len(contacts["candidate"]):
+            for name, values in contacts.items():
+                file[f"contacts/{name}"] = values
+            file["contacts/boundaries"] = np.array(["\n".join(names).encode()])
