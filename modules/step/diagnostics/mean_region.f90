@@ -1,7 +1,7 @@
 !> A region of means, a box with sides along the axes that may be cut into equal bins along one of them, and which parts of bodies
 !> and of branches of contacts lie in it.
 module gravier_mean_region
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i4
   implicit none
   private
   public :: mean_region_t, region_grid_t, share_list_t, unbounded
@@ -147,7 +147,7 @@ contains
     length = self%side(self%n) - self%side(0)
     bin = 1
     if (.not. length > 0.0_dp) return
-    bin = 1 + int(min(max((y - self%side(0))/length, 0.0_dp), 1.0_dp)*self%n)
+    bin = 1 + int(min(max((y - self%side(0))/length, 0.0_dp), 1.0_dp)*self%n, i4)
     bin = min(bin, self%n)
     ! what the division rounds
     if (y < self%side(bin - 1) .and. bin > 1) bin = bin - 1
