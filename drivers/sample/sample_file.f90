@@ -42,9 +42,9 @@ contains
       call raise(error, status_input, path//": &scene bodies = '"//trim(config%scene%bodies)//"': expected 'sample'")
       return
     end if
-    ! what enters while a run goes on is no part of a sample
-    deallocate (config%insertions)
-    allocate (config%insertions(0))
+    ! what enters while a run goes on is no part of a sample, and nobody reads means
+    deallocate (config%insertions, config%regions)
+    allocate (config%insertions(0), config%regions(0))
     call prepare_directory(comm, config, error)
     call lock%take_file(comm, trim(config%sample%file), "gravier_sample "//path, error)
     if (.not. allocated(error)) then

@@ -6,12 +6,13 @@ module gravier_config
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
                                   enriched_config_t, output_config_t, boundary_config_t, sample_config_t, insertion_config_t, &
-                                  material_config_t, law_config_t, given_coefficients_t
+                                  material_config_t, law_config_t, region_config_t, given_coefficients_t
   use gravier_config_key, only: kind_real
   use gravier_config_table, only: groups, keys, surface_rows, fill_keys
   use gravier_method_options, only: method_features_t, default_always, default_on_active
   use gravier_method_registry, only: features_of
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
+  use gravier_mean_region, only: unbounded
   use gravier_config_surfaces, only: surface_value
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
@@ -24,7 +25,7 @@ module gravier_config
   private
   public :: parse_config, write_active, write_key_reference
   public :: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t, output_config_t
-  public :: boundary_config_t, sample_config_t, insertion_config_t, material_config_t, law_config_t
+  public :: boundary_config_t, sample_config_t, insertion_config_t, material_config_t, law_config_t, region_config_t
 
 contains
 
@@ -58,14 +59,14 @@ contains
       allocate (config%boundaries(k)%value(3, size(surface_rows%keys)), source=0.0_dp)
     end do
     allocate (config%materials(number_of_groups(found, "material")), config%laws(number_of_groups(found, "law")))
-    allocate (config%insertions(number_of_groups(found, "insertion")))
+    allocate (config%insertions(number_of_groups(found, "insertion")), config%regions(number_of_groups(found, "region")))
     do k = 1, size(config%laws)
       allocate (config%laws(k)%value(count(keys%group == "law" .and. keys%kind == kind_real)))
     end do
     call registered_diagnostics(diagnostics)
     allocate (config%output%diagnostics(size(diagnostics)), source=.false.)
     allocate (report%given(size(keys), max(1, size(config%boundaries), size(config%materials), size(config%laws), &
-      & size(config%insertions))))
+      & size(config%insertions), size(config%regions))))
     call set_defaults(config, error)
     call read_first(config, found, report, error)
     if (.not. allocated(error)) call read_others(config, found, report, error)
@@ -185,8 +186,8 @@ contains
     end do
   end function unknown_key
 
-  !> Reads what others hang on: the dimension, and sets the defaults that depend on it; the names of boundaries, materials and
-  !> insertions, which messages quote.
+  !> Reads what others hang on: the dimension, and sets the defaults that depend on it; the names of boundaries, materials,
+  !> insertions and regions, which messages quote.
   subroutine read_first(config, found, report, error)
     type(config_t), target, intent(inout) :: config
     type(scan_t), intent(in) :: found
@@ -223,7 +224,7 @@ contains
     type(assignment_t), intent(in) :: item
     select case (item%group)
     case ("scene"); comes_first = item%key == "dimension"
-    case ("boundary", "material", "insertion"); comes_first = item%key == "name"
+    case ("boundary", "material", "insertion", "region"); comes_first = item%key == "name"
     case default; comes_first = .false.
     end select
   end function comes_first
@@ -328,6 +329,12 @@ contains
       if (.not. is_given(report, "insertion", "name")) config%insertions(i)%name = "insertion "//to_text(i)
     end do
     report%instance = 1
+    if (config%scene%dimension == 3) return
+    ! no side along an axis that is not there
+    do i = 1, size(config%regions)
+      if (abs(config%regions(i)%lower(3)) >= unbounded) config%regions(i)%lower(3) = 0.0_dp
+      if (abs(config%regions(i)%upper(3)) >= unbounded) config%regions(i)%upper(3) = 0.0_dp
+    end do
   end subroutine apply_defaults
 
   subroutine apply_boundary_defaults(scene, report, boundary)

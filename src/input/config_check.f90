@@ -16,6 +16,7 @@ module gravier_config_check
   use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
   use gravier_config_check_insertion, only: check_insertions
+  use gravier_config_check_region, only: check_regions
   implicit none
   private
   public :: check_dimension, check_config, grid_product
@@ -54,6 +55,7 @@ contains
     call check_method(report, config, error)
     call check_enriched(report, config, error)
     call check_output(report, config, error)
+    call check_regions(report, config, error)
   end subroutine check_config
 
   !> The rules of the table of keys, for every key of every group.

@@ -59,11 +59,13 @@ contains
       call enriched_slot(config, key%name, slot)
     case ("output")
       call output_slot(config, key%name, slot)
+    case ("region")
+      call region_slot(config, instance, key%name, slot)
     end select
   end function slot_of
 
-  !> How many groups of a name count: each &boundary, &insertion, &material and &law of the file, &sample where it belongs, one of
-  !> any other.
+  !> How many groups of a name count: each &boundary, &insertion, &material, &law and &region of the file, &sample where it belongs,
+  !> one of any other.
   pure integer function group_count(config, group)
     type(config_t), intent(in) :: config
     character(len=*), intent(in) :: group
@@ -76,6 +78,7 @@ contains
     if (group == "insertion") group_count = size(config%insertions)
     if (group == "material") group_count = size(config%materials)
     if (group == "law") group_count = size(config%laws)
+    if (group == "region") group_count = size(config%regions)
   end function group_count
 
   !> Does a key belong to its group as the choice stands on which that hangs?
@@ -411,5 +414,27 @@ contains
       slot%logical => config%output%diagnostics(diagnostic_place(name))
     end select
   end subroutine output_slot
+
+  subroutine region_slot(config, instance, name, slot)
+    type(config_t), target, intent(inout) :: config
+    !> number of the region
+    integer, intent(in) :: instance
+    character(len=*), intent(in) :: name
+    type(slot_t), intent(inout) :: slot
+
+    select case (name)
+    case ("name"); slot%text => config%regions(instance)%name
+    case ("lower"); slot%reals => config%regions(instance)%lower
+    case ("upper"); slot%reals => config%regions(instance)%upper
+    case ("bins"); slot%integer => config%regions(instance)%bins
+    case ("axis"); slot%choice => config%regions(instance)%axis
+    end select
+    select case (name)
+    case ("lower"); slot%given => config%regions(instance)%lower_given
+    case ("upper"); slot%given => config%regions(instance)%upper_given
+    case ("bins"); slot%given => config%regions(instance)%bins_given
+    case ("axis"); slot%given => config%regions(instance)%axis_given
+    end select
+  end subroutine region_slot
 
 end module gravier_config_slots

@@ -36,7 +36,8 @@ module gravier_config_table
      group_t("decomposition", .false., "The subdomains of the domain decomposition methods."), &
      group_t("enriched", .false., &
              "The enriched methods `schwarz_ec` and `nscdd_ep`; the other methods ignore this group."), &
-     group_t("output", .false., "The results.")]
+     group_t("output", .false., "The results."), &
+     group_t("region", .false., "A box, or bins along an axis, over which means are written.", repeated=.true.)]
 
   type(key_t), parameter :: scene_keys(*) = &
     [key_t("scene", "title", kind_text, "''", "", "a title for the log and the results"), &
@@ -281,6 +282,19 @@ module gravier_config_table
      key_t("output", "checkpoint_seconds", kind_real, "0.0", ">= 0", "wall time between two checkpoints; 0: never", unit="s"), &
      key_t("output", "walltime", kind_real, "0.0", ">= 0", &
            "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s")]
+
+  type(key_t), parameter :: region_keys(*) = &
+    [key_t("region", "name", kind_text, "''", "letters, digits and underscores after a letter", &
+           "a name of its own, with which its columns of history.csv begin", required=.true., note="required"), &
+     key_t("region", "lower", kind_real, "3*-1e30", "", &
+           "lower corner of the box; its third component is 0 in 2D. A component of -1e30 or left out: no side there", &
+           count=3, unit="m", note="no side"), &
+     key_t("region", "upper", kind_real, "3*1e30", "", &
+           "upper corner of the box; its third component is 0 in 2D. A component of 1e30 or left out: no side there", &
+           count=3, unit="m", note="no side"), &
+     key_t("region", "bins", kind_integer, "1", "from 1 to 10000", &
+           "bins of equal width along `axis`, whose means are in each written state", note="none"), &
+     key_t("region", "axis", kind_choice, "''", "x y z", "axis along which there are `bins`", note="none")]
   !&>
 
   !> all keys, once `fill_keys` was called
@@ -334,6 +348,7 @@ contains
       end associate
       call add(row)
     end do
+    call add(region_keys)
 
   contains
 

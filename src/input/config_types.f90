@@ -8,7 +8,7 @@ module gravier_config_types
   private
   public :: scene_config_t, time_config_t, solver_config_t, decomposition_config_t, enriched_config_t
   public :: output_config_t, boundary_config_t, grains_config_t, sample_config_t, insertion_config_t, material_config_t
-  public :: law_config_t, config_t
+  public :: law_config_t, region_config_t, config_t
   public :: given_coefficients_t, text_length, choice_length
 
   !> longest title or path
@@ -306,6 +306,21 @@ module gravier_config_types
     real(dp), allocatable :: value(:)
   end type law_config_t
 
+  !> &region: a region of means.
+  type :: region_config_t
+    !> unique; begins the names of its columns
+    character(len=text_length) :: name
+    !> m: corners of the box, -1e30 and 1e30 where there is no side
+    real(dp) :: lower(3), upper(3)
+    logical :: lower_given = .false., upper_given = .false.
+    !> of a profile
+    integer :: bins
+    logical :: bins_given = .false.
+    !> x, y, z or blank
+    character(len=choice_length) :: axis
+    logical :: axis_given = .false.
+  end type region_config_t
+
   !> A whole input file.
   type :: config_t
     !> path and content of the file
@@ -322,6 +337,7 @@ module gravier_config_types
     type(material_config_t), allocatable :: materials(:)
     type(law_config_t), allocatable :: laws(:)
     type(insertion_config_t), allocatable :: insertions(:)
+    type(region_config_t), allocatable :: regions(:)
     !> defaults unless bodies is sample
     type(sample_config_t) :: sample
   end type config_t

@@ -233,7 +233,7 @@ contains
            //"A list takes blanks or commas between its entries, `2*0.5` for `0.5, 0.5`, and `grid(2) = 4` for one entry." &
            //newline &
            //"A group or a key that is not on this page is refused, and so is one that is given twice;"//newline &
-           //"`&boundary`, `&insertion`, `&material` and `&law` may stand any number of times."//newline//newline &
+           //"`&boundary`, `&insertion`, `&material`, `&law` and `&region` may stand any number of times."//newline//newline &
            //"The shortest input:"//newline//newline &
            //"    &scene bodies = 'column' /"//newline &
            //"    &time  step = 0.01, steps = 10 /"//newline

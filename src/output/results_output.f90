@@ -15,6 +15,7 @@ module gravier_results_output
   use gravier_pair_places, only: has_facets
   use gravier_facet_tables, only: describe_facets
   use gravier_contact_collector, only: collect_contacts
+  use gravier_region_tables, only: collect_regions
   use gravier_output, only: output_t, of_states
   implicit none
   private
@@ -116,6 +117,7 @@ contains
     call collect_boundaries(simulation, state%table(size(state%table)))
     if (simulation%tally%steps > 0) state%accuracy = accuracy_t(simulation%tally%velocity_error, simulation%tally%velocity_scale)
     call collect_figures(simulation%diagnostics, state%figures)
+    call collect_regions(simulation, state%region)
     call self%file%write_step(state, error)
     ! a run that goes on from a checkpoint does not write it again
     simulation%last_written = simulation%step

@@ -18,6 +18,7 @@ module gravier_run_log
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
+  use gravier_region_lines, only: region_warnings
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
   use gravier_start_lines, only: banner_text, start_lines
@@ -246,6 +247,9 @@ contains
     if (lines) call write_lines(self, scale_lines(simulation, scales)//error_scale_line(simulation), "", error)
     call scale_warnings(simulation, scales, text, warnings)
     call inflow_warnings(simulation, more, number)
+    warnings = warnings + number
+    text = text//more
+    call region_warnings(simulation, more, number)
     warnings = warnings + number
     call write_lines(self, text//more, "", error)
   end subroutine run_log_write_scales

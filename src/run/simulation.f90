@@ -19,6 +19,8 @@ module gravier_simulation
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
+  use gravier_diagnostic_registry, only: diagnostic_holder_t
+  use gravier_scene_regions, only: make_region_means
   use gravier_method_choice, only: choose_scheme
   use gravier_column_solution, only: column_solution_t
   implicit none
@@ -179,12 +181,15 @@ contains
     end associate
   end subroutine prepare_inflow
 
-  !> Prepare the balance of every run and the diagnostics that &output asks for, of the scene as it is. Collective.
+  !> Prepare the balance of every run, the diagnostics that &output asks for and the means over regions, of the scene as it is.
+  !> Collective.
   subroutine simulation_start_diagnostics(self)
     class(simulation_t), intent(inout) :: self
+    type(diagnostic_holder_t), allocatable :: more(:)
 
     call self%balance%begin(self%decomposition, self%physics)
-    call self%diagnostics%init(self%decomposition, self%physics, self%config%output%diagnostics)
+    call make_region_means(self%config, more)
+    call self%diagnostics%init(self%decomposition, self%physics, self%config%output%diagnostics, more)
   end subroutine simulation_start_diagnostics
 
   !> Make room for the subdomains that &decomposition asks for, without grains.

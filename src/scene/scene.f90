@@ -28,6 +28,7 @@ module gravier_scene
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
   use gravier_scene_boundaries, only: make_boundaries
   use gravier_scene_insertions, only: make_insertions, check_regions
+  use gravier_scene_regions, only: check_mean_regions
   implicit none
   private
   public :: scene_t, make_scene
@@ -104,6 +105,7 @@ contains
       scene%boundaries(b)%period(:) = scene%period%length
     end do
     call check_regions(config, scene%insertions, scene%period, scene%boundaries, error)
+    call check_mean_regions(config, scene%period, error)
     call comm%agree(error)
     if (allocated(error)) return
     call collect_laws(config, scene%laws)

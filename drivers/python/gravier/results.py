@@ -28,13 +28,15 @@ class Table(dict):
         return len(next(iter(self.values()))) if self.keys() else 0
 
     def frame(self):
-        """A pandas DataFrame; component k of a column becomes NAME_k."""
+        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy."""
         import pandas
 
         columns = {}
         for name, values in self.items():
             if values.ndim == 1:
                 columns[name] = values
+            elif values.ndim == 3:
+                columns.update({f"{name}_{'xyz'[j]}{'xyz'[k]}": values[:, j, k] for j in range(values.shape[1]) for k in range(values.shape[2])})
             else:
                 columns.update({f"{name}_{'xyz'[k]}": values[:, k] for k in range(values.shape[1])})
         return pandas.DataFrame(columns)
@@ -81,7 +83,9 @@ class Run:
     _kind = "the results of a run"
     #: columns that each table of a step has
     _columns = {"bodies": ("id", "position", "velocity", "radius"), "boundaries": ("position", "normal", "velocity", "force"),
-                "contacts": ("candidate", "antagonist", "normal", "gap", "impulse")}
+                "contacts": ("candidate", "antagonist", "normal", "gap", "impulse"),
+                "regions": ("bin", "lower", "upper", "volume", "grains", "solid_fraction", "velocity", "granular_temperature", "stress",
+                            "contacts_per_grain")}
 
     def __init__(self, directory):
         self.directory = Path(directory)
@@ -220,6 +224,31 @@ class Run:
         with self._open() as file:
             place = f"steps/{self.find_step(step)}/diagnostics"
             return {name: float(value) for name, value in file[place].attrs.items()} if place in file else {}
+
+    def regions(self, step=None):
+        """Names of the regions of means that a step has, those of the `&region` groups of the input."""
+        with self._open() as file:
+            place = f"steps/{self.find_step(step)}/regions"
+            return list(file[place]) if place in file else []
+
+    def region(self, name, step=None):
+        """Means over a region, a row a bin: bin, lower (n, d), upper (n, d), centre (n, d), volume, grains, solid_fraction, velocity (n, d),
+        granular_temperature, stress (n, d, d), force by branch, compression positive, pressure and contacts_per_grain."""
+        step = self.find_step(step)
+        with self._open() as file:
+            place = f"steps/{step}/regions/{name}"
+            if place not in file:
+                held = ", ".join(file[f"steps/{step}/regions"] if f"steps/{step}/regions" in file else ()) or "none, the step has no regions"
+                raise ResultsError(f"{self.path}: no region {name} in step {step}; expected one of {held}")
+            rows = self._table(file[place], "regions")
+        if any(values.ndim != 1 + (key in ("lower", "upper", "velocity", "stress")) for key, values in rows.items()):
+            raise ResultsError(f"{self.path}: /{place}: an array of another shape than a run writes")
+        if rows.stress.shape[1] != self.dimension**2:
+            raise ResultsError(f"{self.path}: /{place}/stress: shape {rows.stress.shape}; expected (rows, {self.dimension**2})")
+        rows["stress"] = rows.stress.reshape(-1, self.dimension, self.dimension)
+        rows["centre"] = 0.5 * (rows.lower + rows.upper)
+        rows["pressure"] = np.trace(rows.stress, axis1=1, axis2=2) / self.dimension
+        return rows
 
     def history(self):
         """history.csv: a row a step."""

@@ -46,6 +46,8 @@ module gravier_results_file
     type(accuracy_t), allocatable :: accuracy
     !> where some were measured
     type(figures_t), allocatable :: figures
+    !> tables that stand together in the group /steps/<step>/regions, the same on all ranks; not allocated where there are none
+    type(field_list_t), allocatable :: region(:)
   end type results_step_t
 
   !> An open results file.
@@ -65,6 +67,8 @@ module gravier_results_file
 
   !> room for the headers of the groups and datasets of one step
   integer(i8), parameter :: bytes_of_headers = 65536
+  !> the same for one table of a region
+  integer(i8), parameter :: bytes_of_table = 32768
   integer, parameter :: bytes_of_word = 8
   !> steps for which /steps has room in one block: up to there a program that dies leaves the file whole
   integer, parameter :: steps_in_block = 1000
@@ -234,7 +238,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(field_list_t), allocatable :: sorted(:)
     character(len=:), allocatable :: group
-    integer(i8) :: words
+    integer(i8) :: words, room
     integer :: k
 
     if (allocated(error)) return
@@ -251,9 +255,17 @@ contains
       call check_table(self, group//"/"//sorted(k)%name, sorted(k), error)
     end do
     if (allocated(state%figures)) words = words + words_of(state%figures)
+    room = bytes_of_headers
+    if (allocated(state%region)) then
+      do k = 1, size(state%region)
+        call check_table(self, group//"/regions/"//state%region(k)%name, state%region(k), error)
+        words = words + int(state%region(k)%n_items(), i8)*state%region(k)%words()
+        room = room + bytes_of_table
+      end do
+    end if
     call self%comm%agree(error)
 
-    call self%file%reserve(bytes_of_headers + bytes_of_word*words, error)
+    call self%file%reserve(room + bytes_of_word*words, error)
     call self%file%begin_group(group, error)
     call self%file%write_attribute(group, "step", state%step, error)
     call self%file%write_attribute(group, "time", state%time, error)
@@ -266,6 +278,13 @@ contains
       call write_fields(self, group//"/"//sorted(k)%name, sorted(k), error)
     end do
     if (allocated(state%figures)) call write_figures(self, group//"/diagnostics", state%figures, error)
+    if (allocated(state%region)) then
+      call self%file%make_group(group//"/regions", error)
+      do k = 1, size(state%region)
+        call self%file%make_group(group//"/regions/"//state%region(k)%name, error)
+        call write_fields(self, group//"/regions/"//state%region(k)%name, state%region(k), error)
+      end do
+    end if
     call finish(self, error)
   end subroutine results_write_step
 

@@ -21,7 +21,8 @@ module gravier_diagnostic
 
   !> What a diagnostic says of itself.
   type :: diagnostic_features_t
-    !> key of &output, .false. by default, that asks for it; the meaning of the key, for the reference of keys
+    !> key of &output, .false. by default, that asks for it, or the group of its own that does; the meaning of the key, for the
+    !> reference of keys
     character(len=28) :: key = ""
     character(len=120) :: meaning = ""
     !> in_each_step or in_written_steps

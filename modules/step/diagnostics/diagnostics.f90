@@ -42,17 +42,30 @@ module gravier_diagnostics
 
 contains
 
-  !> Make those that are asked for, of a scene as it starts. Collective.
-  subroutine diagnostics_init(self, decomposition, physics, asked)
+  !> Make those that are asked for, of a scene as it starts, and take over those that groups of their own ask for. Collective.
+  subroutine diagnostics_init(self, decomposition, physics, asked, more)
     class(diagnostics_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     !> (registered diagnostics)
     logical, intent(in) :: asked(:)
-    type(diagnostic_holder_t), allocatable :: all_kinds(:)
+    !> is emptied
+    type(diagnostic_holder_t), intent(inout) :: more(:)
+    type(diagnostic_holder_t), allocatable :: all_kinds(:), list(:)
+    logical, allocatable :: taken(:)
+    integer :: k
 
     call registered_diagnostics(all_kinds)
-    call self%take(decomposition, physics, all_kinds, asked)
+    allocate (list(size(all_kinds) + size(more)))
+    allocate (taken(size(list)), source=.true.)
+    taken(1:size(asked)) = asked
+    do k = 1, size(all_kinds)
+      call move_alloc(all_kinds(k)%diagnostic, list(k)%diagnostic)
+    end do
+    do k = 1, size(more)
+      call move_alloc(more(k)%diagnostic, list(size(all_kinds) + k)%diagnostic)
+    end do
+    call self%take(decomposition, physics, list, taken)
   end subroutine diagnostics_init
 
   !> Take over those of a list that are asked for, of a scene as it starts. Collective.

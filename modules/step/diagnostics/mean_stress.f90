@@ -1,14 +1,11 @@
 !> The mean stress of a scene and the share of space that grains fill.
 module gravier_mean_stress
   use gravier_kinds, only: dp
-  use gravier_orientation, only: orientation_matrix
-  use gravier_shape_library, only: shape_library_t
-  use gravier_body_store, only: body_set_t
-  use gravier_facing_planes, only: find_facing_planes
-  use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
+  use gravier_contact_branch, only: find_branch
+  use gravier_scene_extent, only: find_extent
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
@@ -75,6 +72,7 @@ contains
     !> [s]
     real(dp), intent(in) :: h
     real(dp) :: parts(decomposition%nd**2 + 1, size(problem%sub)), sums(decomposition%nd**2 + 1)
+    real(dp), dimension(decomposition%nd) :: low, high, length
     integer :: s, k, nd
 
     nd = decomposition%nd
@@ -88,7 +86,8 @@ contains
       end associate
     end do
     call decomposition%comm%sum_parts(parts, sums)
-    self%volume = volume_of(decomposition)
+    call find_extent(decomposition, low, high, length)
+    self%volume = product(length)
     do k = 1, nd
       self%stress(:, k) = sums((k - 1)*nd + 1:k*nd)
     end do
@@ -118,97 +117,6 @@ contains
       end do
     end associate
   end subroutine add_contacts
-
-  !> The branch of contact `c`, that part of it which lies outside boundaries [m]. Of disks and spheres it is along the normal.
-  pure subroutine find_branch(kernels, sub, c, branch)
-    type(kernels_t), intent(in) :: kernels
-    type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: c
-    !> (nd)
-    real(dp), intent(out) :: branch(:)
-    real(dp) :: arm_i(kernels%nd), arm_j(kernels%nd), length
-    integer :: k
-
-    if (kernels%row%arm_i > 0) then
-      call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
-      branch(:) = arm_j - arm_i
-      return
-    end if
-    length = sub%gap(c)
-    do k = 1, 2
-      if (sub%pair(k, c) <= sub%n_grains) length = length + sub%radius(sub%pair(k, c))
-    end do
-    branch(:) = length*sub%hot(lane_of(c), 1:kernels%nd, block_of(c))
-  end subroutine find_branch
-
-  !> Volume that the scene takes: along each axis the period, or else the way between the planes that shut it in, with the
-  !> outermost points of the grains in the place of planes that are not there. Collective.
-  real(dp) function volume_of(decomposition) result(volume)
-    type(decomposition_t), intent(in) :: decomposition
-    real(dp) :: extremes(2*decomposition%nd), reach(2*decomposition%nd), low, high
-    integer :: s, k, d, nd
-
-    nd = decomposition%nd
-    extremes(:) = -huge(1.0_dp)
-    do s = 1, size(decomposition%owned)
-      associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          call find_reach(decomposition%shapes, owned, k, reach)
-          extremes(1:nd) = max(extremes(1:nd), reach(1:nd) - owned%position(:, k))
-          extremes(nd + 1:) = max(extremes(nd + 1:), reach(nd + 1:) + owned%position(:, k))
-        end do
-      end associate
-    end do
-    call decomposition%comm%highest_of(extremes)
-    volume = 1.0_dp
-    do d = 1, nd
-      if (decomposition%period%length(d) > 0.0_dp) then
-        volume = volume*decomposition%period%length(d)
-        cycle
-      end if
-      call find_facing_planes(decomposition%boundaries, d, low, high)
-      if (.not. low > -huge(1.0_dp)) low = -extremes(d)
-      if (.not. high < huge(1.0_dp)) high = extremes(nd + d)
-      volume = volume*max(high - low, 0.0_dp)
-    end do
-  end function volume_of
-
-  !> How far body `k` reaches from its centre, against each axis and then along each [m].
-  pure subroutine find_reach(shapes, bodies, k, reach)
-    type(shape_library_t), intent(in) :: shapes
-    type(body_set_t), intent(in) :: bodies
-    integer, intent(in) :: k
-    !> (2 nd)
-    real(dp), intent(out) :: reach(:)
-    real(dp) :: axes(3, 3), at(bodies%nd)
-    integer :: p, v, d, nd
-
-    reach(:) = bodies%radius(k)
-    if (bodies%no == 0) return
-    if (bodies%shape(k) == 0) return
-    nd = bodies%nd
-    axes(:, :) = 0.0_dp
-    if (nd == 2) then
-      axes(1, 1) = cos(bodies%orientation(1, k))
-      axes(2, 1) = sin(bodies%orientation(1, k))
-      axes(1, 2) = -axes(2, 1)
-      axes(2, 2) = axes(1, 1)
-    else
-      call orientation_matrix(bodies%orientation(:, k), axes)
-    end if
-    reach(:) = -huge(1.0_dp)
-    associate (shape => shapes%shape(bodies%shape(k)))
-      do p = 1, size(shape%piece)
-        do v = 1, size(shape%piece(p)%vertex, 2)
-          do d = 1, nd
-            at(d) = sum(axes(d, 1:nd)*shape%piece(p)%vertex(:, v))
-          end do
-          reach(1:nd) = max(reach(1:nd), bodies%radius(k)*(shape%piece(p)%rounding - at))
-          reach(nd + 1:) = max(reach(nd + 1:), bodies%radius(k)*(shape%piece(p)%rounding + at))
-        end do
-      end do
-    end associate
-  end subroutine find_reach
 
   !> Mean of the diagonal [Pa, N/m in 2D].
   pure real(dp) function mean_stress_pressure(self) result(pressure)

@@ -562,7 +562,7 @@ contains
     call refuse(column // "&solvr /", "unknown group &solvr; did you mean &solver?")
     call refuse(column // "&physics /", &
       "unknown group &physics: expected one of &scene &boundary &sample &insertion &material &law &time &solver &decomposition " &
-      // "&enriched &output")
+      // "&enriched &output &region")
     call refuse(column // "&solver methd = 'nlgs' /", "unknown key 'methd' in &solver; did you mean 'method'?")
     call refuse(column // "&solver METHDO = 'nlgs' /", "unknown key 'methdo' in &solver; did you mean 'method'?")
     call refuse(column // "&time sweeps = 3 /", "group &time is given twice (lines 1 and 1): expected once")

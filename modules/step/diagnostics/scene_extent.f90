@@ -1,0 +1,91 @@
+!> The space that a scene takes along the axes.
+module gravier_scene_extent
+  use gravier_kinds, only: dp
+  use gravier_orientation, only: orientation_matrix
+  use gravier_shape_library, only: shape_library_t
+  use gravier_body_store, only: body_set_t
+  use gravier_facing_planes, only: find_facing_planes
+  use gravier_decomposition, only: decomposition_t
+  implicit none
+  private
+  public :: find_extent
+
+contains
+
+  !> Where the scene begins and ends along each axis, and its length there: the period, or else the way between the planes that shut
+  !> it in, with the outermost points of the grains in the place of planes that are not there. No length where neither planes nor
+  !> grains bound it. Collective.
+  subroutine find_extent(decomposition, low, high, length)
+    type(decomposition_t), intent(in) :: decomposition
+    !> (nd) [m]
+    real(dp), intent(out) :: low(:), high(:), length(:)
+    real(dp) :: extremes(2*decomposition%nd), reach(2*decomposition%nd)
+    integer :: s, k, d, nd
+
+    nd = decomposition%nd
+    extremes(:) = -huge(1.0_dp)
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          call find_reach(decomposition%shapes, owned, k, reach)
+          extremes(1:nd) = max(extremes(1:nd), reach(1:nd) - owned%position(:, k))
+          extremes(nd + 1:) = max(extremes(nd + 1:), reach(nd + 1:) + owned%position(:, k))
+        end do
+      end associate
+    end do
+    call decomposition%comm%highest_of(extremes)
+    do d = 1, nd
+      if (decomposition%period%length(d) > 0.0_dp) then
+        low(d) = decomposition%period%origin(d)
+        length(d) = decomposition%period%length(d)
+        high(d) = low(d) + length(d)
+        cycle
+      end if
+      call find_facing_planes(decomposition%boundaries, d, low(d), high(d))
+      if (.not. low(d) > -huge(1.0_dp)) low(d) = min(-extremes(d), high(d))
+      if (.not. high(d) < huge(1.0_dp)) high(d) = max(extremes(nd + d), low(d))
+      ! neither planes nor grains
+      if (.not. low(d) < huge(1.0_dp)) low(d) = 0.0_dp
+      if (.not. abs(high(d)) < huge(1.0_dp)) high(d) = low(d)
+      length(d) = max(high(d) - low(d), 0.0_dp)
+    end do
+  end subroutine find_extent
+
+  !> How far body `k` reaches from its centre, against each axis and then along each [m].
+  pure subroutine find_reach(shapes, bodies, k, reach)
+    type(shape_library_t), intent(in) :: shapes
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (2 nd)
+    real(dp), intent(out) :: reach(:)
+    real(dp) :: axes(3, 3), at(bodies%nd)
+    integer :: p, v, d, nd
+
+    reach(:) = bodies%radius(k)
+    if (bodies%no == 0) return
+    if (bodies%shape(k) == 0) return
+    nd = bodies%nd
+    axes(:, :) = 0.0_dp
+    if (nd == 2) then
+      axes(1, 1) = cos(bodies%orientation(1, k))
+      axes(2, 1) = sin(bodies%orientation(1, k))
+      axes(1, 2) = -axes(2, 1)
+      axes(2, 2) = axes(1, 1)
+    else
+      call orientation_matrix(bodies%orientation(:, k), axes)
+    end if
+    reach(:) = -huge(1.0_dp)
+    associate (shape => shapes%shape(bodies%shape(k)))
+      do p = 1, size(shape%piece)
+        do v = 1, size(shape%piece(p)%vertex, 2)
+          do d = 1, nd
+            at(d) = sum(axes(d, 1:nd)*shape%piece(p)%vertex(:, v))
+          end do
+          reach(1:nd) = max(reach(1:nd), bodies%radius(k)*(shape%piece(p)%rounding - at))
+          reach(nd + 1:) = max(reach(nd + 1:), bodies%radius(k)*(shape%piece(p)%rounding + at))
+        end do
+      end do
+    end associate
+  end subroutine find_reach
+
+end module gravier_scene_extent
