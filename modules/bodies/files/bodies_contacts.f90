@@ -63,22 +63,23 @@ contains
     character(len=*), intent(in) :: path
     integer(i8), intent(out) :: total
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: name
     integer(i8) :: rows
     integer :: k
 
     total = 0
     do k = 1, size(contact_sets)
       if (contact_sets(k) == "boundaries") cycle
-      name = "/contacts/"//trim(contact_sets(k))
-      if (contact_sets(k) == "point" .or. contact_sets(k) == "moment") then
-        if (.not. file%exists(name)) cycle
-      end if
-      call file%row_count(name, rows, error)
-      if (allocated(error)) return
-      if (k == 1) total = rows
-      if (rows == total) cycle
-      call raise(error, status_input, path//": "//name//": "//to_text(rows)//" rows, but /contacts/candidate has "//to_text(total))
+      associate (name => "/contacts/"//trim(contact_sets(k)))
+        if (contact_sets(k) == "point" .or. contact_sets(k) == "moment") then
+          if (.not. file%exists(name)) cycle
+        end if
+        call file%row_count(name, rows, error)
+        if (allocated(error)) return
+        if (k == 1) total = rows
+        if (rows == total) cycle
+        call raise(error, status_input, path//": "//name//": "//to_text(rows)//" rows, but /contacts/candidate has "// &
+          & to_text(total))
+      end associate
       return
     end do
   end subroutine find_lengths

@@ -198,7 +198,7 @@ contains
     call check(all(low >= insertion%lower(1:nd) + 0.02_dp .and. low < insertion%lower(1:nd) + 0.025_dp), "lower side of a box")
     call check(all(high <= insertion%upper(1:nd) - 0.02_dp .and. high > insertion%upper(1:nd) - 0.025_dp), "upper side of a box")
     call check(insertion%room_for(0.1_dp) .and. .not. insertion%room_for(0.11_dp), "room in a box")
-    call check_close(insertion%volume(), product([0.2_dp, 0.3_dp, 0.4_dp*(nd - 2) + (3 - nd)]), 1.0e-12_dp, "volume of a box")
+    call check_close(insertion%volume(), 0.2_dp*0.3_dp*merge(1.0_dp, 0.4_dp, nd == 2), 1.0e-12_dp, "volume of a box")
     insertion%in_ball = .true.
     insertion%upper(1:nd) = insertion%lower(1:nd) + 0.2_dp
     centre(:) = insertion%lower(1:nd) + 0.1_dp
