@@ -22,7 +22,7 @@ from pathlib import Path
 
 from dem_codes import Log, lammps_version, run_gravier, run_lammps
 from dem_scenes import Discharge, Settling, Shear
-from masonry_table import Table, say
+from oracle_table import Table, say
 from study_support import BINARIES, ENVIRONMENT, SOURCE, write_measured
 
 from one_line import OneLineParser

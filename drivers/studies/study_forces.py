@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from masonry_table import Table
+from oracle_table import Table
 from study_support import SOURCE, plt, run, states, write_csv
 
 from one_line import OneLineParser

@@ -14,7 +14,7 @@ from pathlib import Path
 import masonry_blocks as blocks
 import masonry_motion as motion
 import masonry_walls as walls
-from masonry_table import Table, say
+from oracle_table import Table, say
 from study_support import write_measured
 
 PARTS = {"slope": blocks.slope, "prisms": blocks.prisms, "map": blocks.slide_topple, "rocking": blocks.rocking,

@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from masonry_table import Table
+from oracle_table import Table
 from study_support import hdf5_file, read_bodies, run, states, whole_file, write_csv
 
 from one_line import OneLineParser

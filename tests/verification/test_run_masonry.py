@@ -13,7 +13,7 @@ os.environ.setdefault("GRAVIER_BIN_DIR", PROGRAMS)
 import masonry_blocks as blocks  # noqa: E402
 import masonry_motion as motion  # noqa: E402
 import masonry_walls as walls  # noqa: E402
-from masonry_table import Table  # noqa: E402
+from oracle_table import Table  # noqa: E402
 
 NEAR = 1.0e-4
 

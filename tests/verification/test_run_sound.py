@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import unittest
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -46,7 +47,7 @@ class Sound(RunTestCase):
         self.assertLess(max(float(row["measured"]) for row in rows if "effective" in row["quantity"]), 1.0)
 
     def test_verdict(self):
-        """With springs a tenth stiffer than what is expected, the study says no."""
+        """Springs a tenth stiffer than those of the expected mode swing faster by the root of that, far outside the bounds."""
         chain = study_sound.chain(8)
         run = study_sound.run
 
@@ -55,7 +56,6 @@ class Sound(RunTestCase):
             return run(folder, groups)
 
         with mock.patch.object(study_sound, "run", stiffer), mock.patch("study_support.BINARIES", PROGRAMS):
-            from pathlib import Path
             found, expected, _ = chain.swing(Path(self.here("stiffer")), 1, 0)
         self.assertAlmostEqual(found / expected, np.sqrt(1.1), delta=2e-3)
 

@@ -429,13 +429,15 @@ contains
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
     if (.not. due) return
     if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)
-    call state%stagnation%judge(problem, report%iterations, state%velocity%levels%most_depth, has_stagnated, in_vain, &
-      & report%creep)
+    call state%stagnation%judge(problem, report%iterations, state%velocity%levels%most_depth, has_stagnated, in_vain)
     if (in_vain) then
       report%status = solve_unbounded
-    else
-      has_stagnated = has_stagnated .and. .not. method%persists
-      if (has_stagnated) report%status = solve_stagnated
+    else if (has_stagnated .and. method%persists) then
+      has_stagnated = .false.
+      call state%stagnation%go_on(problem, report%iterations)
+    else if (has_stagnated) then
+      report%status = solve_stagnated
+      call state%stagnation%describe(problem, report%creep)
     end if
   end subroutine judge_stagnation
 

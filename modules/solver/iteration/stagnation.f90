@@ -33,6 +33,8 @@ module gravier_stagnation
   contains
     procedure :: note => stagnation_note
     procedure :: judge => stagnation_judge
+    procedure :: describe => stagnation_describe
+    procedure :: go_on => stagnation_go_on
   end type stagnation_t
 
 contains
@@ -76,24 +78,37 @@ contains
   end subroutine keep_impulses
 
   !> Where stagnation is due, look whether the solve has really stagnated, because no solution is to be found or because the method
-  !> finds none; else it is looked at again later. Collective.
-  subroutine stagnation_judge(self, problem, iteration, depth, stagnates, in_vain, creep)
-    class(stagnation_t), intent(inout) :: self
+  !> finds none. Collective.
+  subroutine stagnation_judge(self, problem, iteration, depth, stagnates, in_vain)
+    class(stagnation_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: iteration
     !> of the problem, in contacts
     integer, intent(in) :: depth
     logical, intent(out) :: stagnates, in_vain
-    !> what still changes where the method finds no solution
-    type(creep_t), intent(out) :: creep
 
     in_vain = .false.
     stagnates = iteration >= waves*depth
-    if (.not. stagnates) return
-    in_vain = are_in_vain(problem, self%kept)
-    if (.not. in_vain) call find_creep(problem, self%kept, creep)
+    if (stagnates) in_vain = are_in_vain(problem, self%kept)
+  end subroutine stagnation_judge
+
+  !> What still changes in a solve that has stagnated. Collective.
+  subroutine stagnation_describe(self, problem, creep)
+    class(stagnation_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    type(creep_t), intent(out) :: creep
+
+    call find_creep(problem, self%kept, creep)
+  end subroutine stagnation_describe
+
+  !> Look at a solve again later that goes on although it has stagnated.
+  subroutine stagnation_go_on(self, problem, iteration)
+    class(stagnation_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: iteration
+
     self%next_look = iteration + patience
     call keep_impulses(self, problem, iteration)
-  end subroutine stagnation_judge
+  end subroutine stagnation_go_on
 
 end module gravier_stagnation

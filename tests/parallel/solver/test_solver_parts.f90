@@ -397,10 +397,11 @@ contains
     call stagnation%note(sim%problem, 10, 1.0_dp, .true., 0.0_dp, due)
     call check(.not. due, "the first figure is a gain")
     call stagnation%note(sim%problem, 5000, 1.0_dp, .true., 0.0_dp, due)
-    call stagnation%judge(sim%problem, 5000, 834, stagnates, in_vain, creep)
+    call stagnation%judge(sim%problem, 5000, 834, stagnates, in_vain)
     call check(.not. stagnates, "5000 iterations are too few for a depth of 834")
-    call stagnation%judge(sim%problem, 5000, 833, stagnates, in_vain, creep)
+    call stagnation%judge(sim%problem, 5000, 833, stagnates, in_vain)
     call check(stagnates .and. .not. in_vain, "and enough for one of 833")
+    call stagnation%describe(sim%problem, creep)
     call check(creep%contacts == 0, "impulses that stay do not creep")
     call sim%free()
   end subroutine check_stagnation

@@ -1,4 +1,4 @@
-"""The table of study_masonry.py and study_dem.py: a row an oracle, with what was measured beside what is accepted."""
+"""The table of studies that compare with oracles: a row an oracle, with what was measured beside what is accepted."""
 import sys
 
 
