@@ -9,7 +9,7 @@ module gravier_accuracy_input
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
   use gravier_config_table, only: keys, fill_keys
   use gravier_config_keys, only: has_word, choices_text
-  use gravier_run, only: read_input
+  use gravier_read_case, only: read_input
   use gravier_accuracy_study, only: study_t, variant_t, text_t, append, duration_of, same_time
   implicit none
   private

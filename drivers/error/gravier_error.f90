@@ -6,7 +6,7 @@ program gravier_error
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_config, only: parse_config
-  use gravier_run, only: read_input
+  use gravier_read_case, only: read_input
   use gravier_command_line, only: leave
   use gravier_error_options, only: options_t, read_options, usage
   use gravier_error_plan, only: row_t

@@ -11,7 +11,7 @@ module gravier_sample_file
   use gravier_shape_library, only: shape_library_t
   use gravier_shapes_file, only: read_shapes
   use gravier_config, only: config_t
-  use gravier_run, only: read_config
+  use gravier_read_case, only: read_config
   use gravier_run_log, only: run_log_t
   use gravier_sample_bodies, only: make_sample
   use gravier_sample_preparation, only: prepare_sample, open_log

@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Iterations to a velocity error beside iterations to a residual: momentum, heights, subdomains, methods, warm starts.
+"""Iterations to a velocity error beside iterations to a residual: momentum, heights, subdomains, methods, warm starts, Newton's method,
+many grains.
 
     ./gravier study convergence                 all: minutes on two cores
-    ./gravier study convergence --parts LIST    some of momentum,heights,subdomains,methods,warm
+    ./gravier study convergence --parts LIST    some of momentum,heights,subdomains,methods,warm,newton,large
 
 Packings of disks and spheres settle in a box. One step of each is solved from zero impulses by sweeps without a layered start, looked
 at after every iteration (plain sweeps after every tenth), and by the program as it is. A tolerance of the residual is met with the
 first iteration at or below it, a velocity error with the first iteration from which on the estimate stays at or below it, as far as
 the run goes. The estimate is that of doc/theory.md, section 24, over the velocity scale. The heights have the true error too, that to
-the solution of the same step. Warm starts are runs of many steps, each of which ends by its own criterion.
+the solution of the same step. The solves of warm starts, of Newton's method and of 16 000 grains end by their
+own criterion each. `large` takes an hour and is made only where --parts names it.
 
 leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them."""
 import argparse
@@ -19,12 +21,18 @@ from pathlib import Path
 from study_error import measure
 from study_support import SOURCE, gravier, read_history, run, write_measured
 
-PARTS = ("momentum", "heights", "subdomains", "methods", "warm")
+PARTS = ("momentum", "heights", "subdomains", "methods", "warm", "newton")
+LONG_PARTS = ("large",)
 RESIDUALS = (1e-3, 1e-4)
 ERRORS = (0.1, 0.03)
 #: name: dimension, grains along each axis of the lattice that falls, steps of settling
 PACKINGS = {"1000 disks": (2, [32, 31], 700), "1000 spheres": (3, [10, 10, 10], 650), "10^4 spheres": (3, [21, 21, 23], 700)}
 HEIGHTS = (10, 20, 40, 80)
+#: grains along each axis of packings that have fallen for 350 steps at friction 0.3, and frictions of the step that is solved
+TIGHT_PACKINGS = {"343 spheres": ([7, 7, 7], (0.3, 0.5, 0.8))}
+TIGHT_GOALS = [{"accuracy": accuracy} for accuracy in (0.1, 0.03, 0.01, 0.001)]
+#: grains along each axis of the lattice of data/large/settle.nml, made narrower
+LARGE = [14, 14, 80]
 #: iterations with momentum, of plain ones three times as many; residual at which a run ends before
 MOST, TIGHT = 1500, 1e-6
 
@@ -202,6 +210,73 @@ def study_warm(out):
     return rows
 
 
+def ends(place, groups, goal, **solver):
+    """A row for each step of a run that ends its solves by a goal."""
+    groups = {**groups, "solver": {"max_iterations": 20000, **solver, **goal},
+              "output": {"directory": "results", "every": 0, "contacts": False}}
+    run(place, groups)
+    history = read_history(place / "results")
+    log = (place / "results/run.log").read_text(encoding="utf-8")
+    layers = re.search(r"the passes took as much work as (\d+) sweeps?", log)
+    factors = re.search(r"(\d+) factorisations?\n", log)
+    by = f"residual {goal['tolerance']:g}" if "criterion" in goal else f"error {goal['accuracy']:g}"
+    return [{"ends by": by, "step": k + 1, "contacts": int(history["contacts"][k]), "iterations": int(history["iterations"][k]),
+             "sweeps of passes, all steps": int(layers[1]) if layers else 0, "factorisations, all steps": int(factors[1]) if factors else 0,
+             "residual": float(history["residual"][k]), "error": float(history["velocity_error"][k] / history["velocity_scale"][k]),
+             "jump": float(history["jump"][k]), "overlap": float(history["max_overlap"][k]), "converged": int(history["converged"][k]),
+             "solve seconds": float(history["solve_seconds"][k])} for k in range(len(history["step"]))]
+
+
+def study_newton(out):
+    """Newton's method beside accelerated sweeps, to errors and to a residual."""
+    rows = []
+    for name, (count, frictions) in TIGHT_PACKINGS.items():
+        bodies = settle(out, 3, count, 350)
+        for friction in frictions:
+            for goal in TIGHT_GOALS:
+                for method in ("nlgs", "newton"):
+                    place = out / "runs" / "_".join(map(str, ("tight", name, friction, method, *goal.values()))).replace(" ", "_")
+                    found = ends(place, {**on_file(3, bodies, friction), "time": {"step": 1e-3, "steps": 1}}, goal, method=method,
+                                 warm_start=False, layered_start=False)
+                    rows += [{"scene": name, "friction": friction, "method": method, **row} for row in found]
+                    show(rows[-1:])
+    return rows
+
+
+def settle_large(out):
+    """The bodies file of data/large/settle.nml with fewer grains along x and y, made once."""
+    place = out / "settled/large"
+    if not (place / "final_bodies.h5").exists():
+        groups = {name: keys[0] for name, keys in gravier.parse_namelist(
+            (SOURCE / "data/large/settle.nml").read_text(encoding="utf-8")).items()}
+        groups["scene"]["lattice_count"] = LARGE
+        groups["output"] = {"directory": ".", "every": 0, "contacts": False, "final_bodies": True}
+        run(place, groups)
+    return (place / "final_bodies.h5").resolve()
+
+
+def study_large(out, bodies=None):
+    """Four steps of many grains by each criterion."""
+    bodies = bodies or settle_large(out)
+    rows = []
+    for momentum, layered in ((False, False), (True, False), (True, True)):
+        for goal in ({"criterion": "residual", "tolerance": 1e-3}, {"accuracy": 0.1}):
+            if layered and "criterion" in goal:
+                continue
+            by = "plain" if not momentum else "the program" if layered else "momentum"
+            found = ends(out / "runs" / f"large_{by}_{len(goal)}".replace(" ", "_"), many(bodies, 16, 4), goal, method="nscdd",
+                         acceleration="momentum" if momentum else "none", layered_start=layered)
+            rows += [{"by": by, **row} for row in found]
+            show(rows[-len(found):])
+    return rows
+
+
+def many(bodies, subdomains, steps):
+    """Groups of some steps of a large packing."""
+    return {**on_file(3, bodies, alert_distance=0.001), "time": {"step": 1e-3, "steps": steps},
+            "decomposition": {"partition": "metis", "subdomains": subdomains}}
+
+
 def scene(name):
     """Groups and boundaries of a case of data/scenes."""
     groups = gravier.parse_namelist((SOURCE / f"data/scenes/{name}.nml").read_text(encoding="utf-8"))
@@ -220,14 +295,16 @@ def show(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/convergence"))
-    parser.add_argument("--parts", metavar="LIST", default=",".join(PARTS), help=f"some of {','.join(PARTS)}")
+    parser.add_argument("--parts", metavar="LIST", default=",".join(PARTS), help=f"some of {','.join(PARTS + LONG_PARTS)}")
+    parser.add_argument("--bodies", metavar="FILE", type=Path, help="the packing of large, made before")
     options = parser.parse_args()
     out = options.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     for part in options.parts.split(","):
-        if part not in PARTS:
-            parser.error(f"--parts {options.parts}: expected some of {','.join(PARTS)}")
-        rows = globals()[f"study_{part}"](out)
+        if part not in PARTS + LONG_PARTS:
+            parser.error(f"--parts {options.parts}: expected some of {','.join(PARTS + LONG_PARTS)}")
+        more = {"bodies": options.bodies.resolve()} if part in LONG_PARTS and options.bodies else {}
+        rows = globals()[f"study_{part}"](out, **more)
         names = list(dict.fromkeys(key for row in rows for key in row))
         write_measured(out / f"convergence_{part}.csv", {key: [row.get(key, "") for row in rows] for key in names})
 

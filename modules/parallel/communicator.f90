@@ -4,18 +4,18 @@ module gravier_communicator
   use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
   use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, MPI_Finalize, &
-    & MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_Comm_dup, MPI_Comm_free, &
-    & MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Ibarrier, MPI_Test, MPI_Get_library_version, &
+    & MPI_Finalized, MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_Comm_dup, &
+    & MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Ibarrier, MPI_Test, MPI_Get_library_version, &
     & MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, MPI_SUM, &
     & MPI_MIN, MPI_MAX, MPI_LOR, MPI_BOR, MPI_BXOR
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
-  use gravier_errors, only: error_t, status_failure
+  use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_process, only: pause_for, end_at_once
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
-  public :: communicator_t, start_parallel, stop_parallel, mpi_library
+  public :: communicator_t, start_parallel, join_parallel, stop_parallel, mpi_library
 
   !> A communicator with its rank and size. `init` duplicates the parent, `free` must be called.
   type :: communicator_t
@@ -27,6 +27,7 @@ module gravier_communicator
     integer, pointer :: exchanges => null()
   contains
     procedure :: init => communicator_init
+    procedure :: init_from => communicator_init_from
     procedure :: free => communicator_free
     procedure :: barrier => communicator_barrier
     procedure :: barrier_asleep => communicator_barrier_asleep
@@ -73,6 +74,23 @@ contains
     if (.not. running) call MPI_Init()
   end subroutine start_parallel
 
+  !> Start MPI for a library in the process of another program, unless that has started it. Failure (status_input): MPI has been ended.
+  subroutine join_parallel(started, error)
+    !> MPI was started here, and is to be ended by stop_parallel; kept where it was
+    logical, intent(inout) :: started
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: running, ended
+
+    call MPI_Finalized(ended)
+    if (ended) call raise(error, status_input, "MPI has been ended in this process; expected one in which it runs or can be "// &
+      & "started")
+    if (allocated(error)) return
+    call MPI_Initialized(running)
+    if (running) return
+    call start_parallel()
+    started = .true.
+  end subroutine join_parallel
+
   !> End MPI.
   subroutine stop_parallel()
     parallel = .false.
@@ -111,6 +129,16 @@ contains
     self%exchanges = 0
     self%alive = .true.
   end subroutine communicator_init
+
+  !> Duplicate a communicator by its handle, the integer that Fortran and C (MPI_Comm_c2f) have for it. Collective.
+  subroutine communicator_init_from(self, handle)
+    class(communicator_t), intent(inout) :: self
+    integer, intent(in) :: handle
+    type(MPI_Comm) :: parent
+
+    parent%mpi_val = handle
+    call self%init(parent)
+  end subroutine communicator_init_from
 
   subroutine communicator_free(self)
     class(communicator_t), intent(inout) :: self

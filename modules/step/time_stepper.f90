@@ -14,9 +14,9 @@ module gravier_time_stepper
   use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
   use gravier_decomposition, only: decomposition_t
-  use gravier_removal, only: some_leave, remove_grains
+  use gravier_removal, only: some_leave, remove_grains, drop_grains
   use gravier_inflow, only: inflow_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_repartition, only: repartition_rule_t, repartition, repartition_is_due
   use gravier_interface, only: interface_statistics_t
   use gravier_physics, only: physics_t
@@ -28,9 +28,12 @@ module gravier_time_stepper
   use gravier_body_motion, only: move_to_middle, drive, count_fast, move_to_end
   use gravier_velocity_return, only: take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities
+  use gravier_cell_drive, only: cell_drive_t, take_cell, check_cell_size
+  use gravier_cell_response, only: start_response
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
-  use gravier_impulse_memory, only: keep_impulses, recall_impulses, gather_impulses, spread_impulses
+  use gravier_impulse_memory, only: keep_impulses, recall_impulses
+  use gravier_memory_carrying, only: carry_memory
   use gravier_given_contacts, only: given_contacts_t
   use gravier_given_impulses, only: take_given_impulses, started_t
   use gravier_schedule, only: schedule_t
@@ -85,6 +88,8 @@ module gravier_time_stepper
     !> what the scene has
     type(effects_t) :: effects
     type(time_table_t) :: gravity_table
+    !> what moves the periodic cell
+    type(cell_drive_t) :: cell_drive
     ! ---- how a step is made
     !> solves start from the impulses of the step before
     logical :: warm_start = .true.
@@ -115,6 +120,8 @@ module gravier_time_stepper
     integer(i8) :: n_grains = 0, n_glued = 0
     !> mass of the free grains of the scene now, and of those that have left [kg]
     real(dp) :: mass = 0.0_dp, left_mass = 0.0_dp
+    !> velocities of grains were set since the last step
+    logical :: velocities_set = .false.
     !> how many grains there were, at least and at most
     type(population_t) :: population
     !> largest over mean number of contacts of a subdomain in the last step
@@ -146,6 +153,8 @@ module gravier_time_stepper
   contains
     procedure :: assemble => time_stepper_assemble
     procedure :: advance => time_stepper_advance
+    procedure :: take_forces => time_stepper_take_forces
+    procedure :: wake => time_stepper_wake
     procedure :: free => time_stepper_free
   end type time_stepper_t
 
@@ -176,6 +185,7 @@ contains
     solved = solved_step_of(self, figures)
     call self%diagnostics%take_step(solved)
     call self%balance%take_step(solved)
+    self%velocities_set = .false.
     call move_to_end(self%decomposition, self%physics, self%physics%theta, self%n_glued > 0)
     call stop_timer(phase_bodies)
     figures%projected = figures%max_overlap > self%overlap_allowed
@@ -199,16 +209,16 @@ contains
     call move_to_middle(self%decomposition, self%physics, self%physics%theta, self%time, self%n_glued > 0, listed)
     call drive(self%decomposition, self%physics, self%gravity_table, self%time, changed)
     if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%halo)
-    if (self%inflow%exists()) call let_in(self, figures, listed)
+    if (self%inflow%is_due()) call let_in(self, figures, listed)
     figures%fast = count_fast(self%decomposition, self%physics)
     call stop_timer(phase_bodies)
     call start_timer(phase_neighbourhood)
     if (.not. listed) listed = self%halo%are_due(self%decomposition)
-    if (.not. listed) listed = some_leave(self%decomposition)
     figures%divided = repartition_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
     figures%listed = listed .or. figures%divided
     call list_neighbours(self, figures)
     call stop_timer(phase_neighbourhood)
+    call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, self%physics%cell)
     call build_problem(self%decomposition, self%halo, self%problem%kernels, self%physics, self%problem, &
       & figures%interface_statistics)
     call start_timer(phase_setup)
@@ -217,6 +227,7 @@ contains
       self%given = given_contacts_t()
     end if
     if (self%warm_start) call recall_impulses(self%halo, self%problem)
+    if (self%problem%cell%moves) call start_response(self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
     figures%contacts = self%problem%n_contacts
@@ -238,6 +249,28 @@ contains
     end if
     call measure_velocity_scale(self)
   end subroutine time_stepper_assemble
+
+  !> Give all grains an applied force, of 0. The same on every rank, between two steps.
+  subroutine time_stepper_take_forces(self)
+    class(time_stepper_t), intent(inout) :: self
+    integer :: s
+
+    self%decomposition%na = self%decomposition%nd
+    do s = 1, size(self%decomposition%owned)
+      call self%decomposition%owned(s)%take_forces()
+    end do
+    if (.not. allocated(self%halo%view)) return
+    do s = 1, size(self%halo%view)
+      call self%halo%view(s)%bodies%take_forces()
+    end do
+  end subroutine time_stepper_take_forces
+
+  !> Wake the contacts that sleep: what acts on the scene has changed.
+  subroutine time_stepper_wake(self)
+    class(time_stepper_t), intent(inout) :: self
+
+    if (self%sleeping%after > 0 .and. allocated(self%halo%view)) call wake_all(self%halo)
+  end subroutine time_stepper_wake
 
   !> Let grains enter, for which lists are made anew. Collective.
   subroutine let_in(self, figures, listed)
@@ -275,6 +308,10 @@ contains
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(in) :: figures
 
+    if (self%problem%cell%moves) then
+      call take_cell(self%problem, self%decomposition%period)
+      self%physics%cell = self%problem%cell
+    end if
     if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
       & self%halo, self%problem)
     if (self%warm_start) call keep_impulses(self%problem, self%halo)
@@ -298,7 +335,7 @@ contains
     solved%boundary_impulses => self%boundary_impulses
     solved%time = self%time
     solved%n_free = self%n_grains - self%n_glued
-    solved%others = figures%left > 0 .or. figures%entered > 0
+    solved%others = figures%left > 0 .or. figures%entered > 0 .or. self%velocities_set
   end function solved_step_of
 
   !> Note how a solve ended, and the contact where it failed. Collective.
@@ -357,28 +394,32 @@ contains
     call stop_timer(phase_setup)
   end subroutine measure_velocity_scale
 
-  !> Bring views and lists up to date, or make them anew with the impulses carried over. Collective.
+  !> Bring views and lists up to date, without the grains that leave, or make them anew with the impulses carried over. Collective.
   subroutine list_neighbours(self, figures)
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(inout) :: figures
-    integer(i8), allocatable :: records(:, :)
+    type(local_bodies_t), allocatable :: before(:)
     integer(i8) :: n_glued
     real(dp) :: left_mass
     logical :: remembered
 
     if (self%halo%builds > 0) call self%halo%refresh(self%decomposition)
-    if (.not. figures%listed) return
-    remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
-    if (remembered) call gather_impulses(self%decomposition, self%halo, records)
+    if (.not. figures%listed) then
+      if (.not. some_leave(self%decomposition)) return
+      call drop_grains(self%decomposition, self%halo)
+    end if
     call remove_grains(self%decomposition, self%n_glued > 0, figures%left, n_glued, left_mass)
     self%left_mass = self%left_mass + left_mass
     if (figures%left > 0 .or. figures%entered > 0) self%mass = self%decomposition%free_mass()
     self%n_grains = self%n_grains - figures%left - n_glued
     self%n_glued = self%n_glued - n_glued
+    if (.not. figures%listed) return
+    remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
     if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refused)
     call self%decomposition%migrate()
+    if (remembered) call move_alloc(self%halo%view, before)
     call self%halo%build(self%decomposition)
-    if (remembered) call spread_impulses(self%decomposition, records, self%halo)
+    if (remembered) call carry_memory(self%decomposition, before, self%halo)
   end subroutine list_neighbours
 
   !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
@@ -407,6 +448,7 @@ contains
           & call refuse("motion of boundary '"//boundary%name//"'")
       end associate
     end do
+    if (self%decomposition%period%moves) call check_cell_size(self%decomposition, self%step, error)
     if (.not. is_finite(figures%kinetic_energy)) call refuse("kinetic energy")
     if (.not. is_finite(figures%max_overlap)) call refuse("largest overlap")
     if (.not. is_finite(figures%solve%residual)) call refuse("residual")
@@ -447,6 +489,7 @@ contains
     self%population = population_t()
     self%fast = 0
     self%quiet = 0
+    self%velocities_set = .false.
     self%slept = 0
     self%woken = 0
     self%worst_overlap = 0.0_dp

@@ -16,7 +16,7 @@ module gravier_config
   use gravier_config_surfaces, only: surface_value
   use gravier_config_keys, only: find_group, find_key, nearest_group, nearest_key, expected_text
   use gravier_config_scan, only: scan_t, assignment_t, scan_groups, excerpt
-  use gravier_config_slots, only: slot_t, slot_of, group_count
+  use gravier_config_slots, only: slot_t, slot_of, group_count, allocate_groups
   use gravier_config_value, only: read_value, most_entries
   use gravier_config_report, only: report_t, is_given, label
   use gravier_config_check, only: check_dimension, check_config, grid_product
@@ -44,7 +44,8 @@ contains
     type(scan_t) :: found
     type(report_t) :: report
     type(diagnostic_holder_t), allocatable :: diagnostics(:)
-    integer :: k
+    !> groups of each name of the table in the file
+    integer :: counts(size(groups)), k
 
     call fill_keys()
     config%file = file
@@ -54,19 +55,19 @@ contains
     if (present(changes) .and. .not. allocated(error)) call found%change(changes)
     if (.not. allocated(error)) call check_names(file, found, error)
     if (allocated(error)) return
-    allocate (config%boundaries(number_of_groups(found, "boundary")))
+    do k = 1, size(groups)
+      counts(k) = number_of_groups(found, groups(k)%name)
+    end do
+    call allocate_groups(config, counts)
     do k = 1, size(config%boundaries)
       allocate (config%boundaries(k)%value(3, size(surface_rows%keys)), source=0.0_dp)
     end do
-    allocate (config%materials(number_of_groups(found, "material")), config%laws(number_of_groups(found, "law")))
-    allocate (config%insertions(number_of_groups(found, "insertion")), config%regions(number_of_groups(found, "region")))
     do k = 1, size(config%laws)
       allocate (config%laws(k)%value(count(keys%group == "law" .and. keys%kind == kind_real)))
     end do
     call registered_diagnostics(diagnostics)
     allocate (config%output%diagnostics(size(diagnostics)), source=.false.)
-    allocate (report%given(size(keys), max(1, size(config%boundaries), size(config%materials), size(config%laws), &
-      & size(config%insertions), size(config%regions))))
+    allocate (report%given(size(keys), max(1, maxval(counts))))
     call set_defaults(config, error)
     call read_first(config, found, report, error)
     if (.not. allocated(error)) call read_others(config, found, report, error)
@@ -316,7 +317,7 @@ contains
           config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
     end if
     if (.not. config%solver%tolerance_given .and. config%solver%criterion == "velocity_error") config%solver%tolerance = 1.0e-2_dp
-    if (.not. config%solver%sleep_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)
+    if (.not. config%solver%sleep_speed_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)
     do i = 1, size(config%materials)
       if (.not. config%materials(i)%density_given) config%materials(i)%density = config%scene%density
     end do
@@ -349,7 +350,7 @@ contains
     where (.not. report%given(find_key("boundary", "pivot"), report%instance)%entries(:3)) boundary%pivot = point
     call apply_contact_defaults(boundary%contact_given, scene%wall_contact, boundary%contact)
     if (.not. boundary%material_given) boundary%material = scene%wall_material
-    if (.not. boundary%remove_given) boundary%remove_at = huge(boundary%remove_at)
+    if (.not. boundary%remove_at_given) boundary%remove_at = huge(boundary%remove_at)
   end subroutine apply_boundary_defaults
 
   !> Take the coefficients that are not given from others.

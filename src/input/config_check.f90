@@ -168,12 +168,18 @@ contains
       call check_contact(report, scene%dimension, scene%contact, "scene", "", error)
       call check_contact(report, scene%dimension, scene%wall_contact, "scene", "wall_", error)
       call expect(report, all(scene%period >= 0.0_dp), "scene", "period", error)
+      call expect(report, all(scene%cell_pressure >= 0.0_dp), "scene", "cell_pressure", error)
+      call expect(report, scene%cell_inertia > 0.0_dp, "scene", "cell_inertia", error)
+      call expect(report, .not. any(scene%cell_pressure > 0.0_dp .and. abs(scene%cell_strain_rate) > 0.0_dp), "scene", &
+                  "cell_strain_rate", error, "0 along the axes of "//shown_text(report, "scene", "cell_pressure"))
+      call expect(report, .not. any(abs(scene%cell_shear_stress) > 0.0_dp .and. abs(scene%cell_shear_rate) > 0.0_dp), "scene", &
+                  "cell_shear_rate", error, "0 for the components of "//shown_text(report, "scene", "cell_shear_stress"))
       call expect(report, scene%gravity_table == "" .or. .not. is_given(report, "scene", "gravity"), "scene", "gravity", error, &
                   "a scene without it where "//shown_text(report, "scene", "gravity_table")//" replaces it")
-      call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_given, "scene", "alert_distance", error)
+      call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_distance_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
       call expect(report, scene%list_steps >= 0.0_dp, "scene", "list_steps", error)
-      call expect(report, scene%overlap_allowed > 0.0_dp .or. .not. scene%overlap_given, "scene", "overlap_allowed", error)
+      call expect(report, scene%overlap_allowed > 0.0_dp .or. .not. scene%overlap_allowed_given, "scene", "overlap_allowed", error)
       call expect(report, scene%start_overlap >= 0.0_dp, "scene", "start_overlap", error)
     end associate
   end subroutine check_scene
@@ -235,13 +241,15 @@ contains
       call expect(report, known, "time", "stop_boundary", error, "the name of a boundary of the input")
       if (time%stop_boundary /= "") call miss(report, "time", "stop_displacement", error, &
                                               shown_text(report, "time", "stop_boundary"))
-      if (time%displacement_given) call miss(report, "time", "stop_boundary", error, "stop_displacement")
-      call expect(report, time%stop_displacement > 0.0_dp .or. .not. time%displacement_given, "time", "stop_displacement", error)
-      call expect(report, time%stop_grains_at_most >= 0, "time", "stop_grains_at_most", error)
-      call expect(report, time%stop_grains_at_least >= 1 .or. .not. time%grains_at_least_given, "time", "stop_grains_at_least", &
+      if (time%stop_displacement_given) call miss(report, "time", "stop_boundary", error, "stop_displacement")
+      call expect(report, time%stop_displacement > 0.0_dp .or. .not. time%stop_displacement_given, "time", "stop_displacement", &
                   error)
-      call expect(report, time%stop_mass_at_most >= 0.0_dp .or. .not. time%mass_at_most_given, "time", "stop_mass_at_most", error)
-      call expect(report, time%stop_mass_at_least > 0.0_dp .or. .not. time%mass_at_least_given, "time", "stop_mass_at_least", &
+      call expect(report, time%stop_grains_at_most >= 0, "time", "stop_grains_at_most", error)
+      call expect(report, time%stop_grains_at_least >= 1 .or. .not. time%stop_grains_at_least_given, "time", &
+                  "stop_grains_at_least", error)
+      call expect(report, time%stop_mass_at_most >= 0.0_dp .or. .not. time%stop_mass_at_most_given, "time", "stop_mass_at_most", &
+                  error)
+      call expect(report, time%stop_mass_at_least > 0.0_dp .or. .not. time%stop_mass_at_least_given, "time", "stop_mass_at_least", &
                   error)
     end associate
   end subroutine check_stops
@@ -272,7 +280,7 @@ contains
       call expect(report, solver%warm_start .or. .not. solver%sleeping, "solver", "sleeping", error, &
                   ".false. where warm_start = .false.: contacts that sleep keep their impulses from step to step")
       call expect(report, solver%sleep_after >= 1, "solver", "sleep_after", error)
-      call expect(report, solver%sleep_speed > 0.0_dp .or. .not. solver%sleep_given, "solver", "sleep_speed", error)
+      call expect(report, solver%sleep_speed > 0.0_dp .or. .not. solver%sleep_speed_given, "solver", "sleep_speed", error)
     end associate
   end subroutine check_solver
 

@@ -5,10 +5,10 @@ module gravier_config_check_boundary
   use gravier_surface, only: surface_t
   use gravier_surface_registry, only: glued_grains
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_config_types, only: config_t, boundary_config_t
+  use gravier_config_types, only: config_t, boundary_config_t, text_length
   use gravier_config_surfaces, only: set_surface, surface_value, shapes_in
   use gravier_config_keys, only: choices_text, has_word
-  use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, ordinal
+  use gravier_config_report, only: report_t, expect, expect_own_name, miss, is_given, shown_text, ordinal
   implicit none
   private
   public :: check_boundaries, check_contact
@@ -24,11 +24,14 @@ contains
     type(report_t), intent(inout) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    character(len=text_length), allocatable :: names(:)
     integer :: i
 
+    allocate (names(size(config%boundaries)))
+    names(:) = config%boundaries%name
     do i = 1, size(config%boundaries)
       report%instance = i
-      call check_name(report, config%boundaries(:i), error)
+      call expect_own_name(report, "boundary", names(:i), error)
       call check_group(report, config%boundaries(:i), error)
       call check_shape(report, config, config%boundaries(i), error)
       call check_size(report, config%boundaries(i), error)
@@ -40,21 +43,6 @@ contains
     end do
     report%instance = 1
   end subroutine check_boundaries
-
-  !> The last of some boundaries has a name of its own.
-  subroutine check_name(report, boundaries, error)
-    type(report_t), intent(in) :: report
-    type(boundary_config_t), intent(in) :: boundaries(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: n, i
-
-    n = size(boundaries)
-    call expect(report, boundaries(n)%name /= "", "boundary", "name", error)
-    do i = 1, n - 1
-      if (boundaries(i)%name == boundaries(n)%name) call expect(report, .false., "boundary", "name", error, &
-                                                             "a name of its own, but the "//ordinal(i)//" has it too")
-    end do
-  end subroutine check_name
 
   !> The last of some boundaries has a group of grains of its own.
   subroutine check_group(report, boundaries, error)

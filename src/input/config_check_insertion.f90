@@ -2,8 +2,8 @@
 module gravier_config_check_insertion
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_config_types, only: config_t, insertion_config_t
-  use gravier_config_report, only: report_t, expect, is_given, shown_text, ordinal
+  use gravier_config_types, only: config_t, insertion_config_t, text_length
+  use gravier_config_report, only: report_t, expect, expect_own_name, shown_text
   use gravier_config_check_grains, only: check_grains
   use gravier_config_laws, only: material_number
   implicit none
@@ -18,6 +18,7 @@ contains
     type(report_t), intent(inout) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    character(len=text_length), allocatable :: names(:)
     integer :: i
 
     if (config%scene%bodies == "none" .and. size(config%insertions) == 0) call raise(error, status_input, report%file// &
@@ -25,9 +26,11 @@ contains
     call expect(report, config%scene%bodies /= "none" .or. config%decomposition%partition == "grid" .or. &
                 config%decomposition%subdomains == 1, "decomposition", "partition", error, &
                 "'grid' where bodies = 'none': METIS finds no grains to distribute")
+    allocate (names(size(config%insertions)))
+    names(:) = config%insertions%name
     do i = 1, size(config%insertions)
       report%instance = i
-      call check_name(report, config%insertions(:i), error)
+      call expect_own_name(report, "insertion", names(:i), error)
       call check_region(report, config, config%insertions(i), error)
       call check_rate(report, config%insertions(i), error)
       call expect(report, all(config%insertions(i)%velocity_spread >= 0.0_dp), "insertion", "velocity_spread", error)
@@ -37,21 +40,6 @@ contains
     end do
     report%instance = 1
   end subroutine check_insertions
-
-  !> The last of some insertions has a name of its own.
-  subroutine check_name(report, insertions, error)
-    type(report_t), intent(in) :: report
-    type(insertion_config_t), intent(in) :: insertions(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: n, i
-
-    n = size(insertions)
-    call expect(report, insertions(n)%name /= "", "insertion", "name", error)
-    do i = 1, n - 1
-      call expect(report, insertions(i)%name /= insertions(n)%name, "insertion", "name", error, &
-                  "a name of its own, but the "//ordinal(i)//" has it too")
-    end do
-  end subroutine check_name
 
   !> A region has an inside.
   subroutine check_region(report, config, insertion, error)

@@ -4,12 +4,12 @@ module gravier_config_check_laws
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_law_set, only: law_set_t
-  use gravier_config_types, only: config_t
+  use gravier_config_types, only: config_t, text_length
   use gravier_config_key, only: key_t, kind_real
   use gravier_config_table, only: keys
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, belongs
-  use gravier_config_report, only: report_t, expect, is_given, ordinal
+  use gravier_config_report, only: report_t, expect, expect_own_name, ordinal
   use gravier_config_laws, only: material_number, collect_laws
   implicit none
   private
@@ -23,15 +23,14 @@ contains
     type(report_t), intent(inout) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
-    integer :: i, k
+    character(len=text_length), allocatable :: names(:)
+    integer :: i
 
+    allocate (names(size(config%materials)))
+    names(:) = config%materials%name
     do i = 1, size(config%materials)
       report%instance = i
-      call expect(report, config%materials(i)%name /= "", "material", "name", error)
-      do k = 1, i - 1
-        call expect(report, config%materials(k)%name /= config%materials(i)%name, "material", "name", error, &
-                    "a name of its own, but the "//ordinal(k)//" has it too")
-      end do
+      call expect_own_name(report, "material", names(:i), error)
       call expect(report, config%materials(i)%density > 0.0_dp, "material", "density", error)
       call expect(report, config%scene%bodies /= "column" .or. .not. config%materials(i)%density_given, "material", "density", &
                   error, "none where bodies = 'column': mass is the mass of each body")
@@ -104,7 +103,7 @@ contains
     report%instance = 1
     call expect(report, config%output%fclib_step == 0 .or. .not. laws%yields, "output", "fclib_step", error, &
                 "none where contacts are compliant: problems of FCLIB have rigid ones")
-    call expect(report, config%scene%alert_distance >= laws%range .or. .not. config%scene%alert_given, "scene", &
+    call expect(report, config%scene%alert_distance >= laws%range .or. .not. config%scene%alert_distance_given, "scene", &
                 "alert_distance", error, "at least "//to_text(laws%range, 4)//" m, the largest range of a &law")
   end subroutine check_laws
 

@@ -3,8 +3,8 @@ module gravier_config_check_region
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_mean_region, only: unbounded
-  use gravier_config_types, only: config_t, region_config_t
-  use gravier_config_report, only: report_t, expect, miss, shown_text, ordinal
+  use gravier_config_types, only: config_t, region_config_t, text_length
+  use gravier_config_report, only: report_t, expect, expect_own_name, miss, shown_text
   implicit none
   private
   public :: check_regions
@@ -23,11 +23,15 @@ contains
     type(report_t), intent(inout) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    character(len=text_length), allocatable :: names(:)
     integer :: i
 
+    allocate (names(size(config%regions)))
+    names(:) = config%regions%name
     do i = 1, size(config%regions)
       report%instance = i
-      call check_name(report, config%regions(:i), error)
+      call check_name(report, trim(config%regions(i)%name), error)
+      call expect_own_name(report, "region", names(:i), error)
       call check_box(report, config%scene%dimension, config%regions(i), error)
       call check_bins(report, config%scene%dimension, config%regions(i), error)
       if (allocated(error)) return
@@ -35,24 +39,15 @@ contains
     report%instance = 1
   end subroutine check_regions
 
-  !> The last of some regions has a name of its own, of which names of columns can be made.
-  subroutine check_name(report, regions, error)
+  !> Names of columns can be made of the name of a region.
+  subroutine check_name(report, name, error)
     type(report_t), intent(in) :: report
-    type(region_config_t), intent(in) :: regions(:)
+    character(len=*), intent(in) :: name
     type(error_t), allocatable, intent(inout) :: error
     logical :: fits
-    integer :: n, i
 
-    n = size(regions)
-    associate (name => regions(n)%name)
-      fits = len_trim(name) <= longest_name .and. verify(trim(name), letters//"0123456789_") == 0 .and. &
-        & scan(name(1:1), letters) == 1
-    end associate
+    fits = len(name) <= longest_name .and. verify(name, letters//"0123456789_") == 0 .and. scan(name, letters) == 1
     call expect(report, fits, "region", "name", error, "letters, digits and underscores after a letter, at most 64 of them")
-    do i = 1, n - 1
-      call expect(report, regions(i)%name /= regions(n)%name, "region", "name", error, &
-                  "a name of its own, but the "//ordinal(i)//" has it too")
-    end do
   end subroutine check_name
 
   !> A box has an inside.

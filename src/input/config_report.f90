@@ -6,7 +6,7 @@ module gravier_config_report
   use gravier_config_keys, only: find_group, find_key, expected_text
   implicit none
   private
-  public :: given_t, report_t, expect, miss, is_given, shown_text, label, ordinal
+  public :: given_t, report_t, expect, expect_own_name, miss, is_given, shown_text, label, ordinal
 
   !> Whether a key of the table is in a group of the file, and how.
   type :: given_t
@@ -46,6 +46,22 @@ contains
     call raise(error, status_input, report%file//": "//label(report, group)//" "//shown_text(report, group, key) &
                //": expected "//expected)
   end subroutine expect
+
+  !> Fails unless the group under check, the last of some, has a name and no other has the same.
+  subroutine expect_own_name(report, group, names, error)
+    type(report_t), intent(in) :: report
+    character(len=*), intent(in) :: group
+    !> of the groups up to the one under check
+    character(len=*), intent(in) :: names(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: i, n
+
+    n = size(names)
+    call expect(report, names(n) /= "", group, "name", error)
+    do i = 1, n - 1
+      call expect(report, names(i) /= names(n), group, "name", error, "a name of its own, but the "//ordinal(i)//" has it too")
+    end do
+  end subroutine expect_own_name
 
   !> Fails with `FILE: &group key is missing: expected ..., required by ...` unless the key is given.
   subroutine miss(report, group, key, error, required_by)

@@ -102,12 +102,25 @@ module gravier_config_table
            count=3, unit="m"), &
      key_t("scene", "period_origin", kind_real, "3*0", "", &
            "lower corner of the period, and of the box of a sample; its third component is 0 in 2D", count=3, unit="m"), &
+     key_t("scene", "cell_strain_rate", kind_real, "3*0", "", &
+           "rates of strain of the period along the axes, extension positive; the third is 0 in 2D", count=3, unit="1/s"), &
+     key_t("scene", "cell_shear_rate", kind_real, "3*0", "", &
+           "rates of shear of the period: of the velocity along x over y, along x over z, along y over z; one entry in 2D", &
+           count=3, planar=1, unit="1/s"), &
+     key_t("scene", "cell_pressure", kind_real, "3*0", ">= 0", &
+           "normal stresses that drive the lengths of the period, compression positive, 0: the rate of strain is given", &
+           count=3, unit="Pa, N/m in 2D"), &
+     key_t("scene", "cell_shear_stress", kind_real, "3*0", "", &
+           "shear stresses that drive the shear of the period, 0: the rate of shear is given; one entry in 2D", &
+           count=3, planar=1, unit="Pa, N/m in 2D"), &
+     key_t("scene", "cell_inertia", kind_real, "0.1", "> 0", &
+           "inertia of the period that stresses drive, over the mass of the grains times the square of its length"), &
      key_t("scene", "alert_distance", kind_real, "-1", ">= 0", "gap below which two bodies make a contact", &
            unit="m", note="0.1 of the largest radius"), &
      key_t("scene", "skin", kind_real, "-1", ">= 0", &
            "gap beyond the alert distance up to which pairs are listed, so that neighbour lists last for several steps", &
            unit="m", note="0.2 of the mean radius"), &
-     key_t("scene", "list_steps", kind_real, "0", ">= 0", &
+     key_t("scene", "list_steps", kind_real, "10", ">= 0", &
            "steps for which neighbour lists leave a body room at its speed, beyond half the skin, at most half the mean radius"), &
      key_t("scene", "overlap_allowed", kind_real, "-1", "> 0", "overlap that grains may have", &
            unit="m", note="0.01 of the mean radius, or the least rounding"), &
@@ -204,7 +217,8 @@ module gravier_config_table
            "what ends a solve: the estimated velocity error, with the residual as a guard; the residual alone; "// &
            "the known error on the impulses of `bodies = 'column'`"), &
      key_t("solver", "accuracy", kind_real, "0.1", "> 0", &
-           "estimated velocity error over the velocity scale at which a solve has converged (`velocity_error` only)"), &
+           "estimated velocity error over the velocity scale at which a solve has converged; with another criterion the "// &
+           "closing lines count the solves that miss it"), &
      key_t("solver", "tolerance", kind_real, "1e-4", "> 0", &
            "residual, or error on the impulses, at which a solve has converged; with `velocity_error` both must be met", &
            note="1e-2 with `velocity_error`, else 1e-4"), &

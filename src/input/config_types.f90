@@ -55,14 +55,17 @@ module gravier_config_types
     real(dp) :: period(3)
     !> m: lower corner of the period, and of the box of a sample
     real(dp) :: period_origin(3)
+    !> what moves the cell: rates of strain along the axes, of shear xy, xz and yz [1/s], stresses in their place [Pa, N/m in 2D], and
+    !> the inertia of what stresses drive over M L^2
+    real(dp) :: cell_strain_rate(3), cell_shear_rate(3), cell_pressure(3), cell_shear_stress(3), cell_inertia
     !> N/m^3 (N/m^2 in 2D); the third component is 0 in 2D
     real(dp) :: body_force(3)
     !> CSV table of the gravity in time; blank: none
     character(len=text_length) :: gravity_table
-    !> m; negative when not given, see alert_given
+    !> m; negative when not given, see alert_distance_given
     real(dp) :: alert_distance
     !> false: the alert distance is 0.1 of the largest radius
-    logical :: alert_given = .false.
+    logical :: alert_distance_given = .false.
     !> m: distance within which neighbour lists stay valid; negative when not given
     real(dp) :: skin
     !> false: the skin is 0.2 of the mean radius
@@ -72,7 +75,7 @@ module gravier_config_types
     !> m; negative when not given
     real(dp) :: overlap_allowed
     !> false: the allowed overlap is 0.01 of the mean radius
-    logical :: overlap_given = .false.
+    logical :: overlap_allowed_given = .false.
     logical :: overlap_projection
     !> largest overlap at the start, as a fraction of the smaller radius
     real(dp) :: start_overlap
@@ -92,8 +95,8 @@ module gravier_config_types
     !> free grains, kg: what ends the run when the scene comes down or up to it
     integer :: stop_grains_at_most, stop_grains_at_least
     real(dp) :: stop_mass_at_most, stop_mass_at_least
-    logical :: displacement_given = .false., grains_at_most_given = .false., grains_at_least_given = .false.
-    logical :: mass_at_most_given = .false., mass_at_least_given = .false.
+    logical :: stop_displacement_given = .false., stop_grains_at_most_given = .false., stop_grains_at_least_given = .false.
+    logical :: stop_mass_at_most_given = .false., stop_mass_at_least_given = .false.
   end type time_config_t
 
   !> &solver: the method of every step and when it stops.
@@ -126,7 +129,7 @@ module gravier_config_types
     !> steps; momentum of a body at rest over the root mean square of the impulses
     integer :: sleep_after
     real(dp) :: sleep_speed
-    logical :: sleep_given = .false.
+    logical :: sleep_speed_given = .false.
     !> continue, stop or discard
     character(len=choice_length) :: on_failure
   end type solver_config_t
@@ -221,7 +224,7 @@ module gravier_config_types
     logical :: material_given = .false.
     !> s; the largest real number when not given
     real(dp) :: remove_at
-    logical :: remove_given = .false.
+    logical :: remove_at_given = .false.
   end type boundary_config_t
 
   !> What grains are drawn from at random. What does not belong to the choices keeps the default.

@@ -1,5 +1,6 @@
 !> The bodies of a simulation as tables of named fields, for whatever file is written of them.
 module gravier_body_collector
+  use gravier_periodic, only: shift_code
   use gravier_kinds, only: dp, i8
   use gravier_body_mass, only: invert_symmetric, multiply_symmetric
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -9,7 +10,7 @@ module gravier_body_collector
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: collect_bodies, collect_boundaries, collect_problem_bodies
+  public :: collect_cell, collect_bodies, collect_boundaries, collect_problem_bodies
 
 contains
 
@@ -75,6 +76,34 @@ contains
     end associate
     call table%add_reals("axes", "", axes)
   end subroutine collect_boundaries
+
+  !> The edges of the periodic cell and their rates, the corner of the box that grains are kept in and, along each axis, its length:
+  !> an item an axis.
+  subroutine collect_cell(simulation, table)
+    type(simulation_t), intent(in) :: simulation
+    type(field_list_t), intent(out) :: table
+    real(dp), allocatable :: edge(:, :), velocity(:, :), origin(:, :)
+    integer :: d, nd, shift(3)
+
+    nd = simulation%decomposition%nd
+    call table%init("cell", "axis", nd)
+    table%everywhere = .true.
+    allocate (edge(nd, nd), velocity(nd, nd), source=0.0_dp)
+    allocate (origin(1, nd))
+    associate (period => simulation%decomposition%period)
+      do d = 1, nd
+        table%key(1, d) = d
+        shift(:) = 0
+        shift(d) = 1
+        call period%add_shift(shift_code(shift), 1, edge(:, d))
+        call period%add_velocity(shift, velocity(:, d))
+        origin(1, d) = period%origin(d)
+      end do
+    end associate
+    call table%add_reals("edge", "m", edge)
+    call table%add_reals("velocity", "m/s", velocity)
+    call table%add_reals("origin", "m", origin)
+  end subroutine collect_cell
 
   !> Bodies that the contacts of this rank's subdomains act on and that can move, boundaries included, one item a copy: the table
   !> `bodies` with the key `id`, `place` (rank, subdomain of the rank, number there), `mass` (1 for what cannot move), the diagonal

@@ -15,7 +15,7 @@ module gravier_body_outlines
   type :: outline_t
     !> polygon c has the points point(:, first(c):first(c + 1) - 1), (3, points); z is 0 in the plane; both have room for more
     integer, allocatable :: first(:)
-    real(dp), allocatable :: point(:, :)
+    real(dp), private, allocatable :: point(:, :)
     !> polygons
     integer :: n = 0
   end type outline_t

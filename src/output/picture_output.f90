@@ -107,6 +107,7 @@ contains
     end associate
     call draw_bodies(simulation, table)
     call self%bodies%write_step(simulation%step, simulation%time, table, error)
+    self%facets_due = self%facets_due .or. facets_move(simulation)
     if (self%facets_due) then
       call draw_facets(simulation, table)
       call self%facets%write_step(simulation%step, simulation%time, table, error)

@@ -10,7 +10,7 @@ module gravier_results_output
   use gravier_build_info, only: version
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_body_collector, only: collect_bodies, collect_boundaries
+  use gravier_body_collector, only: collect_bodies, collect_boundaries, collect_cell
   use gravier_shape_tables, only: describe_shapes
   use gravier_pair_places, only: has_facets
   use gravier_facet_tables, only: describe_facets
@@ -111,10 +111,11 @@ contains
     state%step = simulation%step
     state%time = simulation%time
     has_contacts = simulation%config%output%contacts .and. allocated(simulation%problem%sub)
-    allocate (state%table(merge(3, 2, has_contacts)))
+    allocate (state%table(merge(3, 2, has_contacts) + merge(1, 0, simulation%effects%moving_cell)))
     call collect_bodies(simulation, state%table(1))
     if (has_contacts) call collect_contacts(simulation, contact_fields, state%table(2))
-    call collect_boundaries(simulation, state%table(size(state%table)))
+    call collect_boundaries(simulation, state%table(merge(3, 2, has_contacts)))
+    if (simulation%effects%moving_cell) call collect_cell(simulation, state%table(size(state%table)))
     if (simulation%tally%steps > 0) state%accuracy = accuracy_t(simulation%tally%velocity_error, simulation%tally%velocity_scale)
     call collect_figures(simulation%diagnostics, state%figures)
     call collect_regions(simulation, state%region)

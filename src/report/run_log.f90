@@ -38,23 +38,25 @@ module gravier_run_log
     type(communicator_t), pointer :: comm => null()
     type(text_file_t) :: file
     !> kept until the file is open
-    type(growing_text_t) :: early
+    type(growing_text_t), private :: early
     !> how often what is said
-    type(progress_t) :: progress
+    type(progress_t), private :: progress
     !> rank 0 writes to a terminal of so many columns; a live line stands there
-    logical :: live = .false., line_stands = .false.
-    integer :: columns = 0
+    logical, private :: live = .false., line_stands = .false.
+    integer, private :: columns = 0
+    !> lines go to the file alone
+    logical :: quiet = .false.
     !> step that comes next; what its figure is and is compared with
-    integer :: next_step = 1
-    character(len=:), allocatable :: figure_name, goal_name
+    integer, private :: next_step = 1
+    character(len=:), private, allocatable :: figure_name, goal_name
     !> of a line within a solve that could not be written
-    type(error_t), allocatable :: unwritten
+    type(error_t), private, allocatable :: unwritten
     !> up to the last step
-    type(work_t) :: told
+    type(work_t), private :: told
     !> stiffest compliant contact that was warned of, by the product of the step and its frequency
-    real(dp) :: told_stiffest = 0.5_dp*most_by_spring
+    real(dp), private :: told_stiffest = 0.5_dp*most_by_spring
     !> kind of the velocity scale that was named last
-    character(len=20) :: scale_kind = ""
+    character(len=20), private :: scale_kind = ""
   contains
     procedure :: init => run_log_init
     procedure :: open => run_log_open
@@ -74,13 +76,17 @@ module gravier_run_log
 
 contains
 
-  subroutine run_log_init(self, comm)
+  subroutine run_log_init(self, comm, quiet)
     class(run_log_t), intent(inout) :: self
     type(communicator_t), target, intent(in) :: comm
+    !> nothing goes to the standard output
+    logical, intent(in), optional :: quiet
+
     self%comm => comm
     self%early = growing_text_t()
+    if (present(quiet)) self%quiet = quiet
     if (comm%rank == 0) self%columns = terminal_width()
-    self%live = self%columns > 0
+    self%live = self%columns > 0 .and. .not. self%quiet
     call self%progress%begin()
   end subroutine run_log_init
 
@@ -109,8 +115,10 @@ contains
 
     if (self%comm%rank /= 0) return
     call wipe_live_line(self)
-    write (output_unit, "(a)") text
-    flush (output_unit)
+    if (.not. self%quiet) then
+      write (output_unit, "(a)") text
+      flush (output_unit)
+    end if
     call note_line(self, text, error)
   end subroutine run_log_line
 

@@ -4,6 +4,7 @@ module gravier_checkpoint
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_periodic, only: period_words, period_record
   use gravier_narrow, only: take_count
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_body_store, only: body_record
@@ -34,6 +35,7 @@ contains
 
     text = "grain: "//body_record//" position_now speed_when_listed"//newline//"pair: "//pair_record//newline// &
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
+      & "cell: "//period_record//", "//to_text(period_words)//" words"//newline// &
       & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
       & "population: "//population_record//", "//to_text(population_words)//" words"//newline
     call registered_diagnostics(diagnostics)
@@ -43,6 +45,7 @@ contains
           & to_text(features%n_words)//" words"//newline
       end associate
     end do
+    text = text//"lists: largest_extent_when_listed, corner_of_orders"//newline
     text = text//"partition: "//head_record//", "//to_text(head_words)//" words"
   end function records_text
 
@@ -77,6 +80,9 @@ contains
     call file%write_scalar("quiet", int(simulation%quiet, i8), error)
     call file%write_scalar("last_written", int(simulation%last_written, i8), error)
     call file%write_scalar("lists_made", simulation%halo%builds, error)
+    call file%write_scalar("largest_extent_when_listed", simulation%halo%largest_extent, error)
+    words = real_words(simulation%halo%corner, size(simulation%halo%corner))
+    call file%write_array("corner_of_orders", words, error)
     call file%write_scalar("next_id", simulation%inflow%next_id, error)
     call simulation%population%get_state(seen)
     call file%write_array("population", seen, error)
@@ -97,6 +103,8 @@ contains
       call pack_boundaries(simulation%halo%reference_boundaries, words)
       call file%write_array("boundaries_when_listed", words, error)
     end if
+    words = cell_words(simulation)
+    call file%write_array("cell", words, error)
     words = real_words(simulation%boundary_impulses, size(simulation%boundary_impulses))
     call file%write_array("boundary_impulses", words, error)
     call save_diagnostics(simulation%diagnostics, file, error)
@@ -226,6 +234,16 @@ contains
       end associate
     end do
   end subroutine load_diagnostics
+
+  !> The cell now, and as it was when the lists were made.
+  pure function cell_words(simulation) result(words)
+    type(simulation_t), intent(in) :: simulation
+    integer(i8) :: words(2*period_words)
+
+    call simulation%decomposition%period%get_state(words(1:period_words))
+    words(period_words + 1:) = words(1:period_words)
+    if (simulation%halo%builds > 0) call simulation%halo%reference_period%get_state(words(period_words + 1:))
+  end function cell_words
 
   pure function real_words(values, n) result(words)
     integer, intent(in) :: n

@@ -3,6 +3,7 @@ module gravier_checkpoint_tables
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_periodic, only: period_words
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_narrow, only: narrow, take_count
   use gravier_body_store, only: body_layout_t, place_word
@@ -46,6 +47,7 @@ contains
     type(checkpoint_file_t), intent(inout) :: file
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), own(:, :), counts(:), map(:)
+    integer, allocatable :: kept(:)
     integer :: s, n, k, n_subdomains
 
     n_subdomains = simulation%decomposition%n_subdomains
@@ -55,13 +57,15 @@ contains
       call file%write_table("grains", n_subdomains, records, counts, error)
       if (simulation%halo%builds > 0) then
         do s = 1, size(owned)
-          counts(s) = simulation%halo%view(s)%list%n_kept()
+          call simulation%halo%view(s)%list%find_kept(kept)
+          counts(s) = size(kept)
         end do
         deallocate (records)
         allocate (records(2 + simulation%halo%memory%words(), sum(counts)))
         n = 0
         do s = 1, size(owned)
-          call list_impulses(simulation%halo%view(s), 0, own)
+          call simulation%halo%view(s)%list%find_kept(kept)
+          call list_impulses(simulation%halo%view(s), 0, kept, own)
           records(:, n + 1:n + size(own, 2)) = own
           n = n + size(own, 2)
         end do
@@ -93,11 +97,13 @@ contains
     !> (subdomains of this rank)
     integer(i8), intent(out) :: counts(:)
     type(body_layout_t) :: layout
+    integer(i8), allocatable :: whole(:)
     integer :: s, k, n, d, words, nd
 
     nd = simulation%decomposition%nd
     layout = simulation%decomposition%layout()
-    words = layout%record_words()
+    words = layout%saved_words()
+    allocate (whole(layout%record_words()))
     associate (owned => simulation%decomposition%owned)
       do s = 1, size(owned)
         counts(s) = owned(s)%n
@@ -107,7 +113,8 @@ contains
       do s = 1, size(owned)
         do k = 1, owned(s)%n
           n = n + 1
-          call owned(s)%get_record(k, records(1:words, n))
+          call owned(s)%get_record(k, whole)
+          records(1:words, n) = whole(1:words)
           do d = 1, nd
             records(words + d, n) = transfer(owned(s)%position(d, k), 0_i8)
             if (simulation%halo%builds > 0) records(place_word - 1 + d, n) = &
@@ -148,8 +155,9 @@ contains
     character(len=*), intent(in) :: path
     integer(i8), intent(in) :: builds
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:)
+    integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:), cell(:), corner(:)
     type(body_layout_t) :: layout
+    real(dp) :: least_extent
     integer :: s, k, n, d, nd, n_words, n_boundary
 
     associate (decomposition => simulation%decomposition)
@@ -158,8 +166,13 @@ contains
       n_words = layout%record_words()
       n_boundary = boundary_words*size(decomposition%boundaries)
       call file%read_table("grains", decomposition%n_subdomains, n_words + nd + 1, records, counts, error)
+      call file%read_scalar("largest_extent_when_listed", least_extent, error)
+      call file%read_array("corner_of_orders", 3, 3, corner, error)
+      if (.not. allocated(error)) call check_reals(path//": the array corner_of_orders", corner, error)
       if (builds > 0) call file%read_array("boundaries_when_listed", n_boundary, n_boundary, words, error)
       call file%read_array("boundaries", n_boundary, n_boundary, now, error)
+      call file%read_array("cell", 2*period_words, 2*period_words, cell, error)
+      if (.not. allocated(error)) call check_reals(path//": the array cell", cell, error)
       if (builds > 0 .and. .not. allocated(error)) call check_reals(path//": the array boundaries_when_listed", words, error)
       if (.not. allocated(error)) call check_reals(path//": the array boundaries", now, error)
       if (.not. allocated(error)) call check_grains(simulation, path, records, error)
@@ -178,7 +191,11 @@ contains
       end do
       if (builds > 0) then
         call unpack_boundaries(words, decomposition%boundaries)
-        call simulation%halo%build(decomposition)
+        call decomposition%period%set_state(cell(period_words + 1:))
+        do d = 1, size(corner)
+          simulation%halo%corner(d) = transfer(corner(d), 0.0_dp)
+        end do
+        call simulation%halo%build(decomposition, least_extent)
         simulation%halo%builds = builds
         call load_impulses(simulation, file, path, error)
       end if
@@ -193,6 +210,7 @@ contains
         n = n + decomposition%owned(s)%n
       end do
       call unpack_boundaries(now, decomposition%boundaries)
+      call decomposition%period%set_state(cell(1:period_words))
     end associate
   end subroutine load_grains
 

@@ -49,14 +49,14 @@ contains
     end if
     grains = simulation%n_grains - simulation%n_glued
     associate (time => simulation%config%time, seen => simulation%population, mass => simulation%mass)
-      if (time%grains_at_most_given .and. grains <= time%stop_grains_at_most .and. seen%most > time%stop_grains_at_most) then
+      if (time%stop_grains_at_most_given .and. grains <= time%stop_grains_at_most .and. seen%most > time%stop_grains_at_most) then
         why = counted(grains, "grain")//" in the scene, stop_grains_at_most = "//to_text(time%stop_grains_at_most)
-      else if (time%grains_at_least_given .and. grains >= time%stop_grains_at_least .and. &
+      else if (time%stop_grains_at_least_given .and. grains >= time%stop_grains_at_least .and. &
         & seen%fewest < time%stop_grains_at_least) then
         why = counted(grains, "grain")//" in the scene, stop_grains_at_least = "//to_text(time%stop_grains_at_least)
-      else if (time%mass_at_most_given .and. mass <= time%stop_mass_at_most .and. seen%heaviest > time%stop_mass_at_most) then
+      else if (time%stop_mass_at_most_given .and. mass <= time%stop_mass_at_most .and. seen%heaviest > time%stop_mass_at_most) then
         why = to_text(mass, 7)//" kg of grains in the scene, stop_mass_at_most = "//to_text(time%stop_mass_at_most, 7)//" kg"
-      else if (time%mass_at_least_given .and. mass >= time%stop_mass_at_least .and. &
+      else if (time%stop_mass_at_least_given .and. mass >= time%stop_mass_at_least .and. &
         & seen%lightest < time%stop_mass_at_least) then
         why = to_text(mass, 7)//" kg of grains in the scene, stop_mass_at_least = "//to_text(time%stop_mass_at_least, 7)//" kg"
       else if (simulation%watched > 0) then

@@ -19,6 +19,7 @@ module gravier_simulation
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
+  use gravier_scene_cell, only: make_cell_drive
   use gravier_diagnostic_registry, only: diagnostic_holder_t
   use gravier_scene_regions, only: make_region_means
   use gravier_method_choice, only: choose_scheme
@@ -118,6 +119,7 @@ contains
     call self%decomposition%figures%init(scene%shapes)
     ! one subdomain until it is known that the scene has room for so many
     call self%decomposition%init(comm, 1, scene%grains, scene%period)
+    call make_cell_drive(config%scene, self%cell_drive)
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
     if (self%inflow%exists()) call prepare_inflow(self)
@@ -147,6 +149,7 @@ contains
     call self%start_diagnostics()
     self%mass = self%decomposition%free_mass()
     self%first_mass = self%mass
+    call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, self%physics%cell)
     call self%population%note(self%n_grains - self%n_glued, self%mass)
   end subroutine simulation_start
 
@@ -223,7 +226,7 @@ contains
         & self%sleeping%after > 0, scene%effects%shapes .or. has_facets(scene%boundaries))
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
-      rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_given)
+      rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_distance_given)
       rule%alert_distance = max(rule%alert_distance, scene%laws%range)
       rule%filter = scene%laws%filter
       rule%skin = merge(config%skin, 0.2_dp*scene%mean_radius, config%skin_given)
@@ -232,7 +235,7 @@ contains
       self%overlap_allowed = huge(1.0_dp)
       if (config%overlap_projection .and. scene%mean_radius > 0.0_dp) &
         & self%overlap_allowed = merge(config%overlap_allowed, min(0.01_dp*scene%mean_radius, scene%least_rounding), &
-        & config%overlap_given)
+        & config%overlap_allowed_given)
       self%overlap_left = merge(overlap_left_of_shapes, 1.0_dp, scene%effects%shapes)*self%overlap_allowed
       rule%kind = merge(rule_primal, rule_dual, self%config%decomposition%kind == "primal")
     end associate

@@ -22,6 +22,7 @@ module gravier_scene
   use gravier_pair_laws, only: set_default_laws
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: features_of, quoted_names, with_moments
+  use gravier_scene_cell, only: cell_moves, check_cell
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_laws, only: density_of, collect_laws
   use gravier_run_memory, only: check_planned_grains, check_read_grains, check_entering_grains
@@ -104,6 +105,7 @@ contains
     do b = 1, size(scene%boundaries)
       scene%boundaries(b)%period(:) = scene%period%length
     end do
+    call check_cell(config, scene%period, size(scene%boundaries), error)
     call check_regions(config, scene%insertions, scene%period, scene%boundaries, error)
     call check_mean_regions(config, scene%period, error)
     call comm%agree(error)
@@ -132,6 +134,7 @@ contains
     type(bodies_data_t), intent(in) :: data
     type(scene_t), intent(inout) :: scene
 
+    scene%period%moves = cell_moves(config)
     scene%period%length(:) = config%period
     scene%period%origin(:) = config%period_origin
     if (scene%period%on() .or. .not. data%has_box) return
@@ -347,6 +350,7 @@ contains
       end do
       effects%rotation = effects%friction .or. turning .or. effects%shapes .or. effects%compliance
       effects%periodic = scene%period%on()
+      effects%moving_cell = scene%period%moves
       effects%insertion = size(scene%insertions) > 0
       effects%glued = comm%any_true(any(data%group > 0))
       effects%gravity = any(abs(config%gravity) > 0.0_dp) .or. config%gravity_table /= ""

@@ -29,7 +29,7 @@ module gravier_scene_scales
     !> what that pressure does to the mean grain in a step [m/s]
     real(dp) :: load = 0.0_dp
     !> largest difference of imposed velocities [m/s], and the boundary that moves fastest then
-    real(dp) :: drive = 0.0_dp
+    real(dp), private :: drive = 0.0_dp
     integer :: driver = 0
     !> that boundary's speed over its way to the one that faces it [1/s]; it moves along itself
     real(dp) :: rate = 0.0_dp

@@ -19,6 +19,8 @@ EXCEPTIONS = {
     **dict.fromkeys(("gravier_bodies_csv", "gravier_bodies_hdf5"), "parallel/bodies/test_io_bodies_file.f90"),
     # h5py reads what it writes
     "gravier_vtkhdf_file": "hard/test_run_vtk.py",
+    # it ends all processes
+    "gravier_abandon": "verification/test_run_loop_refusals.py",
     # the linker calls it where memory ends
     "gravier_own_allocations": "hard/test_run_too_large.py",
 }

@@ -20,7 +20,10 @@ from gravier_runs import SOURCE, RunTestCase
 import gravier
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
+import curve_pictures  # noqa: E402
 import gravier_plot  # noqa: E402
+import packing_picture  # noqa: E402
+import picture_style  # noqa: E402
 
 GROUND = {"name": "it's the ground", "shape": "plane", "normal": [0.0, 1.0]}
 
@@ -151,7 +154,7 @@ class Package(RunTestCase):
         """What tells directories apart is kept of them."""
         for paths, names in ((["/a/run_1/results", "/a/run_2/results"], ["run_1", "run_2"]), (["/a/b", "/a/b/c"], ["b", "b/c"]),
                              (["/a/x/y/r", "/a/z/r"], ["x/y", "z"]), (["/a/b"], ["b"])):
-            self.assertEqual(gravier_plot.names_of([types.SimpleNamespace(directory=pathlib.Path(path)) for path in paths]), names)
+            self.assertEqual(curve_pictures.names_of([types.SimpleNamespace(directory=pathlib.Path(path)) for path in paths]), names)
 
     def test_runs_compared_and_movie(self):
         status, said = self.plot("history", "heap/results", "heap/results", "--out", "two.png", "--columns", "contacts")
@@ -167,19 +170,19 @@ class Package(RunTestCase):
 
     def test_colours_of_a_movie(self):
         """One value has one colour in all frames, also where a frame alone would have another unit."""
-        run, options = self.run_, types.SimpleNamespace(view=(-60.0, 20.0), colour="speed", chains=True)
-        frame = gravier_plot.shared_frame(run, list(run.steps), options)
+        run, options = self.run_, types.SimpleNamespace(view=(-60.0, 20.0), colour="speed", chains=True, regions=False)
+        frame = packing_picture.shared_frame(run, list(run.steps), options)
         speeds = [np.linalg.norm(run.bodies(step).velocity, axis=1) for step in run.steps]
         tops = [np.quantile(values, 0.98) for values in speeds]
         self.assertLess(min(tops), 1e-3 * max(tops))
         self.assertEqual(frame.limits, (0.0, max(tops)))
-        how = [gravier_plot.colours(run, step, run.bodies(step), "speed", frame.limits) for step in run.steps]
+        how = [packing_picture.colours(run, step, run.bodies(step), "speed", frame.limits) for step in run.steps]
         self.assertEqual({label for _, label, _ in how}, {"speed [$10^{-3}$ m/s]"})
         for values, (shown, _, keys) in zip(speeds, how):
             np.testing.assert_allclose(shown, 1e3 * values, rtol=1e-12)
             np.testing.assert_allclose([keys["norm"].vmin, keys["norm"].vmax], [0.0, 1e3 * max(tops)], rtol=1e-12)
-        self.assertEqual(gravier_plot.shared_limits([(0.0, 1.0), (-3.0, 3.0), (-2.0, 2.0)]), (-3.0, 3.0))
-        self.assertIsNone(gravier_plot.shared_limits([]))
+        self.assertEqual(packing_picture.shared_limits([(0.0, 1.0), (-3.0, 3.0), (-2.0, 2.0)]), (-3.0, 3.0))
+        self.assertIsNone(packing_picture.shared_limits([]))
 
     def test_movies_by_ffmpeg(self):
         """Frames go to the program ffmpeg one after the other, of even size, which its coding of .mp4 wants. A program that keeps what it is

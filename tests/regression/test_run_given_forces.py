@@ -279,7 +279,7 @@ class GivenForces(RunTestCase):
             ("no name", {"antagonist": [-1, -3]}, names, ("/contacts/antagonist: row 1", "-3", "-1 to -2")),
             ("no names", {}, (), ("/contacts/antagonist: row 0", "/contacts/boundaries")),
             ("zero", {"antagonist": [0, -1]}, names, ("/contacts/antagonist: row 0",)),
-            ("no body", {"candidate": [0, 7]}, names, ("/contacts/candidate: row 0",)),
+            ("no body", {"candidate": [0, 7]}, names, ("/contacts/candidate: row 0", ", but the identifier of a body was expected")),
             ("NaN", {"force": [[1.0, 1.0], [nan, 1.0]]}, names, ("/contacts/force: row 1", "NaN or infinity")),
             ("huge", {"force": [[1.0, 1e300], [1.0, 1.0]]}, names, ("/contacts/force: row 0", "1.000")),
             ("no normal", {"normal": [[0.0, 0.0], [0.0, 1.0]]}, names, ("/contacts/normal: row 0", "zero")),

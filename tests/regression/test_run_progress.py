@@ -150,7 +150,7 @@ class Progress(RunTestCase):
         """Whether it converged, where the time went, what would halve it: as the history has it."""
         residual = merged(self.case, {"solver": {"criterion": "residual"}})
         idle = run_case(residual, 2, self.here("idle"))
-        self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-04; [\d.]+ iterations a solve\n")
+        self.assertRegex(idle.stdout, r"\nconverged   yes: every solve reached the tolerance 1.00E-04 and the accuracy 1.00E-01; [\d.]+ iterations a solve\n")
         self.assertRegex(idle.stdout, r"\ntime        [\d.]+ s, [\d.]+ m?s a step: [a-z]+.* \d+ %")
         self.assertIn("\nto halve it 1 of 2 ranks own no subdomain and wait: choose as many &decomposition subdomains as ranks, now 1, or fewer ranks", idle.stdout)
         lost = run_case(merged(residual, {"time": {"steps": 5}, "solver": {"tolerance": 1e-16, "max_iterations": 3000},

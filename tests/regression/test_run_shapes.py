@@ -16,6 +16,7 @@ from gravier.shapes import axes_of
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
 import gravier_plot  # noqa: E402
+import packing_picture  # noqa: E402
 
 SHAPES = """# bodies of the plane
 shape brick
@@ -250,8 +251,8 @@ class Shapes(RunTestCase):
         for colour in ("speed", "radius", "subdomain", "none"):
             options = gravier_plot.parse(["packing", run.path("results"), "--colour", colour])
             options.chains = False
-            figure = gravier_plot.draw_packing(results, None, options)
-            drawn = next(one for one in figure.axes[0].collections if isinstance(one, gravier_plot.PolyCollection))
+            figure = packing_picture.draw_packing(results, None, options)
+            drawn = next(one for one in figure.axes[0].collections if isinstance(one, packing_picture.PolyCollection))
             polygons = [path.vertices[:-1] for path in drawn.get_paths()]
             expected = [points for outline in results.outlines() for points in outline]
             self.assertEqual(len(polygons), len(expected))

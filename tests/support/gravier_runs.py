@@ -4,6 +4,7 @@ The environment names the program (GRAVIER_BIN_DIR) and the launcher (MPIEXEC); 
     GRAVIER_BIN_DIR=build/release/bin PYTHONPATH=tests/support /usr/bin/python3 -m unittest discover -s tests/regression
 """
 import concurrent.futures
+import contextlib
 import glob
 import itertools
 import os
@@ -24,6 +25,11 @@ from gravier import namelist  # noqa: E402
 PROGRAMS = os.path.abspath(os.environ.get("GRAVIER_BIN_DIR", os.path.join(SOURCE, "build/release/bin")))
 GRAVIER = os.path.join(PROGRAMS, "gravier")
 MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
+#: a file system in memory, and the bytes that must be free there for runs to write to it: each state that a run writes waits for the disk
+#: twice. TMPDIR names another place
+MEMORY, ROOM = "/dev/shm", 2**32
+if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
+    tempfile.tempdir = MEMORY
 #: numbers of the runs of this process
 RUNS = itertools.count()
 #: seconds after which a run that does not end is taken for one that hangs, on whatever machine, with whatever else to do
@@ -82,26 +88,46 @@ class Run:
 
 
 def gravier(*arguments, ranks=1, directory=".", program="gravier"):
-    """Run `gravier ARGUMENTS`, or another program, on so many ranks. A run not over after PATIENCE is ended and is an error: one
-    rank waits for another that has left, or a loop does not end."""
-    # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure; each
-    # run has its own names, since several may share a directory
-    own = f"rank.{os.getpid()}_{next(RUNS)}"
-    rank = f'"$0" "$@" 2>{own}.$$.stderr; status=$?; echo $status >{own}.$$.status; exit $status'
-    process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", rank, os.path.join(PROGRAMS, program), *arguments], cwd=directory,
-                               env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE)
+    """Run `gravier ARGUMENTS`, or another program, on so many ranks: one runs by itself, several under a launcher, which takes twice as
+    long to start them. A run not over after PATIENCE is ended and is an error: one rank waits for another that has left, or a loop does
+    not end."""
+    command = [os.path.join(PROGRAMS, program), *arguments]
+    if ranks > 1:
+        return launched(command, ranks, directory)
+    with alone_environment() as environment:
+        process = subprocess.Popen(command, cwd=directory, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
+        stdout, stderr = wait_for_end(process, command, ranks)
+    # a signal that ended it as a shell counts it
+    status = process.returncode if process.returncode >= 0 else 128 - process.returncode
+    return Run(directory, status, stdout.decode(errors="replace"), stderr.decode(errors="replace"), "")
+
+
+def wait_for_end(process, command, ranks):
+    """What a run leaves on its two outputs."""
     try:
-        stdout, launcher = process.communicate(timeout=PATIENCE)
+        return process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
-        # the launcher ends its ranks when it is told to stop
+        # a launcher ends its ranks when it is told to stop
         process.terminate()
         try:
             process.communicate(timeout=10)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
-        raise AssertionError(f"{program} {' '.join(arguments)} on {ranks} ranks did not end in {PATIENCE} s") from None
+        raise AssertionError(f"{' '.join(command)} on {ranks} ranks did not end in {PATIENCE} s") from None
+
+
+def launched(command, ranks, directory):
+    """A run under the launcher."""
+    # the ranks write their standard error and status to files, apart from what the launcher has to say about a failure; each
+    # run has its own names, since several may share a directory
+    own = f"rank.{os.getpid()}_{next(RUNS)}"
+    rank = f'"$0" "$@" 2>{own}.$$.stderr; status=$?; echo $status >{own}.$$.status; exit $status'
+    process = subprocess.Popen([MPIEXEC, "-n", str(ranks), "sh", "-c", rank, *command], cwd=directory,
+                               env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE)
+    stdout, launcher = wait_for_end(process, command, ranks)
     said = {}
     for name in sorted(glob.glob(os.path.join(glob.escape(directory), own + ".*"))):
         with open(name, "rb") as file:
@@ -121,16 +147,22 @@ class Said:
         self.status, self.stdout, self.stderr = status, stdout, stderr
 
 
+@contextlib.contextmanager
+def alone_environment():
+    """The environment of a program that runs without a launcher."""
+    # programs that run at once each have a session directory of their own: all of them would be number 0 of job 0 there
+    session = tempfile.mkdtemp(prefix="gravier-alone-")
+    try:
+        yield {**ENVIRONMENT, **ALONE, "OMPI_MCA_orte_tmpdir_base": session, **os.environ}
+    finally:
+        shutil.rmtree(session, ignore_errors=True)
+
+
 def alone(command, directory, seconds=20):
     """Run a program by itself, on one rank and without a launcher, for so many seconds of processor time: of wall time it may take ten
     times as much, since a machine may be busy with other things. Signals that end it are in its status, with a minus."""
-    # programs that run at once each have a session directory of their own: all of them would be number 0 of job 0 there
-    session = tempfile.mkdtemp(prefix="gravier-alone-")
-    environment = {**ENVIRONMENT, **ALONE, "OMPI_MCA_orte_tmpdir_base": session, **os.environ}
-    try:
+    with alone_environment() as environment:
         return _ended(command, directory, environment, seconds)
-    finally:
-        shutil.rmtree(session, ignore_errors=True)
 
 
 def _ended(command, directory, environment, seconds):

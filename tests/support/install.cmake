@@ -18,6 +18,15 @@ run(${WORK}/build/consumer)
 run(${PYTHON} ${CONSUMER}/check_own.py ${WORK}/build/own_gravier)
 if(PROGRAM)
   run(${WORK}/prefix/bin/gravier --version)
+  # the library and the class of the installation, which find each other
+  file(WRITE ${WORK}/find.py
+    "from gravier.library import find_library, load\nload()\nwith open('library', 'w') as file:\n    file.write(find_library())\n")
+  run(${CMAKE_COMMAND} -E env --unset=GRAVIER_BIN_DIR PYTHONPATH=${WORK}/prefix/share/gravier/python ${PYTHON} ${WORK}/find.py)
+  file(READ ${WORK}/library library)
+  file(REAL_PATH ${WORK}/prefix prefix)
+  if(NOT library MATCHES "^${prefix}/lib.*/libgravier\\.so$" OR NOT EXISTS ${WORK}/prefix/include/gravier.h)
+    message(FATAL_ERROR "the Python class of the installation uses '${library}'; expected a library in ${prefix} and gravier.h")
+  endif()
   # a Python that says what it is to draw with: the script of the installation
   file(WRITE ${WORK}/python "#!/bin/sh\n[ \"$1\" = -c ] || realpath \"$1\" >${WORK}/script\n")
   file(CHMOD ${WORK}/python PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)

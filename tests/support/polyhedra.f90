@@ -1,18 +1,26 @@
-!> Polyhedra for tests: the regular ones, random hulls, and turns.
+!> Polyhedra for tests: the regular ones, random hulls, a box, a rod and a ball; turns.
 module gravier_polyhedra
   use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
   use gravier_random_hash, only: hash_uniform
   use gravier_rotation, only: make_rotation
   use gravier_convex_distance, only: placed_pair_t
+  use gravier_polyhedron, only: make_box, make_capsule
   use gravier_shape_library, only: body_shape_t
+  use gravier_check, only: check
   implicit none
   private
   public :: tetrahedron, cube, octahedron, dodecahedron, icosahedron, golden
   public :: draws_t, random_turn
   public :: put_pair
+  public :: make_box_rod_ball, box_rounding, half_core, straight
   public :: vector_t, turn_t, vec, about, back, on, between, inverse
 
   real(dp), parameter :: golden = (1.0_dp + sqrt(5.0_dp))/2
+  !> of the box of make_box_rod_ball, and the half-edge of its core
+  real(dp), parameter :: box_rounding = 0.1_dp, half_core = 1.0_dp - box_rounding
+  !> the turn that turns nothing
+  real(dp), parameter :: straight(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
   real(dp), parameter :: signs(2) = [-1.0_dp, 1.0_dp]
 
   !> Numbers drawn one after the other.
@@ -35,6 +43,17 @@ module gravier_polyhedra
   end type turn_t
 
 contains
+
+  !> A cube of edge 2, a capsule of length 2 and radius 0.25 along the third axis, a ball of radius 1.
+  subroutine make_box_rod_ball(box, rod, ball)
+    type(body_shape_t), intent(out) :: box, rod, ball
+    type(error_t), allocatable :: error
+
+    call make_box("box", [2.0_dp, 2.0_dp, 2.0_dp], box_rounding, box, error)
+    call make_capsule("rod", 2.0_dp, 0.25_dp, rod, error)
+    call make_capsule("ball", 0.0_dp, 1.0_dp, ball, error)
+    call check(.not. allocated(error), "shapes")
+  end subroutine make_box_rod_ball
 
   !> A vector of three components.
   pure type(vector_t) function vec(x, y, z)

@@ -185,6 +185,14 @@ class Diagnostics(RunTestCase):
         self.assertLess(off, 1e-12 * turned)
         self.assertNotAlmostEqual(turned, expected, delta=0.1 * expected)
 
+    def test_balance_of_shared_grains_of_any_size(self):
+        """A force on volumes does its work on those of the grains themselves, also where subdomains share them."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [8, 6], "radius_min": 0.005, "radius_max": 0.012, "friction": 0.3,
+                          "body_force": [3000.0, -5000.0]},
+                "time": {"step": 1e-3, "steps": 150}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 4}}
+        off, turned = self.balance_line(self.run_here("sizes", case, []))
+        self.assertLess(off, 1e-12 * turned)
+
     def test_balance_without_iterations(self):
         """Solves that end where they start, since impulses of the last step are good enough, by a method that keeps reactions of
         subdomains: the work of contacts is that of whole impulses."""

@@ -1,4 +1,4 @@
-"""Results of Gravier as arrays, and runs of it from Python.
+"""Results of Gravier as arrays, runs of it from Python, and runs whose loop is the user's.
 
     import gravier
     run = gravier.Run("out/packing")
@@ -7,11 +7,12 @@
 needs numpy and h5py; `Table.frame()` needs pandas too.
 """
 from . import blocks
-from .case import CaseError, namelist, parse_namelist, run, study, value_text
+from .case import CaseError, entries, namelist, parse_namelist, run, study, value_text
 from .checksum import seal
 from .restarts import write_bodies
 from .results import BodiesFile, ResultsError, Run, Table, read_table
 from .shapes import Piece, Shape
+from .simulation import Simulation, SimulationError, StaleArray
 
-__all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Table", "blocks", "namelist", "parse_namelist", "read_table", "run",
-           "seal", "study", "value_text", "write_bodies"]
+__all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
+           "entries", "namelist", "parse_namelist", "read_table", "run", "seal", "study", "value_text", "write_bodies"]

@@ -34,6 +34,20 @@ def namelist(groups):
     return text
 
 
+def entries(keys, name, missing):
+    """An array of a group as {key: value}, however its entries are given, `lower = 0.0, , 1.0` or `lower(2) = 0.1`; those that nothing is said
+    of are those of `missing`."""
+    full = np.array(missing, dtype=float)
+    for key, value in keys.items():
+        found = re.fullmatch(rf"{name}(?:\(\s*(\d*)\s*(?::.*)?\))?", key)
+        if found:
+            first = int(found[1] or 1) - 1
+            for k, entry in enumerate(value if isinstance(value, list) else [value], first):
+                if entry is not None and k < len(full):
+                    full[k] = entry
+    return full
+
+
 TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>'(?:[^']|'')*'|"(?:[^"]|"")*")|(?P<mark>[&/=,])|(?P<word>[^\s&/=,!'"]+))""")
 
 

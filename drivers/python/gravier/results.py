@@ -83,7 +83,7 @@ class Run:
     _kind = "the results of a run"
     #: columns that each table of a step has
     _columns = {"bodies": ("id", "position", "velocity", "radius"), "boundaries": ("position", "normal", "velocity", "force"),
-                "contacts": ("candidate", "antagonist", "normal", "gap", "impulse"),
+                "cell": ("axis", "edge", "velocity", "origin"), "contacts": ("candidate", "antagonist", "normal", "gap", "impulse"),
                 "regions": ("bin", "lower", "upper", "volume", "grains", "solid_fraction", "velocity", "granular_temperature", "stress",
                             "contacts_per_grain")}
 
@@ -182,6 +182,10 @@ class Run:
         if "axes" in rows:
             rows["axes"] = rows["axes"].reshape(-1, self.dimension, self.dimension)
         return rows
+
+    def cell(self, step=None):
+        """The edges of a periodic cell that moves, a row an axis: Table with edge, velocity, origin; None where none does."""
+        return self._group(step, "cell")
 
     def facets(self, step=None):
         """Facets of mesh walls where they are: boundary (its id) and corners (n, d, d), a row a corner [m]; None where there are none."""
@@ -377,6 +381,10 @@ class BodiesFile(Run):
                                                    normal=np.zeros((0, self.dimension)))
         return Table(id=rows.id, name=np.array([f"wall {number}" for number in rows.id], dtype=str), shape=np.full(len(rows), "plane"),
                      position=rows.point, normal=rows.normal)
+
+    def cell(self, step=None):
+        """None: the periods of a bodies file do not move."""
+        self.find_step(step)
 
     def facets(self, step=None):
         """None: a bodies file has no mesh walls."""

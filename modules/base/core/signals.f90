@@ -5,7 +5,7 @@ module gravier_signals
   use gravier_kinds, only: i8
   implicit none
   private
-  public :: catch_signals, take_signals
+  public :: catch_signals, release_signals, take_signals
 
   ! Linux numbers
   integer(c_int), parameter :: sigusr1 = 10, sigterm = 15
@@ -13,6 +13,8 @@ module gravier_signals
   logical, volatile :: stop_asked = .false.
   !> SIGUSR1 that arrived since the start
   integer(i8), volatile :: checkpoints_asked = 0
+  !> what SIGTERM and SIGUSR1 did before
+  type(c_funptr) :: before(2)
 
   interface
     type(c_funptr) function c_signal(number, action) bind(C, name="signal")
@@ -25,16 +27,24 @@ module gravier_signals
 
 contains
 
-  !> Note SIGTERM and SIGUSR1 from now on instead of dying of them. Interrupted system calls go on.
+  !> Note SIGTERM and SIGUSR1 from now on instead of dying of them; none is noted yet. Interrupted system calls go on.
   subroutine catch_signals()
-    type(c_funptr) :: ignored
-
-    ignored = c_signal(sigterm, c_funloc(ask_stop))
-    ignored = c_signal(sigusr1, c_funloc(ask_checkpoint))
+    stop_asked = .false.
+    checkpoints_asked = 0
+    before(1) = c_signal(sigterm, c_funloc(ask_stop))
+    before(2) = c_signal(sigusr1, c_funloc(ask_checkpoint))
   end subroutine catch_signals
 
+  !> Let both signals do again what they did before catch_signals.
+  subroutine release_signals()
+    type(c_funptr) :: ignored
+
+    ignored = c_signal(sigterm, before(1))
+    ignored = c_signal(sigusr1, before(2))
+  end subroutine release_signals
+
   !> Whether this process was asked to stop since the last call, and how many times it was asked for a checkpoint since
-  !> the start. Not collective: a launcher may signal one rank only, or several, of which one learns of it a step after
+  !> catch_signals. Not collective: a launcher may signal one rank only, or several, of which one learns of it a step after
   !> another, so that the ranks have to agree before they act. The largest count of a rank grows once a request.
   subroutine take_signals(stop, checkpoints)
     logical, intent(out) :: stop

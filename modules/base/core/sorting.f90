@@ -3,7 +3,7 @@ module gravier_sorting
   use gravier_kinds, only: i4, i8
   implicit none
   private
-  public :: argsort, argsort_rows, find_sorted, first_not_before
+  public :: argsort, argsort_rows, find_sorted, first_not_before, is_before
 
   !> bits of a digit; it divides those of a key
   integer, parameter :: digit = 8

@@ -32,6 +32,8 @@ module gravier_boundary
     real(dp) :: last_velocity(3) = 0.0_dp, last_spin(3) = 0.0_dp
     !> as prescribed, where no table says otherwise [m/s], [rad/s]
     real(dp) :: given_velocity(3) = 0.0_dp, given_spin(3) = 0.0_dp
+    !> a loop of the user's own has set its drive, so that its spin may jump between two steps
+    logical :: steered = .false.
     !> components of translation that forces move
     logical :: free(3) = .false.
     !> on the free components [N]; [Pa], or [N/m] in 2D

@@ -21,10 +21,10 @@ module gravier_mesh
     !> (3, dimension, facets) [m]
     real(dp), allocatable :: corner(:, :, :)
     !> box of all facets [m]
-    real(dp) :: low(3) = 0.0_dp, high(3) = 0.0_dp
+    real(dp), private :: low(3) = 0.0_dp, high(3) = 0.0_dp
     !> facets of the file that were left out, since they have no area (in 2D, no length)
-    integer :: without_area = 0
-    type(facet_tree_t) :: tree
+    integer, private :: without_area = 0
+    type(facet_tree_t), private :: tree
   contains
     procedure :: diagonal => mesh_data_diagonal
   end type mesh_data_t
@@ -32,7 +32,7 @@ module gravier_mesh
   !> `edge` holds the first two axes of the file, unit vectors that turn with the boundary.
   type, extends(surface_t) :: mesh_t
     !> what a length of the file is multiplied by [m]
-    real(dp) :: scale = 1.0_dp
+    real(dp), private :: scale = 1.0_dp
     !> associated once the file was read
     type(mesh_data_t), pointer :: data => null()
   contains

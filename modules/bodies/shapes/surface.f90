@@ -47,7 +47,7 @@ module gravier_surface
     !> 0 where the shape has none [m]
     real(dp) :: radius = 0.0_dp
     !> what `features` says, at hand where it is asked for each grain; set by the registry, which makes surfaces
-    type(surface_features_t) :: is
+    type(surface_features_t) :: is = surface_features_t()
   contains
     procedure(surface_features), deferred, nopass :: features
     procedure(surface_keys), deferred, nopass :: keys

@@ -22,7 +22,7 @@ module gravier_cell_hash
     integer(i8), allocatable :: key(:)
     integer, allocatable :: first(:)
     !> open addressing: the cell that is found there, or 0; its size is a power of 2
-    integer, allocatable :: slot(:)
+    integer, private, allocatable :: slot(:)
   contains
     procedure :: init => cell_hash_init
     procedure :: find => cell_hash_find

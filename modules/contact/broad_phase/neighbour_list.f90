@@ -48,7 +48,8 @@ module gravier_neighbour_list
     procedure :: points_of => neighbour_list_points_of
     procedure :: begins => neighbour_list_begins
     procedure :: keeps => neighbour_list_keeps
-    procedure :: n_kept => neighbour_list_n_kept
+    procedure :: drop => neighbour_list_drop
+    procedure :: find_kept => neighbour_list_find_kept
   end type neighbour_list_t
 
 contains
@@ -69,20 +70,38 @@ contains
   pure logical function neighbour_list_keeps(self, p) result(keeps)
     class(neighbour_list_t), intent(in) :: self
     integer, intent(in) :: p
+    integer :: e
 
-    keeps = any(abs(self%impulse(:, p)) > 0.0_dp) .or. any(self%state(:, p) /= 0) .or. any(abs(self%spring(:, p)) > 0.0_dp)
+    keeps = .true.
+    do e = 1, size(self%impulse, 1)
+      if (abs(self%impulse(e, p)) > 0.0_dp) return
+    end do
+    do e = 1, size(self%state, 1)
+      if (self%state(e, p) /= 0) return
+    end do
+    do e = 1, size(self%spring, 1)
+      if (abs(self%spring(e, p)) > 0.0_dp) return
+    end do
+    keeps = .false.
   end function neighbour_list_keeps
 
-  !> Pairs that keep something from the last step.
-  pure integer function neighbour_list_n_kept(self) result(n)
+  !> Places of the pairs that keep something from the last step.
+  pure subroutine neighbour_list_find_kept(self, kept)
     class(neighbour_list_t), intent(in) :: self
-    integer :: p
+    !> ascending
+    integer, allocatable, intent(out) :: kept(:)
+    integer, allocatable :: place(:)
+    integer :: p, n
 
+    allocate (place(self%n))
     n = 0
     do p = 1, self%n
-      if (self%keeps(p)) n = n + 1
+      if (.not. self%keeps(p)) cycle
+      n = n + 1
+      place(n) = p
     end do
-  end function neighbour_list_n_kept
+    kept = place(1:n)
+  end subroutine neighbour_list_find_kept
 
   !> An empty list with room for `room` pairs.
   subroutine neighbour_list_init(self, periodic, room)
@@ -164,6 +183,31 @@ contains
     allocate (self%spring(memory%n_spring, self%n), source=0.0_dp)
     allocate (self%state(memory%n_states(), self%n), source=0)
   end subroutine neighbour_list_finish
+
+  !> Drop the pairs of bodies that are gone; the others stay in their order, with what they keep. Spare room stays.
+  subroutine neighbour_list_drop(self, place)
+    class(neighbour_list_t), intent(inout) :: self
+    !> new place of each body searched, 0 for those that are gone
+    integer, intent(in), contiguous :: place(:)
+    integer :: p, n, i, j
+
+    n = 0
+    do p = 1, self%n
+      i = place(self%candidate(p))
+      j = self%antagonist(p)
+      if (j > 0) j = place(j)
+      if (i == 0 .or. j == 0) cycle
+      n = n + 1
+      self%candidate(n) = i
+      self%antagonist(n) = j
+      if (n == p) cycle
+      if (size(self%shift) > 0) self%shift(n) = self%shift(p)
+      self%impulse(:, n) = self%impulse(:, p)
+      self%spring(:, n) = self%spring(:, p)
+      self%state(:, n) = self%state(:, p)
+    end do
+    self%n = n
+  end subroutine neighbour_list_drop
 
   subroutine permute(list, order)
     integer, allocatable, intent(inout) :: list(:)

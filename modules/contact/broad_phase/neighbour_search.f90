@@ -2,13 +2,12 @@
 !> which subdomain a pair belongs to.
 module gravier_neighbour_search
   use gravier_kinds, only: dp, i8
-  use gravier_narrow, only: narrow
-  use gravier_sorting, only: argsort_rows
-  use gravier_periodic, only: period_t, no_shift, shift_code
+  use gravier_periodic, only: period_t, no_shift, shift_code, most_images
   use gravier_body_store, only: body_set_t
   use gravier_shape_library, only: point_counts_t
   use gravier_facet, only: near_facets_t
   use gravier_boundary, only: boundary_t
+  use gravier_cell_order, only: sweep_order, place_of
   use gravier_cell_hash, only: cell_hash_t, cell_key, n_levels, last_cell
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_pair_places, only: has_facets, repeat_pairs
@@ -16,7 +15,7 @@ module gravier_neighbour_search
   use gravier_region, only: region_t
   implicit none
   private
-  public :: neighbour_search_t, sweep_order
+  public :: neighbour_search_t
 
   !> The search for the near pairs that belong to one subdomain: what it knows besides the grains.
   type :: neighbour_search_t
@@ -25,31 +24,38 @@ module gravier_neighbour_search
     type(boundary_t), allocatable :: boundaries(:)
     !> whose pairs are listed
     integer :: subdomain = 0
+    !> whether the subdomain is all of space
+    logical :: is_alone = .false.
+    !> from which the cells of the order of pairs are counted [m]
+    real(dp) :: corner(3) = 0.0_dp
     !> of the shapes of bodies, where these have some
     type(point_counts_t) :: counts
   contains
     procedure :: find => search_find
   end type neighbour_search_t
 
-  !> The grains and periodic images of them, where pairs are searched, in grids of cells: one for each class of radii.
+  !> The grains and periodic images of them, where pairs are searched, in the order of the cells of grids: one for each class of radii.
   type :: entries_t
     integer :: n = 0
     !> place among the bodies (n)
     integer, allocatable :: body(:)
-    !> periods by which it is shifted (3, n); of a period alone
+    !> periods by which it is shifted (3, n, or 0 without a period)
     integer, allocatable :: shift(:, :)
     !> with the shift (nd, n) [m]
     real(dp), allocatable :: position(:, :)
-    !> class of the radius (n), and whether a class has an entry
+    !> radius with margin (n) [m]
+    real(dp), allocatable :: extent(:)
+    !> class of the extent (n), and whether a class has an entry
     integer, allocatable :: level(:)
     logical :: used(0:n_levels - 1) = .false.
     !> corner from which cells are counted (nd), and the edge of the cells of each class [m]
     real(dp), allocatable :: lower(:)
     real(dp) :: edge(0:n_levels - 1) = 1.0_dp
-    !> entries by their cells
+    !> whose places in the order of cells are those of the entries
     type(cell_hash_t) :: hash
   contains
     procedure :: place => entries_place
+    procedure :: are_near => entries_are_near
   end type entries_t
 
   !> offsets of the cells searched from a cell besides itself: half of its neighbours, so that a pair is met once
@@ -58,44 +64,6 @@ module gravier_neighbour_search
     & -1, -1, 1, 0, -1, 1, 1, -1, 1, -1, 0, 1, 0, 0, 1, 1, 0, 1, -1, 1, 1, 0, 1, 1, 1, 1, 1], [3, 13])
 
 contains
-
-  !> Order of points along rows of cells, the last axis slowest, then by identifier: it depends on the set of points alone.
-  subroutine sweep_order(points, lower, edge, id, order)
-    !> (nd, n) [m]
-    real(dp), intent(in), contiguous :: points(:, :)
-    !> corner from which cells are counted (nd), and their edge [m]
-    real(dp), intent(in) :: lower(:), edge
-    !> (identifiers of a point, n)
-    integer(i8), intent(in), contiguous :: id(:, :)
-    !> (n) permutation to apply
-    integer, intent(out), contiguous :: order(:)
-    integer(i8), allocatable :: keys(:, :)
-    integer :: k, place(3)
-
-    allocate (keys(1 + size(id, 1), size(points, 2)))
-    do k = 1, size(points, 2)
-      place(:) = place_of(points(:, k), lower, edge)
-      keys(1, k) = cell_key(0, place)
-      keys(2:, k) = id(:, k)
-    end do
-    call argsort_rows(keys, order)
-  end subroutine sweep_order
-
-  !> Cell of a point along each axis, from 0 at `lower`. Far out the numbers begin again, so that cells stay small wherever
-  !> a grain has flown: what shares a number with cells far away is told from them by its distance.
-  pure function place_of(point, lower, edge) result(place)
-    real(dp), intent(in) :: point(:), lower(:), edge
-    integer :: place(3), d
-    !> a number that i8 can hold
-    real(dp), parameter :: farthest = 2.0_dp**62
-    integer(i8) :: cell
-
-    place(:) = 0
-    do d = 1, size(point)
-      cell = int(min(max((point(d) - lower(d))/edge, 0.0_dp), farthest), i8)
-      place(d) = narrow(iand(cell, int(last_cell, i8)))
-    end do
-  end function place_of
 
   !> List the near pairs that belong to the subdomain, in sweep order, with nothing kept.
   subroutine search_find(self, bodies, owned, region, memory, list)
@@ -122,8 +90,8 @@ contains
       call make_entries(bodies, extent, self%period, self%rule, entries)
       call hash_entries(entries, extent, self%rule)
       call search_boundaries(self, bodies, extent, owned, list)
-      call search_class(self, bodies, extent, region, entries, list)
-      if (count(entries%used) > 1) call search_larger(self, bodies, extent, region, entries, list)
+      call search_class(self, bodies, region, entries, list)
+      if (count(entries%used) > 1) call search_larger(self, bodies, region, entries, list)
     end if
     call sort_list(self, bodies, memory, list)
   end subroutine search_find
@@ -146,15 +114,58 @@ contains
       if (.not. entries%edge(l) > 0.0_dp) entries%edge(l) = 1.0_dp
     end do
     allocate (keys(entries%n), entries%level(entries%n))
+    allocate (entries%extent(entries%n))
     do e = 1, entries%n
-      l = level_of(extent(entries%body(e)), largest)
+      entries%extent(e) = extent(entries%body(e))
+      l = level_of(entries%extent(e), largest)
       entries%level(e) = l
       entries%used(l) = .true.
       place(:) = entries%place(e, l)
       keys(e) = cell_key(l, place)
     end do
     call entries%hash%init(keys)
+    call reorder_entries(entries)
   end subroutine hash_entries
+
+  !> Put entries in the order of their cells.
+  subroutine reorder_entries(entries)
+    type(entries_t), intent(inout) :: entries
+    type(entries_t) :: old
+    integer :: e, from
+
+    call move_alloc(entries%body, old%body)
+    call move_alloc(entries%level, old%level)
+    call move_alloc(entries%extent, old%extent)
+    call move_alloc(entries%position, old%position)
+    call move_alloc(entries%shift, old%shift)
+    allocate (entries%body(entries%n), entries%level(entries%n), entries%extent(entries%n))
+    allocate (entries%position(size(old%position, 1), entries%n))
+    allocate (entries%shift(3, size(old%shift, 2)))
+    do e = 1, entries%n
+      from = entries%hash%order(e)
+      entries%body(e) = old%body(from)
+      entries%level(e) = old%level(from)
+      entries%extent(e) = old%extent(from)
+      entries%position(:, e) = old%position(:, from)
+      if (size(old%shift, 2) > 0) entries%shift(:, e) = old%shift(:, from)
+    end do
+  end subroutine reorder_entries
+
+  !> Whether two entries are so near that their bodies may touch before lists are made anew.
+  pure logical function entries_are_near(self, a, b, alert) result(are_near)
+    class(entries_t), intent(in) :: self
+    integer, intent(in) :: a, b
+    !> [m]
+    real(dp), intent(in) :: alert
+    real(dp) :: square
+    integer :: d
+
+    square = 0.0_dp
+    do d = 1, size(self%position, 1)
+      square = square + (self%position(d, a) - self%position(d, b))**2
+    end do
+    are_near = square <= (self%extent(a) + self%extent(b) + alert)**2
+  end function entries_are_near
 
   !> Cell of entry e in the grid of a class.
   pure function entries_place(self, e, level) result(place)
@@ -195,23 +206,22 @@ contains
   end subroutine search_boundaries
 
   !> List the near pairs of entries of one class: those in a cell, and those in cells that touch.
-  subroutine search_class(self, bodies, extent, region, entries, list)
+  subroutine search_class(self, bodies, region, entries, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
-    real(dp), intent(in), contiguous :: extent(:)
     class(region_t), intent(in) :: region
     type(entries_t), intent(in) :: entries
     type(neighbour_list_t), intent(inout) :: list
     integer :: cell, other, a, b, l, k, place(3), near(3)
 
-    associate (hash => entries%hash)
+    associate (hash => entries%hash, alert => self%rule%alert_distance)
       do cell = 1, hash%n_cells
-        a = hash%order(hash%first(cell))
+        a = hash%first(cell)
         l = entries%level(a)
         place(:) = entries%place(a, l)
         do a = hash%first(cell), hash%first(cell + 1) - 1
           do b = a + 1, hash%first(cell + 1) - 1
-            call test_pair(self, bodies, extent, region, entries, hash%order(a), hash%order(b), list)
+            if (entries%are_near(a, b, alert)) call add_pair(self, bodies, region, entries, a, b, list)
           end do
         end do
         do k = 1, merge(4, 13, bodies%nd == 2)
@@ -220,7 +230,7 @@ contains
           if (other == 0 .or. other == cell) cycle
           do a = hash%first(cell), hash%first(cell + 1) - 1
             do b = hash%first(other), hash%first(other + 1) - 1
-              call test_pair(self, bodies, extent, region, entries, hash%order(a), hash%order(b), list)
+              if (entries%are_near(a, b, alert)) call add_pair(self, bodies, region, entries, a, b, list)
             end do
           end do
         end do
@@ -229,10 +239,9 @@ contains
   end subroutine search_class
 
   !> List the near pairs of two classes. A grain of a larger class never lies farther off than one of the cells of that class.
-  subroutine search_larger(self, bodies, extent, region, entries, list)
+  subroutine search_larger(self, bodies, region, entries, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
-    real(dp), intent(in), contiguous :: extent(:)
     class(region_t), intent(in) :: region
     type(entries_t), intent(in) :: entries
     type(neighbour_list_t), intent(inout) :: list
@@ -253,7 +262,7 @@ contains
               other = entries%hash%find(cell_key(l, near))
               if (other == 0) cycle
               do b = entries%hash%first(other), entries%hash%first(other + 1) - 1
-                call test_pair(self, bodies, extent, region, entries, a, entries%hash%order(b), list)
+                if (entries%are_near(a, b, self%rule%alert_distance)) call add_pair(self, bodies, region, entries, a, b, list)
               end do
             end do
           end do
@@ -262,28 +271,22 @@ contains
     end do
   end subroutine search_larger
 
-  !> List entries a and b where they are near, the subdomain owns their pair, and this is the one of its images that counts.
-  subroutine test_pair(self, bodies, extent, region, entries, a, b, list)
+  !> List entries a and b, which are near, where the subdomain owns their pair and this is the one of its images that counts.
+  subroutine add_pair(self, bodies, region, entries, a, b, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
-    real(dp), intent(in), contiguous :: extent(:)
     class(region_t), intent(in) :: region
     type(entries_t), intent(in) :: entries
     integer, intent(in) :: a, b
     type(neighbour_list_t), intent(inout) :: list
     integer :: i, j, shift(3), periods(3)
-    real(dp) :: antagonist(3), point(3), square
+    real(dp) :: antagonist(3), point(3)
     logical :: periodic
-    integer :: d, nd
+    integer :: nd
 
     i = entries%body(a)
     j = entries%body(b)
     nd = bodies%nd
-    square = 0.0_dp
-    do d = 1, nd
-      square = square + (entries%position(d, a) - entries%position(d, b))**2
-    end do
-    if (square > (extent(i) + extent(j) + self%rule%alert_distance)**2) return
     if (bodies%glued(i) > 0 .and. bodies%glued(j) > 0) return
     if (allocated(self%rule%filter%passes)) then
       if (self%rule%filter%lets_pass(bodies, self%boundaries, i, j)) return
@@ -303,15 +306,17 @@ contains
       i = entries%body(b)
       j = entries%body(a)
     end if
-    antagonist(1:nd) = bodies%position(:, j)
-    if (periodic) antagonist(1:nd) = antagonist(1:nd) + shift(1:nd)*self%period%length(1:nd)
-    point(1:nd) = owner_point(self%rule%kind, bodies%position(:, i), antagonist(1:nd))
-    if (periodic) then
-      if (.not. is_where_owned(self%period, point(1:nd), periods)) return
+    if (periodic .or. .not. self%is_alone) then
+      antagonist(1:nd) = bodies%position(:, j)
+      if (periodic) call self%period%add_shift(shift_code(shift), 1, antagonist(1:nd))
+      point(1:nd) = owner_point(self%rule%kind, bodies%position(:, i), antagonist(1:nd))
+      if (periodic) then
+        if (.not. is_where_owned(self%period, point(1:nd), periods)) return
+      end if
+      if (region%owner(point(1:nd)) /= self%subdomain) return
     end if
-    if (region%owner(point(1:nd)) /= self%subdomain) return
     call list%add(i, j, merge(shift_code(shift), no_shift, periodic))
-  end subroutine test_pair
+  end subroutine add_pair
 
   !> Put the pairs in sweep order of their owner points.
   subroutine sort_list(self, bodies, memory, list)
@@ -322,7 +327,7 @@ contains
     integer(i8), allocatable :: id(:, :)
     real(dp), allocatable :: point(:, :)
     integer, allocatable :: order(:)
-    real(dp) :: antagonist(bodies%nd), lower(bodies%nd)
+    real(dp) :: antagonist(bodies%nd)
     integer :: p, nd
 
     nd = bodies%nd
@@ -339,9 +344,7 @@ contains
         point(:, p) = owner_point(self%rule%kind, bodies%position(:, list%candidate(p)), antagonist)
       end if
     end do
-    lower(:) = 0.0_dp
-    if (list%n > 0) lower(:) = minval(point, dim=2)
-    call sweep_order(point, lower, self%rule%sweep_edge(), id, order)
+    call sweep_order(point, self%corner(1:nd), self%rule%sweep_edge(), id, order)
     if (bodies%no > 0 .or. has_facets(self%boundaries)) call repeat_pairs(self%counts, self%boundaries, self%rule, bodies, &
       & list, order)
     call list%finish(order, memory)
@@ -381,13 +384,13 @@ contains
     type(period_t), intent(in) :: period
     type(neighbour_rule_t), intent(in) :: rule
     type(entries_t), intent(out) :: entries
-    integer :: k, x, y, z, low(3), high(3), round, n
+    integer :: k, i, round, n, n_images, shifts(3, most_images)
     real(dp) :: largest
 
     if (.not. period%on()) then
       entries%n = bodies%n
       entries%position = bodies%position
-      allocate (entries%body(bodies%n))
+      allocate (entries%body(bodies%n), entries%shift(3, 0))
       do k = 1, bodies%n
         entries%body(k) = k
       end do
@@ -397,42 +400,19 @@ contains
     do round = 1, 2
       n = 0
       do k = 1, bodies%n
-        call image_range(bodies%position(:, k), extent(k) + largest + rule%alert_distance, low, high)
-        do z = low(3), high(3)
-          do y = low(2), high(2)
-            do x = low(1), high(1)
-              n = n + 1
-              if (round == 1) cycle
-              entries%body(n) = k
-              entries%shift(1, n) = x
-              entries%shift(2, n) = y
-              entries%shift(3, n) = z
-              entries%position(:, n) = bodies%position(:, k) + entries%shift(1:bodies%nd, n)*period%length(1:bodies%nd)
-            end do
-          end do
+        call period%find_images(bodies%position(:, k), extent(k) + largest + rule%alert_distance, shifts, n_images)
+        do i = 1, n_images
+          n = n + 1
+          if (round == 1) cycle
+          entries%body(n) = k
+          entries%shift(:, n) = shifts(:, i)
+          entries%position(:, n) = bodies%position(:, k)
+          call period%add_shift(shift_code(shifts(:, i)), 1, entries%position(:, n))
         end do
       end do
       entries%n = n
       if (round == 1) allocate (entries%body(n), entries%shift(3, n), entries%position(bodies%nd, n))
     end do
-
-  contains
-
-    !> Shifts that leave a grain within `margin` of the cell.
-    pure subroutine image_range(x, margin, low, high)
-      real(dp), intent(in) :: x(:), margin
-      integer, intent(out) :: low(3), high(3)
-      integer :: d
-
-      low(:) = 0
-      high(:) = 0
-      do d = 1, size(x)
-        if (.not. period%length(d) > 0.0_dp) cycle
-        if (x(d) - period%origin(d) <= margin) high(d) = 1
-        if (period%origin(d) + period%length(d) - x(d) <= margin) low(d) = -1
-      end do
-    end subroutine image_range
-
   end subroutine make_entries
 
 end module gravier_neighbour_search

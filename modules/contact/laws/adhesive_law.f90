@@ -10,7 +10,7 @@ module gravier_adhesive_law
   type, extends(contact_law_t) :: adhesive_law_t
     real(dp) :: friction = 0.0_dp
     !> [N]
-    real(dp) :: adhesion = 0.0_dp
+    real(dp), private :: adhesion = 0.0_dp
   contains
     procedure, nopass :: kind => adhesive_kind
     procedure, nopass :: keys => adhesive_keys

@@ -15,10 +15,10 @@ module gravier_bonded_law
   type, extends(contact_law_t) :: bonded_law_t
     real(dp) :: friction = 0.0_dp
     !> [N]
-    real(dp) :: bond_strength = 0.0_dp
-    real(dp) :: bond_friction = 0.0_dp
+    real(dp), private :: bond_strength = 0.0_dp
+    real(dp), private :: bond_friction = 0.0_dp
     !> [m]
-    real(dp) :: bond_distance = 0.0_dp
+    real(dp), private :: bond_distance = 0.0_dp
   contains
     procedure, nopass :: kind => bonded_kind
     procedure, nopass :: keys => bonded_keys

@@ -15,9 +15,9 @@ module gravier_capillary_law
   type, extends(contact_law_t) :: capillary_law_t
     real(dp) :: friction = 0.0_dp
     !> [N/m]
-    real(dp) :: capillarity = 0.0_dp
+    real(dp), private :: capillarity = 0.0_dp
     !> [m]
-    real(dp) :: decay_length = 1.0_dp, debonding_distance = 0.0_dp
+    real(dp), private :: decay_length = 1.0_dp, debonding_distance = 0.0_dp
   contains
     procedure, nopass :: kind => capillary_kind
     procedure, nopass :: keys => capillary_keys

@@ -63,7 +63,7 @@ module gravier_contact_law
     !> bodies of its two materials pass through each other: their pairs are never listed
     logical :: passes = .false.
     !> the largest coefficients that it hands over; all but that of friction are the same for all its pairs
-    type(coefficients_t) :: largest
+    type(coefficients_t) :: largest = coefficients_t()
     !> gap up to which bodies that have not been nearer act on each other [m]
     real(dp) :: range = 0.0_dp
     !> of values that keep the rules of their keys but do not go together: the first key at fault and what is expected of it

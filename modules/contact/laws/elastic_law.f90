@@ -16,9 +16,9 @@ module gravier_elastic_law
   type, extends(contact_law_t), abstract :: spring_law_t
     real(dp) :: friction = 0.0_dp
     !> what all pairs have in common
-    type(spring_t) :: spring
+    type(spring_t) :: spring = spring_t()
     !> [N]
-    real(dp) :: pull_off = 0.0_dp
+    real(dp), private :: pull_off = 0.0_dp
   contains
     procedure :: set_springs => spring_law_set_springs
     procedure :: begin_pair => spring_law_begin_pair
@@ -28,7 +28,7 @@ module gravier_elastic_law
     !> [N/m]; kappa; [Pa, N/m in 2D]
     real(dp) :: stiffness = 0.0_dp, number = 0.0_dp, pressure = 0.0_dp
     !> tangential stiffness over the normal one
-    real(dp) :: ratio = 1.0_dp
+    real(dp), private :: ratio = 1.0_dp
   contains
     procedure, nopass :: kind => elastic_kind
     procedure, nopass :: keys => elastic_keys

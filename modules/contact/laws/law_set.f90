@@ -31,7 +31,7 @@ module gravier_law_set
     !> laws of pairs of materials from 1 on; the default law of grains at 0, that of boundary b at -b (-boundaries to laws)
     type(scene_law_t), allocatable :: of(:)
     !> place in `of` of the law of two materials, 0 where a default law holds (materials, materials)
-    integer, allocatable :: of_pair(:, :)
+    integer, private, allocatable :: of_pair(:, :)
     !> some law has other terms for each pair
     logical :: varies = .false.
     !> some law attracts, has a memory, has springs, is one of spheres alone

@@ -9,6 +9,7 @@ module gravier_velocity_law
   public :: velocity_law_t
 
   type, extends(contact_law_t) :: velocity_law_t
+    private
     real(dp) :: static_friction = 0.0_dp, dynamic_friction = 0.0_dp
     !> [m/s]
     real(dp) :: slip_scale = 1.0_dp

@@ -6,7 +6,7 @@
 !> lowest of them.
 module gravier_convex_distance
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, sector_of
   use gravier_nearest_simplex, only: find_nearest
   implicit none
   private
@@ -47,8 +47,6 @@ module gravier_convex_distance
   integer, parameter :: most_back = 8
   !> more steps than a search takes
   integer, parameter :: most_steps = 200
-  !> from this number of vertices on, the farthest is searched along edges
-  integer, parameter :: many_vertices = 48
   !> a length beyond all others whose fourth power can be had [m]
   real(dp), parameter :: endless = 1.0e70_dp
   !> below this distance, in parts of the size of the differences, cores count as overlapping
@@ -70,14 +68,12 @@ contains
     v(:) = -pair%way
     if (.not. dot_product(v, v) > 0.0_dp) v(3) = 1.0_dp
     n = 0
-    i = 1
-    j = 1
     size_squared = 0.0_dp
     squared = huge(1.0_dp)
     along = 0.0_dp
     back = 0
     done = .false.
-    walk = max(size(a%vertex, 2), size(b%vertex, 2)) >= many_vertices
+    walk = allocated(a%start) .or. allocated(b%start)
     do while (found%steps < most_steps)
       found%steps = found%steps + 1
       call support_a(a, v, walk, i)
@@ -249,9 +245,9 @@ contains
   pure subroutine support_a(a, v, walk, i)
     type(convex_piece_t), intent(in) :: a
     real(dp), intent(in) :: v(3)
-    !> whether to go along edges, from a vertex on
+    !> whether a search along edges will do
     logical, intent(in) :: walk
-    integer, intent(inout) :: i
+    integer, intent(out) :: i
     real(dp) :: along(3)
 
     along(:) = -v
@@ -264,7 +260,7 @@ contains
     type(placed_pair_t), intent(in) :: pair
     real(dp), intent(in) :: v(3)
     logical, intent(in) :: walk
-    integer, intent(inout) :: j
+    integer, intent(out) :: j
     real(dp) :: along(3)
     integer :: k
 
@@ -274,17 +270,17 @@ contains
     call find_support(b, along, walk, j)
   end subroutine support_b
 
-  !> The vertex that is farthest along a direction, the lowest of those equally far. A walk goes along edges that lead farther, and is
-  !> for pieces of many vertices; it may end a rounding too early.
+  !> The vertex that is farthest along a direction, the lowest of those equally far. In a piece of many vertices a walk goes along
+  !> edges that lead farther, from the farthest vertex along a direction nearby; it may end a rounding too early.
   pure subroutine find_support(piece, along, walk, best)
     type(convex_piece_t), intent(in) :: piece
     real(dp), intent(in) :: along(3)
     logical, intent(in) :: walk
-    integer, intent(inout) :: best
+    integer, intent(out) :: best
     real(dp) :: farthest, reach
     integer :: k, from
 
-    if (.not. walk) then
+    if (.not. walk .or. .not. allocated(piece%start)) then
       best = 1
       farthest = along(1)*piece%vertex(1, 1) + along(2)*piece%vertex(2, 1) + along(3)*piece%vertex(3, 1)
       do k = 2, size(piece%vertex, 2)
@@ -296,6 +292,7 @@ contains
       end do
       return
     end if
+    best = piece%start(sector_of(along))
     farthest = along(1)*piece%vertex(1, best) + along(2)*piece%vertex(2, best) + along(3)*piece%vertex(3, best)
     do
       from = best

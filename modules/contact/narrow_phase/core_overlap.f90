@@ -67,8 +67,6 @@ contains
     integer :: i, j
     logical :: walk
 
-    i = 1
-    j = 1
     ! walks are fast and bound the separation from above; all vertices tell it
     walk = .true.
     do

@@ -203,7 +203,6 @@ contains
     frame%normal(:) = normal
     call find_tangents(frame)
     along(:) = -normal
-    lowest(1) = 1
     call find_support(a, along, .false., lowest(1))
     call find_feature(a, along, lowest, feature)
     feature%at = at

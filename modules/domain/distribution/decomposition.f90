@@ -3,7 +3,7 @@ module gravier_decomposition
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_sorting, only: argsort, find_sorted
-  use gravier_periodic, only: period_t
+  use gravier_periodic, only: period_t, most_images, shift_code
   use gravier_communicator, only: communicator_t
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, place_word
@@ -11,7 +11,7 @@ module gravier_decomposition
   use gravier_body_figures, only: body_figures_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_rule, only: neighbour_rule_t
-  use gravier_partition, only: partition_t
+  use gravier_partition, only: partition_t, add_once
   implicit none
   private
   public :: decomposition_t
@@ -23,8 +23,8 @@ module gravier_decomposition
     type(period_t) :: period
     type(neighbour_rule_t) :: rule
     integer :: n_subdomains = 1
-    !> space dimension, degrees of freedom of a body, entries of an image and of an orientation
-    integer :: nd = 2, nv = 3, ni = 0, no = 0
+    !> space dimension, degrees of freedom of a body, entries of an image, of an orientation and of an applied force
+    integer :: nd = 2, nv = 3, ni = 0, no = 0, na = 0
     !> first subdomain of this rank; owned(s) belongs to subdomain first + s - 1
     integer :: first = 1
     type(body_set_t), allocatable :: owned(:)
@@ -34,10 +34,13 @@ module gravier_decomposition
     type(body_figures_t) :: figures
     !> corners of the box that grains enter in, which partitions cover (nd, 2) [m]; not allocated where none enter
     real(dp), allocatable :: entry_box(:, :)
+    !> identifiers of free grains that leave in the next step, ascending, the same on every rank; else not allocated
+    integer(i8), allocatable :: dismissed(:)
   contains
     procedure :: init => decomposition_init
     procedure :: migrate => decomposition_migrate
     procedure :: deliver => decomposition_deliver
+    procedure :: find_near => decomposition_find_near
     procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
     procedure :: subdomain_of => decomposition_subdomain_of
@@ -64,6 +67,7 @@ contains
     self%nv = layout%nv
     self%ni = layout%ni
     self%no = layout%no
+    self%na = layout%na
     self%period = period
     if (.not. allocated(self%boundaries)) allocate (self%boundaries(0))
     self%first = comm%first_subdomain(comm%rank, n_subdomains)
@@ -86,7 +90,7 @@ contains
   pure type(body_layout_t) function decomposition_layout(self) result(layout)
     class(decomposition_t), intent(in) :: self
 
-    layout = body_layout_t(self%nd, self%nv, self%ni, self%no)
+    layout = body_layout_t(self%nd, self%nv, self%ni, self%no, self%na)
   end function decomposition_layout
 
   !> Subdomain of this rank and place among its owned bodies of a grain.
@@ -158,10 +162,12 @@ contains
     type(body_set_t), intent(in), optional :: newcomers
     type(body_set_t) :: leaving
     integer(i8), allocatable :: records(:, :), received(:, :)
-    integer :: k, s
+    integer :: k, s, turns(3)
 
+    call self%period%straighten(turns)
     if (self%ni > 0) then
       do s = 1, size(self%owned)
+        call renumber_images(turns, self%owned(s))
         call wrap_grains(self%period, self%owned(s))
       end do
     end if
@@ -176,17 +182,70 @@ contains
     call take_in(self, received)
   end subroutine decomposition_migrate
 
-  !> Bring grains into the period, counting their images.
+  !> Count the images of grains by the edges that `straighten` of the period has taken.
+  pure subroutine renumber_images(turns, bodies)
+    integer, intent(in) :: turns(3)
+    type(body_set_t), intent(inout) :: bodies
+    integer :: k
+
+    if (all(turns == 0)) return
+    do k = 1, bodies%n
+      associate (image => bodies%image(:, k))
+        if (bodies%nd == 3) then
+          image(2) = image(2) + turns(3)*image(3)
+          image(1) = image(1) + turns(2)*image(3)
+        end if
+        image(1) = image(1) + turns(1)*image(2)
+      end associate
+    end do
+  end subroutine renumber_images
+
+  !> Bring grains into the period, counting their images. Where the cell moves, the image that is taken has a velocity of its own.
   pure subroutine wrap_grains(period, bodies)
     type(period_t), intent(in) :: period
     type(body_set_t), intent(inout) :: bodies
-    integer :: k, turns(bodies%nd)
+    integer :: k, turns(bodies%nd), shift(3)
 
     do k = 1, bodies%n
       call period%wrap(bodies%position(:, k), turns)
       bodies%image(:, k) = bodies%image(:, k) + turns
+      if (.not. period%moves .or. all(turns == 0)) cycle
+      shift(:) = 0
+      shift(1:bodies%nd) = -turns
+      call period%add_velocity(shift, bodies%velocity(1:bodies%nd, k))
     end do
   end subroutine wrap_grains
+
+  !> Subdomains that may hold a point within `reach` of any image of `point`, each once. Partitions know nothing of a cell that
+  !> moves: its images are asked for one by one.
+  subroutine decomposition_find_near(self, point, reach, list, n)
+    class(decomposition_t), intent(in) :: self
+    !> (nd) in the cell [m]
+    real(dp), intent(in), contiguous :: point(:)
+    real(dp), intent(in) :: reach
+    !> the first n are set; grown where needed
+    integer, allocatable, intent(inout) :: list(:)
+    integer, intent(out) :: n
+    integer, allocatable :: more(:)
+    integer :: shifts(3, most_images), n_images, n_more, i, j
+    real(dp) :: image(self%nd)
+
+    if (.not. self%period%moves) then
+      call self%partition%near(point, reach, list, n)
+      return
+    end if
+    n = 0
+    allocate (more(8))
+    call self%period%find_images(point, reach, shifts, n_images)
+    do i = 1, n_images
+      image(:) = point
+      call self%period%add_shift(shift_code(shifts(:, i)), 1, image)
+      call self%partition%near(image, reach, more, n_more)
+      do j = 1, n_more
+        call add_once(list, n, more(j))
+      end do
+    end do
+  end subroutine decomposition_find_near
 
   !> Bring records to the ranks of the subdomains that hold a point. Collective.
   subroutine decomposition_deliver(self, point_word, records, received)
@@ -220,13 +279,14 @@ contains
     integer(i8), intent(inout), contiguous :: records(:, :)
     integer, allocatable, intent(out) :: destination(:)
     real(dp) :: point(self%nd)
-    integer :: k, d, owner
+    integer :: k, d, owner, turns(self%nd)
 
     allocate (destination(size(records, 2)))
     do k = 1, size(records, 2)
       do d = 1, self%nd
         point(d) = transfer(records(point_word + d - 1, k), 0.0_dp)
       end do
+      if (self%period%moves) call self%period%wrap(point, turns)
       owner = self%partition%owner(point)
       if (owner == 0) owner = self%partition%relay(point)
       records(1, k) = owner

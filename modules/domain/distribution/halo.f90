@@ -3,16 +3,18 @@
 module gravier_halo
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
+  use gravier_periodic, only: period_t, gradient_times
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_body_store, only: body_layout_t, body_set_t, append_bodies
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_rule, only: neighbour_rule_t
-  use gravier_neighbour_search, only: neighbour_search_t, sweep_order
+  use gravier_cell_order, only: sweep_order
+  use gravier_neighbour_search, only: neighbour_search_t
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: local_bodies_t, halo_t
+  public :: local_bodies_t, halo_t, mask_t
 
   !> The grains that a subdomain sees, in an order that depends on them alone, and its near pairs.
   type :: local_bodies_t
@@ -20,6 +22,8 @@ module gravier_halo
     !> subdomain that owns each, and for its own the place among the owned (n); 0 for ghosts
     integer, allocatable :: owner(:), origin(:)
     type(neighbour_list_t) :: list
+    !> the cell as it is, for the velocities of images; set where it moves
+    type(period_t) :: period
   end type local_bodies_t
 
   !> The grains of a subdomain when its list was made: their places (nd, n) [m] and speeds (n) [m/s].
@@ -27,32 +31,49 @@ module gravier_halo
     real(dp), allocatable :: position(:, :), speed(:)
   end type reference_t
 
+  !> One of each body of a set, of those that stay.
+  type :: mask_t
+    logical, allocatable :: of(:)
+  end type mask_t
+
+  type :: place_t
+    integer, allocatable :: of(:)
+  end type place_t
+
   !> The halo of the subdomains of this rank, and who sends which grain to whom.
   type :: halo_t
     type(local_bodies_t), allocatable :: view(:)
     !> as they were when the lists were made
     type(reference_t), allocatable :: reference(:)
     type(boundary_t), allocatable :: reference_boundaries(:)
+    type(period_t) :: reference_period
     !> ghosts sent: subdomain of this rank and place among its owned bodies (2, n); subdomain that sees it, and its rank (n)
-    integer, allocatable :: sent(:, :), recipient(:), destination(:)
+    integer, private, allocatable :: sent(:, :), recipient(:), destination(:)
     !> ghosts received, in the order of arrival: subdomain of this rank and place among its local bodies (2, n)
-    integer, allocatable :: arrival(:, :)
+    integer, private, allocatable :: arrival(:, :)
     !> to be set before the first list
     type(pair_memory_t) :: memory
     !> lists made so far
     integer(i8) :: builds = 0
+    !> largest extent of a body when the lists were made [m]
+    real(dp) :: largest_extent = 0.0_dp
+    !> least coordinates of the bodies when lists were first made, from which the cells of orders are counted [m]
+    real(dp) :: corner(3) = 0.0_dp
   contains
     procedure :: build => halo_build
     procedure :: refresh => halo_refresh
     procedure :: are_due => halo_are_due
+    procedure :: drop => halo_drop
   end type halo_t
 
 contains
 
   !> Make the local bodies and lists from the grains as they have migrated. Collective.
-  subroutine halo_build(self, decomposition)
+  subroutine halo_build(self, decomposition, least_extent)
     class(halo_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
+    !> largest extent of bodies that were there when the lists were first made, and have left since [m]
+    real(dp), intent(in), optional :: least_extent
     type(body_set_t), allocatable :: ghosts(:)
     integer(i8), allocatable :: records(:, :), received(:, :)
     type(neighbour_search_t) :: search
@@ -60,6 +81,10 @@ contains
 
     search%rule = decomposition%rule
     call find_largest_extent(decomposition, search%rule)
+    if (present(least_extent)) search%rule%largest_extent = max(search%rule%largest_extent, least_extent)
+    self%largest_extent = search%rule%largest_extent
+    if (self%builds == 0 .and. .not. present(least_extent)) call find_corner(decomposition, self%corner)
+    search%corner(:) = self%corner
     call plan_ghosts(self, decomposition, search%rule)
     call write_ghosts(self, decomposition, records)
     call sparse_exchange(decomposition%comm, records, self%destination, received)
@@ -69,18 +94,40 @@ contains
     allocate (self%view(size(decomposition%owned)), self%reference(size(decomposition%owned)))
     call make_views(self, decomposition, ghosts, received)
     search%period = decomposition%period
+    search%is_alone = decomposition%n_subdomains == 1
     search%boundaries = decomposition%boundaries
     search%counts = decomposition%shapes%counts
     do s = 1, size(self%view)
       call note_reference(decomposition%owned(s), self%reference(s))
       associate (view => self%view(s))
         search%subdomain = decomposition%subdomain_of(s)
+        view%period = decomposition%period
         call search%find(view%bodies, view%owner, decomposition%partition, self%memory, view%list)
       end associate
     end do
     self%reference_boundaries = decomposition%boundaries
+    self%reference_period = decomposition%period
     self%builds = self%builds + 1
   end subroutine halo_build
+
+  !> The least coordinates of all bodies, 0 without bodies. Collective.
+  subroutine find_corner(decomposition, corner)
+    type(decomposition_t), intent(in) :: decomposition
+    real(dp), intent(out) :: corner(3)
+    integer :: s, d
+
+    corner(:) = 0.0_dp
+    do d = 1, decomposition%nd
+      corner(d) = huge(1.0_dp)
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s))
+          if (owned%n > 0) corner(d) = min(corner(d), minval(owned%position(d, 1:owned%n)))
+        end associate
+      end do
+      corner(d) = decomposition%comm%lowest(corner(d))
+      if (.not. corner(d) < huge(1.0_dp)) corner(d) = 0.0_dp
+    end do
+  end subroutine find_corner
 
   !> The largest extent of all bodies, into the rule. Collective.
   subroutine find_largest_extent(decomposition, rule)
@@ -130,7 +177,7 @@ contains
         associate (owned => decomposition%owned(s))
           do k = 1, owned%n
             reach = rule%reach(owned%radius(k), norm2(owned%velocity(1:owned%nd, k)))
-            call decomposition%partition%near(owned%position(:, k), reach, near, n_near)
+            call decomposition%find_near(owned%position(:, k), reach, near, n_near)
             do j = 1, n_near
               if (near(j) == decomposition%subdomain_of(s)) cycle
               n = n + 1
@@ -205,7 +252,6 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable :: id(:, :)
     integer, allocatable :: order(:), owner(:), origin(:), place(:), offset(:)
-    real(dp) :: lower(decomposition%nd)
     integer :: s, k
 
     allocate (offset(size(self%view) + 1))
@@ -218,9 +264,7 @@ contains
       associate (view => self%view(s))
         allocate (order(view%bodies%n), id(1, view%bodies%n))
         id(1, :) = view%bodies%id
-        lower(:) = 0.0_dp
-        if (view%bodies%n > 0) lower(:) = minval(view%bodies%position, dim=2)
-        call sweep_order(view%bodies%position, lower, decomposition%rule%sweep_edge(), id, order)
+        call sweep_order(view%bodies%position, self%corner(1:view%bodies%nd), decomposition%rule%sweep_edge(), id, order)
         call view%bodies%reorder(order)
         call move_alloc(view%owner, owner)
         call move_alloc(view%origin, origin)
@@ -257,6 +301,7 @@ contains
     end do
     do s = 1, size(self%view)
       associate (view => self%view(s), owned => decomposition%owned(s))
+        if (decomposition%period%moves) view%period = decomposition%period
         do k = 1, view%bodies%n
           if (view%origin(k) == 0) cycle
           call view%bodies%renew(k, owned, view%origin(k))
@@ -265,23 +310,142 @@ contains
     end do
   end subroutine halo_refresh
 
+  !> Drop the bodies that leave the scene from views and lists, which stay valid for the others. The bodies are those whose mask is
+  !> false, of the grains of this rank and of all that its subdomains see; a ghost and its grain leave together.
+  subroutine halo_drop(self, owned_stays, view_stays)
+    class(halo_t), intent(inout) :: self
+    !> of the subdomains of this rank
+    type(mask_t), intent(in) :: owned_stays(:), view_stays(:)
+    type(place_t) :: owned(size(owned_stays)), seen(size(view_stays))
+    integer :: s, k, n
+
+    do s = 1, size(self%view)
+      call number_places(owned_stays(s)%of, owned(s)%of)
+      call number_places(view_stays(s)%of, seen(s)%of)
+      call drop_references(self%reference(s), owned(s)%of)
+      associate (view => self%view(s))
+        do k = 1, view%bodies%n
+          if (seen(s)%of(k) == 0) cycle
+          n = view%origin(k)
+          if (n > 0) n = owned(s)%of(n)
+          view%owner(seen(s)%of(k)) = view%owner(k)
+          view%origin(seen(s)%of(k)) = n
+        end do
+        call view%bodies%keep_only(view_stays(s)%of)
+        call shorten(view%owner, view%bodies%n)
+        call shorten(view%origin, view%bodies%n)
+        call view%list%drop(seen(s)%of)
+      end associate
+    end do
+    n = 0
+    do k = 1, size(self%recipient)
+      if (owned(self%sent(1, k))%of(self%sent(2, k)) == 0) cycle
+      n = n + 1
+      self%sent(1, n) = self%sent(1, k)
+      self%sent(2, n) = owned(self%sent(1, k))%of(self%sent(2, k))
+      self%recipient(n) = self%recipient(k)
+      self%destination(n) = self%destination(k)
+    end do
+    call shorten_columns(self%sent, n)
+    call shorten(self%recipient, n)
+    call shorten(self%destination, n)
+    n = 0
+    do k = 1, size(self%arrival, 2)
+      if (seen(self%arrival(1, k))%of(self%arrival(2, k)) == 0) cycle
+      n = n + 1
+      self%arrival(1, n) = self%arrival(1, k)
+      self%arrival(2, n) = seen(self%arrival(1, k))%of(self%arrival(2, k))
+    end do
+    call shorten_columns(self%arrival, n)
+  end subroutine halo_drop
+
+  !> New places of what stays, 0 for the others.
+  pure subroutine number_places(stays, place)
+    logical, intent(in), contiguous :: stays(:)
+    integer, allocatable, intent(out) :: place(:)
+    integer :: k, n
+
+    allocate (place(size(stays)), source=0)
+    n = 0
+    do k = 1, size(stays)
+      if (.not. stays(k)) cycle
+      n = n + 1
+      place(k) = n
+    end do
+  end subroutine number_places
+
+  !> What lists were made for, of the grains that stay. Spare room stays.
+  pure subroutine drop_references(reference, place)
+    type(reference_t), intent(inout) :: reference
+    integer, intent(in), contiguous :: place(:)
+    integer :: k, n
+
+    n = 0
+    do k = 1, size(place)
+      if (place(k) == 0) cycle
+      n = n + 1
+      reference%position(:, n) = reference%position(:, k)
+      reference%speed(n) = reference%speed(k)
+    end do
+  end subroutine drop_references
+
+  !> Keep the first numbers, or columns.
+  pure subroutine shorten(list, n)
+    integer, allocatable, intent(inout) :: list(:)
+    integer, intent(in) :: n
+    integer, allocatable :: kept(:)
+
+    allocate (kept(n))
+    kept(:) = list(1:n)
+    call move_alloc(kept, list)
+  end subroutine shorten
+
+  pure subroutine shorten_columns(table, n)
+    integer, allocatable, intent(inout) :: table(:, :)
+    integer, intent(in) :: n
+    integer, allocatable :: kept(:, :)
+
+    allocate (kept(size(table, 1), n))
+    kept(:, :) = table(:, 1:n)
+    call move_alloc(kept, table)
+  end subroutine shorten_columns
+
   !> Whether some pair outside the lists may have come within the alert distance: a grain has gone farther than its margin, or a
-  !> boundary farther than its own and what all grains have left of theirs. Collective.
+  !> boundary farther than its own and what all grains have left of theirs. In a cell that moves, ways are those besides the motion
+  !> F of the cell, and what the cell brings nearer by deforming is a part |F - 1| of the distance of a pair. Collective.
   logical function halo_are_due(self, decomposition) result(due)
     class(halo_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
     !> least that a grain has left of its margin
-    real(dp) :: left
-    integer :: s, k, b
+    real(dp) :: left, strain(3, 3), centre(3), nearer
+    real(dp) :: way(decomposition%nd), place(decomposition%nd), carried(decomposition%nd)
+    integer :: s, k, b, d, nd
 
     due = .true.
     if (.not. allocated(self%view)) return
-    associate (rule => decomposition%rule)
+    nd = decomposition%nd
+    nearer = 0.0_dp
+    strain(:, :) = 0.0_dp
+    associate (rule => decomposition%rule, moves => decomposition%period%moves)
+      if (moves) then
+        strain(:, :) = decomposition%period%strain_since(self%reference_period)
+        do d = 1, 3
+          strain(d, d) = strain(d, d) - 1.0_dp
+        end do
+        centre(:) = decomposition%period%centre()
+        nearer = 0.5_dp*norm2(strain)*(2.0_dp*self%largest_extent + rule%alert_distance)
+      end if
       left = huge(1.0_dp)
       do s = 1, size(decomposition%owned)
         associate (owned => decomposition%owned(s), before => self%reference(s))
           do k = 1, owned%n
-            left = min(left, rule%margin(before%speed(k)) - norm2(owned%position(:, k) - before%position(:, k)))
+            way(:) = owned%position(:, k) - before%position(:, k)
+            if (moves) then
+              place(:) = before%position(:, k) - centre(1:nd)
+              carried(:) = gradient_times(strain, place)
+              way(:) = way - carried
+            end if
+            left = min(left, rule%margin(before%speed(k)) - nearer - norm2(way))
           end do
         end associate
       end do

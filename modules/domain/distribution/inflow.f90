@@ -11,14 +11,28 @@ module gravier_inflow
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: inflow_t, is_clear
+  public :: inflow_t, placed_t, is_clear
+
+  !> Grains with their centres (nd, n) [m] and materials (n).
+  type :: placed_t
+    integer :: n = 0
+    type(new_grain_t), allocatable :: grain(:)
+    real(dp), allocatable :: position(:, :)
+    integer, allocatable :: material(:)
+  end type placed_t
 
   type :: inflow_t
     type(insertion_t), allocatable :: insertions(:)
     !> of the next grain: larger than all that the scene has had
     integer(i8) :: next_id = 1
+    !> grains that a loop of the user's own has placed, the same on every rank: they enter in the next step, before all others
+    type(placed_t) :: given
+    !> those of them that have entered since this run began or went on from a checkpoint, and their mass [kg]
+    integer(i8) :: given_entered = 0
+    real(dp) :: given_mass = 0.0_dp
   contains
     procedure :: exists => inflow_exists
+    procedure :: is_due => inflow_is_due
     procedure :: enter => inflow_enter
     procedure :: entered => inflow_entered
     procedure :: mass => inflow_mass
@@ -32,17 +46,9 @@ module gravier_inflow
     integer(i8), allocatable :: taken(:)
   end type owed_t
 
-  !> Grains that have been placed in a step, with their centres (nd, n) [m] and materials (n).
-  type :: placed_t
-    integer :: n = 0
-    type(new_grain_t), allocatable :: grain(:)
-    real(dp), allocatable :: position(:, :)
-    integer, allocatable :: material(:)
-  end type placed_t
-
 contains
 
-  !> Whether grains enter the scene at some time.
+  !> Whether grains enter by insertions at some time.
   pure logical function inflow_exists(self) result(exists)
     class(inflow_t), intent(in) :: self
 
@@ -50,20 +56,27 @@ contains
     if (allocated(self%insertions)) exists = size(self%insertions) > 0
   end function inflow_exists
 
+  !> Whether grains may enter in the next step.
+  pure logical function inflow_is_due(self) result(due)
+    class(inflow_t), intent(in) :: self
+
+    due = self%exists() .or. self%given%n > 0
+  end function inflow_is_due
+
   !> Grains that have entered so far.
   pure integer(i8) function inflow_entered(self) result(entered)
     class(inflow_t), intent(in) :: self
 
-    entered = 0
-    if (self%exists()) entered = sum(self%insertions%entered)
+    entered = self%given_entered
+    if (self%exists()) entered = entered + sum(self%insertions%entered)
   end function inflow_entered
 
   !> Their mass [kg].
   pure real(dp) function inflow_mass(self) result(mass)
     class(inflow_t), intent(in) :: self
 
-    mass = 0.0_dp
-    if (self%exists()) mass = sum(self%insertions%mass)
+    mass = self%given_mass
+    if (self%exists()) mass = mass + sum(self%insertions%mass)
   end function inflow_mass
 
   !> The accounts of all insertions as words of a checkpoint.
@@ -106,6 +119,7 @@ contains
     integer(i8), allocatable :: words(:)
     integer :: i, first, n
 
+    if (self%given%n > 0) call enter_given(self, decomposition)
     if (.not. self%exists()) return
     allocate (owed(size(self%insertions)))
     n = 0
@@ -132,6 +146,18 @@ contains
     if (placed%n > 0) call create_bodies(decomposition, placed, self%next_id)
     self%next_id = self%next_id + placed%n
   end subroutine inflow_enter
+
+  !> Let the grains enter that were given with their places.
+  subroutine enter_given(self, decomposition)
+    class(inflow_t), intent(inout) :: self
+    type(decomposition_t), intent(inout) :: decomposition
+
+    call create_bodies(decomposition, self%given, self%next_id)
+    self%next_id = self%next_id + self%given%n
+    self%given_entered = self%given_entered + self%given%n
+    self%given_mass = self%given_mass + sum(self%given%grain(1:self%given%n)%mass)
+    self%given%n = 0
+  end subroutine enter_given
 
   !> Candidate places that bodies of this rank take.
   subroutine find_taken(insertion, decomposition, owed)

@@ -310,6 +310,8 @@ contains
       call move_alloc(sub%place, old%place)
       call move_alloc(sub%multiplicity, old%multiplicity)
       call move_alloc(sub%radius, old%radius)
+      call move_alloc(sub%volume, old%volume)
+      call move_alloc(sub%applied, old%applied)
       call move_alloc(sub%v_free, old%v_free)
       call move_alloc(sub%inverse_mass, old%inverse_mass)
       allocate (sub%id, source=old%id)
@@ -317,6 +319,8 @@ contains
       allocate (sub%place, mold=old%place)
       allocate (sub%multiplicity, source=old%multiplicity)
       allocate (sub%radius, mold=old%radius)
+      if (allocated(old%volume)) allocate (sub%volume, mold=old%volume)
+      if (allocated(old%applied)) allocate (sub%applied, mold=old%applied)
       allocate (sub%v_free, source=old%v_free)
       allocate (sub%inverse_mass, source=old%inverse_mass)
       do n = 1, sub%n_grains
@@ -326,10 +330,24 @@ contains
         sub%place(n) = old%place(b)
         sub%multiplicity(n) = old%multiplicity(b)
         sub%radius(n) = old%radius(b)
+        if (allocated(old%volume)) sub%volume(n) = old%volume(b)
+        if (allocated(old%applied)) sub%applied(:, n) = old%applied(:, b)
         sub%v_free(:, n) = old%v_free(:, b)
         sub%inverse_mass(:, n) = old%inverse_mass(:, b)
       end do
+      if (allocated(sub%cell%place)) call reorder_places(sub%cell%place)
     end subroutine reorder
+
+    !> Places of the grains in a cell that moves.
+    subroutine reorder_places(place)
+      real(dp), intent(inout), contiguous :: place(:, :)
+      real(dp) :: before(size(place, 1), size(place, 2))
+
+      before(:, :) = place
+      do n = 1, sub%n_grains
+        place(:, n) = before(:, grain(n))
+      end do
+    end subroutine reorder_places
 
   end subroutine number_shared_first
 

@@ -1,45 +1,63 @@
-!> Grains that leave the scene: behind outlets, or with the boundary that they are glued to.
+!> Grains that leave the scene: behind outlets, with the boundary that they are glued to, or because they were dismissed.
 module gravier_removal
   use gravier_kinds, only: dp, i8
+  use gravier_sorting, only: find_sorted
+  use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_halo, only: mask_t, halo_t
   implicit none
   private
-  public :: some_leave, remove_grains
+  public :: some_leave, remove_grains, drop_grains
 
 contains
 
-  !> Whether grain `k` of subdomain `s` of this rank stays in the scene: its centre lies behind no outlet, and the
-  !> boundary that it is glued to is there.
-  pure logical function stays(decomposition, s, k)
+  !> Whether a grain stays in the scene: its centre lies behind no outlet, the boundary that it is glued to is there, and it was not
+  !> dismissed.
+  pure logical function stays(decomposition, bodies, k)
     type(decomposition_t), intent(in) :: decomposition
-    integer, intent(in) :: s, k
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
     integer :: b
-    real(dp) :: distance, normal(decomposition%nd)
+    real(dp) :: distance, normal(3)
 
     stays = .true.
-    associate (boundaries => decomposition%boundaries, owned => decomposition%owned(s))
-      if (owned%glued(k) > 0) then
-        stays = boundaries(owned%glued(k))%present
+    associate (boundaries => decomposition%boundaries)
+      if (bodies%glued(k) > 0) then
+        stays = boundaries(bodies%glued(k))%present
         return
       end if
+      if (allocated(decomposition%dismissed)) stays = find_sorted(decomposition%dismissed, bodies%id(k)) == 0
       do b = 1, size(boundaries)
         if (.not. (boundaries(b)%lets_out() .and. boundaries(b)%present)) cycle
-        call boundaries(b)%locate(owned%position(:, k), distance, normal)
+        call boundaries(b)%locate(bodies%position(:, k), distance, normal(1:decomposition%nd))
         if (distance < 0.0_dp) stays = .false.
       end do
     end associate
   end function stays
 
-  !> Whether the scene has an outlet.
-  pure logical function has_outlet(decomposition)
+  !> Which bodies of a set stay.
+  subroutine find_staying(decomposition, bodies, mask)
+    type(decomposition_t), intent(in) :: decomposition
+    type(body_set_t), intent(in) :: bodies
+    logical, allocatable, intent(out) :: mask(:)
+    integer :: k
+
+    allocate (mask(bodies%n))
+    do k = 1, bodies%n
+      mask(k) = stays(decomposition, bodies, k)
+    end do
+  end subroutine find_staying
+
+  !> Whether free grains may leave now: the scene has an outlet, or some were dismissed.
+  pure logical function some_may_leave(decomposition)
     type(decomposition_t), intent(in) :: decomposition
     integer :: b
 
-    has_outlet = .false.
+    some_may_leave = allocated(decomposition%dismissed)
     do b = 1, size(decomposition%boundaries)
-      has_outlet = has_outlet .or. decomposition%boundaries(b)%lets_out()
+      some_may_leave = some_may_leave .or. decomposition%boundaries(b)%lets_out()
     end do
-  end function has_outlet
+  end function some_may_leave
 
   !> Whether some grain leaves the scene now. Collective.
   logical function some_leave(decomposition)
@@ -47,10 +65,10 @@ contains
     integer :: s, k
 
     some_leave = .false.
-    if (.not. has_outlet(decomposition)) return
+    if (.not. some_may_leave(decomposition)) return
     do s = 1, size(decomposition%owned)
       do k = 1, decomposition%owned(s)%n
-        if (.not. stays(decomposition, s, k)) some_leave = .true.
+        if (.not. stays(decomposition, decomposition%owned(s), k)) some_leave = .true.
       end do
     end do
     some_leave = decomposition%comm%any_true(some_leave)
@@ -68,30 +86,42 @@ contains
     logical, allocatable :: mask(:)
     integer(i8) :: counts(2)
     real(dp) :: parts(size(decomposition%owned))
-    integer :: s, k
+    integer :: s
 
     n_free = 0
     n_glued = 0
     mass = 0.0_dp
-    if (.not. has_outlet(decomposition) .and. (.not. has_glued .or. all(decomposition%boundaries%present))) return
+    if (.not. some_may_leave(decomposition) .and. (.not. has_glued .or. all(decomposition%boundaries%present))) return
     counts(:) = 0
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
-        allocate (mask(owned%n))
-        do k = 1, owned%n
-          mask(k) = stays(decomposition, s, k)
-        end do
+        call find_staying(decomposition, owned, mask)
         counts(2) = counts(2) + count(.not. mask .and. owned%glued > 0)
         counts(1) = counts(1) + count(.not. mask .and. owned%glued == 0)
         parts(s) = sum(owned%mass, mask=.not. mask .and. owned%glued == 0)
         if (.not. all(mask)) call owned%keep_only(mask)
-        deallocate (mask)
       end associate
     end do
+    if (allocated(decomposition%dismissed)) deallocate (decomposition%dismissed)
     call decomposition%comm%sum_counts(counts)
     n_free = counts(1)
     n_glued = counts(2)
     if (n_free > 0) mass = decomposition%comm%sum_real(parts)
   end subroutine remove_grains
+
+  !> Take the grains that leave out of views and lists, which stay valid for the others, before `remove_grains` takes them out of the
+  !> scene. The views are up to date.
+  subroutine drop_grains(decomposition, halo)
+    type(decomposition_t), intent(in) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    type(mask_t) :: owned_stays(size(decomposition%owned)), view_stays(size(decomposition%owned))
+    integer :: s
+
+    do s = 1, size(decomposition%owned)
+      call find_staying(decomposition, decomposition%owned(s), owned_stays(s)%of)
+      call find_staying(decomposition, halo%view(s)%bodies, view_stays(s)%of)
+    end do
+    call halo%drop(owned_stays, view_stays)
+  end subroutine drop_grains
 
 end module gravier_removal

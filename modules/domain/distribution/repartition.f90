@@ -72,6 +72,8 @@ contains
 
       associate (partition => decomposition%partition)
         partition%period(:) = decomposition%period%length
+        ! a cell that moves is cut as the box that it is, and its images are found by the decomposition
+        if (decomposition%period%moves) partition%period(:) = 0.0_dp
         if (rule%by_graph) then
           call collect_weights(decomposition%nd, halo, bodies, points, weights)
           call partition%init_graph(decomposition%comm, lower, upper, edge, points, weights, rule%subdomains, error)

@@ -11,7 +11,7 @@ module gravier_cell_levels
   use gravier_cell_cut, only: cut_group, refuse_overflow
   implicit none
   private
-  public :: cut_levels, share_out, cells_per_subdomain
+  public :: make_groups, cut_groups, share_out, cells_per_subdomain
 
   !> cells wanted per subdomain, over all cells that are not empty
   integer(i8), parameter :: cells_per_subdomain = 64_i8
@@ -23,58 +23,16 @@ module gravier_cell_levels
 
 contains
 
-  !> Share out cells on two levels. The graph of a group is cut on one rank, and its map given to the ranks that own
-  !> subdomains of it or next to it. Without enough occupied pieces for all subdomains nothing is cut: see `occupied`.
-  !> Collective; an error is that of all ranks.
-  subroutine cut_levels(groups, comm, cells, weight, points, weights, n_subdomains, cell_limit, occupied, error)
+  !> Cut the cells into groups of about as much weight and about as many cells, so that neither grows without bound; the same
+  !> groups on every rank.
+  subroutine make_groups(groups, cells, weight, n_subdomains, cell_limit, error)
     type(cell_groups_t), intent(inout) :: groups
-    type(communicator_t), intent(in) :: comm
     !> split as far as it may be
     type(cell_map_t), intent(in) :: cells
     !> (cells) of all ranks
     integer(i8), intent(in), contiguous :: weight(:)
-    !> (nd, points of this rank) [m]; (points of this rank)
-    real(dp), intent(in), contiguous :: points(:, :)
-    integer, intent(in), contiguous :: weights(:)
     integer, intent(in) :: n_subdomains
     !> entries wanted at most in the graph of a group
-    integer(i8), intent(in) :: cell_limit
-    !> pieces that are not empty; too few where less than n_subdomains
-    integer(i8), intent(out) :: occupied
-    type(error_t), allocatable, intent(inout) :: error
-    integer(i8), allocatable :: records(:, :), most(:), sums(:)
-    integer, allocatable :: counts(:), holder(:)
-    integer :: g
-
-    call make_groups(groups, cells, weight, n_subdomains, cell_limit, error)
-    occupied = huge(1_i8)
-    call comm%agree(error)
-    if (allocated(error)) return
-    call gather_pieces(groups, comm, points, weights, records)
-    allocate (most(groups%n), counts(groups%n), holder(groups%n))
-    call count_pieces(records, most)
-    call comm%sum_counts(most)
-    occupied = sum(most)
-    if (occupied < n_subdomains) return
-    allocate (sums(groups%n))
-    call weigh_groups(groups, weight, sums)
-    call share_out(sums, most, n_subdomains, counts)
-    call groups%set_first(counts)
-    call cut_groups(groups, comm, records, error)
-    call comm%agree(error)
-    if (allocated(error)) return
-    do g = 1, groups%n
-      holder(g) = comm%rank_of(g, groups%n)
-    end do
-    call groups%share(comm, holder)
-  end subroutine cut_levels
-
-  !> Cut the cells into groups of about as much weight and about as many cells, so that neither grows without bound.
-  subroutine make_groups(groups, cells, weight, n_subdomains, cell_limit, error)
-    type(cell_groups_t), intent(inout) :: groups
-    type(cell_map_t), intent(in) :: cells
-    integer(i8), intent(in), contiguous :: weight(:)
-    integer, intent(in) :: n_subdomains
     integer(i8), intent(in) :: cell_limit
     type(error_t), allocatable, intent(inout) :: error
     type(cell_map_t) :: fine
@@ -104,6 +62,41 @@ contains
     call groups%set(fine, max(1, maxval(owner)), owner, flag)
     call refuse_overflow(maxval(groups%length), error)
   end subroutine make_groups
+
+  !> Cut the groups that make_groups made into subdomains, each in its pieces. The graph of a group is cut on one rank, and its map
+  !> given to the ranks that own subdomains of it or next to it. Without enough occupied pieces for all subdomains nothing is cut:
+  !> see `occupied`. Collective; an error is that of all ranks.
+  subroutine cut_groups(groups, comm, points, weights, n_subdomains, occupied, error)
+    type(cell_groups_t), intent(inout) :: groups
+    type(communicator_t), intent(in) :: comm
+    !> (nd, points of this rank) [m]; (points of this rank)
+    real(dp), intent(in), contiguous :: points(:, :)
+    integer, intent(in), contiguous :: weights(:)
+    integer, intent(in) :: n_subdomains
+    !> pieces that are not empty; too few where less than n_subdomains
+    integer(i8), intent(out) :: occupied
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: records(:, :), sums(:, :)
+    integer, allocatable :: counts(:), holder(:)
+    integer :: g
+
+    call gather_pieces(groups, comm, points, weights, records)
+    allocate (sums(groups%n, 2), counts(groups%n), holder(groups%n))
+    call sum_pieces(records, sums(:, 1), sums(:, 2))
+    call comm%sum_counts(sums(:, 1))
+    call comm%sum_counts(sums(:, 2))
+    occupied = sum(sums(:, 1))
+    if (occupied < n_subdomains) return
+    call share_out(sums(:, 2), sums(:, 1), n_subdomains, counts)
+    call groups%set_first(counts)
+    call cut_own_groups(groups, comm, records, error)
+    call comm%agree(error)
+    if (allocated(error)) return
+    do g = 1, groups%n
+      holder(g) = comm%rank_of(g, groups%n)
+    end do
+    call groups%share(comm, holder)
+  end subroutine cut_groups
 
   !> Pieces along the edge of a cell for `wanted` pieces in all.
   pure integer function split_for(cells, occupied, wanted) result(split)
@@ -184,29 +177,21 @@ contains
     merged(:, :) = work(:, 1:n)
   end subroutine merge_records
 
-  pure subroutine count_pieces(records, counts)
+  !> Pieces of each group and their weight.
+  pure subroutine sum_pieces(records, pieces, weight)
+    !> (group, entry, weight), each entry once
     integer(i8), intent(in), contiguous :: records(:, :)
-    integer(i8), intent(out), contiguous :: counts(:)
+    !> (groups)
+    integer(i8), intent(out), contiguous :: pieces(:), weight(:)
     integer :: k
 
-    counts(:) = 0
+    pieces(:) = 0
+    weight(:) = 0
     do k = 1, size(records, 2)
-      counts(records(1, k)) = counts(records(1, k)) + 1
+      pieces(records(1, k)) = pieces(records(1, k)) + 1
+      weight(records(1, k)) = weight(records(1, k)) + records(3, k)
     end do
-  end subroutine count_pieces
-
-  pure subroutine weigh_groups(groups, weight, sums)
-    type(cell_groups_t), intent(in) :: groups
-    !> (cells); (groups)
-    integer(i8), intent(in), contiguous :: weight(:)
-    integer(i8), intent(out), contiguous :: sums(:)
-    integer :: cell
-
-    sums(:) = 0
-    do cell = 1, size(weight)
-      sums(groups%group_of_cell(cell)) = sums(groups%group_of_cell(cell)) + weight(cell)
-    end do
-  end subroutine weigh_groups
+  end subroutine sum_pieces
 
   !> Numbers of subdomains about as the weights, at least 1 and at most `most` each, so that the largest weight per
   !> subdomain is least: below the mean times total/(total - groups) where `most` does not bind.
@@ -258,7 +243,7 @@ contains
   end function count_for
 
   !> Cut the groups that this rank has the pieces of.
-  subroutine cut_groups(groups, comm, records, error)
+  subroutine cut_own_groups(groups, comm, records, error)
     type(cell_groups_t), intent(inout) :: groups
     type(communicator_t), intent(in) :: comm
     !> (group, entry, weight), sorted
@@ -285,6 +270,6 @@ contains
       call move_alloc(owner, groups%maps(groups%known(g))%subdomain)
       deallocate (weight)
     end do
-  end subroutine cut_groups
+  end subroutine cut_own_groups
 
 end module gravier_cell_levels

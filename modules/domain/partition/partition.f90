@@ -9,10 +9,10 @@ module gravier_partition
   use gravier_cell_map, only: cell_map_t
   use gravier_cell_groups, only: cell_groups_t
   use gravier_cell_cut, only: cut_group
-  use gravier_cell_levels, only: cut_levels, cells_per_subdomain
+  use gravier_cell_levels, only: make_groups, cut_groups, cells_per_subdomain
   implicit none
   private
-  public :: partition_t, is_sound_head, head_words, head_record
+  public :: partition_t, add_once, is_sound_head, head_words, head_record
 
   !> kinds of a partition: boxes; cells with one map that every rank has; cells with a map for each group
   integer, parameter :: kind_boxes = 0, kind_cells = 1, kind_groups = 2
@@ -131,7 +131,10 @@ contains
       self%kind = kind_groups
       ! as many pieces along the edge of a cell as leave them no smaller than asked for
       call self%cells%set_split(int(min(cell_edge/edge, real(huge(1), dp)), i4))
-      call cut_levels(self%groups, comm, self%cells, weight, points, weights, n_subdomains, self%cell_limit, occupied, error)
+      call make_groups(self%groups, self%cells, weight, n_subdomains, self%cell_limit, error)
+      call comm%agree(error)
+      if (allocated(error)) return
+      call cut_groups(self%groups, comm, points, weights, n_subdomains, occupied, error)
       call refuse_too_many(n_subdomains, occupied, error)
       call comm%agree(error)
       self%cells = self%groups%cells
@@ -172,6 +175,8 @@ contains
     real(dp), intent(in) :: point(:)
     integer :: place(3)
 
+    subdomain = 1
+    if (self%n_subdomains == 1) return
     call self%cells%locate(point, place)
     subdomain = subdomain_at(self, place)
   end function partition_owner
@@ -214,10 +219,14 @@ contains
     integer, intent(out) :: n
     integer :: low(3), high(3), sides(3), x, y, z, place(3)
 
+    n = 0
+    if (self%n_subdomains == 1) then
+      call add_once(list, n, 1)
+      return
+    end if
     call self%cells%range(point, reach, low, high)
     sides(:) = 1
     sides(1:self%nd) = self%cells%n(1:self%nd)*self%cells%split
-    n = 0
     do z = low(3), high(3)
       place(3) = modulo(z, sides(3))
       do y = low(2), high(2)

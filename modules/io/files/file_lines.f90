@@ -15,7 +15,7 @@ module gravier_file_lines
     integer :: number = 0
     integer :: first = 1, last = 0
     !> where the next word is sought
-    integer :: place = 1
+    integer, private :: place = 1
   contains
     procedure :: open => lines_open
     procedure :: next => lines_next

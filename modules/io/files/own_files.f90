@@ -6,7 +6,7 @@ module gravier_own_files
   use gravier_file_system, only: place_t, place_of, replace_file, remove_file
   implicit none
   private
-  public :: part_of, give_name, note_own, remove_own, check_own_files
+  public :: part_of, give_name, note_own, remove_own, check_own_files, forget_own_files
 
   type :: own_file_t
     character(len=:), allocatable :: path
@@ -88,5 +88,10 @@ contains
         & ": the file that was written under this name is not there any more: it was removed, or another program has replaced it")
     end do
   end subroutine check_own_files
+
+  !> Forget the files of a run that is over: another one may follow in this process.
+  subroutine forget_own_files()
+    n_own = 0
+  end subroutine forget_own_files
 
 end module gravier_own_files

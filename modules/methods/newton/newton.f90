@@ -56,8 +56,8 @@ module gravier_newton
   end type newton_part_t
 
   type, extends(nscdd_t) :: newton_t
-    type(enriched_matrix_t) :: matrix
-    type(interface_direct_t) :: interface_solver
+    type(enriched_matrix_t), private :: matrix
+    type(interface_direct_t), private :: interface_solver
     type(newton_part_t), allocatable, private :: part(:)
     type(interface_field_t), allocatable, private :: b(:), f(:)
     logical, private :: sweeping = .true.

@@ -23,9 +23,9 @@ module gravier_schwarz
     !> R^ddm
     real(dp), allocatable :: value(:, :)
     !> what the last iteration asked it to change by
-    real(dp), allocatable :: change(:, :)
+    real(dp), private, allocatable :: change(:, :)
     !> R^ddm of the iteration before; allocated where sweeps are accelerated
-    real(dp), allocatable :: previous(:, :)
+    real(dp), private, allocatable :: previous(:, :)
   end type neighbour_load_t
 
   !> The relaxation factor, the fraction of a change of R^ddm that is applied: 1 in the paper, less where the method would

@@ -15,7 +15,7 @@ module gravier_alart_curnier
     !> velocities and the function at the point evaluated last (dimension, contacts)
     real(dp), allocatable :: v(:, :), f(:, :)
     !> dP/dx of each contact by columns (dimension**2, contacts)
-    real(dp), allocatable :: cut(:, :)
+    real(dp), private, allocatable :: cut(:, :)
     !> blocks of the Jacobian, in the order of those of the problem
     real(dp), allocatable :: own(:, :), coupling(:, :)
   contains

@@ -41,13 +41,13 @@ module gravier_unbounded
   !> Sums over contacts from which the bound follows. Sums and maxima over parts of a problem add up to those of the whole.
   type :: ray_sums_t
     !> z.q, and what it may be wrong by
-    real(dp) :: work = 0.0_dp, work_error = 0.0_dp
+    real(dp), private :: work = 0.0_dp, work_error = 0.0_dp
     !> sum of |W z|/s, errors of rounding included
-    real(dp) :: motion = 0.0_dp
+    real(dp), private :: motion = 0.0_dp
     !> max|q|
-    real(dp) :: speed = 0.0_dp
+    real(dp), private :: speed = 0.0_dp
     !> largest s |z|, and its contact
-    real(dp) :: largest = 0.0_dp
+    real(dp), private :: largest = 0.0_dp
     integer :: contact = 0
   contains
     procedure :: add => ray_sums_add

@@ -43,7 +43,7 @@ module gravier_acceleration
     integer :: restarted = 0
     real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
     !> largest beta
-    real(dp) :: most = 1.0_dp
+    real(dp), private :: most = 1.0_dp
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
     !> iterations of this solve, windows since `lowest`, plain iterations to come

@@ -41,7 +41,7 @@ module gravier_layer_trial
     logical, private :: anew = .false.
     !> the iteration after which a pass is judged
     integer, private :: ends = 0
-    !> what is compared, and the impulses, before the pass [m/s]
+    !> what a start is judged by [m/s], and the impulses, before the pass
     real(dp), private :: error_before = 0.0_dp
     type(kept_impulses_t), allocatable, private :: before(:)
   contains
@@ -121,7 +121,7 @@ contains
     do s = 1, size(problem%sub)
       self%before(s)%value = problem%sub(s)%impulse
     end do
-    self%error_before = velocity%criterion()
+    self%error_before = velocity%measure_of_start()
     call carry_loads(problem, above%way, method%work, sweeps)
     if (.not. sweeps > 0.0_dp) return
     self%sweeps = self%sweeps + sweeps
@@ -142,7 +142,7 @@ contains
     integer :: s
 
     call velocity%complete(problem, method, iteration)
-    if (velocity%criterion() < worth_keeping*self%error_before) then
+    if (velocity%measure_of_start() < worth_keeping*self%error_before) then
       ! what errors of the layers have left, another pass lowers again
       self%may_try = velocity%levels%most_depth > very_deep
       return

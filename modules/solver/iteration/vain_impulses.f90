@@ -10,7 +10,8 @@
 !> A solution needs bodies as fast as max|V| >= A/sum|P|. Where that is far beyond the speeds of the problem, there is none. With
 !> friction in z this is a sign and no proof, as in gravier_unbounded, which looks at the matrix of a problem in the same way.
 !> For compliant contacts the law holds for v + s + a r, and A loses z a r for the impulses r: springs give way before impulses grow
-!> without bound. Their shifts are speeds of the problem, since springs drive bodies that are at rest.
+!> without bound. Their shifts are speeds of the problem, since springs drive bodies that are at rest; so are shifts in a periodic
+!> cell that moves.
 module gravier_vain_impulses
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lane_of, block_of, project_on_cones
@@ -139,8 +140,9 @@ contains
     integer :: b, c, nd
 
     nd = problem%kernels%nd
-    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring))
-      if (sub%yields(c)) fastest = max(fastest, abs(sub%hot(lane_of(c), problem%kernels%row%shift, block_of(c))))
+    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring) .or. problem%cell%moves)
+      if (.not. (sub%yields(c) .or. problem%cell%moves)) cycle
+      fastest = max(fastest, abs(sub%hot(lane_of(c), problem%kernels%row%shift, block_of(c))))
     end do
     do b = 1, sub%n_columns
       speed = norm2(sub%v_free(1:nd, b))

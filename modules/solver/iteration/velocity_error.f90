@@ -72,7 +72,7 @@ module gravier_velocity_error
     !> L and how fast bodies sink, by the last `add_levels`; 0 since `bound`
     type(levels_t) :: levels
     !> weight of Y
-    real(dp) :: weight = weight_of_projection
+    real(dp), private :: weight = weight_of_projection
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
@@ -92,6 +92,7 @@ module gravier_velocity_error
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
+    procedure :: measure_of_start => velocity_error_measure_of_start
     procedure, private :: wave => velocity_error_wave
     procedure :: all_are_slow => velocity_error_all_are_slow
     procedure :: begin_anew => velocity_error_begin_anew
@@ -203,6 +204,14 @@ contains
     if (self%has_followed) criterion = max(criterion, self%levels%fastest_body/body_allowed, &
       & self%levels%mean_of_bodies/bodies_allowed)
   end function velocity_error_criterion
+
+  !> What tells whether one start is better than another [m/s]: E, because single contacts that are far off are soon mended; but where
+  !> few heavy bodies have most of the mass, in which the others hide, what the criterion compares.
+  pure real(dp) function velocity_error_measure_of_start(self) result(measure)
+    class(velocity_error_t), intent(in) :: self
+    measure = self%estimate()
+    if (self%is_uneven) measure = self%criterion()
+  end function velocity_error_measure_of_start
 
   !> E with a weight on L [m/s].
   pure real(dp) function velocity_error_wave(self, weight_of_levels) result(wave)

@@ -66,7 +66,7 @@ contains
 
     compliant = effects%compliance
     friction = effects%friction .or. effects%shapes .or. compliant
-    shifted = (effects%friction .and. effects%tangential_restitution) .or. compliant
+    shifted = (friction .and. (effects%tangential_restitution .or. effects%moving_cell)) .or. compliant
     rolling = effects%friction .and. effects%rolling .and. .not. effects%shapes
     if (dimension == 2) then
       self%row = rows_of_disks(friction, shifted, rolling, effects%shapes, compliant)

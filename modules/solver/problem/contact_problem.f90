@@ -7,6 +7,7 @@ module gravier_contact_problem
   use gravier_shared_exchange, only: shared_exchange_t
   use gravier_body_mass, only: add_inverse_mass, apply_inverse_mass, can_move, mass_product, multiply_mass, velocities_under
   use gravier_contact_spring, only: spring_step_t
+  use gravier_moving_cell, only: cell_motion_t, cell_contacts_t
   use gravier_contact_kernels, only: kernels_t, global_impulse, lanes, n_blocks, lane_of, block_of
   implicit none
   private
@@ -48,6 +49,8 @@ module gravier_contact_problem
     real(dp), allocatable :: radius(:)
     !> of grains, where a force acts on their volume (n_grains) [m^3, m^2 in 2D]
     real(dp), allocatable :: volume(:)
+    !> what the applied forces of a loop of the user's own add to the velocity of grains, where there are such (nd, n_grains) [m/s]
+    real(dp), allocatable :: applied(:, :)
     !> velocity without contacts, M^-1 R^d, with attractions among the loads (nv, n_columns) [m/s, rad/s]
     real(dp), allocatable :: v_free(:, :)
     !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
@@ -79,6 +82,8 @@ module gravier_contact_problem
     real(dp), allocatable :: gap(:)
     !> place of each contact in the neighbour list (n_contacts)
     integer, allocatable :: source(:)
+    !> where the periodic cell moves
+    type(cell_contacts_t) :: cell
   contains
     procedure :: share_masses => subproblem_share_masses
     procedure :: update_local_operator => subproblem_update_local_operator
@@ -98,13 +103,15 @@ module gravier_contact_problem
     !> subdomains of this rank
     type(subproblem_t), allocatable :: sub(:)
     type(shared_exchange_t) :: shared
+    !> motion of the periodic cell in this step
+    type(cell_motion_t) :: cell
     !> subdomains of the scene
     integer :: n_subdomains = 1
     !> of each subdomain, (sum of |r - y|^2, sum of |r|^2) of the first sweep of the last iteration, which started from y
     !> (2, subdomains) [N^2 s^2]
     real(dp), allocatable :: progress(:, :)
     !> their sums over all subdomains, once `sum_progress` was called; whoever changes `progress` clears the mark
-    real(dp) :: progress_sums(2) = 0.0_dp
+    real(dp), private :: progress_sums(2) = 0.0_dp
     logical :: progress_is_summed = .false.
     !> contacts of the scene, and those of them that sleep: no sweep takes them, their impulses stay
     integer(i8) :: n_contacts = 0, n_asleep = 0
@@ -256,11 +263,12 @@ contains
     class(subproblem_t), intent(in) :: self
     integer, intent(in) :: d, b
 
-    real(dp) :: change(size(self%v_free, 1))
+    !> most degrees of freedom of a body
+    real(dp) :: change(6)
 
     velocity = self%v_free(d, b)
     if (.not. allocated(self%attraction_load)) return
-    call apply_inverse_mass(self%inverse_mass(:, b), self%attraction_load(:, b), change)
+    call apply_inverse_mass(self%inverse_mass(:, b), self%attraction_load(:, b), change(1:size(self%v_free, 1)))
     ! the product is rounded by itself
     velocity = velocity - change(d)
   end function subproblem_free_velocity

@@ -4,7 +4,7 @@ module gravier_effects
   private
   public :: effects_t, n_effects, effect_name_length
 
-  integer, parameter :: n_effects = 17, effect_name_length = 24
+  integer, parameter :: n_effects = 18, effect_name_length = 24
 
   !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
   type :: effects_t
@@ -17,6 +17,8 @@ module gravier_effects
     logical :: rotation = .false., periodic = .false., drives = .false., forces = .false., glued = .false.
     !> loads; grains are taken out; grains enter
     logical :: gravity = .false., body_force = .false., removal = .false., insertion = .false.
+    !> the periodic cell deforms: contacts have shifts then, along their tangents too
+    logical :: moving_cell = .false.
   contains
     procedure :: list => effects_list
   end type effects_t
@@ -63,6 +65,8 @@ contains
     on(16) = self%removal
     names(17) = "insertion"
     on(17) = self%insertion
+    names(18) = "moving cell"
+    on(18) = self%moving_cell
   end subroutine effects_list
 
 end module gravier_effects

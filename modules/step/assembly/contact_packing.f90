@@ -7,7 +7,7 @@ module gravier_contact_packing
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: subproblem_t
   use gravier_halo, only: local_bodies_t
-  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, approach_velocity
+  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, approach_velocity, add_image_velocity
   use gravier_pair_laws, only: boundary_of, law_of, terms_of
   use gravier_contact_springs, only: pack_spring
   use gravier_physics, only: physics_t
@@ -55,6 +55,8 @@ contains
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
     if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
     if (physics%laws%yields) allocate (sub%spring(found%n))
+    if (physics%cell%moves) allocate (sub%cell%branch(kernels%nd, found%n), sub%cell%way(kernels%nd, found%n), &
+      & sub%cell%shift(kernels%nd, found%n))
     do c = 1, found%n
       this%c = c
       this%q = lane_of(c)
@@ -70,9 +72,37 @@ contains
       if (this%b > 0) then
         if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub)
       end if
+      if (physics%cell%moves) call pack_image(view, this, sub)
       call pack_terms(view, found, boundaries, kernels, physics, this, sub)
+      if (physics%cell%moves) call keep_shifts(kernels, this, sub)
     end do
   end subroutine pack_contacts
+
+  !> Branch of a contact and way to the image that it meets, in a cell that moves.
+  pure subroutine pack_image(view, this, sub)
+    type(local_bodies_t), intent(in) :: view
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(inout) :: sub
+
+    associate (way => sub%cell%way(:, this%c))
+      way(:) = 0.0_dp
+      call view%period%add_shift(view%list%shift(this%p), 1, way)
+      sub%cell%branch(:, this%c) = view%bodies%position(:, this%i) - view%bodies%position(:, this%j) - way
+    end associate
+  end subroutine pack_image
+
+  !> Keep what the law alone adds to the velocities of a contact.
+  pure subroutine keep_shifts(kernels, this, sub)
+    type(kernels_t), intent(in) :: kernels
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(inout) :: sub
+
+    associate (row => kernels%row, shift => sub%cell%shift(:, this%c))
+      shift(:) = 0.0_dp
+      shift(1) = sub%hot(this%q, row%shift, this%g)
+      if (row%shift_t > 0) shift(2:) = sub%hot(this%q, row%shift_t:row%shift_t + kernels%nd - 2, this%g)
+    end associate
+  end subroutine keep_shifts
 
   !> Columns of candidates and antagonists in the order in which contacts were found; of a boundary that turns, one that cannot move
   !> stands for the columns that `add_column` makes.
@@ -170,7 +200,8 @@ contains
         if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
       end if
       if (terms%restitution > 0.0_dp) then
-        sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, kernels, this, sub)
+        sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, kernels, physics, &
+          & this, sub)
       else
         sub%hot(q, row%shift, g) = terms%free_gap/physics%h
       end if
@@ -189,32 +220,63 @@ contains
   !> Normal velocity at the start of the step as far as the contact sends it back. It counts where the contact opens, too: what
   !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
   !> the contact comes to rest.
-  real(dp) function returned_velocity(view, found, boundaries, kernels, this, sub) result(returned)
+  real(dp) function returned_velocity(view, found, boundaries, kernels, physics, this, sub) result(returned)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(in) :: sub
+    real(dp) :: free
+    integer :: d
+
+    if (kernels%row%arm_i > 0) then
+      returned = returned_by_shapes(view, found, boundaries, kernels, physics, this, sub)
+      return
+    end if
+    returned = approach_velocity(view, boundaries, this%p, found%gap(this%f), found%normal(:, this%f))
+    if (returned <= 0.0_dp) return
+    free = cell_adds(found, physics, this, sub)
+    do d = 1, kernels%nd
+      free = free + (sub%v_free(d, sub%pair(1, this%c)) - sub%v_free(d, sub%pair(2, this%c)))*found%normal(d, this%f)
+    end do
+    if (free < 0.0_dp) returned = 0.0_dp
+  end function returned_velocity
+
+  !> The same of bodies with shapes, at the point where they touch.
+  real(dp) function returned_by_shapes(view, found, boundaries, kernels, physics, this, sub) result(returned)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(in) :: sub
     real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
-    integer :: nd
 
-    if (kernels%row%arm_i > 0) then
-      call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
-      call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
-      returned = sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj)
-      if (returned <= 0.0_dp) return
-      vi(:) = sub%v_free(:, sub%pair(1, this%c))
-      vj(:) = sub%v_free(:, sub%pair(2, this%c))
-      if (sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj) < 0.0_dp) returned = 0.0_dp
-      return
-    end if
-    nd = size(found%normal, 1)
-    returned = approach_velocity(view, boundaries, this%p, found%gap(this%f), found%normal(:, this%f))
+    call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
+    call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
+    returned = sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj)
     if (returned <= 0.0_dp) return
-    if (sum((sub%v_free(1:nd, sub%pair(1, this%c)) - sub%v_free(1:nd, sub%pair(2, this%c)))*found%normal(:, this%f)) < 0.0_dp) &
-      & returned = 0.0_dp
-  end function returned_velocity
+    vi(:) = sub%v_free(:, sub%pair(1, this%c))
+    vj(:) = sub%v_free(:, sub%pair(2, this%c))
+    if (sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj) + cell_adds(found, physics, this, sub) < 0.0_dp) returned = 0.0_dp
+  end function returned_by_shapes
+
+  !> What a cell that moves adds to the normal velocity without contacts.
+  pure real(dp) function cell_adds(found, physics, this, sub)
+    type(contact_list_t), intent(in) :: found
+    type(physics_t), intent(in) :: physics
+    type(packed_t), intent(in) :: this
+    type(subproblem_t), intent(in) :: sub
+    real(dp) :: added(size(found%normal, 1))
+
+    cell_adds = 0.0_dp
+    if (.not. physics%cell%moves) return
+    added(:) = physics%cell%added(physics%cell%free, sub%cell%branch(:, this%c), sub%cell%way(:, this%c))
+    cell_adds = sum(found%normal(:, this%f)*added)
+  end function cell_adds
 
   !> Tangential velocity at the start of the step as far as the contact sends it back (Newton), or what springs make of it.
   subroutine pack_tangential_shift(view, found, boundaries, kernels, physics, restitution, this, sub)
@@ -259,6 +321,7 @@ contains
     call find_touching_points(view, found, this, points)
     call find_start_velocity(view, boundaries, this%i, points(:, 1), vi)
     call find_start_velocity(view, boundaries, this%j, points(:, 2), vj)
+    call add_image_velocity(view, this%p, vj(1:nd))
     associate (i => sub%pair(1, this%c), j => sub%pair(2, this%c))
       if (i <= sub%n_grains) vi(nd + 1:) = sub%v_free(nd + 1:, i)
       if (j <= sub%n_grains) vj(nd + 1:) = sub%v_free(nd + 1:, j)

@@ -7,6 +7,7 @@ module gravier_contact_springs
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of, contact_tangents, lanes
   use gravier_contact_operator, only: find_local_operator
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_cell_response, only: subtract_images
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: halo_t
   use gravier_physics, only: physics_t
@@ -93,6 +94,7 @@ contains
         list%spring(:, :) = 0.0_dp
         allocate (v, mold=sub%impulse)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+        if (problem%cell%moves) call subtract_images(problem, k, v)
         do c = 1, sub%n_contacts
           associate (q => lane_of(c), g => block_of(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
@@ -128,6 +130,7 @@ contains
     energies(:) = 0.0_dp
     associate (sub => problem%sub(k), nd => problem%kernels%nd, h => physics%h, theta => physics%theta)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+      if (problem%cell%moves) call subtract_images(problem, k, v)
       do c = 1, sub%n_contacts
         if (.not. sub%yields(c)) cycle
         associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))

@@ -9,7 +9,7 @@ module gravier_pair_laws
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity
+  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity, add_image_velocity
   implicit none
   private
   public :: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair, conclude_pairs
@@ -89,6 +89,7 @@ contains
     if (j > 0) then
       pair%radius = sqrt(view%bodies%radius(i)*view%bodies%radius(j))
       call find_surface_velocity(view, boundaries, j, place%arm_j(1:nd), w)
+      call add_image_velocity(view, p, w)
     else
       call find_start_velocity(view, boundaries, j, place%on_wall(1:nd), w)
     end if

@@ -4,6 +4,7 @@ module gravier_physics
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
   use gravier_law_set, only: law_set_t
+  use gravier_moving_cell, only: cell_motion_t
   implicit none
   private
   public :: physics_t
@@ -24,6 +25,8 @@ module gravier_physics
     real(dp) :: h = 1.0_dp, theta = 0.5_dp
     !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
     integer :: sleep_after = 0
+    !> motion of the periodic cell in this step, without contacts until it is solved
+    type(cell_motion_t) :: cell
   contains
     procedure :: accelerate => physics_accelerate
   end type physics_t
@@ -44,6 +47,9 @@ contains
     if (bodies%no > 0) call figures%turn_freely(bodies, k, self%h, v)
     do d = 1, bodies%nd
       v(d) = v(d) + self%h*self%gravity(d)
+    end do
+    do d = 1, bodies%na
+      v(d) = v(d) + self%h*bodies%force(d, k)/bodies%mass(k)
     end do
     if (.not. any(abs(self%body_force) > 0.0_dp)) return
     do d = 1, bodies%nd

@@ -38,6 +38,7 @@ contains
     problem%comm => decomposition%comm
     problem%kernels = kernels
     problem%n_subdomains = decomposition%n_subdomains
+    problem%cell = physics%cell
     if (allocated(problem%sub)) deallocate (problem%sub)
     allocate (problem%sub(size(halo%view)))
     do s = 1, size(problem%sub)
@@ -103,7 +104,9 @@ contains
       end do
       call allocate_bodies(kernels, sub%n_columns + n, sub)
       if (any(abs(physics%body_force) > 0.0_dp)) allocate (sub%volume(sub%n_grains))
+      if (decomposition%na > 0) allocate (sub%applied(decomposition%na, sub%n_grains))
       call pack_grains(view, numbers%of_grain, decomposition%figures, kernels, physics, sub)
+      if (physics%cell%moves) call pack_places(view, numbers%of_grain, sub)
       do b = 1, size(boundaries)
         if (numbers%of_boundary(b) == 0 .or. boundaries(b)%turns()) cycle
         call pack_boundary(boundaries(b), b, numbers%of_boundary(b), decomposition%n_subdomains, kernels, sub)
@@ -161,10 +164,26 @@ contains
       end associate
       sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/view%bodies%mass(k)
       if (allocated(sub%volume)) sub%volume(b) = figures%volume_of(view%bodies, k)
+      if (allocated(sub%applied)) sub%applied(:, b) = physics%h*view%bodies%force(:, k)/view%bodies%mass(k)
       if (kernels%nw > kernels%nd .and. physics%rotation) call figures%find_inverse_inertia(view%bodies, k, &
         & sub%inverse_mass(kernels%nd + 1:, b))
     end do
   end subroutine pack_grains
+
+  !> Places of the grains in a cell that moves.
+  pure subroutine pack_places(view, number_of, sub)
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in), contiguous :: number_of(:)
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: centre(3)
+    integer :: k
+
+    allocate (sub%cell%place(size(view%bodies%position, 1), sub%n_grains))
+    centre(:) = view%period%centre()
+    do k = 1, size(number_of)
+      if (number_of(k) > 0) sub%cell%place(:, number_of(k)) = view%bodies%position(:, k) - centre(1:size(sub%cell%place, 1))
+    end do
+  end subroutine pack_places
 
   !> A boundary as a column. One that forces move is a body shared by the subdomains that touch it, with one of all
   !> subdomains to keep account of them.
@@ -222,6 +241,12 @@ contains
           associate (contact => sub%hot(lane_of(c), :, block_of(c)), row => problem%kernels%row)
             scales(1) = max(scales(1), -contact(row%shift)/contact(row%compliance_n))
           end associate
+        end do
+        do c = 1, merge(sub%n_contacts, 0, problem%cell%moves)
+          moving(:) = problem%cell%added(problem%cell%free, sub%cell%branch(:, c), sub%cell%way(:, c))
+          speed = norm2(moving)
+          scales(1) = max(scales(1), speed/lightest)
+          scales(2) = max(scales(2), speed)
         end do
         scales(3) = max(scales(3), sub%largest_term)
         if (allocated(sub%attraction)) scales(3) = max(scales(3), maxval(sub%attraction))

@@ -3,11 +3,13 @@
 !> A body is a grain of a view, by its number there, or a boundary, by its negative number. Grains glued to a boundary move with it.
 module gravier_surface_velocity
   use gravier_kinds, only: dp
+  use gravier_periodic, only: shift_of_code
   use gravier_boundary, only: boundary_t
   use gravier_halo, only: local_bodies_t
   implicit none
   private
-  public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity
+  public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity, &
+    & add_image_velocity
 
   !> Where two bodies touch.
   type :: contact_place_t
@@ -90,6 +92,19 @@ contains
     end associate
   end subroutine find_surface_velocity
 
+  !> Add to the velocity of the antagonist of pair `p` that of the image which the candidate meets, in a cell that moves.
+  pure subroutine add_image_velocity(view, p, v)
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in) :: p
+    !> (nd) [m/s]
+    real(dp), intent(inout) :: v(:)
+    integer :: shift(3)
+
+    if (.not. view%period%moves) return
+    shift(:) = shift_of_code(view%list%shift(p))
+    call view%period%add_velocity(shift, v)
+  end subroutine add_image_velocity
+
   !> Point of the surface of a boundary that grain `i` is nearest to.
   pure subroutine find_wall_point(view, i, gap, normal, point)
     type(local_bodies_t), intent(in) :: view
@@ -112,18 +127,23 @@ contains
     real(dp), intent(in) :: gap
     !> (nd) from the antagonist to the candidate
     real(dp), intent(in) :: normal(:)
-    real(dp) :: v(size(normal)), w(size(normal)), point(size(normal))
+    real(dp) :: w(3), point(3)
+    integer :: d, nd
 
+    nd = size(normal)
     associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      v(:) = view%bodies%velocity(1:size(v), i)
       if (j > 0) then
-        w(:) = view%bodies%velocity(1:size(w), j)
+        w(1:nd) = view%bodies%velocity(1:nd, j)
+        call add_image_velocity(view, p, w(1:nd))
       else
-        call find_wall_point(view, i, gap, normal, point)
-        call find_start_velocity(view, boundaries, j, point, w)
+        call find_wall_point(view, i, gap, normal, point(1:nd))
+        call find_start_velocity(view, boundaries, j, point(1:nd), w(1:nd))
       end if
+      approach = 0.0_dp
+      do d = 1, nd
+        approach = approach + (view%bodies%velocity(d, i) - w(d))*normal(d)
+      end do
     end associate
-    approach = sum((v - w)*normal)
   end function approach_velocity
 
 end module gravier_surface_velocity

@@ -13,7 +13,7 @@ module gravier_boundary_forces
     !> as columns can have them (boundaries)
     character(len=name_length), allocatable :: name(:)
     !> mean force of the grains in the step [N], and a point of the boundary at its end [m] (nd, boundaries)
-    real(dp), allocatable :: force(:, :), position(:, :)
+    real(dp), private, allocatable :: force(:, :), position(:, :)
   contains
     procedure, nopass :: features => boundary_forces_features
     procedure :: begin => boundary_forces_begin

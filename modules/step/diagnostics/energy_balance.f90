@@ -7,9 +7,11 @@ module gravier_energy_balance
   use gravier_body_figures, only: body_figures_t
   use gravier_contact_kernels, only: contact_arms, global_moment, lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_cell_response, only: image_velocity
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
   use gravier_contact_springs, only: spring_energies
+  use gravier_grain_balance, only: work_of_carrying
   use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
@@ -23,14 +25,14 @@ module gravier_energy_balance
     !> of the free grains in the loads of the present time, from the origin, unwrapped in periodic scenes
     real(dp) :: potential = 0.0_dp
     !> kinetic energy at the start
-    real(dp) :: start = 0.0_dp
-    !> done by gravity and body force on the grains; by boundaries on grains where they move as prescribed, and by the
-    !> forces of the user on the others
+    real(dp), private :: start = 0.0_dp
+    !> done by gravity and body force on the grains; by boundaries on grains where they move as prescribed, by a periodic cell that
+    !> moves, and by the forces of the user on the others
     real(dp) :: load_work = 0.0_dp, boundary_work = 0.0_dp
     !> where contacts are compliant: of their springs along the normals and along the tangents; that at the start, and whether it is
     !> known
-    real(dp) :: elastic(2) = 0.0_dp, elastic_start = 0.0_dp
-    logical :: has_springs = .false., knows_springs = .false.
+    real(dp), private :: elastic(2) = 0.0_dp, elastic_start = 0.0_dp
+    logical, private :: has_springs = .false., knows_springs = .false.
     !> in contacts, by the normal and by the tangential impulses; what springs store is not among it
     real(dp) :: dissipated_normal = 0.0_dp, dissipated_friction = 0.0_dp
     !> kinetic energy of grains and boundaries that were taken out of the scene
@@ -154,16 +156,23 @@ contains
       earlier(b) = step%decomposition%boundaries(b)
       call earlier(b)%prescribe(step%decomposition%nd, step%time)
       earlier(b)%velocity(:) = earlier(b)%last_velocity
+      if (earlier(b)%steered) earlier(b)%spin(:) = earlier(b)%last_spin
     end do
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
       call add_grains(step%halo%view(s), step%decomposition, s, step%physics, parts(:, s))
       call add_contacts(step, earlier, s, parts(:, s))
+      if (step%problem%cell%moves) parts(in_boundary, s) = parts(in_boundary, s) + work_of_carrying(step%halo%view(s), &
+        & step%decomposition, s, step%physics%cell)
       if (.not. self%has_springs) cycle
       call spring_energies(step%problem, s, step%halo, step%physics, springs)
       parts(in_springs + 1:in_springs + 3, s) = springs
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
+    if (step%problem%cell%moves) then
+      ! grains that cross the cell have the velocity of another image: nothing else is taken out of such a scene
+      self%boundary_work = self%boundary_work - (self%translation + self%rotation - sums(in_start))
+    end if
     if (step%others) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
     self%translation = sums(in_translation)
     self%rotation = sums(in_rotation)
@@ -235,6 +244,7 @@ contains
       do c = 1, sub%n_contacts
         q = lane_of(c)
         g = block_of(c)
+        if (step%problem%cell%moves) call add_cell_work(c)
         part(in_normal) = part(in_normal) - sub%normal_impulse(c)*v(q, 1, g)
         part(in_friction) = part(in_friction) - sum(sub%impulse(q, 2:, g)*v(q, 2:, g))
         if (any(sub%pair(:, c) > sub%n_grains)) call add_boundary_work(c)
@@ -242,6 +252,21 @@ contains
     end associate
 
   contains
+
+    !> The image that a contact meets moves with the cell, as a boundary does.
+    subroutine add_cell_work(c)
+      integer, intent(in) :: c
+      real(dp) :: image(step%problem%kernels%nd), mean_gradient(3, 3)
+      integer :: nf
+
+      associate (sub => step%problem%sub(s), cell => step%problem%cell)
+        nf = step%problem%kernels%nf
+        mean_gradient(:, :) = 0.5_dp*(cell%before + cell%now)
+        image(:) = image_velocity(sub, step%problem%kernels%nd, c, mean_gradient)
+        v(q, 1:nf, g) = v(q, 1:nf, g) - image(1:nf)
+        part(in_boundary) = part(in_boundary) + sub%normal_impulse(c)*image(1) + sum(sub%impulse(q, 2:nf, g)*image(2:nf))
+      end associate
+    end subroutine add_cell_work
 
     subroutine add_boundary_work(c)
       integer, intent(in) :: c
@@ -390,6 +415,7 @@ contains
           do d = 1, owned%nd
             x = owned%position(d, k)
             if (owned%ni > 0) x = x + owned%image(d, k)*decomposition%period%length(d)
+            if (decomposition%period%moves) x = x + decomposition%period%tilt_along(owned%image(:, k), d)
             part(s) = part(s) - (owned%mass(k)*physics%gravity(d) &
               & + decomposition%figures%volume_of(owned, k)*physics%body_force(d))*x
           end do

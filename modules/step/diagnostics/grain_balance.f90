@@ -4,21 +4,24 @@
 !> dissipates, and where, is for gravier_energy_balance.
 module gravier_grain_balance
   use gravier_kinds, only: dp
+  use gravier_periodic, only: gradient_times
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
   use gravier_contact_problem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_moving_cell, only: cell_motion_t
+  use gravier_halo, only: local_bodies_t
   use gravier_physics, only: physics_t
   use gravier_diagnostic, only: solved_step_t
   implicit none
   private
-  public :: grain_balance_t
+  public :: grain_balance_t, work_of_carrying
 
   !> Of the free grains since `begin`; the same on every rank [J].
   type :: grain_balance_t
     !> now, and at the start
     real(dp) :: kinetic = 0.0_dp, start = 0.0_dp
-    !> done on them by gravity and body force, and by the contacts
+    !> done on them by gravity, body force and applied forces, and by the contacts
     real(dp) :: load_work = 0.0_dp, contact_work = 0.0_dp
     !> kinetic energy of grains that were taken out of the scene, less that of grains that entered
     real(dp) :: carried_away = 0.0_dp
@@ -66,7 +69,7 @@ contains
     integer :: s, nd
 
     nd = step%decomposition%nd
-    if (step%others) then
+    if (step%others .or. step%problem%cell%moves) then
       kinetic = self%kinetic
       parts(:, :) = 0.0_dp
       do s = 1, size(parts, 2)
@@ -84,6 +87,8 @@ contains
     do s = 1, size(step%problem%sub)
       call add_grains(step%decomposition%figures, step%decomposition%owned(s), step%physics, parts(:, s))
       call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%kernels%nv, parts(in_contacts, s))
+      if (step%problem%cell%moves) parts(in_contacts, s) = parts(in_contacts, s) + work_of_carrying(step%halo%view(s), &
+        & step%decomposition, s, step%physics%cell)
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
     call keep_motion(self, sums)
@@ -92,8 +97,29 @@ contains
       self%load_work = self%load_work + 0.5_dp*physics%h*(dot_product(physics%gravity(1:nd), momentum(1:nd) + &
         & self%momentum(1:nd)) + dot_product(physics%body_force(1:nd), flux(1:nd) + self%flux(1:nd)))
     end associate
+    if (step%decomposition%na > 0) self%load_work = self%load_work + applied_work(step)
     self%contact_work = self%contact_work + sums(in_contacts)
   end subroutine grain_balance_take_step
+
+  !> Work of the applied forces in a step, h f . (v_i + v_{i+1})/2 over the free grains [J]. Collective.
+  real(dp) function applied_work(step) result(work)
+    type(solved_step_t), intent(in) :: step
+    real(dp) :: parts(size(step%halo%view))
+    integer :: s, k, nd
+
+    nd = step%decomposition%nd
+    parts(:) = 0.0_dp
+    do s = 1, size(parts)
+      associate (bodies => step%halo%view(s)%bodies, origin => step%halo%view(s)%origin, owned => step%decomposition%owned(s))
+        do k = 1, bodies%n
+          if (origin(k) == 0 .or. bodies%glued(k) > 0) cycle
+          parts(s) = parts(s) + 0.5_dp*step%physics%h*dot_product(bodies%force(:, k), bodies%velocity(1:nd, k) + &
+            & owned%velocity(1:nd, origin(k)))
+        end do
+      end associate
+    end do
+    work = step%decomposition%comm%sum_real(parts)
+  end function applied_work
 
   pure subroutine keep_motion(self, sums)
     class(grain_balance_t), intent(inout) :: self
@@ -172,12 +198,41 @@ contains
           twice = twice - sub%contact_reaction(d, b)*(physics%h*physics%body_force(d)*volume*sub%inverse_mass(d, b))
         end do
       end if
+      if (allocated(sub%applied)) then
+        do d = 1, nd
+          twice = twice - sub%contact_reaction(d, b)*sub%applied(d, b)
+        end do
+      end if
       do d = nd + 1, nv
         twice = twice + sub%contact_reaction(d, b)*(sub%free_velocity(d, b) + sub%v_global(d, b))
       end do
       work = work + 0.5_dp*twice/sub%multiplicity(b)
     end do
   end subroutine add_contact_work
+
+  !> Work on the grains that a subdomain owns by carrying them along with the change of a cell's velocity, m (G' - G) x .
+  !> (v_i + v_{i+1})/2 [J].
+  pure real(dp) function work_of_carrying(view, decomposition, s, motion) result(work)
+    type(local_bodies_t), intent(in) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: s
+    type(cell_motion_t), intent(in) :: motion
+    real(dp) :: centre(3), change(3, 3), place(decomposition%nd), carried(decomposition%nd)
+    integer :: k, nd
+
+    nd = decomposition%nd
+    centre(:) = decomposition%period%centre()
+    change(:, :) = motion%now - motion%before
+    work = 0.0_dp
+    do k = 1, view%bodies%n
+      if (view%origin(k) == 0) cycle
+      associate (before => view%bodies%velocity(1:nd, k), after => decomposition%owned(s)%velocity(1:nd, view%origin(k)))
+        place(:) = view%bodies%position(:, k) - centre(1:nd)
+        carried(:) = gradient_times(change, place)
+        work = work + 0.5_dp*view%bodies%mass(k)*sum(carried*(before + after))
+      end associate
+    end do
+  end function work_of_carrying
 
   !> What the balance lacks since the start [J]: rounding, whatever the tolerance, and what was taken from grains that stand still.
   pure real(dp) function grain_balance_error(self) result(error)

@@ -45,7 +45,7 @@ module gravier_mean_region
     !> volume of a bin [m^3, m^2 in 2D]
     real(dp) :: volume = 0.0_dp
     !> whether bodies end at the sides of each axis: not where there is no side, and not where the region spans a period (nd)
-    logical, allocatable :: cuts_low(:), cuts_high(:)
+    logical, private, allocatable :: cuts_low(:), cuts_high(:)
     !> after which the region repeats itself along each axis, 0 where it does not (nd) [m]
     real(dp), allocatable :: period(:)
   contains

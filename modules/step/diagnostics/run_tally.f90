@@ -4,7 +4,7 @@
 module gravier_run_tally
   use gravier_kinds, only: dp, i8
   use gravier_creeping_groups, only: creep_t
-  use gravier_solve, only: solve_report_t, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
+  use gravier_solve, only: solve_report_t, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   implicit none
   private
   public :: run_tally_t, relative_error, far_off, often_mended
@@ -21,6 +21,9 @@ module gravier_run_tally
   type :: run_tally_t
     !> solves, and how those that missed the criterion ended
     integer(i8) :: solves = 0, stagnated = 0, unbounded = 0, exhausted = 0, diverged = 0
+    !> solves that reached another criterion than the velocity error: those that missed the accuracy, those that ended too soon to
+    !> tell
+    integer(i8) :: inaccurate = 0, unjudged = 0
     !> steps made, and those in which projections of overlaps shifted grains by more than rounding
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
@@ -73,6 +76,12 @@ contains
 
     self%solves = self%solves + 1
     select case (solve%status)
+    case (solve_converged)
+      if (.not. solve%judged) then
+        self%unjudged = self%unjudged + 1
+      else if (.not. solve%accurate) then
+        self%inaccurate = self%inaccurate + 1
+      end if
     case (solve_stagnated)
       self%stagnated = self%stagnated + 1
       if (solve%creep%contacts > self%creep%contacts) self%creep = solve%creep

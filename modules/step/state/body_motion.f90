@@ -1,6 +1,7 @@
 !> Motion of grains and boundaries over a step: to the middle, by drives, and to the end (gravier_motion has the rule).
 module gravier_body_motion
   use gravier_kinds, only: dp, i8
+  use gravier_periodic, only: gradient_times
   use gravier_time_table, only: time_table_t
   use gravier_orientation, only: turn_orientation
   use gravier_motion, only: predict_position, advance_position
@@ -41,6 +42,7 @@ contains
       end associate
     end do
     if (some_glued) call carry_glued(decomposition, part)
+    call decomposition%period%move(part)
     do b = 1, size(decomposition%boundaries)
       associate (boundary => decomposition%boundaries(b))
         call boundary%move(part)
@@ -99,19 +101,30 @@ contains
     end do
   end subroutine drive
 
-  !> Count the grains that move by more than their radius in a step: they may pass through others unseen. Collective.
+  !> Count the grains that move by more than their radius in a step, beside a cell that moves: they may pass through others unseen.
+  !> Collective.
   integer(i8) function count_fast(decomposition, physics) result(fast)
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     integer(i8) :: counts(1)
+    real(dp) :: gradient(3, 3), centre(3), v(decomposition%nd), place(decomposition%nd), carried(decomposition%nd)
     integer :: s, k, nd
 
     nd = decomposition%nd
+    gradient(:, :) = 0.0_dp
+    if (decomposition%period%moves) gradient(:, :) = decomposition%period%gradient()
+    centre(:) = decomposition%period%centre()
     counts(:) = 0
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (physics%h**2*sum(owned%velocity(1:nd, k)**2) > owned%radius(k)**2) counts(1) = counts(1) + 1
+          v(:) = owned%velocity(1:nd, k)
+          if (decomposition%period%moves) then
+            place(:) = owned%position(:, k) - centre(1:nd)
+            carried(:) = gradient_times(gradient, place)
+            v(:) = v - carried
+          end if
+          if (physics%h**2*sum(v**2) > owned%radius(k)**2) counts(1) = counts(1) + 1
         end do
       end associate
     end do
@@ -138,6 +151,7 @@ contains
       end associate
     end do
     if (some_glued) call carry_glued(decomposition, theta*physics%h)
+    call decomposition%period%move(theta*physics%h)
     do b = 1, size(decomposition%boundaries)
       call decomposition%boundaries(b)%move(theta*physics%h)
     end do

@@ -1,5 +1,5 @@
 !> Impulses kept from one step to the next, so that a solve starts from those of contacts that persist. They stay with the
-!> pairs of the neighbour lists, and move with them when the lists are made anew; so do the states of pairs.
+!> pairs of the neighbour lists, as the states of pairs do; gravier_memory_carrying brings both to lists that are made anew.
 module gravier_impulse_memory
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
@@ -8,13 +8,10 @@ module gravier_impulse_memory
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_list, only: pair_memory_t
-  use gravier_neighbour_rule, only: owner_point
-  use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
   implicit none
   private
-  public :: memory_of, impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses, list_impulses, &
-    & match_impulses, pair_record
+  public :: memory_of, impulse_entries, keep_impulses, recall_impulses, list_impulses, match_impulses, pair_record
 
   !> the words of a record of list_impulses, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: pair_record = "candidate antagonist impulse elongation states"
@@ -111,22 +108,22 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for the pairs of a list that keep something; the
+  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for pairs of a list; the
   !> antagonist of a boundary is minus its number.
-  subroutine list_impulses(view, lead, records)
+  subroutine list_impulses(view, lead, pairs, records)
     type(local_bodies_t), intent(in) :: view
     !> words left free before those of a record
     integer, intent(in) :: lead
-    !> (lead + 2 + words of the memory, pairs that keep something)
+    !> places of the pairs in the list
+    integer, intent(in), contiguous :: pairs(:)
+    !> (lead + 2 + words of the memory, pairs)
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer :: p, e, n
 
     associate (list => view%list)
-      allocate (records(lead + 2 + list%memory%words(), list%n_kept()))
-      n = 0
-      do p = 1, list%n
-        if (.not. list%keeps(p)) cycle
-        n = n + 1
+      allocate (records(lead + 2 + list%memory%words(), size(pairs)))
+      do n = 1, size(pairs)
+        p = pairs(n)
         records(lead + 1, n) = view%bodies%id(list%candidate(p))
         records(lead + 2, n) = antagonist_id(view, p)
         do e = 1, size(list%impulse, 1)
@@ -147,87 +144,6 @@ contains
     id = view%list%antagonist(p)
     if (id > 0) id = view%bodies%id(view%list%antagonist(p))
   end function antagonist_id
-
-  !> All impulses and states kept on this rank, each with the point that decides the owner of its pair, as records for
-  !> spread_impulses. The views must be up to date.
-  subroutine gather_impulses(decomposition, halo, records)
-    type(decomposition_t), intent(in) :: decomposition
-    type(halo_t), intent(in) :: halo
-    !> (1 + nd + 2 + words of the memory, n): subdomain (to be set), point, candidate, antagonist, impulse, elongation, states
-    integer(i8), allocatable, intent(out) :: records(:, :)
-    integer(i8), allocatable :: own(:, :)
-    integer :: s, n, words
-
-    words = 3 + decomposition%nd + halo%memory%words()
-    n = 0
-    do s = 1, size(halo%view)
-      n = n + halo%view(s)%list%n_kept()
-    end do
-    allocate (records(words, n))
-    n = 0
-    do s = 1, size(halo%view)
-      call list_impulses(halo%view(s), 1 + decomposition%nd, own)
-      call write_points(decomposition, halo%view(s), own)
-      records(:, n + 1:n + size(own, 2)) = own
-      n = n + size(own, 2)
-    end do
-  end subroutine gather_impulses
-
-  !> The owner points of the pairs that keep something.
-  subroutine write_points(decomposition, view, records)
-    type(decomposition_t), intent(in) :: decomposition
-    type(local_bodies_t), intent(in) :: view
-    integer(i8), intent(inout), contiguous :: records(:, :)
-    real(dp) :: point(decomposition%nd), candidate(decomposition%nd), antagonist(decomposition%nd)
-    integer :: p, n, d
-
-    n = 0
-    associate (list => view%list, position => view%bodies%position)
-      do p = 1, list%n
-        if (.not. list%keeps(p)) cycle
-        n = n + 1
-        point(:) = position(:, list%candidate(p))
-        if (list%antagonist(p) > 0) then
-          antagonist(:) = position(:, list%antagonist(p))
-          if (size(list%shift) > 0) call decomposition%period%add_shift(list%shift(p), 1, antagonist)
-          candidate(:) = point
-          point(:) = owner_point(decomposition%rule%kind, candidate, antagonist)
-        end if
-        do d = 1, decomposition%nd
-          records(1 + d, n) = transfer(point(d), 0_i8)
-        end do
-      end do
-    end associate
-  end subroutine write_points
-
-  !> Bring each impulse and state to the subdomain that owns its pair now. Collective.
-  subroutine spread_impulses(decomposition, records, halo)
-    type(decomposition_t), intent(in) :: decomposition
-    !> of gather_impulses
-    integer(i8), intent(inout), contiguous :: records(:, :)
-    type(halo_t), intent(inout) :: halo
-    integer(i8), allocatable :: received(:, :), keys(:, :), mine(:, :)
-    integer, allocatable :: order(:)
-    integer :: s, k, first, lead
-
-    lead = 1 + decomposition%nd
-    call decomposition%deliver(2, records, received)
-    allocate (order(size(received, 2)), keys(1, size(received, 2)), mine(size(received, 1) - lead, size(received, 2)))
-    keys(1, :) = received(1, :)
-    call argsort_rows(keys, order)
-    do k = 1, size(order)
-      mine(:, k) = received(lead + 1:, order(k))
-    end do
-    k = 1
-    do s = 1, size(halo%view)
-      first = k
-      do while (k <= size(order))
-        if (received(1, order(k)) /= decomposition%subdomain_of(s)) exit
-        k = k + 1
-      end do
-      call match_impulses(mine(:, first:k - 1), halo%memory, halo%view(s))
-    end do
-  end subroutine spread_impulses
 
   !> Give impulses and states to the pairs of a list that have the same bodies; what the records do not have stays.
   subroutine match_impulses(records, kept, view)

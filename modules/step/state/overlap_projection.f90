@@ -6,6 +6,7 @@ module gravier_overlap_projection
   use gravier_timers, only: start_timer, stop_timer, phase_projection
   use gravier_contact_kernels, only: lanes, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_cell_response, only: subtract_images
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
   use gravier_velocity_return, only: take_displacements
@@ -151,6 +152,7 @@ contains
       allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nf > 1), size(sub%hot, 3)))
       allocate (borrowed%work, mold=sub%impulse)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
+      if (problem%cell%moves) call subtract_images(problem, s, borrowed%work)
       borrowed%law(:, 1, :) = sub%hot(:, nd + 1, :)
       do c = 1, sub%n_contacts
         sub%hot(lane_of(c), nd + 1, block_of(c)) = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed

@@ -7,6 +7,7 @@ module gravier_velocity_return
   use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
+  use gravier_cell_drive, only: carry_grains
   implicit none
   private
   public :: take_velocities, take_displacements
@@ -15,7 +16,7 @@ contains
 
   !> Velocities at the end of the step: those of the solved problem (v_global) for grains in contact, free ones for
   !> the others. A shared grain whose owner has no contact on it gets its velocity from its first sharer. Grains glued to
-  !> a boundary are left. Collective.
+  !> a boundary are left. In a cell that moves grains are carried along, and v_global is that of grains carried along. Collective.
   subroutine take_velocities(decomposition, physics, problem)
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
@@ -29,6 +30,7 @@ contains
         end do
       end associate
     end do
+    if (problem%cell%moves) call carry_grains(decomposition, problem%cell)
     call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 

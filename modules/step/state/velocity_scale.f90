@@ -3,14 +3,16 @@
 !> against what loads do in a step, in fast flow against the motion itself.
 !>
 !>     load   what loads do to the mean grain in a step (mass m, diameter d):
-!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act; attraction of the laws where there is
-!>            no other load, which are internal forces else
-!>     drive  largest difference of imposed velocities
+!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds; attraction
+!>            of the laws where there is no other load, which are internal forces else; the root mean square of what applied forces
+!>            add to velocities
+!>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
-!>     own    root mean square velocity of the bodies in contact at the start of the step
+!>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms
 !>     U      = max(U_q, 0.3 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there
 module gravier_velocity_scale
   use gravier_kinds, only: dp
+  use gravier_periodic, only: gradient_times
   use gravier_communicator, only: communicator_t
   use gravier_motion, only: grain_volume
   use gravier_body_store, only: body_set_t
@@ -32,9 +34,9 @@ module gravier_velocity_scale
     !> largest difference of velocities [m/s]
     real(dp) :: difference = 0.0_dp
     !> velocity of all boundaries where they move alike, else 0 [m/s]
-    real(dp) :: common(3) = 0.0_dp
+    real(dp), private :: common(3) = 0.0_dp
     !> there is a boundary that grains touch
-    logical :: bounded = .false.
+    logical, private :: bounded = .false.
   end type imposed_motion_t
 
   type :: velocity_scale_t
@@ -169,6 +171,7 @@ contains
       call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(3:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
+    if (decomposition%na > 0) self%load = max(self%load, applied_load(problem))
     ! attractions hold bodies together and move none of them but where there is no other load
     if (.not. self%load > 0.0_dp .and. sums(2) > 0.0_dp .and. self%mass > 0.0_dp) self%load = sqrt(sums(1)/sums(2))/self%mass
     self%own = 0.0_dp
@@ -201,7 +204,7 @@ contains
     real(dp), intent(in) :: frame(3)
     !> (2 + nd)
     real(dp), intent(inout) :: sums(:)
-    real(dp) :: v(size(sums) - 2), m, volume
+    real(dp) :: v(size(sums) - 2), carried(size(sums) - 2), m, volume
     integer :: b, nd
 
     nd = size(v)
@@ -210,6 +213,11 @@ contains
       volume = 0.0_dp
       if (allocated(sub%volume)) volume = sub%volume(b)
       v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*volume/m)
+      if (allocated(sub%applied)) v(:) = v - sub%applied(:, b)
+      if (physics%cell%moves) then
+        carried(:) = gradient_times(physics%cell%before, sub%cell%place(:, b))
+        v(:) = v - carried
+      end if
       if (allocated(sub%attraction_load)) v(:) = v - sub%inverse_mass(1, b)*sub%attraction_load(1:nd, b)
       v(:) = v - frame(1:nd)
       m = m/sub%multiplicity(b)
@@ -218,6 +226,28 @@ contains
       sums(3:) = sums(3:) + m*v
     end do
   end subroutine add_grains
+
+  !> What applied forces add to the velocities of grains in contact in a step, as a root mean square by mass [m/s]. Collective.
+  real(dp) function applied_load(problem) result(load)
+    type(contact_problem_t), intent(in) :: problem
+    !> mass, and mass times squares
+    real(dp) :: parts(2, size(problem%sub)), sums(2), m
+    integer :: s, b
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        do b = 1, sub%n_grains
+          m = 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+          parts(1, s) = parts(1, s) + m
+          parts(2, s) = parts(2, s) + m*sum(sub%applied(:, b)**2)
+        end do
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    load = 0.0_dp
+    if (sums(1) > 0.0_dp) load = sqrt(sums(2)/sums(1))
+  end function applied_load
 
   !> The same of boundaries that forces move, along the components that are free.
   pure subroutine add_driven(sub, boundaries, frame, sums)
@@ -256,6 +286,7 @@ contains
     load = 0.0_dp
     if (.not. self%mass > 0.0_dp) return
     load = physics%h*norm2(physics%gravity(1:nd) + physics%body_force(1:nd)*grain_volume(nd, 0.5_dp*self%diameter)/self%mass)
+    if (physics%cell%is_driven) load = max(load, maxval(abs(physics%cell%impulse))*self%diameter**(nd - 1)/self%mass)
     do b = 1, size(boundaries)
       load = max(load, physics%h*self%pressure_of(nd, boundaries(b), time, area(b))*self%diameter**(nd - 1)/self%mass)
     end do
@@ -304,6 +335,7 @@ contains
         turning = max(turning, norm2(boundary%spin)*self%lever(b))
       end associate
     end do
+    motion%difference = norm2(merge(0.0_dp, physics%cell%free, physics%cell%driven))*self%diameter
     if (n == 0) return
     do d = 1, nd
       ! along an axis along which forces move all, nothing is imposed

@@ -8,6 +8,7 @@ program test_neighbourhood
   use gravier_neighbour_rule, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
+  use gravier_removal, only: some_leave, remove_grains, drop_grains
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape, make_decomposition
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -32,6 +33,11 @@ program test_neighbourhood
   do axes = 0, 3
     call test_fast_grains(2, axes, 7, rule_dual)
     call test_fast_grains(3, axes, 5, rule_primal)
+  end do
+  do nd = 2, 3
+    do k = 1, size(counts)
+      call test_departures(nd, counts(k))
+    end do
   end do
   call test_due_grains()
   call test_due_boundaries()
@@ -237,7 +243,7 @@ contains
           call cloud%find_antagonist(pair, place)
           if (norm2(cloud%place(:, pair%i) - place) - cloud%radius(pair%i) - cloud%radius(pair%j) > range) cycle
           times(pair%i, pair%j) = times(pair%i, pair%j) + 1
-          owner(pair%i, pair%j) = 27*decomposition%subdomain_of(s) + code
+          owner(pair%i, pair%j) = 125*decomposition%subdomain_of(s) + code
         end do
       end associate
     end do
@@ -254,12 +260,110 @@ contains
         place(:) = cloud%place(:, pairs(p)%i)
       end if
       expected(pairs(p)%i, pairs(p)%j) = 1
-      right(pairs(p)%i, pairs(p)%j) = 27*decomposition%partition%owner(place) + shift_code(pairs(p)%shift)
+      right(pairs(p)%i, pairs(p)%j) = 125*decomposition%partition%owner(place) + shift_code(pairs(p)%shift)
     end do
     call check(size(pairs) > 60, "enough pairs to tell")
     call check(all(times == expected), "pairs of all subdomains are those between all grains")
     if (fresh) call check(all(owner == right), "pairs in the subdomains of their owner points")
   end subroutine check_pairs
+
+  !> Grains behind an outlet leave views and lists as they are: the others keep their order, their pairs with what these hold, and the
+  !> copies that other subdomains see of them.
+  subroutine test_departures(nd, n_subdomains)
+    integer, intent(in) :: nd, n_subdomains
+    type(cloud_t) :: cloud
+    type(decomposition_t) :: decomposition
+    type(halo_t) :: seen, before
+    real(dp) :: point(nd), normal(nd), mass
+    integer(i8) :: n_free, n_glued
+    integer :: s, p, g, home_of(n_grains)
+    logical :: stays(n_grains)
+
+    call cloud%init(nd, n_grains, 0.03_dp, 0.1_dp, 40 + nd)
+    decomposition%rule = cloud%rule(alert, skin, rule_dual)
+    point(:) = sum(cloud%place, dim=2)/n_grains
+    normal(:) = 0.0_dp
+    normal(1) = 1.0_dp
+    normal(2) = 0.5_dp
+    normal(:) = normal/norm2(normal)
+    allocate (decomposition%boundaries(1))
+    decomposition%boundaries(1) = plane(1000, point, normal)
+    call change_shape("outlet", decomposition%boundaries(1))
+    call make_decomposition(comm, cloud, n_subdomains, nd, .true., decomposition)
+    do g = 1, n_grains
+      home_of(g) = decomposition%partition%owner(cloud%place(:, g))
+    end do
+    seen%memory%n_impulse = 2
+    call seen%build(decomposition)
+    do s = 1, size(seen%view)
+      do p = 1, seen%view(s)%list%n
+        seen%view(s)%list%impulse(:, p) = real(p, dp)
+      end do
+    end do
+    call move(decomposition, cloud, 30, 0.2_dp*skin)
+    call seen%refresh(decomposition)
+    before = seen
+    do g = 1, n_grains
+      stays(g) = sum((cloud%place(:, g) - point)*normal) >= 0.0_dp
+    end do
+    call check(some_leave(decomposition), "departures: some leave")
+    call drop_grains(decomposition, seen)
+    call remove_grains(decomposition, .false., n_free, n_glued, mass)
+    call check_equal(n_free, int(count(.not. stays), i8), "departures: how many leave")
+    call check(.not. some_leave(decomposition), "departures: nobody leaves twice")
+    call check_lists_without(before, seen, stays)
+    call move(decomposition, cloud, 31, 0.2_dp*skin)
+    call check(.not. seen%are_due(decomposition), "departures: lists stay valid")
+    call seen%refresh(decomposition)
+    call check_views(decomposition, seen, cloud, home_of)
+    do s = 1, size(seen%view)
+      do p = 1, seen%view(s)%bodies%n
+        call check(stays(seen%view(s)%bodies%id(p)), "departures: those who left are not seen")
+      end do
+    end do
+    g = findloc(stays, .true., dim=1)
+    call shift_grain(decomposition, g, skin)
+    call check(seen%are_due(decomposition), "departures: a grain that stayed makes lists due")
+  end subroutine test_departures
+
+  !> Views and lists are those before without the grains that have left.
+  subroutine check_lists_without(before, seen, stays)
+    type(halo_t), intent(in) :: before, seen
+    logical, intent(in) :: stays(:)
+    integer :: s, p, k, n, i, j, left
+    logical :: same
+
+    left = 0
+    do s = 1, size(seen%view)
+      associate (old => before%view(s), new => seen%view(s))
+        n = 0
+        same = .true.
+        do k = 1, old%bodies%n
+          if (.not. stays(old%bodies%id(k))) cycle
+          n = n + 1
+          if (n > new%bodies%n) exit
+          same = same .and. new%bodies%id(n) == old%bodies%id(k) .and. new%owner(n) == old%owner(k)
+        end do
+        call check(same .and. n == new%bodies%n, "departures: bodies in their order")
+        n = 0
+        same = .true.
+        do p = 1, old%list%n
+          i = int(old%bodies%id(old%list%candidate(p)))
+          j = int(old%bodies%id(old%list%antagonist(p)))
+          if (.not. (stays(i) .and. stays(j))) then
+            left = left + 1
+            cycle
+          end if
+          n = n + 1
+          if (n > new%list%n) exit
+          same = same .and. new%bodies%id(new%list%candidate(n)) == i .and. new%bodies%id(new%list%antagonist(n)) == j
+          same = same .and. all(abs(new%list%impulse(:, n) - p) <= 0.0_dp)
+        end do
+        call check(same .and. n == new%list%n, "departures: pairs in their order, with their impulses")
+      end associate
+    end do
+    call check(comm%total(int(left, i8)) > 20, "departures: pairs go with them")
+  end subroutine check_lists_without
 
   !> One grain, whichever it is, that moves by more than half the skin makes the lists due on all ranks.
   subroutine test_due_grains()

@@ -3,7 +3,6 @@ program test_interface
   use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, status_failure
-  use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_problem, only: contact_problem_t
@@ -11,11 +10,11 @@ program test_interface
   use gravier_interface_problem, only: interface_field_t, make_field, chain_differences, load_transpose, dot_field
   use gravier_interface_cg, only: interface_cg_t
   use gravier_interface_direct, only: interface_direct_t
-  use gravier_config, only: config_t, parse_config
-  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_simulation, only: simulation_t
+  use gravier_test_simulations, only: make_lattice, iterate, same_bits
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
-  character(len=*), parameter :: newline = new_line("a"), keys = "&solver method = 'nscdd' /"
+  character(len=*), parameter :: keys = "&solver method = 'nscdd' /"
   type(communicator_t), target :: comm, alone
   integer :: dimension, k
   real(dp), parameter :: directions(*) = [0.0_dp, 0.5_dp, 20.0_dp]
@@ -42,70 +41,6 @@ program test_interface
 
 contains
 
-  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
-  !> follow from their identifiers press some together and part others.
-  subroutine make(over, dimension, n_subdomains, friction, keys, sim)
-    type(communicator_t), target, intent(in) :: over
-    integer, intent(in) :: dimension, n_subdomains
-    real(dp), intent(in) :: friction
-    !> of the groups &solver and &enriched
-    character(len=*), intent(in) :: keys
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-    type(step_figures_t) :: figures
-    character(len=:), allocatable :: counts
-    integer :: s, b, d
-
-    counts = "9, 8"
-    if (dimension == 3) counts = "5, 4, 4"
-    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
-      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
-      & newline//"&time step = 1, steps = 1, theta = 1 /"//newline//keys//newline// &
-      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
-    call check(.not. allocated(error), "configuration")
-    call sim%init(over, config, error)
-    call sim%assemble(figures)
-    call check(.not. allocated(error), "assembly")
-    do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s))
-        do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
-            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
-          end do
-        end do
-      end associate
-    end do
-  end subroutine make
-
-  !> Start a solve from the impulses of the problem and do `n` iterations.
-  subroutine iterate(sim, n)
-    type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: n
-    type(error_t), allocatable :: error
-    real(dp) :: jump
-    integer :: k
-
-    call sim%method%start(sim%problem, error)
-    do k = 1, n
-      call sim%method%iterate(sim%problem, .false., jump, error)
-    end do
-    call check(.not. allocated(error), "iterations")
-  end subroutine iterate
-
-  pure logical function same_bits(a, b)
-    real(dp), intent(in) :: a(:, :), b(:, :)
-    integer :: i, j
-
-    same_bits = size(a) == size(b)
-    if (.not. same_bits) return
-    do j = 1, size(a, 2)
-      do i = 1, size(a, 1)
-        same_bits = same_bits .and. transfer(a(i, j), 0_i8) == transfer(b(i, j), 0_i8)
-      end do
-    end do
-  end function same_bits
-
   !> A problem with shared masses, impulses, and its matrices.
   subroutine prepare(over, dimension, n_subdomains, friction, l, sim, matrix)
     type(communicator_t), target, intent(in) :: over
@@ -116,7 +51,7 @@ contains
     type(error_t), allocatable :: error
     logical :: changed
 
-    call make(over, dimension, n_subdomains, friction, keys, sim)
+    call make_lattice(over, dimension, n_subdomains, friction, keys, sim)
     call iterate(sim, 2)
     matrix%direction%value = l
     call matrix%start(sim%problem, error)

@@ -2,17 +2,16 @@
 program test_enriched_matrix
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_problem, only: contact_problem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
-  use gravier_config, only: config_t, parse_config
-  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_simulation, only: simulation_t
   use gravier_test_contact_columns, only: contact_column
+  use gravier_test_simulations, only: make_lattice, iterate
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
-  character(len=*), parameter :: newline = new_line("a"), keys = "&solver method = 'nscdd', sweeps = 2 /"
+  character(len=*), parameter :: keys = "&solver method = 'nscdd', sweeps = 2 /"
   type(communicator_t), target :: comm
   integer :: dimension, k
   real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]
@@ -34,57 +33,6 @@ program test_enriched_matrix
 
 contains
 
-  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
-  !> follow from their identifiers press some together and part others.
-  subroutine make(over, dimension, n_subdomains, friction, keys, sim)
-    type(communicator_t), target, intent(in) :: over
-    integer, intent(in) :: dimension, n_subdomains
-    real(dp), intent(in) :: friction
-    !> of the groups &solver and &enriched
-    character(len=*), intent(in) :: keys
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-    type(step_figures_t) :: figures
-    character(len=:), allocatable :: counts
-    integer :: s, b, d
-
-    counts = "9, 8"
-    if (dimension == 3) counts = "5, 4, 4"
-    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
-      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
-      & newline//"&time step = 1, steps = 1, theta = 1 /"//newline//keys//newline// &
-      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
-    call check(.not. allocated(error), "configuration")
-    call sim%init(over, config, error)
-    call sim%assemble(figures)
-    call check(.not. allocated(error), "assembly")
-    do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s))
-        do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
-            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
-          end do
-        end do
-      end associate
-    end do
-  end subroutine make
-
-  !> Start a solve from the impulses of the problem and do `n` iterations.
-  subroutine iterate(sim, n)
-    type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: n
-    type(error_t), allocatable :: error
-    real(dp) :: jump
-    integer :: k
-
-    call sim%method%start(sim%problem, error)
-    do k = 1, n
-      call sim%method%iterate(sim%problem, .false., jump, error)
-    end do
-    call check(.not. allocated(error), "iterations")
-  end subroutine iterate
-
   !> l of every component, and y = (M + H l H^T)^-1 b, put back into the matrix. For roundings relative to b the condition
   !> does not count: what is left is the backward error of the factorisation, some n roundings of |A| |y|.
   subroutine test_solution(dimension, friction, l, relative, active)
@@ -99,7 +47,7 @@ contains
     integer :: s, g, d, nv
     logical :: changed
 
-    call make(comm, dimension, 9, friction, keys, sim)
+    call make_lattice(comm, dimension, 9, friction, keys, sim)
     call iterate(sim, 10)
     matrix%direction%value = l
     matrix%direction%relative = relative
@@ -207,7 +155,7 @@ contains
     integer :: s
     logical :: changed
 
-    call make(comm, dimension, 9, friction, keys, sim)
+    call make_lattice(comm, dimension, 9, friction, keys, sim)
     mine = 0
     do s = 1, size(sim%problem%sub)
       call sim%problem%sub(s)%share_masses(sim%problem%kernels, .true.)

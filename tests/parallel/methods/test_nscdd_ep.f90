@@ -1,33 +1,27 @@
 !> NSCDD-EP: l = 0, the enriched interface condition after each iteration, impulses fed back, fixed points, both interface solvers,
 !> work, any number of ranks.
 program test_nscdd_ep
-  use mpi_f08, only: MPI_COMM_SELF
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text
-  use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_nscdd_ep, only: nscdd_ep_t
   use gravier_solve, only: solve_report_t, solve_contacts, solve_converged
-  use gravier_config, only: config_t, parse_config
-  use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_test_contact_columns, only: same_contacts
+  use gravier_simulation, only: simulation_t
+  use gravier_test_simulations, only: make_lattice, iterate, same_bits, same_impulses, compare_with_one_rank
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
-  character(len=*), parameter :: newline = new_line("a")
   character(len=*), parameter :: plain = "&solver method = 'nscdd', sweeps = 2, acceleration = 'none' /"
   character(len=*), parameter :: enriched = &
     & "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched direction = "
-  type(communicator_t), target :: comm, alone
+  type(communicator_t), target :: comm
   integer :: dimension, k
   real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]
 
   call start_parallel()
   call comm%init()
-  call alone%init(MPI_COMM_SELF)
   do dimension = 2, 3
     do k = 1, size(frictions)
       call test_zero(dimension, frictions(k))
@@ -45,105 +39,10 @@ program test_nscdd_ep
   end do
   call test_work()
   call finish_checks()
-  call alone%free()
   call comm%free()
   call stop_parallel()
 
 contains
-
-  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
-  !> follow from their identifiers press some together and part others.
-  subroutine make(over, dimension, n_subdomains, friction, keys, sim)
-    type(communicator_t), target, intent(in) :: over
-    integer, intent(in) :: dimension, n_subdomains
-    real(dp), intent(in) :: friction
-    !> of the groups &solver and &enriched
-    character(len=*), intent(in) :: keys
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-    type(step_figures_t) :: figures
-    character(len=:), allocatable :: counts
-    integer :: s, b, d
-
-    counts = "9, 8"
-    if (dimension == 3) counts = "5, 4, 4"
-    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
-      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
-      & newline//"&time step = 1, steps = 1, theta = 1 /"//newline//keys//newline// &
-      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
-    call check(.not. allocated(error), "configuration")
-    call sim%init(over, config, error)
-    call sim%assemble(figures)
-    call check(.not. allocated(error), "assembly")
-    do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s))
-        do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
-            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
-          end do
-        end do
-      end associate
-    end do
-  end subroutine make
-
-  !> Start a solve from the impulses of the problem and do `n` iterations.
-  subroutine iterate(sim, n)
-    type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: n
-    type(error_t), allocatable :: error
-    real(dp) :: jump
-    integer :: k
-
-    call sim%method%start(sim%problem, error)
-    do k = 1, n
-      call sim%method%iterate(sim%problem, .false., jump, error)
-    end do
-    call check(.not. allocated(error), "iterations")
-  end subroutine iterate
-
-  pure logical function same_bits(a, b)
-    real(dp), intent(in) :: a(:, :), b(:, :)
-    integer :: i, j
-
-    same_bits = size(a) == size(b)
-    if (.not. same_bits) return
-    do j = 1, size(a, 2)
-      do i = 1, size(a, 1)
-        same_bits = same_bits .and. transfer(a(i, j), 0_i8) == transfer(b(i, j), 0_i8)
-      end do
-    end do
-  end function same_bits
-
-  !> Whether two copies of a subdomain have the same impulses, contact by contact, bit for bit.
-  pure logical function same_impulses(a, b)
-    type(subproblem_t), intent(in) :: a, b
-    same_impulses = a%n_contacts == b%n_contacts .and. same_contacts(a%impulse, b%impulse, a%n_contacts)
-  end function same_impulses
-
-  !> Whether the subdomains of this rank have the bits that one rank alone gives them.
-  subroutine compare_with_one_rank(dimension, n_subdomains, friction, keys, n, name)
-    integer, intent(in) :: dimension, n_subdomains, n
-    real(dp), intent(in) :: friction
-    character(len=*), intent(in) :: keys, name
-    type(simulation_t) :: many, one
-    integer :: s, first
-    logical :: same
-
-    call make(comm, dimension, n_subdomains, friction, keys, many)
-    call make(alone, dimension, n_subdomains, friction, keys, one)
-    call iterate(many, n)
-    call iterate(one, n)
-    first = many%decomposition%first
-    same = .true.
-    do s = 1, size(many%problem%sub)
-      same = same .and. same_impulses(many%problem%sub(s), one%problem%sub(first + s - 1))
-      same = same .and. same_bits(many%problem%sub(s)%velocity, one%problem%sub(first + s - 1)%velocity)
-    end do
-    call check(same, name//": the bits of one rank alone")
-    call many%free()
-    call one%free()
-  end subroutine compare_with_one_rank
 
   !> Largest difference of the impulses of two runs. Collective.
   real(dp) function distance(a, b)
@@ -165,9 +64,9 @@ contains
     integer :: s
     logical :: same
 
-    call make(comm, dimension, 9, friction, plain, nscdd)
-    call make(comm, dimension, 9, friction, enriched//"0 /", zero)
-    call make(comm, dimension, 9, friction, enriched//"1 /", some)
+    call make_lattice(comm, dimension, 9, friction, plain, nscdd)
+    call make_lattice(comm, dimension, 9, friction, enriched//"0 /", zero)
+    call make_lattice(comm, dimension, 9, friction, enriched//"1 /", some)
     call iterate(nscdd, 10)
     call iterate(zero, 10)
     call iterate(some, 10)
@@ -196,7 +95,7 @@ contains
     real(dp) :: jump
     integer :: n
 
-    call make(comm, dimension, 9, friction, enriched//direction, sim)
+    call make_lattice(comm, dimension, 9, friction, enriched//direction, sim)
     ! the second round starts from impulses
     do n = 1, 4
       if (mod(n, 2) == 1) call sim%method%start(sim%problem, error)
@@ -287,8 +186,9 @@ contains
     real(dp) :: jump, reached(2), gained
     integer :: n, s
 
-    call make(comm, dimension, 9, friction, plain, nscdd)
-    call make(comm, dimension, 9, friction, "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched "//keys, ep)
+    call make_lattice(comm, dimension, 9, friction, plain, nscdd)
+    call make_lattice(comm, dimension, 9, friction, &
+      & "&solver method = 'nscdd_ep', sweeps = 2, acceleration = 'none' / &enriched "//keys, ep)
     call ep%method%start(ep%problem, error)
     gained = 0.0_dp
     do n = 1, 6
@@ -362,8 +262,8 @@ contains
     real(dp), intent(in) :: friction
     type(simulation_t) :: direct, cg
 
-    call make(comm, dimension, 5, friction, enriched//"2 /", direct)
-    call make(comm, dimension, 5, friction, enriched//"2, interface = 'cg' /", cg)
+    call make_lattice(comm, dimension, 5, friction, enriched//"2 /", direct)
+    call make_lattice(comm, dimension, 5, friction, enriched//"2, interface = 'cg' /", cg)
     call iterate(direct, 3)
     call iterate(cg, 3)
     call check_close(distance(direct%problem, cg%problem), 0.0_dp, 1.0e-8_dp, "direct and iterative interface solves")
@@ -384,8 +284,8 @@ contains
     real(dp) :: residual, defect
     integer :: s
 
-    call make(comm, dimension, 9, 0.0_dp, plain, nscdd)
-    call make(comm, dimension, 9, 0.0_dp, enriched//"1 /", ep)
+    call make_lattice(comm, dimension, 9, 0.0_dp, plain, nscdd)
+    call make_lattice(comm, dimension, 9, 0.0_dp, enriched//"1 /", ep)
     nscdd%control%tolerance = 1.0e-10_dp
     call solve_contacts(nscdd%problem, nscdd%method, nscdd%control, report, error)
     call check_equal(report%status, solve_converged, "NSCDD converges")
@@ -407,7 +307,7 @@ contains
     integer :: s
     integer(i8) :: mine
 
-    call make(comm, 2, 9, 0.4_dp, enriched//"1 /", sim)
+    call make_lattice(comm, 2, 9, 0.4_dp, enriched//"1 /", sim)
     mine = 0
     do s = 1, size(sim%problem%sub)
       if (sim%problem%sub(s)%n_bodies > 0) mine = mine + 1

@@ -1,35 +1,29 @@
 !> Schwarz-NSCD and Schwarz-NSCD-EC: neighbours' loads, under-relaxation, the enriched reactions against their definition
 !> on dense matrices, l = 0 and l > 0, one subdomain, any number of ranks.
 program test_schwarz
-  use mpi_f08, only: MPI_COMM_SELF
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text
-  use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_kernels, only: contact_jacobian, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_nlgs, only: nlgs_t
   use gravier_schwarz, only: schwarz_t, neighbour_load_t, relaxation_t
   use gravier_schwarz_ec, only: schwarz_ec_t
-  use gravier_config, only: config_t, parse_config
-  use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_test_contact_columns, only: same_contacts
+  use gravier_simulation, only: simulation_t
+  use gravier_test_simulations, only: make_lattice, iterate, compare_with_one_rank
   use gravier_check, only: check, check_close, finish_checks
   implicit none
-  character(len=*), parameter :: newline = new_line("a")
   character(len=*), parameter :: plain = "&solver method = 'schwarz', sweeps = 2 /"
   character(len=*), parameter :: enriched = "&solver method = 'schwarz_ec', sweeps = 2 / &enriched direction = "
   !> velocities and impulses of size 1 to 10, some ten iterations
   real(dp), parameter :: rounding = 1.0e-12_dp
-  type(communicator_t), target :: comm, alone
+  type(communicator_t), target :: comm
   integer :: dimension, k
   real(dp), parameter :: frictions(*) = [0.0_dp, 0.4_dp]
 
   call start_parallel()
   call comm%init()
-  call alone%init(MPI_COMM_SELF)
   call test_adapting()
   do dimension = 2, 3
     do k = 1, size(frictions)
@@ -47,105 +41,10 @@ program test_schwarz
     end do
   end do
   call finish_checks()
-  call alone%free()
   call comm%free()
   call stop_parallel()
 
 contains
-
-  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
-  !> follow from their identifiers press some together and part others.
-  subroutine make(over, dimension, n_subdomains, friction, keys, sim)
-    type(communicator_t), target, intent(in) :: over
-    integer, intent(in) :: dimension, n_subdomains
-    real(dp), intent(in) :: friction
-    !> of the groups &solver and &enriched
-    character(len=*), intent(in) :: keys
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-    type(step_figures_t) :: figures
-    character(len=:), allocatable :: counts
-    integer :: s, b, d
-
-    counts = "9, 8"
-    if (dimension == 3) counts = "5, 4, 4"
-    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
-      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
-      & newline//"&time step = 1, steps = 1, theta = 1 /"//newline//keys//newline// &
-      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
-    call check(.not. allocated(error), "configuration")
-    call sim%init(over, config, error)
-    call sim%assemble(figures)
-    call check(.not. allocated(error), "assembly")
-    do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s))
-        do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
-            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
-          end do
-        end do
-      end associate
-    end do
-  end subroutine make
-
-  !> Start a solve from the impulses of the problem and do `n` iterations.
-  subroutine iterate(sim, n)
-    type(simulation_t), intent(inout) :: sim
-    integer, intent(in) :: n
-    type(error_t), allocatable :: error
-    real(dp) :: jump
-    integer :: k
-
-    call sim%method%start(sim%problem, error)
-    do k = 1, n
-      call sim%method%iterate(sim%problem, .false., jump, error)
-    end do
-    call check(.not. allocated(error), "iterations")
-  end subroutine iterate
-
-  pure logical function same_bits(a, b)
-    real(dp), intent(in) :: a(:, :), b(:, :)
-    integer :: i, j
-
-    same_bits = size(a) == size(b)
-    if (.not. same_bits) return
-    do j = 1, size(a, 2)
-      do i = 1, size(a, 1)
-        same_bits = same_bits .and. transfer(a(i, j), 0_i8) == transfer(b(i, j), 0_i8)
-      end do
-    end do
-  end function same_bits
-
-  !> Whether two copies of a subdomain have the same impulses, contact by contact, bit for bit.
-  pure logical function same_impulses(a, b)
-    type(subproblem_t), intent(in) :: a, b
-    same_impulses = a%n_contacts == b%n_contacts .and. same_contacts(a%impulse, b%impulse, a%n_contacts)
-  end function same_impulses
-
-  !> Whether the subdomains of this rank have the bits that one rank alone gives them.
-  subroutine compare_with_one_rank(dimension, n_subdomains, friction, keys, n, name)
-    integer, intent(in) :: dimension, n_subdomains, n
-    real(dp), intent(in) :: friction
-    character(len=*), intent(in) :: keys, name
-    type(simulation_t) :: many, one
-    integer :: s, first
-    logical :: same
-
-    call make(comm, dimension, n_subdomains, friction, keys, many)
-    call make(alone, dimension, n_subdomains, friction, keys, one)
-    call iterate(many, n)
-    call iterate(one, n)
-    first = many%decomposition%first
-    same = .true.
-    do s = 1, size(many%problem%sub)
-      same = same .and. same_impulses(many%problem%sub(s), one%problem%sub(first + s - 1))
-      same = same .and. same_bits(many%problem%sub(s)%velocity, one%problem%sub(first + s - 1)%velocity)
-    end do
-    call check(same, name//": the bits of one rank alone")
-    call many%free()
-    call one%free()
-  end subroutine compare_with_one_rank
 
   !> After the exchange every copy has the velocity of the undivided body under all impulses: its own and, as loads, those
   !> of all others. Cold, and from impulses at the start.
@@ -156,7 +55,7 @@ contains
     integer :: s, round
     logical :: same
 
-    call make(comm, dimension, 9, friction, plain, sim)
+    call make_lattice(comm, dimension, 9, friction, plain, sim)
     do round = 1, 2
       call iterate(sim, 6)
       call sim%problem%evaluate()
@@ -201,7 +100,7 @@ contains
     integer :: s, k, n
     logical :: right
 
-    call make(comm, dimension, 9, friction, plain, sim)
+    call make_lattice(comm, dimension, 9, friction, plain, sim)
     schwarz%relaxation = relaxation_t(0.375_dp, automatic=.false.)
     call schwarz%start(sim%problem, error)
     allocate (expected(sim%problem%kernels%nv))
@@ -264,8 +163,8 @@ contains
     real(dp) :: jump
     integer :: s, k
 
-    call make(comm, dimension, 1, friction, keys, sim)
-    call make(comm, dimension, 1, friction, keys, other)
+    call make_lattice(comm, dimension, 1, friction, keys, sim)
+    call make_lattice(comm, dimension, 1, friction, keys, other)
     call iterate(sim, 6)
     nlgs%sweeps = 2
     call nlgs%start(other%problem, error)
@@ -298,9 +197,9 @@ contains
     real(dp), intent(in) :: friction
     type(simulation_t) :: schwarz, zero, some
 
-    call make(comm, dimension, 9, friction, plain, schwarz)
-    call make(comm, dimension, 9, friction, enriched//"0 /", zero)
-    call make(comm, dimension, 9, friction, enriched//"2 /", some)
+    call make_lattice(comm, dimension, 9, friction, plain, schwarz)
+    call make_lattice(comm, dimension, 9, friction, enriched//"0 /", zero)
+    call make_lattice(comm, dimension, 9, friction, enriched//"2 /", some)
     call iterate(schwarz, 1)
     call iterate(some, 1)
     call check_close(distance(schwarz%problem, some%problem), 0.0_dp, rounding, "the first sweeps do not know of l")
@@ -340,7 +239,7 @@ contains
     integer :: s, k, n
     logical :: right
 
-    call make(comm, dimension, 9, friction, enriched//direction, sim)
+    call make_lattice(comm, dimension, 9, friction, enriched//direction, sim)
     select type (method => sim%method)
     type is (schwarz_ec_t)
       method%matrix%direction = method%matrix%direction

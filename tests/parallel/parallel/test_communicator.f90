@@ -6,12 +6,19 @@ program test_communicator
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_random_hash, only: hash_uniform
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
-  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel, mpi_library
+  use gravier_communicator, only: communicator_t, start_parallel, join_parallel, stop_parallel, mpi_library
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   type(communicator_t) :: comm
+  type(error_t), allocatable :: error
+  logical :: started = .false.
   integer :: n
 
+  call join_parallel(started, error)
+  call check(started .and. .not. allocated(error), "MPI is started")
+  started = .false.
+  call join_parallel(started, error)
+  call check(.not. (started .or. allocated(error)), "MPI runs")
   call start_parallel()
   call comm%init()
   do n = 1, 40
@@ -25,12 +32,22 @@ program test_communicator
   call test_blocks()
   call test_barrier_asleep()
   call test_self()
+  call test_handle()
   call test_twice()
   call finish_checks()
   call comm%free()
   call stop_parallel()
 
 contains
+
+  !> A communicator by its handle.
+  subroutine test_handle()
+    type(communicator_t) :: own
+
+    call own%init_from(MPI_COMM_SELF%mpi_val)
+    call check(own%size == 1 .and. own%rank == 0, "the communicator of a rank by itself, by its handle")
+    call own%free()
+  end subroutine test_handle
 
   !> Term `i` of subdomain `s`: both signs, over 400 binary orders of magnitude, so that the order of additions matters.
   real(dp) function term(s, i)

@@ -112,9 +112,9 @@ program test_diagnostics
   use gravier_diagnostics, only: diagnostics_t
   use gravier_boundary_forces, only: boundary_forces_t
   use gravier_contact_structure, only: contact_structure_t
-  use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use own_diagnostics, only: counter_t, least_t
+  use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -136,18 +136,6 @@ program test_diagnostics
   call stop_parallel()
 
 contains
-
-  subroutine make(text, sim)
-    character(len=*), intent(in) :: text
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-
-    call parse_config("case", text, config, error)
-    if (.not. allocated(error)) call sim%init(comm, config, error)
-    call check(.not. allocated(error), "the scene is made")
-    if (allocated(error)) print "(a)", error%message
-  end subroutine make
 
   subroutine advance(sim)
     type(simulation_t), intent(inout) :: sim
@@ -215,7 +203,7 @@ contains
     type(histogram_t), allocatable :: histograms(:)
     integer :: k
 
-    call make(case_text//" &output every = 2 /", sim)
+    call make_scene(comm, case_text//" &output every = 2 /", sim)
     allocate (list(1)%diagnostic, source=counter_t())
     allocate (list(2)%diagnostic, source=boundary_forces_t())
     allocate (list(3)%diagnostic, source=least_t())
@@ -267,7 +255,7 @@ contains
     type(diagnostic_holder_t) :: list(2)
     type(histogram_t), allocatable :: histograms(:)
 
-    call make(case_text//" &output every = 2 /", sim)
+    call make_scene(comm, case_text//" &output every = 2 /", sim)
     allocate (list(1)%diagnostic, source=contact_structure_t())
     allocate (list(2)%diagnostic, source=counter_t())
     call sim%diagnostics%take(sim%decomposition, sim%physics, list, [.true., .true.])
@@ -295,13 +283,13 @@ contains
     integer :: k
     logical :: of_stress
 
-    call make(case_text, sim)
+    call make_scene(comm, case_text, sim)
     call check_equal(size(sim%diagnostics%asked), 0, "none is asked for")
     call check_equal(sim%diagnostics%n_columns, 0, "and there are no columns")
     call advance(sim)
     call check_equal(sim%diagnostics%n_columns, 0, "nor after a step")
     call sim%free()
-    call make(case_text//" &output stress = T, structure = T /", sim)
+    call make_scene(comm, case_text//" &output stress = T, structure = T /", sim)
     call check_equal(size(sim%diagnostics%asked), 2, "two are asked for")
     call check_equal(sim%diagnostics%n_columns, 7 + 13, "columns of stress and of structure")
     call check_equal(trim(sim%diagnostics%name(1)), "stress_xx", "in the order of the registry")
@@ -327,7 +315,7 @@ contains
     real(dp) :: weight, place(3)
     integer :: k
 
-    call make(case_text//" &output boundary_forces = T /", sim)
+    call make_scene(comm, case_text//" &output boundary_forces = T /", sim)
     call check_equal(sim%diagnostics%n_columns, 4*size(sim%decomposition%boundaries), "force and place of each boundary")
     k = 4*size(sim%decomposition%boundaries) - 3
     call check_equal(trim(sim%diagnostics%name(k)), "force_x:a_b_c", "no comma and no quote")
@@ -341,7 +329,8 @@ contains
     call check_close(sim%diagnostics%value(k + 3), place(2), 0.0_dp, "its place")
     call check(sim%diagnostics%in_history(k) .and. .not. sim%diagnostics%in_results(k), "they are in the history alone")
     call sim%free()
-    call make(case_text//" &boundary shape = 'plane', normal = 0, 1, point = 1, -9, velocity = 0.5, 0, name = 'belt' / "// &
+    call make_scene(comm, case_text// &
+      & " &boundary shape = 'plane', normal = 0, 1, point = 1, -9, velocity = 0.5, 0, name = 'belt' / "// &
       & "&output boundary_forces = T /", sim)
     call advance(sim)
     k = 4*size(sim%decomposition%boundaries) - 1

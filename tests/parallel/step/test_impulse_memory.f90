@@ -12,12 +12,13 @@ program test_impulse_memory
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_rule, only: rule_dual, rule_primal
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_physics, only: physics_t
   use gravier_interface, only: interface_statistics_t
   use gravier_problem_builder, only: build_problem
   use gravier_velocity_return, only: take_velocities
-  use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, gather_impulses, spread_impulses
+  use gravier_impulse_memory, only: impulse_entries, keep_impulses, recall_impulses, list_impulses
+  use gravier_memory_carrying, only: carry_memory
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_test_scenes, only: cloud_t, draw_number => draw, make_decomposition
@@ -214,14 +215,14 @@ contains
     call check(comm%total(fresh) > 0, "some contacts are new")
   end subroutine check_recalled
 
-  !> Impulses kept with the pairs of lists, gathered, and spread over a new partition after all grains have moved on: every
+  !> Impulses kept with the pairs of lists, and carried to the lists of a new partition after all grains have moved on: every
   !> pair that is still near has its own, and none is lost.
   subroutine test_new_partition(nd, axes, kind)
     integer, intent(in) :: nd, axes, kind
     type(cloud_t) :: cloud
     type(decomposition_t) :: decomposition, other
     type(halo_t) :: before, after
-    integer(i8), allocatable :: records(:, :), owner(:, :)
+    integer(i8), allocatable :: owner(:, :)
     integer(i8) :: counts(3)
     integer :: s, k
 
@@ -241,13 +242,12 @@ contains
       end associate
     end do
     call before%refresh(decomposition)
-    call gather_impulses(decomposition, before, records)
     call make_decomposition(comm, cloud, 7, nd, .true., other)
     decomposition%partition = other%partition
     call decomposition%migrate()
     after%memory%n_impulse = 4
     call after%build(decomposition)
-    call spread_impulses(decomposition, records, after)
+    call carry_memory(decomposition, before%view, after)
     call count_pairs(decomposition, after, owner, counts)
     call check(count(owner > 0) > 60, "new partition: enough pairs to tell")
     call check_equal(counts(1), 0_i8, "new partition: pairs with another impulse than theirs")
@@ -456,25 +456,41 @@ contains
   subroutine test_nothing_kept()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
-    integer(i8), allocatable :: records(:, :)
+    integer(i8) :: gathered
     integer :: s, c
 
     call make(2, 3, 0.3_dp, "partition = 'grid'", sim)
     call sim%assemble(figures)
     call recall_impulses(sim%halo, sim%problem)
     call check(.not. sim%problem%any_impulse(), "nothing kept, nothing recalled")
-    call gather_impulses(sim%decomposition, sim%halo, records)
-    call check_equal(size(records, 2), 0, "zero impulses are not gathered")
+    call gather(sim, gathered)
+    call check_equal(gathered, 0_i8, "zero impulses are not gathered")
     do s = 1, size(sim%problem%sub)
       do c = 1, sim%problem%sub(s)%n_contacts
         sim%problem%sub(s)%impulse(lane_of(c), 1, block_of(c)) = 1.0_dp
       end do
     end do
     call keep_impulses(sim%problem, sim%halo)
-    call gather_impulses(sim%decomposition, sim%halo, records)
-    call check_equal(comm%total(size(records, 2, kind=i8)), sim%problem%n_contacts, "all impulses are gathered")
-    call check_equal(size(records, 1), 7, "words of a record")
+    call gather(sim, gathered)
+    call check_equal(comm%total(gathered), sim%problem%n_contacts, "all impulses are gathered")
     call sim%free()
   end subroutine test_nothing_kept
+
+  !> The records of all pairs of this rank that keep something.
+  subroutine gather(sim, n)
+    type(simulation_t), intent(in) :: sim
+    integer(i8), intent(out) :: n
+    integer(i8), allocatable :: records(:, :)
+    integer, allocatable :: kept(:)
+    integer :: s
+
+    n = 0
+    do s = 1, size(sim%halo%view)
+      call sim%halo%view(s)%list%find_kept(kept)
+      call list_impulses(sim%halo%view(s), 0, kept, records)
+      call check_equal(size(records, 1), 4, "words of a record")
+      n = n + size(records, 2)
+    end do
+  end subroutine gather
 
 end program test_impulse_memory

@@ -8,8 +8,8 @@ program test_region_means
   use gravier_scene_extent, only: find_extent
   use gravier_contact_branch, only: find_branch
   use gravier_region_means, only: region_means_t, region_figures_t, regions_key
-  use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -32,18 +32,6 @@ program test_region_means
 
 contains
 
-  subroutine make(text, sim)
-    character(len=*), intent(in) :: text
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-
-    call parse_config("case", text, config, error)
-    if (.not. allocated(error)) call sim%init(comm, config, error)
-    call check(.not. allocated(error), "the scene is made")
-    if (allocated(error)) print "(a)", error%message
-  end subroutine make
-
   !> The whole scene has the stress, the volume and the solid fraction of `stress`, the parts of the scene add up to it, and so do
   !> bins.
   subroutine test_whole(text)
@@ -57,7 +45,7 @@ contains
     real(dp) :: scale
     integer :: k, nd
 
-    call make(text, sim)
+    call make_scene(comm, text, sim)
     do k = 1, 200
       call sim%advance(figures, error)
     end do
@@ -130,12 +118,14 @@ contains
     type(simulation_t) :: sim
     real(dp) :: low(2), high(2), length(2)
 
-    call make("&scene bodies = 'column', column_count = 3, radius = 0.1, mass = 1 / &time step = 0.01, steps = 1 /", sim)
+    call make_scene(comm, &
+      & "&scene bodies = 'column', column_count = 3, radius = 0.1, mass = 1 / &time step = 0.01, steps = 1 /", sim)
     call find_extent(sim%decomposition, low, high, length)
     call check_close(length(1), 0.2_dp, 1.0e-15_dp, "a grain wide")
     call check_close(length(2), 0.6_dp, 1.0e-15_dp, "three grains high, from the ground")
     call check_close(maxval(abs(length - (high - low))), 0.0_dp, 0.0_dp, "length")
-    call make("&scene bodies = 'none' / &insertion lower = 0, 0, upper = 1, 1, rate = 1, radius = 0.1 / &time step = 0.01, "// &
+    call make_scene(comm, &
+      & "&scene bodies = 'none' / &insertion lower = 0, 0, upper = 1, 1, rate = 1, radius = 0.1 / &time step = 0.01, "// &
       & "steps = 1 / &boundary shape = 'plane', normal = 0, 1, point = 0, -0.5 /", sim)
     call find_extent(sim%decomposition, low, high, length)
     call check_close(low(2), -0.5_dp, 0.0_dp, "a plane alone")

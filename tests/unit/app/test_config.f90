@@ -125,7 +125,7 @@ contains
     call check_close(config%scene%contact%friction, 0.375_dp, 0.0_dp, "friction")
     call check_close(config%scene%wall_contact%friction, 0.625_dp, 0.0_dp, "wall_friction")
     call check_close(config%scene%alert_distance, 0.125_dp, 0.0_dp, "alert_distance")
-    call check(config%scene%alert_given, "alert_given")
+    call check(config%scene%alert_distance_given, "alert_distance_given")
     call check_whole_effects(config%scene)
     call check_close(config%time%step, 0.0078125_dp, 0.0_dp, "step")
     call check_equal(config%time%steps, 40, "steps")
@@ -143,10 +143,15 @@ contains
     call check_vector(scene%period, [0.0_dp, 8.0_dp, 16.0_dp], "period")
     call check_vector(scene%period_origin, [-1.0_dp, -2.0_dp, -3.0_dp], "period_origin")
     call check_vector(scene%body_force, [4.0_dp, 5.0_dp, 6.0_dp], "body_force")
+    call check_vector(scene%cell_strain_rate, [0.0_dp, 0.5_dp, 0.0_dp], "cell_strain_rate")
+    call check_vector(scene%cell_shear_rate, [0.25_dp, 0.0_dp, 0.0_dp], "cell_shear_rate")
+    call check_vector(scene%cell_pressure, [0.0_dp, 0.0_dp, 7.0_dp], "cell_pressure")
+    call check_vector(scene%cell_shear_stress, [0.0_dp, 0.0_dp, -2.0_dp], "cell_shear_stress")
+    call check_close(scene%cell_inertia, 0.5_dp, 0.0_dp, "cell_inertia")
     call check_close(scene%skin, 0.375_dp, 0.0_dp, "skin")
     call check(scene%skin_given, "skin_given")
     call check_close(scene%overlap_allowed, 0.0625_dp, 0.0_dp, "overlap_allowed")
-    call check(scene%overlap_given, "overlap_given")
+    call check(scene%overlap_allowed_given, "overlap_allowed_given")
     call check(.not. scene%overlap_projection, "overlap_projection")
     call check_close(scene%start_overlap, 0.25_dp, 0.0_dp, "start_overlap")
     call check_close(scene%list_steps, 12.0_dp, 0.0_dp, "list_steps")
@@ -177,7 +182,8 @@ contains
       // "  wall_friction = 0.625, restitution = 0.25, wall_restitution = 0.75, rotation = .false." // newline &
       // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6" // newline &
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
-      // "  start_overlap = 0.25, list_steps = 12" // newline &
+      // "  start_overlap = 0.25, list_steps = 12, cell_strain_rate = 0, 0.5, cell_shear_rate = 0.25" // newline &
+      // "  cell_pressure = 0, 0, 7, cell_shear_stress = 0, 0, -2, cell_inertia = 0.5" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75, rest_energy = 0.001 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
@@ -257,7 +263,7 @@ contains
     call check_close(config%scene%contact%friction, 0.0_dp, 0.0_dp, "default friction")
     call check_close(config%scene%wall_contact%friction, 0.0_dp, 0.0_dp, "default wall_friction")
     call check(config%scene%alert_distance < 0.0_dp, "default alert_distance")
-    call check(.not. config%scene%alert_given, "default alert_given")
+    call check(.not. config%scene%alert_distance_given, "default alert_distance_given")
     call check_default_effects(config%scene)
     call check_equal(size(config%boundaries), 0, "no boundary by default")
     call check_close(config%time%theta, 0.5_dp, 0.0_dp, "default theta")
@@ -275,11 +281,16 @@ contains
     call check_vector(scene%period_origin, spread(0.0_dp, 1, 3), "default period_origin")
     call check_vector(scene%body_force, spread(0.0_dp, 1, 3), "default body_force")
     call check_equal(scene%gravity_table, "", "default gravity_table")
+    call check_vector(scene%cell_strain_rate, spread(0.0_dp, 1, 3), "default cell_strain_rate")
+    call check_vector(scene%cell_shear_rate, spread(0.0_dp, 1, 3), "default cell_shear_rate")
+    call check_vector(scene%cell_pressure, spread(0.0_dp, 1, 3), "default cell_pressure")
+    call check_vector(scene%cell_shear_stress, spread(0.0_dp, 1, 3), "default cell_shear_stress")
+    call check_close(scene%cell_inertia, 0.1_dp, 0.0_dp, "default cell_inertia")
     call check(.not. scene%skin_given, "default skin_given")
-    call check(.not. scene%overlap_given, "default overlap_given")
+    call check(.not. scene%overlap_allowed_given, "default overlap_allowed_given")
     call check(scene%overlap_projection, "default overlap_projection")
     call check_close(scene%start_overlap, 0.5_dp, 0.0_dp, "default start_overlap")
-    call check_close(scene%list_steps, 0.0_dp, 0.0_dp, "default list_steps")
+    call check_close(scene%list_steps, 10.0_dp, 0.0_dp, "default list_steps")
   end subroutine check_default_effects
 
   subroutine check_default_methods(config)
@@ -350,7 +361,7 @@ contains
     call accept(scene("bodies = 'column' skin = 0"), "skin = 0", config)
     call check(config%scene%skin_given, "skin_given where skin = 0")
     call accept(scene("bodies = 'column' alert_distance = 0"), "alert_distance = 0", config)
-    call check(config%scene%alert_given, "alert_given where alert_distance = 0")
+    call check(config%scene%alert_distance_given, "alert_distance_given where alert_distance = 0")
     call accept(scene("bodies = 'lattice'" // lattice_keys), "a lattice in 2D", config)
     call check(all(config%scene%lattice_count == [4, 5, 1]), "one layer of a lattice in 2D")
     call accept(scene("bodies = 'file' bodies_file = 'a.h5' density = 3"), "a bodies file", config)
@@ -686,6 +697,15 @@ contains
       "&scene period = 1, -1: expected at most 3 finite real numbers >= 0 (m)")
     call refuse(scene("bodies = 'column' period(3) = 1"), "&scene period(3) = 1: " // third)
     call refuse(scene("bodies = 'column' period_origin = 0, 0, 1"), "&scene period_origin = 0, 0, 1: " // third)
+    call refuse(scene("bodies = 'column' cell_pressure = 0, -2"), &
+      "&scene cell_pressure = 0, -2: expected at most 3 finite real numbers >= 0 (Pa, N/m in 2D)")
+    call refuse(scene("bodies = 'column' cell_inertia = 0"), "&scene cell_inertia = 0: expected a finite real number > 0")
+    call refuse(scene("bodies = 'column' cell_strain_rate = 0, 1 cell_pressure = 1, 2"), &
+      "&scene cell_strain_rate = 0, 1: expected 0 along the axes of cell_pressure = 1, 2")
+    call refuse(scene("bodies = 'column' cell_shear_rate = 1 cell_shear_stress = 2"), &
+      "&scene cell_shear_rate = 1: expected 0 for the components of cell_shear_stress = 2")
+    call refuse(scene("bodies = 'column' cell_shear_rate = 1, 2"), &
+      "&scene cell_shear_rate = 1, 2: expected one entry where dimension = 2")
     call refuse(scene("bodies = 'column' body_force(3) = -1"), "&scene body_force(3) = -1: " // third)
     call refuse(scene("bodies = 'column' skin = -1"), "&scene skin = -1: expected a finite real number >= 0 (m)")
     call refuse(scene("bodies = 'column' overlap_allowed = 0"), "&scene overlap_allowed = 0: " // positive // " (m)")
@@ -863,7 +883,7 @@ contains
       call check_close(drum%contact%restitution, 0.75_dp, 0.0_dp, "restitution of the 2nd is wall_restitution")
       call check(lid%contact_given%restitution .and. .not. drum%contact_given%restitution, "restitution_given")
       call check_close(floor%remove_at, 3.0_dp, 0.0_dp, "remove_at of the 1st")
-      call check(floor%remove_given .and. .not. drum%remove_given, "remove_given")
+      call check(floor%remove_at_given .and. .not. drum%remove_at_given, "remove_at_given")
       call check(drum%remove_at > 1.0e300_dp, "the 2nd is never taken away")
       call check_surface(drum, "radius", [2.0_dp, 0.0_dp, 0.0_dp], "radius of the 2nd")
       call check_surface(drum, "point", [1.0_dp, 2.0_dp, 0.0_dp], "point of the 2nd")

@@ -3,7 +3,8 @@ program test_periodic
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_periodic, only: period_t, wrap, shift_code, shift_of_code, no_shift
+  use gravier_periodic, only: period_t, wrap, shift_code, shift_of_code, no_shift, most_images, period_words, &
+    & gradient_times
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -14,10 +15,114 @@ program test_periodic
   call test_random()
   call test_codes()
   call test_shift()
+  call test_moving()
   call finish_checks()
   call MPI_Finalize()
 
 contains
+
+  !> A cell that deforms: other edges of the same lattice, the gradient of its velocity, the images of a place, its state in words.
+  subroutine test_moving()
+    type(period_t) :: cell, later, again
+    integer :: k(3), turns(3), shift(3), shifts(3, most_images), n, i
+    integer(i8) :: words(period_words)
+    real(dp) :: x(3), y(3), v(3), w(3), g(3, 3), f(3, 3)
+
+    cell = period_t(length=[2.0_dp, 3.0_dp, 4.0_dp], origin=[-1.0_dp, 0.5_dp, 0.0_dp], tilt=[1.7_dp, -2.9_dp, 4.2_dp], moves=.true.)
+    g(:, :) = 0.0_dp
+    g(1, :) = [0.1_dp, 0.7_dp, -0.3_dp]
+    g(2, 2:) = [-0.2_dp, 0.4_dp]
+    g(3, 3) = 0.05_dp
+    call cell%set_gradient(g)
+    f(:, :) = cell%gradient()
+    call check(maxval(abs(f - g)) < 1.0e-14_dp, "the gradient comes back")
+    ! an image moves with the gradient
+    shift(:) = [-2, 1, 2]
+    x(:) = 0.0_dp
+    v(:) = 0.0_dp
+    call cell%add_shift(shift_code(shift), 1, x)
+    call cell%add_velocity(shift, v)
+    w(:) = gradient_times(g, x)
+    call check(maxval(abs(v - w)) < 1.0e-14_dp, "an image moves with the cell")
+    ! the same point of the lattice by other edges
+    later = cell
+    call later%straighten(k)
+    call check(all(k == [1, -2, 1]), "edges taken")
+    call check(all(abs(later%tilt) <= 0.5_dp*[2.0_dp, 2.0_dp, 3.0_dp]), "tilts are at most half a length")
+    shift(2) = shift(2) + k(3)*shift(3)
+    shift(1) = shift(1) + k(1)*shift(2) + k(2)*shift(3)
+    y(:) = 0.0_dp
+    w(:) = 0.0_dp
+    ! beyond the codes: in two parts
+    turns(:) = shift/2
+    call later%add_shift(shift_code(turns), 1, y)
+    turns(:) = shift - turns
+    call later%add_shift(shift_code(turns), 1, y)
+    call later%add_velocity(shift, w)
+    call check(maxval(abs(x - y)) < 1.0e-14_dp, "straighten leaves the lattice as it is")
+    call check(maxval(abs(v - w)) < 1.0e-14_dp, "and its velocities")
+    call later%straighten(k)
+    call check(all(k == 0), "straight edges stay")
+    ! a place and its image inside
+    x(:) = [7.3_dp, -5.1_dp, 9.9_dp]
+    y(:) = x
+    call later%wrap(y, turns)
+    call check(all(y >= later%origin .and. y < later%origin + later%length), "wrapped into the box")
+    w(1) = turns(1)*2.0_dp + turns(2)*later%tilt(1) + turns(3)*later%tilt(2)
+    w(2) = turns(2)*3.0_dp + turns(3)*later%tilt(3)
+    w(3) = turns(3)*4.0_dp
+    call check(maxval(abs(x - y - w)) < 1.0e-13_dp, "by whole edges")
+    ! all images near the box, each once
+    call later%find_images(y, 0.9_dp, shifts, n)
+    do i = 1, n
+      x(:) = y
+      call later%add_shift(shift_code(shifts(:, i)), 1, x)
+      call check(all(x >= later%origin - 0.9_dp .and. x <= later%origin + later%length + 0.9_dp), "an image near the box")
+    end do
+    call check_equal(n, count_near(later, y, 0.9_dp), "images near the box")
+    ! it deforms about its middle, and F takes images along
+    again = later
+    call again%move(0.25_dp)
+    v(:) = again%centre()
+    w(:) = later%centre()
+    call check(maxval(abs(v - w)) < 1.0e-15_dp, "the middle stays")
+    f(:, :) = again%strain_since(later)
+    shift(:) = [1, -1, 1]
+    x(:) = 0.0_dp
+    y(:) = 0.0_dp
+    call later%add_shift(shift_code(shift), 1, x)
+    call again%add_shift(shift_code(shift), 1, y)
+    w(:) = gradient_times(f, x)
+    call check(maxval(abs(w - y)) < 1.0e-14_dp, "F takes images along")
+    call again%get_state(words)
+    later = cell
+    call later%set_state(words)
+    call check(all(abs(later%tilt - again%tilt) <= 0.0_dp) .and. all(abs(later%length - again%length) <= 0.0_dp) .and. &
+      & all(abs(later%origin - again%origin) <= 0.0_dp) .and. all(abs(later%length_rate - again%length_rate) <= 0.0_dp) .and. &
+      & all(abs(later%tilt_rate - again%tilt_rate) <= 0.0_dp), "the state comes back")
+  end subroutine test_moving
+
+  !> Images of a place within a margin of the box, by trial.
+  integer function count_near(cell, place, margin) result(n)
+    type(period_t), intent(in) :: cell
+    real(dp), intent(in) :: place(3), margin
+    real(dp) :: x(3)
+    integer :: i, j, k, shift(3)
+
+    n = 0
+    do k = -2, 2
+      do j = -2, 2
+        do i = -2, 2
+          x(:) = place
+          shift(1) = i
+          shift(2) = j
+          shift(3) = k
+          call cell%add_shift(shift_code(shift), 1, x)
+          if (all(x >= cell%origin - margin .and. x <= cell%origin + cell%length + margin)) n = n + 1
+        end do
+      end do
+    end do
+  end function count_near
 
   subroutine check_wrap(x, origin, period, inside, turns)
     real(dp), intent(in) :: x, origin, period, inside
@@ -67,9 +172,9 @@ contains
     logical :: same
 
     same = .true.
-    do z = -1, 1
-      do y = -1, 1
-        do x = -1, 1
+    do z = -2, 2
+      do y = -2, 2
+        do x = -2, 2
           shift(1) = x
           shift(2) = y
           shift(3) = z

@@ -21,6 +21,7 @@ program test_body_store
     call test_written(kinds(:, k))
     call test_described(kinds(:, k))
     call test_invalid(kinds(:, k))
+    call test_forces(kinds(:, k))
   end do
   call finish_checks()
   call MPI_Finalize()
@@ -293,7 +294,7 @@ contains
       names = names//name//" "
       words = words + entries
     end do
-    call check(trim(names) == body_record, "names of the fields")
+    call check(trim(names) == body_record//" force", "names of the fields, of which checkpoints have all but the last")
     call check_equal(words, bodies%record_words(), "entries of the fields")
     call check(bytes == 0 .and. entries == 0, "nothing behind the last field")
   end subroutine test_described
@@ -344,6 +345,47 @@ contains
     bodies%velocity = 0.0_dp
     call expect_invalid(bodies, "", "a sound body again")
   end subroutine test_invalid
+
+  !> Applied forces, 0 at first, travel and stay with their bodies, and are in no checkpoint.
+  subroutine test_forces(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
+    type(body_set_t) :: bodies, back, copies
+    integer, parameter :: order(*) = [3, 1]
+    integer(i8), allocatable :: record(:), renewed(:)
+    integer :: b, words
+
+    call fill(bodies, sizes, 3, 1)
+    words = bodies%record_words()
+    call check(words == bodies%saved_words() .and. size(bodies%force) == 0, "no forces unless asked for")
+    call bodies%take_forces()
+    call check(size(bodies%force, 1) == sizes(1) .and. size(bodies%force, 2) == 3 .and. &
+      & all(abs(bodies%force) <= 0.0_dp), "forces of 0")
+    call check_equal(bodies%record_words(), words + sizes(1), "a record has forces")
+    call check_equal(bodies%saved_words(), words, "a checkpoint has none")
+    do b = 1, 3
+      bodies%force(:, b) = real(b, dp)
+    end do
+    allocate (record(bodies%record_words()), renewed(bodies%renewed_words()))
+    call back%init(bodies, 3)
+    call copies%init(bodies, 3)
+    do b = 1, 3
+      call bodies%get_record(b, record)
+      call back%set_record(b, record)
+      call bodies%get_renewed(b, renewed)
+      call copies%set_renewed(b, renewed)
+    end do
+    call check(all(abs(back%force - bodies%force) <= 0.0_dp), "forces travel")
+    call check(all(abs(copies%force - bodies%force) <= 0.0_dp), "copies get them in every step")
+    copies%force(:, :) = 0.0_dp
+    call copies%renew(2, bodies, 3)
+    call check(all(abs(copies%force(:, 2) - 3.0_dp) <= 0.0_dp), "copies in the same process, too")
+    call back%reorder(order)
+    call check(all(abs(back%force(:, 1) - 3.0_dp) <= 0.0_dp) .and. all(abs(back%force(:, 2) - 1.0_dp) <= 0.0_dp), &
+      & "forces stay with bodies")
+    call append_bodies(back, bodies)
+    call check(back%n == 5 .and. all(abs(back%force(:, 4) - 2.0_dp) <= 0.0_dp), "forces of bodies that are appended")
+  end subroutine test_forces
 
   !> The field of the first body that is named as invalid, among 3 boundaries and 2 materials.
   subroutine expect_invalid(bodies, field, name)

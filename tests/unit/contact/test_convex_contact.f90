@@ -3,7 +3,7 @@
 program test_convex_contact
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, sector_of
   use gravier_nearest_simplex, only: find_nearest
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, find_support, support_a, support_b, &
     & place_a, place_b
@@ -13,21 +13,21 @@ program test_convex_contact
   use gravier_edge_patch, only: add_edge_points
   use gravier_face_patch, only: add_face_points
   use gravier_manifold, only: feature_base, most_points
-  use gravier_polyhedron, only: make_box, make_capsule
+  use gravier_polyhedron, only: make_polyhedron
   use gravier_shape_library, only: body_shape_t
-  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair
+  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair, make_box_rod_ball, &
+    & half => half_core, straight
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
-  !> of a cube of edge 2, and the half-edge of its core
-  real(dp), parameter :: rounding = 0.1_dp, half = 1.0_dp - rounding
-  real(dp), parameter :: straight(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
   type(body_shape_t) :: box, rod, ball
 
-  call make_shapes()
+  call make_box_rod_ball(box, rod, ball)
   call test_simplices()
   call test_random_simplices()
   call test_support()
+  call test_walk()
+  call test_sectors()
   call test_distance()
   call test_turned_distance()
   call test_needle()
@@ -40,16 +40,6 @@ program test_convex_contact
   call finish_checks()
 
 contains
-
-  !> A cube of edge 2, a capsule of length 2 and radius 0.25 along the third axis, a ball of radius 1.
-  subroutine make_shapes()
-    type(error_t), allocatable :: error
-
-    call make_box("box", [2.0_dp, 2.0_dp, 2.0_dp], rounding, box, error)
-    call make_capsule("rod", 2.0_dp, 0.25_dp, rod, error)
-    call make_capsule("ball", 0.0_dp, 1.0_dp, ball, error)
-    call check(.not. allocated(error), "shapes")
-  end subroutine make_shapes
 
   !> Simplices whose nearest points are known.
   subroutine test_simplices()
@@ -136,12 +126,10 @@ contains
     call put_pair(box, box, [3.0_dp, 1.0_dp, -2.0_dp], random_turn(draws), pair)
     do trial = 1, 200
       along = draws%direction()
-      best = 1
       call find_support(box%piece(1), along%x, .false., best)
       do d = 1, 3
         farthest = farthest .and. box%piece(1)%vertex(d, best)*along%x(d) > 0.0_dp
       end do
-      walked = 1 + mod(trial, 8)
       call find_support(box%piece(1), along%x, .true., walked)
       same = same .and. walked == best
       against(:) = -along%x
@@ -156,10 +144,75 @@ contains
       end do
     end do
     call check(farthest, "the vertex farthest along a direction")
-    call check(same, "a walk along edges finds it too")
+    call check(same, "a piece of few vertices knows no walk")
     call place_a(box%piece(1), pair, 1, x)
     call check_close(norm2(x), sqrt(3.0_dp)*half, tight, "the corner of a core is where it was made")
   end subroutine test_support
+
+  !> In a stone of many vertices a walk along edges ends at the farthest vertex, but for rounding.
+  subroutine test_walk()
+    integer, parameter :: corners = 60
+    type(draws_t) :: draws
+    type(vector_t) :: along
+    type(body_shape_t) :: stone
+    type(error_t), allocatable :: error
+    real(dp) :: point(3, corners)
+    integer :: best, walked, trial, k
+    logical :: same
+
+    do k = 1, corners
+      along = draws%direction()
+      point(:, k) = along%x*[1.0_dp, 0.8_dp, 0.5_dp]
+    end do
+    call make_polyhedron("stone", point, 0.001_dp, stone, error)
+    call check(.not. allocated(error), "a stone")
+    if (allocated(error)) return
+    associate (piece => stone%piece(1))
+      call check(allocated(piece%start), "a piece of many vertices has starts of walks")
+      same = .true.
+      do trial = 1, 5000
+        along = draws%direction()
+        call find_support(piece, along%x, .false., best)
+        call find_support(piece, along%x, .true., walked)
+        same = same .and. dot_product(along%x, piece%vertex(:, walked)) >= dot_product(along%x, piece%vertex(:, best)) - tight
+      end do
+      call check(same, "a walk along edges finds the farthest vertex")
+      same = .true.
+      do k = 1, 3
+        do trial = -1, 1, 2
+          ! the middle of a sector
+          along%x(:) = 0.25_dp
+          along%x(k) = real(trial, dp)
+          call find_support(piece, along%x, .false., best)
+          same = same .and. piece%start(sector_of(along%x)) == best
+        end do
+      end do
+      call check(same, "a walk starts from the vertex that is farthest along the middle of the sector")
+    end associate
+  end subroutine test_walk
+
+  !> Sectors are those of the six sides of a cube, each with four by four parts.
+  subroutine test_sectors()
+    type(draws_t) :: draws
+    type(vector_t) :: along
+    logical :: met(96), within
+    integer :: trial, sector
+
+    met(:) = .false.
+    within = .true.
+    do trial = 1, 5000
+      along = draws%direction()
+      sector = sector_of(along%x)
+      within = within .and. sector >= 1 .and. sector <= size(met)
+      if (within) met(sector) = .true.
+    end do
+    call check(within, "a direction lies in one of 96 sectors")
+    call check(all(met), "each sector has directions")
+    call check_equal(sector_of([2.0_dp, 0.1_dp, 0.1_dp]), sector_of([5.0_dp, 0.9_dp, 0.2_dp]), "the length does not matter")
+    call check(sector_of([-2.0_dp, 0.1_dp, 0.1_dp]) /= sector_of([2.0_dp, 0.1_dp, 0.1_dp]), "opposite sides have their own")
+    call check_equal(sector_of([1.0_dp, 1.0_dp, 1.0_dp]), sector_of([1.0_dp, 0.99_dp, 0.99_dp]), "a corner has a sector")
+    call check(sector_of([0.0_dp, 0.0_dp, 0.0_dp]) >= 1, "a vector without length has a sector")
+  end subroutine test_sectors
 
   !> Cubes and balls beside each other: faces, edges, corners.
   subroutine test_distance()
@@ -382,7 +435,6 @@ contains
     type(vector_t) :: along
 
     along = vec(x, y, z)
-    best = 1
     call find_support(piece, along%x, .false., best)
   end function farthest
 

@@ -6,34 +6,22 @@ program test_core_overlap
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, place_a, place_b
   use gravier_core_overlap, only: find_least_separation
-  use gravier_polyhedron, only: make_box, make_capsule, make_polyhedron
+  use gravier_polyhedron, only: make_capsule, make_polyhedron
   use gravier_shape_library, only: body_shape_t
-  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair
+  use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair, make_box_rod_ball, &
+    & half => half_core, straight
   use gravier_check, only: check, check_close, finish_checks
   implicit none
   real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
-  !> of a cube of edge 2, and the half-edge of its core
-  real(dp), parameter :: rounding = 0.1_dp, half = 1.0_dp - rounding
-  real(dp), parameter :: straight(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
   type(body_shape_t) :: box, rod, ball
 
-  call make_shapes()
+  call make_box_rod_ball(box, rod, ball)
   call test_overlap()
   call test_overlap_of_rods()
   call test_all_axes()
   call finish_checks()
 
 contains
-
-  !> A cube of edge 2, a capsule of length 2 and radius 0.25 along the third axis, a ball of radius 1.
-  subroutine make_shapes()
-    type(error_t), allocatable :: error
-
-    call make_box("box", [2.0_dp, 2.0_dp, 2.0_dp], rounding, box, error)
-    call make_capsule("rod", 2.0_dp, 0.25_dp, rod, error)
-    call make_capsule("ball", 0.0_dp, 1.0_dp, ball, error)
-    call check(.not. allocated(error), "shapes")
-  end subroutine make_shapes
 
   !> Cubes one within the other by a face, and by an edge on an edge.
   subroutine test_overlap()

@@ -45,11 +45,14 @@ program test_neighbour_search
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t, pair_memory_t
   use gravier_neighbour_rule, only: neighbour_rule_t, owner_point, rule_dual, rule_primal
-  use gravier_neighbour_search, only: neighbour_search_t, sweep_order
+  use gravier_cell_order, only: sweep_order
+  use gravier_neighbour_search, only: neighbour_search_t
   use gravier_test_scenes, only: cloud_t, near_pair_t, draw, plane, change_shape
   use test_search_region, only: sites_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
+  !> from which the cells of orders are counted [m]
+  real(dp), parameter :: corner(3) = [0.1_dp, -0.3_dp, 0.7_dp], origin(3) = 0.0_dp
   integer :: k, axes
 
   call MPI_Init()
@@ -197,11 +200,12 @@ contains
 
     boundaries(:) = two_planes(cloud%nd)
     call find_homes(bodies, region, owned)
-    allocate (found(cloud%n, cloud%n, 0:26), near(cloud%n, 2), source=0)
+    allocate (found(cloud%n, cloud%n, 0:124), near(cloud%n, 2), source=0)
     right = .true.
     ordered = .true.
     do s = 1, size(region%site, 2)
-      call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s), bodies, owned, region, pair_memory_t(3), list)
+      call find_pairs(neighbour_search_t(rule, cloud%period, boundaries, s, corner=corner), bodies, owned, &
+        & region, pair_memory_t(3), list)
       right = right .and. size(list%candidate) == list%n .and. size(list%impulse, 1) == 3 .and. size(list%impulse, 2) == list%n
       right = right .and. size(list%shift) == merge(list%n, 0, cloud%period%on()) .and. all(abs(list%impulse) <= 0.0_dp)
       do p = 1, list%n
@@ -294,7 +298,7 @@ contains
     type(neighbour_rule_t), intent(in) :: rule
     type(neighbour_list_t), intent(in) :: list
     integer(i8) :: key(5, list%n)
-    real(dp) :: point(cloud%nd, list%n), other(cloud%nd)
+    real(dp) :: point(cloud%nd, list%n), other(cloud%nd), edge
     integer :: p, d, shift(3)
 
     ordered = .true.
@@ -310,9 +314,10 @@ contains
       other(:) = bodies%position(:, list%antagonist(p)) + shift(1:cloud%nd)*cloud%period%length(1:cloud%nd)
       if (rule%kind == rule_dual) point(:, p) = 0.5_dp*(point(:, p) + other)
     end do
+    edge = 2.0_dp*rule%mean_radius + rule%alert_distance
     do d = 1, cloud%nd
-      ! far out the numbers of cells begin again
-      key(4 - d, :) = mod(int((point(d, :) - minval(point(d, :)))/(2.0_dp*rule%mean_radius + rule%alert_distance), i8), 2_i8**19)
+      ! half of the cells lie before the corner; farther out are the first ones, and the numbers of cells begin again
+      key(4 - d, :) = mod(int(max((point(d, :) - corner(d))/edge + 2.0_dp**18, 0.0_dp), i8), 2_i8**19)
     end do
     do p = 2, list%n
       do d = 1, 5
@@ -586,14 +591,47 @@ contains
     integer(i8) :: id(1, 6)
     integer :: order(6)
     integer, parameter :: expected(6) = [3, 1, 6, 5, 2, 4]
-    real(dp), parameter :: lower(2) = [-1.0_dp, -1.0_dp]
 
     points(1, :) = [-0.5_dp, 0.5_dp, -0.75_dp, 1.5_dp, -0.5_dp, 8.5_dp]
     points(2, :) = [-0.5_dp, 0.5_dp, -0.25_dp, 0.5_dp, 0.5_dp, -0.5_dp]
     id(1, :) = [5_i8, 1_i8, 3_i8, 2_i8, 9_i8, 4_i8]
-    call sweep_order(points, lower, 1.0_dp, id, order)
+    call sweep_order(points, origin(1:2), 1.0_dp, id, order)
     call check(all(order == expected), "sweep order")
+    ! in two cells, whose border no other point decides on
+    points(1, 1:2) = [0.95_dp, 1.05_dp]
+    points(2, 1:2) = 0.0_dp
+    id(1, 1:2) = [2_i8, 1_i8]
+    call sweep_order(points(:, 1:2), origin(1:2), 1.0_dp, id(:, 1:2), order(1:2))
+    call check(all(order(1:2) == [1, 2]), "sweep order of two points alone")
+    call test_many_in_a_cell()
   end subroutine test_sweep_order
+
+  !> Points of one cell are sorted by their identifiers, few as well as many.
+  subroutine test_many_in_a_cell()
+    integer, parameter :: n(3) = [2, 32, 500]
+    real(dp), allocatable :: points(:, :)
+    integer(i8), allocatable :: id(:, :)
+    integer, allocatable :: order(:)
+    integer :: k, j
+    logical :: sorted
+
+    do k = 1, size(n)
+      allocate (points(3, n(k)), id(2, n(k)), order(n(k)))
+      points(:, :) = 0.5_dp
+      do j = 1, n(k)
+        id(1, j) = mod(7*j, 5)
+        id(2, j) = n(k) - j
+      end do
+      call sweep_order(points, origin, 1.0_dp, id, order)
+      sorted = .true.
+      do j = 2, n(k)
+        sorted = sorted .and. (id(1, order(j)) > id(1, order(j - 1)) .or. &
+          & (id(1, order(j)) == id(1, order(j - 1)) .and. id(2, order(j)) > id(2, order(j - 1))))
+      end do
+      call check(sorted, "points of a cell by their identifiers")
+      deallocate (points, id, order)
+    end do
+  end subroutine test_many_in_a_cell
 
   !> One search, as of a subdomain.
   subroutine find_pairs(search, bodies, owned, region, memory, list)

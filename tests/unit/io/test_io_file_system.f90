@@ -7,7 +7,7 @@ program test_io_file_system
   use gravier_file_system, only: make_directory, remove_directory, rename_file, replace_file, remove_file, check_readable, &
     & check_creatable, reserve_space, extend_file, is_device, place_t, place_of, place_of_open
   use gravier_system_calls, only: c_open, c_close, c_text, o_rdonly
-  use gravier_own_files, only: part_of, give_name, note_own, remove_own, check_own_files
+  use gravier_own_files, only: part_of, give_name, note_own, remove_own, check_own_files, forget_own_files
   use gravier_text_file, only: text_file_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -258,6 +258,12 @@ contains
     call remove_own(here//"/own")
     call check_own_files(error)
     call expect_none(error, "removed by itself")
+    call file%create(here//"/own", "own", error)
+    call file%close(error)
+    call remove_file(here//"/own")
+    call forget_own_files()
+    call check_own_files(error)
+    call expect_none(error, "of a run that is over")
     call give_name(here//"/own", error)
     call expect(error, status_failure, "own.part: cannot bring this file to the disk: No such file", "a name for no file")
   end subroutine test_own_files

@@ -16,8 +16,8 @@ program test_time_stepper
   use gravier_search_direction, only: search_direction_t, chosen_direction
   use gravier_method_options, only: method_options_t
   use gravier_time_stepper, only: time_stepper_t, step_figures_t
-  use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t
+  use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
@@ -44,18 +44,6 @@ program test_time_stepper
 
 contains
 
-  subroutine make(text, simulation)
-    character(len=*), intent(in) :: text
-    type(simulation_t), intent(out) :: simulation
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-
-    call parse_config("case", text, config, error)
-    if (.not. allocated(error)) call simulation%init(comm, config, error)
-    call check(.not. allocated(error), "the scene is made")
-    if (allocated(error)) print "(a)", error%message
-  end subroutine make
-
   !> By schedule; by an imbalance that exceeds the limit and 1.1 times what the last division reached; never in step 0 or alone.
   subroutine test_division()
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=4), 7, 9.0_dp, 1.0_dp), "never without a rule")
@@ -75,7 +63,7 @@ contains
     type(simulation_t) :: simulation
     real(dp) :: area(5)
 
-    call make(column//"&time step = 0.01, steps = 1 / "// &
+    call make_scene(comm, column//"&time step = 0.01, steps = 1 / "// &
       & "&boundary name = 'left', shape = 'plane', normal = 1, 0, point = -1, 0 / "// &
       & "&boundary name = 'right', shape = 'plane', normal = -1, 0, point = 1, 0, free = T, F, mass = 1.0, pressure = 5.0 / "// &
       & "&boundary name = 'lid', shape = 'plane', normal = 0, -1, point = 0, 4 / "// &
@@ -97,7 +85,8 @@ contains
     real(dp) :: start(2)
     logical :: taken, changed
 
-    call make(column//"&boundary name = 'ceiling', shape = 'plane', normal = 0, -1, point = 0, 9, velocity = 0, -2, "// &
+    call make_scene(comm, column// &
+      & "&boundary name = 'ceiling', shape = 'plane', normal = 0, -1, point = 0, 9, velocity = 0, -2, "// &
       & "remove_at = 1 / &time step = 0.01, steps = 1 /", simulation)
     associate (owned => simulation%decomposition%owned(1), ceiling => simulation%decomposition%boundaries(2))
       start(:) = owned%position(:, 1)
@@ -130,7 +119,7 @@ contains
     real(dp) :: start
     integer :: n
 
-    call make(one//"&time step = 0.01, steps = 9 /", simulation)
+    call make_scene(comm, one//"&time step = 0.01, steps = 9 /", simulation)
     stepper => simulation
     ! away from the walls of the lattice
     stepper%decomposition%owned(1)%position(2, 1) = 5.0_dp
@@ -161,7 +150,7 @@ contains
     character(len=:), allocatable :: cause
     integer :: c, top
 
-    call make("&scene bodies = 'column', column_count = 3, radius = 0.5, gravity = 0, -10, friction = 0.5 / "// &
+    call make_scene(comm, "&scene bodies = 'column', column_count = 3, radius = 0.5, gravity = 0, -10, friction = 0.5 / "// &
       & "&time step = 0.01, steps = 1 /", simulation)
     call simulation%assemble(figures)
     associate (sub => simulation%problem%sub(1))
@@ -213,7 +202,7 @@ contains
     text = trim(number(1))//" and "//trim(number(2))
   end function text_of
 
-  !> Three solves and three steps.
+  !> Six solves and three steps.
   subroutine test_tally()
     type(run_tally_t) :: tally
     type(solve_report_t) :: solve
@@ -222,6 +211,12 @@ contains
     solve%velocity_error = 0.02_dp
     solve%velocity_scale = 0.1_dp
     solve%residual = 2e-2_dp
+    call tally%add_solve(solve, "load of a step")
+    ! reached another criterion: out of the accuracy, then too soon to tell, twice
+    solve%accurate = .false.
+    call tally%add_solve(solve, "load of a step")
+    solve%judged = .false.
+    call tally%add_solve(solve, "load of a step")
     call tally%add_solve(solve, "load of a step")
     ! a pass over layers that the solve went on from, then one that it did not
     solve%layered_sweeps = 1.5_dp
@@ -235,7 +230,9 @@ contains
     solve%velocity_error = 1e9_dp
     solve%velocity_scale = 0.4_dp
     call tally%add_solve(solve, "speeds")
-    call check_equal(int(tally%solves), 3, "solves")
+    call check_equal(int(tally%solves), 6, "solves")
+    call check_equal(int(tally%inaccurate), 1, "out of the accuracy")
+    call check_equal(int(tally%unjudged), 2, "ended too soon to tell")
     call check_equal(int(tally%missed()), 2, "missed")
     call check_equal(int(tally%tried_layers), 2, "passes over layers that were tried")
     call check_equal(int(tally%took_layers), 1, "and gone on from")
@@ -248,7 +245,7 @@ contains
     call check_close(tally%least_scale, 0.1_dp, 0.0_dp, "smallest scale")
     call check_close(tally%most_scale, 0.4_dp, 0.0_dp, "largest scale")
     call check_equal(tally%n_kinds, 2, "kinds of scales")
-    call check_equal(int(tally%of_kind(1)), 2, "solves of the first kind")
+    call check_equal(int(tally%of_kind(1)), 5, "solves of the first kind")
     call tally%add_step(0.3_dp, 0_i8, .true., 0.1_dp, 1.0_dp)
     call tally%add_step(0.1_dp, 4_i8, .false., 0.0_dp, 2.0_dp)
     call tally%add_step(0.5_dp, 3_i8, .false., 0.2_dp, 3.0_dp)

@@ -1,0 +1,250 @@
+"""Curves: panels of history.csv against time, convergence of a solve, profiles of means over the bins of a region."""
+import re
+
+import matplotlib.pyplot as plt
+import numpy
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.ticker import FuncFormatter
+from palette import LINES, SHADES
+from picture_style import PictureError, scaled
+
+#: early steps are light, late ones dark
+TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
+STYLES = ["-", "--", ":", "-."]
+UNITS = [(r"kinetic_|potential_energy|_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"wall_seconds|solve_seconds", "s"),
+         (r"force_[xyz]:|force_mean|force_max", "N"), (r"position_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass", "kg"),
+         (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s")]
+NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
+
+
+def label_of(name, dimension):
+    """Name of a column of history.csv with its unit."""
+    text = NAMES.get(name, name.replace("_", " "))
+    if re.search(r"(^|_)(stress_[xyz]{2}|pressure)$", name):
+        return f"{text} [{'N/m' if dimension == 2 else 'Pa'}]"
+    if re.search(r"(^|_)volume$", name):
+        return f"{text} [{'m²' if dimension == 2 else 'm³'}]"
+    unit = next((unit for pattern, unit in UNITS if re.match(pattern, name)), None)
+    return f"{text} [{unit}]" if unit else text
+
+
+def names_of(runs):
+    """What tells the directories of runs apart: their paths without what all begin and end with."""
+    parts = [run.directory.resolve().parts for run in runs]
+    if len(set(parts)) < len(parts):
+        return [str(run.directory) for run in runs]
+    shortest = min(len(path) for path in parts)
+    first = next((k for k in range(shortest) if len({path[k] for path in parts}) > 1), shortest - 1)
+    last = next((k for k in range(1, shortest - first) if len({path[-k] for path in parts}) > 1), shortest - first)
+    return ["/".join(path[first:len(path) - last + 1]) for path in parts]
+
+
+def limits_of(values, logarithms=True):
+    """Scale and limits of an axis on which the values are seen: logarithms where the largest is far above a quarter of them, but no more
+    than three decades for the least twentieth; from 0 where that is near."""
+    values = values[numpy.isfinite(values)]
+    positive = values[values > 0.0]
+    if len(values) == 0:
+        return "linear", 0.0, 1.0
+    low, high = values.min(), values.max()
+    if logarithms and low >= 0.0 and 2 * len(positive) > len(values):
+        if high > 30.0 * numpy.quantile(positive, 0.25):
+            return "log", max(positive.min(), 1e-3 * numpy.quantile(positive, 0.05)) / 1.5, 1.5 * high
+    if 0.0 <= low < 0.5 * high:
+        return "linear", 0.0, 1.05 * high
+    if 0.5 * low < high <= 0.0:
+        return "linear", 1.05 * low, 0.0
+    margin = 0.05 * (high - low) or 0.05 * abs(high) or 0.5
+    return "linear", low - margin, high + margin
+
+
+def fit_axis(axis, values, label, logarithms=True):
+    """Scale, limits and label of an axis for these values; a power of ten stands in the label, beside the unit, not over the panel."""
+    name = axis.axis_name
+    scale, low, high = limits_of(values, logarithms)
+    axis.axes.set(**{f"{name}scale": scale, f"{name}lim": (low, high)})
+    top = max(abs(low), abs(high))
+    if scale == "linear" and not 1e-2 <= top < 1e4:
+        power, unit = scaled(top, "")
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**power:.10g}"))
+        label = label.replace(" [", f" [{unit}", 1) if " [" in label else f"{label} [{unit.strip()}]"
+    axis.set_label_text(label)
+
+
+def legend_above(axes, columns=3):
+    """The legend over the panel, where it covers nothing."""
+    handles, names = axes.get_legend_handles_labels()
+    if names:
+        axes.legend(handles, names, loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.1, frameon=False, fontsize=8,
+                    ncol=min(columns, len(names)), columnspacing=1.2, handlelength=1.6)
+
+
+def grid(axes):
+    axes.grid(True, color="0.9", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+class Panel:
+    """Curves over one axis: `label` of the vertical axis, `curves` (x, y, name or None), `goals` (value, name); never with logarithms
+    where `counts`."""
+
+    def __init__(self, label, curves, goals=(), counts=False):
+        self.label, self.curves, self.goals, self.counts = label, curves, list(goals), counts
+
+    def draw(self, axes, colours=LINES):
+        for k, (x, y, name) in enumerate(self.curves):
+            axes.plot(x, y, color=colours[k % len(colours)], linestyle=STYLES[k // len(colours) % len(STYLES)], linewidth=1.2, label=name,
+                      marker="o" if len(x) <= 50 else None, markersize=3)
+        for value, name in self.goals:
+            axes.axhline(value, color="0.35", linewidth=0.9, linestyle=(0, (5, 2)), label=name)
+        grid(axes)
+        values = [numpy.asarray(y, float) for _, y, _ in self.curves] + [[value] for value, _ in self.goals]
+        fit_axis(axes.yaxis, numpy.concatenate(values), self.label, not self.counts)
+        legend_above(axes)
+
+
+def draw_panels(panels, width=6.2, height=1.75):
+    """A figure of panels one under the other, against time."""
+    high = [height + 0.22 * any(name for _, _, name in panel.curves) for panel in panels]
+    figure, places = plt.subplots(len(panels), 1, figsize=(width, 0.4 + sum(high)), sharex=True, squeeze=False, constrained_layout=True)
+    for axes, panel in zip(places[:, 0], panels):
+        panel.draw(axes)
+    places[-1, 0].set_xlabel("time [s]")
+    figure.align_ylabels(places[:, 0])
+    return figure
+
+
+def draw_history(runs, columns):
+    """A figure with a panel for each column of history.csv against time, a line a run."""
+    histories = [run.history() for run in runs]
+    for run, history in zip(runs, histories):
+        if len(history) == 0:
+            raise PictureError(f"{run.directory}/history.csv: no step; expected one at least")
+        for name in columns:
+            if name not in history:
+                raise PictureError(f"{run.directory}/history.csv: no column {name}; expected one of {', '.join(history)}")
+    names = names_of(runs) if len(runs) > 1 else [None]
+    panels = [Panel(label_of(column, runs[0].dimension), [(history.time, history[column], name if k == 0 else None)
+                                                          for name, history in zip(names, histories)], counts=column == "iterations")
+              for k, column in enumerate(columns)]
+    return draw_panels(panels)
+
+
+def velocity_scale(run, step):
+    """U of a step, from history.csv; 0 where it has none."""
+    history = run.history()
+    if "velocity_scale" not in history or step not in history.step:
+        return 0.0
+    return float(history.velocity_scale[history.step == step][0])
+
+
+def draw_convergence(runs, step):
+    """A figure of residual, jump and velocity error over its scale against iterations, a line a run: of one step, that of most
+    iterations unless told."""
+    figure, axes = plt.subplots(figsize=(6.2, 4.0))
+    for k, (run, label) in enumerate(zip(runs, names_of(runs))):
+        trace = run.trace()
+        held = numpy.unique(trace.step).astype(int) if len(trace) > 0 else []
+        if len(held) == 0 or (step is not None and step not in held):
+            raise PictureError(f"{run.directory}/trace.csv: no step {step}; expected one of "
+                               f"{', '.join(map(str, held)) or 'none, it has no row'}")
+        drawn = trace.step[numpy.argmax(trace.iteration)] if step is None else step
+        chosen = trace.step == drawn
+        begin = "" if len(runs) == 1 else f"{label}, step {drawn:.0f}, "
+        curves = {name: trace[name][chosen] for name in ("error", "residual", "jump") if name in trace}
+        scale = velocity_scale(run, drawn)
+        if "velocity_error" in trace and scale > 0.0:
+            # before some iterations the error is not known, and a huge number stands for it
+            ratio = trace.velocity_error[chosen] / scale
+            curves["velocity error / U"] = numpy.where(ratio < 1e6, ratio, numpy.nan)
+        styles = {"error": "-", "residual": "-" if "error" not in trace else "--", "jump": ":", "velocity error / U": "-."}
+        for name, values in curves.items():
+            if (values > 0.0).any():
+                axes.plot(trace.iteration[chosen], numpy.where(values > 0.0, values, numpy.nan), styles[name],
+                          color=LINES[k % len(LINES)], linewidth=1.2, label=begin + name)
+        tolerance = run.case.get("solver", [{}])[0].get("tolerance")
+        if tolerance is not None:
+            axes.axhline(tolerance, color=LINES[k % len(LINES)], linewidth=0.6, label=begin + "tolerance")
+    axes.set(xlabel=f"iteration of step {drawn:.0f}" if len(runs) == 1 else "iteration", ylabel="residual, jump, velocity error / U",
+             yscale="log")
+    grid(axes)
+    legend_above(axes, columns=4 if len(runs) == 1 else 2)
+    return figure
+
+
+# ---- profiles
+
+#: components of the columns of a profile
+PROFILES = ("solid_fraction", "velocity", "stress", "pressure", "granular_temperature", "contacts_per_grain", "grains")
+
+
+def region_with_bins(run, name, step):
+    """Name, axis and keys of a region with bins: the only one unless told."""
+    held = {keys["name"]: keys for keys in run.case.get("region", []) if "bins" in keys and "axis" in keys}
+    if name is None and len(held) == 1:
+        name = next(iter(held))
+    if name not in held:
+        raise PictureError(f"{run.path}: {f'no region {name} with bins' if name else 'no single region has bins'}; expected one of "
+                           f"{', '.join(held) or 'none, the case has none'}")
+    run.region(name, step)
+    return name, "xyz".index(held[name]["axis"])
+
+
+def components(rows, column, dimension):
+    """Curves of a column over the bins: {name: values (bins)}."""
+    if column == "velocity":
+        return {"xyz"[a]: rows.velocity[:, a] for a in range(dimension)}
+    if column == "stress":
+        pairs = [(a, a) for a in range(dimension)] + [(0, dimension - 1)]
+        return {"xyz"[a] + "xyz"[b]: rows.stress[:, a, b] for a, b in pairs}
+    return {None: rows[column]}
+
+
+def draw_profile(run, name, steps, columns, mean):
+    """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. A
+    position along the height of the scene is drawn upwards."""
+    for column in columns:
+        if column not in PROFILES:
+            raise PictureError(f"no column {column} of a profile; expected one of {', '.join(PROFILES)}")
+    steps = [step for step in run.steps if step > 0] if steps == "all" else [run.find_step(step) for step in steps or [None]]
+    if not steps:
+        raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
+    name, axis = region_with_bins(run, name, steps[-1])
+    tables = [run.region(name, step) for step in steps]
+    upright = axis == run.dimension - 1
+    figure, places = plt.subplots(*((1, len(columns)) if upright else (len(columns), 1)), squeeze=False, constrained_layout=True,
+                                  figsize=(0.9 + 2.3 * len(columns), 3.9) if upright else (6.2, 0.6 + 1.95 * len(columns)),
+                                  sharex=not upright, sharey=upright)
+    places = places.ravel()
+    for axes, column in zip(places, columns):
+        draw_column(axes, run, tables, column, axis, mean)
+        grid(axes)
+        legend_above(axes, columns=4)
+    (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
+    what = f"region {name}, step {steps[0]}" + (f" to {steps[-1]}: {'mean of ' if mean else ''}{len(steps)} states" if len(steps) > 1 else
+                                               f", t = {run.time(steps[0]):.4g} s")
+    figure.suptitle(what, fontsize=9, x=0.01, ha="left")
+    if len(steps) > 1 and not mean:
+        figure.colorbar(ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), TIMES), ax=list(places), label="time [s]",
+                        aspect=35)
+    return figure
+
+
+def draw_column(axes, run, tables, column, axis, mean):
+    """Curves of a column: a colour a component where there is one state, else a colour a state and a dash a component."""
+    upright = axis == run.dimension - 1
+    rows = [components(table, column, run.dimension) for table in tables]
+    centres = [table.centre[:, axis] for table in tables]
+    if mean:
+        rows = [{key: numpy.mean([row[key] for row in rows], axis=0) for key in rows[0]}]
+        centres = [numpy.mean(centres, axis=0)]
+    for k, (centre, row) in enumerate(zip(centres, rows)):
+        for c, (key, values) in enumerate(row.items()):
+            colour = LINES[c % len(LINES)] if len(rows) == 1 else TIMES(k / (len(rows) - 1))
+            x, y = (values, centre) if upright else (centre, values)
+            axes.plot(x, y, STYLES[c % len(STYLES)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
+    shown = numpy.concatenate([values for row in rows for values in row.values()])
+    unit = "N/m" if run.dimension == 2 else "Pa"
+    label = {"velocity": "velocity [m/s]", "stress": f"stress [{unit}]"}.get(column) or label_of(column, run.dimension)
+    fit_axis(axes.xaxis if upright else axes.yaxis, shown, label, logarithms=False)

@@ -1,0 +1,52 @@
+"""Movies: pictures of the written steps of a run, one after the other."""
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import matplotlib.animation
+import matplotlib.pyplot as plt
+from packing_picture import draw_packing, shared_frame
+from picture_style import PictureError
+from whole_file import save_figure, written
+
+
+def draw_movie(run, options):
+    """A movie (.gif, .mp4) or, for any other path, a directory of frames."""
+    out = options.out or run.directory / "movie.gif"
+    if out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
+        raise PictureError(f"{out}: no program ffmpeg; expected a movie .gif, or a directory for frames")
+    if out.suffix in (".avi", ".mkv", ".mov", ".webm"):
+        raise PictureError(f"{out}: expected a movie .gif or .mp4, or a directory for frames")
+    movie = out.suffix in (".gif", ".mp4")
+    try:
+        (out.parent if movie else out).mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise PictureError(f"{out}: {reason.strerror}; expected a place for files") from None
+    steps = [step for step in run.steps if len(run.bodies(step)) > 0][::options.every]
+    frame = shared_frame(run, steps, options)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) if movie else out
+        for k, step in enumerate(steps):
+            figure = draw_packing(run, step, options, frame)
+            # frames of one size
+            save_figure(figure, folder / f"frame_{k:05d}.png", dpi=100, metadata={"Software": None})
+            plt.close(figure)
+        if movie:
+            join_frames(sorted(folder.glob("frame_*.png")), out, options.fps)
+    print(out)
+
+
+def join_frames(paths, out, fps):
+    """A movie of pictures of one size, which are read one after the other: all of a long run would not fit into memory."""
+    first = plt.imread(paths[0])
+    height, width = first.shape[:2]
+    figure = plt.figure(figsize=(width / 100, height / 100), dpi=100)
+    image = figure.figimage(first)
+    play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k]))], frames=len(paths))
+    try:
+        with written(out) as part:
+            play.save(part, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
+    except subprocess.CalledProcessError as reason:
+        raise PictureError(f"{out}: ffmpeg ended with status {reason.returncode}; expected a movie .gif, or a directory for frames") from None
+    plt.close(figure)

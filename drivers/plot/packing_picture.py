@@ -1,0 +1,257 @@
+"""Pictures of bodies: coloured by a quantity, with their walls and force chains, one state or several of a movie."""
+import matplotlib.pyplot as plt
+import numpy
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
+from matplotlib.colors import to_rgba
+from palette import CHAINS, PLAIN
+from picture_regions import draw_regions, region_corners
+from picture_space import View, Walls, box_around, draw_flat_walls, draw_space
+from picture_style import SPEEDS, TURNS, PictureError, colours_of_kinds, scaled
+
+import gravier
+
+WIDEST = 4.0  # chain of the largest force, points
+FAINTEST = 0.02  # forces below this part of the largest are not drawn
+MOST_SHADED = 20000  # spheres that get a highlight each
+COLOURS = ("speed", "velocity_x", "velocity_y", "velocity_z", "rotation", "pressure", "radius", "material", "subdomain", "none")
+#: numbers of things, not quantities
+KINDS = ("material", "subdomain")
+
+
+# ---- colours
+
+def quantity(run, step, bodies, kind):
+    """Values to colour bodies by, their unit and their name; values None for no colour."""
+    if kind == "none" or (kind == "radius" and bodies.radius.min() == bodies.radius.max()):
+        return None, None, None
+    if kind == "radius":
+        return bodies.radius, "m", "radius"
+    if kind == "pressure":
+        return run.pressure(step), "N/m" if run.dimension == 2 else "Pa", "pressure"
+    if "velocity" not in bodies:
+        raise PictureError(f"{run.path}: no velocities; expected another --colour")
+    if kind == "rotation" and run.dimension == 2:
+        return bodies.spin[:, 0], "rad/s", "rotation, anticlockwise"
+    if kind == "rotation":
+        return numpy.linalg.norm(bodies.spin, axis=1), "rad/s", "rotation"
+    if kind.startswith("velocity_"):
+        axis = "xyz".index(kind[-1])
+        if axis >= run.dimension:
+            raise PictureError(f"{run.path}: a scene of the plane has no {kind}; expected velocity_x or velocity_y")
+        return bodies.velocity[:, axis], "m/s", f"velocity along {kind[-1]}"
+    return numpy.linalg.norm(bodies.velocity, axis=1), "m/s", "speed"
+
+
+def spread(values, kind):
+    """Least and largest value of the colours: a few extreme bodies must not make all others look alike."""
+    top = numpy.quantile(numpy.abs(values), 0.98) or numpy.abs(values).max() or 1.0
+    if values.min() < 0.0 or kind.startswith("velocity_"):
+        return -top, top
+    return (values.min(), top) if kind == "radius" and values.min() < top else (0.0, top)
+
+
+def kinds(run, step, bodies, kind):
+    """Numbers to colour bodies by, from 1, and the names of all of them."""
+    if kind == "subdomain":
+        values = run.subdomain(step)
+        return values, [str(number) for number in range(1, values.max() + 1)]
+    if "material" not in bodies:
+        raise PictureError(f"{run.path}: no materials; expected another --colour")
+    values = bodies.material.astype(int)
+    named = [keys.get("name", str(number)) for number, keys in enumerate(run.case.get("material", []), 1)]
+    return values, named + [str(number) for number in range(len(named) + 1, values.max() + 1)]
+
+
+def colours(run, step, bodies, kind, limits=None):
+    """Values to colour bodies by, their label, and how: a dictionary for a collection; values None for no colour. `limits` are those of
+    the colours where several pictures share them."""
+    if kind in KINDS:
+        values, names = kinds(run, step, bodies, kind)
+        return values, kind, colours_of_kinds(len(names))
+    values, unit, name = quantity(run, step, bodies, kind)
+    if values is None:
+        return None, None, {}
+    low, top = limits or spread(values, kind)
+    power, unit = scaled(top, unit)
+    norm = plt.Normalize(low / 10.0**power, top / 10.0**power)
+    return values / 10.0**power, f"{name} [{unit}]", {"cmap": plt.get_cmap(TURNS if low < 0.0 else SPEEDS), "norm": norm}
+
+
+def add_legend(figure, axes, values, label, how, names=None):
+    """A bar of colours beside the picture; pointed where values lie beyond it. Of kinds, their names."""
+    norm = how["norm"]
+    ends = "neither"
+    if names is None:
+        below, above = values.min() < norm.vmin - 1e-9 * abs(norm.vmin), values.max() > norm.vmax + 1e-9 * abs(norm.vmax)
+        ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[below, above]
+    bar = figure.colorbar(ScalarMappable(**how), cax=axes.inset_axes([1.02, 0.0, 0.025, 1.0]), label=label, extend=ends)
+    if names is not None:
+        shown = numpy.unique(values)
+        bar.set_ticks(shown, labels=[names[number - 1] for number in shown])
+
+
+# ---- bodies
+
+def shaped(bodies):
+    """Whether some body is neither a disk nor a sphere."""
+    return "shape" in bodies and "orientation" in bodies and bool(numpy.any(bodies.shape > 0))
+
+
+def newell(points):
+    """Normal of a polygon in space, as long as twice its area."""
+    return numpy.cross(points, numpy.roll(points, -1, axis=0)).sum(axis=0)
+
+
+def visible_polygons(outlines, view, order):
+    """Polygons of bodies in the plane of the picture, in the order in which they are drawn, and the body of each: in 3D those that face
+    the eye, the nearest last."""
+    polygons, body = [], []
+    for k in order:
+        found = outlines[k]
+        if not view.flat:
+            found = [points for points in found if numpy.dot(newell(points), view.eye) > 0.0]
+            found.sort(key=lambda points: numpy.mean(points @ view.eye))
+        polygons += [view.place(points) for points in found]
+        body += [k] * len(found)
+    return polygons, numpy.array(body)
+
+
+def draw_bodies(axes, view, bodies, outlines, values, style):
+    """Bodies as polygons where `outlines` are given, else as disks; `style` has the keys of a collection."""
+    order, diameter = view.order(bodies.position), 2.0 * bodies.radius
+    if outlines is not None:
+        polygons, order = visible_polygons(outlines, view, order)
+        drawn = PolyCollection(polygons, **style)
+    elif not view.flat and style["alpha"] == 1.0 and len(bodies) <= MOST_SHADED:
+        axes.add_collection(shaded_spheres(view.place(bodies.position)[order], diameter[order], None if values is None else values[order],
+                                           style, axes))
+        return
+    else:
+        drawn = EllipseCollection(diameter[order], diameter[order], numpy.zeros_like(diameter), units="xy",
+                                  offsets=view.place(bodies.position)[order], offset_transform=axes.transData, **style)
+    if values is None:
+        drawn.set_facecolor(PLAIN)
+    else:
+        drawn.set_array(values[order])
+    axes.add_collection(drawn)
+
+
+def shaded_spheres(place, diameter, values, style, axes):
+    """Disks in this order, each with a lighter one on it, up and to the left, as light makes it."""
+    style = dict(style)
+    cmap, norm = style.pop("cmap", None), style.pop("norm", None)
+    face = numpy.tile(to_rgba(PLAIN), (len(place), 1)) if values is None else cmap(norm(values))
+    edge = numpy.tile(to_rgba(style.pop("edgecolors")), (len(place), 1))
+    light = 0.55 * face + 0.45
+    light[:, 3] = 0.55
+    offsets = numpy.stack([place, place + 0.13 * diameter[:, None] * numpy.array([-1.0, 1.0])], axis=1).reshape(-1, 2)
+    widths = numpy.stack([diameter, 0.5 * diameter], axis=1).ravel()
+    edge = numpy.stack([edge, numpy.zeros_like(edge)], axis=1).reshape(-1, 4)
+    style.pop("alpha")
+    return EllipseCollection(widths, widths, numpy.zeros_like(widths), units="xy", offsets=offsets, offset_transform=axes.transData,
+                             facecolors=numpy.stack([face, light], axis=1).reshape(-1, 4), edgecolors=edge, **style)
+
+
+def draw_chains(axes, run, step, view, force):
+    """Force chains: a segment for each loaded contact, as thick as its normal force; `force` is that of the thickest."""
+    segments, normal = run.chains(step)
+    top = force or normal.max(initial=0.0)
+    loaded = normal > FAINTEST * top
+    if not loaded.any():
+        return
+    axes.add_collection(LineCollection(view.place(segments[loaded]), linewidths=WIDEST * normal[loaded] / top, colors=CHAINS,
+                                       capstyle="round", zorder=2))
+    axes.plot([], [], color=CHAINS, linewidth=WIDEST, label=f"normal force {float(f'{top:.2g}'):g} N")
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8)
+
+
+def draw_cell(axes, run, step):
+    """The edges of a periodic cell that moves, from the corner of the box that bodies are kept in."""
+    cell = run.cell(step)
+    if cell is not None:
+        corners = cell.origin.ravel() + numpy.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) @ cell.edge
+        axes.plot(*corners.T, color="0.35", linewidth=0.9, linestyle="--", zorder=1)
+
+
+# ---- a picture
+
+class Frame:
+    """What pictures of one movie share: the box, the limits of the colours, the force of the thickest chain."""
+
+    def __init__(self, low=None, high=None, limits=None, force=None):
+        self.low, self.high, self.limits, self.force = low, high, limits, force
+
+
+def title_of(run, step, bodies, contacts, flat):
+    title = run.path.name if isinstance(run, gravier.BodiesFile) else f"step {step}, t = {run.time(step):.4g} s"
+    title += f": {len(bodies)} {'bodies' if shaped(bodies) else 'disks' if flat else 'spheres'}"
+    return title if contacts is None else f"{title}, {len(contacts)} contacts"
+
+
+def draw_packing(run, step, options, frame=None):
+    """A figure of one step: bodies by colour, walls, force chains by normal force; `options` has size, view, colour, chains and
+    regions."""
+    frame = frame or Frame()
+    step = run.find_step(step)
+    bodies, contacts = run.bodies(step), run.contacts(step)
+    if len(bodies) == 0:
+        raise PictureError(f"{run.path}: no body in step {step}; expected one at least")
+    view, walls = View(run.dimension, *options.view), Walls(run, step)
+    held = region_corners(run.case, run.dimension) if options.regions else ()
+    box = box_around(bodies, walls, held) if frame.low is None else (frame.low, frame.high)
+    low, high = view.extent(*box)
+    size = (high - low) / (high - low).max()
+    figure, axes = plt.subplots(figsize=(options.size * size[0] + 1.3, options.size * size[1] + 0.9))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+
+    values, label, how = colours(run, step, bodies, options.colour, frame.limits)
+    chains = options.chains and contacts is not None and len(contacts) > 0
+    through = 0.25 if chains and not view.flat else 1.0
+    # an outline would hide a body of a few points
+    points = 72.0 * options.size / (high - low).max() * numpy.median(2.0 * bodies.radius)
+    style = {"edgecolors": "0.55" if view.flat else "0.25", "linewidths": min(0.4, 0.06 * points), "alpha": through, **how}
+    draw_bodies(axes, view, bodies, run.outlines(step) if shaped(bodies) else None, values, style)
+    if chains:
+        draw_chains(axes, run, step, view, frame.force)
+    if view.flat:
+        draw_cell(axes, run, step)
+        draw_flat_walls(axes, walls, low, high)
+        axes.set(xlabel="x [m]", ylabel="y [m]")
+    else:
+        draw_space(axes, view, walls, *box)
+        axes.set_axis_off()
+    if options.regions:
+        draw_regions(axes, run, step, view, *box)
+    axes.set_title(title_of(run, step, bodies, contacts, view.flat), fontsize=9, loc="left", pad=18 if options.chains else 6)
+    if values is not None:
+        add_legend(figure, axes, values, label, how, kinds(run, step, bodies, options.colour)[1] if options.colour in KINDS else None)
+    return figure
+
+
+# ---- several
+
+def shared_frame(run, steps, options):
+    """Box, colours and forces that hold for all steps of a movie."""
+    lows, highs, limits, force = [], [], [], 0.0
+    for step in steps:
+        bodies = run.bodies(step)
+        low, high = box_around(bodies, Walls(run, step), region_corners(run.case, run.dimension) if options.regions else ())
+        lows.append(low)
+        highs.append(high)
+        values = None if options.colour in KINDS else quantity(run, step, bodies, options.colour)[0]
+        if values is not None and values.any():
+            limits.append(spread(values, options.colour))
+        if options.chains and run.contacts(step) is not None:
+            force = max(force, run.chains(step)[1].max(initial=0.0))
+    if not lows:
+        raise PictureError(f"{run.path}: no body in any step; expected one at least")
+    return Frame(numpy.min(lows, axis=0), numpy.max(highs, axis=0), shared_limits(limits), force or None)
+
+
+def shared_limits(limits):
+    """Limits of colours that hold for several pictures, about 0 where one has negative values; None where there are none."""
+    if not limits:
+        return None
+    low, top = min(least for least, _ in limits), max(most for _, most in limits)
+    return (min(low, -top), max(-low, top)) if low < 0.0 else (low, top)

@@ -1,0 +1,252 @@
+"""Where things are in a picture: the direction of the view, the box of a scene, its axes and its walls."""
+import matplotlib.pyplot as plt
+import numpy
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.ticker import MaxNLocator
+from picture_style import WALLS
+
+import gravier
+
+#: angles of the points of a circle
+ARC = numpy.linspace(0.0, 2.0 * numpy.pi, 97)
+
+
+class View:
+    """Directions across and up the picture, and towards the eye, of a scene in 2D or 3D."""
+
+    def __init__(self, dimension, azimuth, elevation):
+        self.flat = dimension == 2
+        a, e = numpy.radians([azimuth, elevation])
+        self.axes = numpy.array([[-numpy.sin(a), numpy.cos(a), 0.0],
+                                 [-numpy.sin(e) * numpy.cos(a), -numpy.sin(e) * numpy.sin(a), numpy.cos(e)]])
+        self.eye = numpy.array([numpy.cos(e) * numpy.cos(a), numpy.cos(e) * numpy.sin(a), numpy.sin(e)])
+
+    def place(self, points):
+        """(..., d) to (..., 2)."""
+        return points if self.flat else points @ self.axes.T
+
+    def order(self, points):
+        """What is nearest to the eye comes last."""
+        return numpy.arange(len(points)) if self.flat else numpy.argsort(points @ self.eye, kind="stable")
+
+    def extent(self, low, high):
+        """Corners of the picture of a box, with a margin; in 3D it has room for the numbers of the axes."""
+        corners = self.place(box_corners(low, high))
+        first, last = corners.min(axis=0), corners.max(axis=0)
+        margin = (last - first).max() * (numpy.full(2, 0.015) if self.flat else numpy.array([0.14, 0.11]))
+        return first - margin, last + margin
+
+
+class Walls:
+    """Boundaries that are there at a step: their rows, the keys of each in the case, and facets of mesh walls (n, d, d)."""
+
+    def __init__(self, run, step):
+        rows, time = run.boundaries(step), run.time(step)
+        known = {keys.get("name", f"boundary {k}"): keys for k, keys in enumerate(run.case.get("boundary", []), 1)}
+        there = numpy.array([time < known.get(name, {}).get("remove_at", numpy.inf) for name in rows.name], dtype=bool)
+        self.dimension = run.dimension
+        self.rows = gravier.Table({key: values[there] for key, values in rows.items()})
+        self.keys = [known.get(name, {}) for name in rows.name[there]]
+        facets = run.facets(step)
+        self.facets = numpy.zeros((0, run.dimension, run.dimension))
+        if facets is not None:
+            self.facets = facets.corners[numpy.isin(facets.boundary, self.rows.id)]
+
+    def planes(self):
+        """Points and normals (n, d)."""
+        chosen = self.rows.shape == "plane"
+        return self.rows.position[chosen], self.rows.normal[chosen]
+
+    def polygons(self):
+        """Corners of segments and rectangles (c, d) and points of circles, where they are now; one that turns, as it was at the start."""
+        for shape, point, keys in zip(self.rows.shape, self.rows.position, self.keys):
+            if shape == "segment":
+                yield numpy.array([point, point + self._vector(keys, "end") - self._vector(keys, "point")])
+            elif shape == "rectangle":
+                a, b = self._vector(keys, "edge_a"), self._vector(keys, "edge_b")
+                yield numpy.array([point, point + a, point + a + b, point + b])
+            elif shape == "circle" and "radius" in keys:
+                yield point + keys["radius"] * numpy.column_stack([numpy.cos(ARC), numpy.sin(ARC)])
+
+    def cylinders(self):
+        """Point, direction and radius of each."""
+        for shape, point, keys in zip(self.rows.shape, self.rows.position, self.keys):
+            axis = self._vector(keys, "axis")
+            if shape == "cylinder" and "radius" in keys and axis.any():
+                yield point, axis / numpy.linalg.norm(axis), float(keys["radius"])
+
+    def _vector(self, keys, name):
+        """Of a case, where entries that nothing is said of are 0."""
+        return gravier.entries(keys, name, numpy.zeros(self.dimension))
+
+
+def box_corners(low, high):
+    """Corners of a box (2^d, d)."""
+    return numpy.stack(numpy.meshgrid(*zip(low, high), indexing="ij"), axis=-1).reshape(-1, len(low))
+
+
+def box_around(bodies, walls, points=()):
+    """Corners of the box that holds the bodies, some points and the walls: of planes, which have no end, the points nearest to the middle."""
+    low, high = (bodies.position - bodies.radius[:, None]).min(axis=0), (bodies.position + bodies.radius[:, None]).max(axis=0)
+    parts = [*walls.polygons(), *walls.facets] + ([points] if len(points) > 0 else [])
+    for point, axis, radius in walls.cylinders():
+        reach = radius * numpy.sqrt(numpy.maximum(1.0 - axis**2, 0.0))
+        across = reach > 0.5 * radius
+        ends = numpy.array([numpy.where(across, point + side * reach, 0.5 * (low + high)) for side in (-1.0, 1.0)])
+        parts.append(ends)
+    if parts:
+        points = numpy.concatenate(parts)
+        low, high = numpy.minimum(low, points.min(axis=0)), numpy.maximum(high, points.max(axis=0))
+    middle = 0.5 * (low + high)
+    for point, normal in zip(*walls.planes()):
+        foot = middle - numpy.dot(middle - point, normal) * normal
+        low, high = numpy.minimum(low, foot), numpy.maximum(high, foot)
+    return low, high
+
+
+# ---- in the plane
+
+def draw_flat_walls(axes, walls, low, high):
+    """Boundaries of a scene in 2D: planes as lines across the picture, cut where another plane leaves them behind, segments, circles and
+    facets."""
+    style = {"color": WALLS, "linewidth": 1.5, "solid_capstyle": "butt", "zorder": 3}
+    length = numpy.linalg.norm(high - low)
+    places, normals = walls.planes()
+    for point, normal in zip(places, normals):
+        tangent = numpy.array([-normal[1], normal[0]])
+        start = point + numpy.dot(0.5 * (low + high) - point, tangent) * tangent
+        line = start + numpy.linspace(-length, length, 4001)[:, None] * tangent
+        free = numpy.ones(len(line), dtype=bool)
+        for other, other_normal in zip(places, normals):
+            free &= (line - other) @ other_normal > -1e-3 * length
+        axes.plot(*line[free].T, **style)
+    for points in walls.polygons():
+        axes.plot(*points.T, **style)
+    axes.add_collection(LineCollection(walls.facets, colors=WALLS, linewidths=1.5, capstyle="round", zorder=3))
+
+
+# ---- in space
+
+def draw_space(axes, view, walls, low, high):
+    """The box around a scene in 3D with numbers along three of its edges, and the walls: what is behind the bodies is filled, what is in
+    front of them is an outline."""
+    draw_box(axes, view, walls, low, high)
+    middle = 0.5 * (low + high)
+    for points in walls.polygons():
+        draw_wall(axes, view, points, numpy.dot(points.mean(axis=0) - middle, view.eye) > 0.0)
+    for point, normal in zip(*walls.planes()):
+        if numpy.abs(normal).max() < 0.999:
+            points = cut_box(point, normal, low, high)
+            if len(points) >= 3:
+                draw_wall(axes, view, points, numpy.dot(normal, view.eye) < 0.0)
+    for point, axis, radius in walls.cylinders():
+        draw_cylinder(axes, view, (point, axis, radius), low, high)
+    if len(walls.facets) > 0:
+        axes.add_collection(PolyCollection(view.place(walls.facets), facecolors="none", edgecolors="0.6", linewidths=0.3, zorder=0.5))
+
+
+def draw_wall(axes, view, points, before):
+    """A wall with these corners, in front of the bodies or behind them."""
+    axes.add_patch(plt.Polygon(view.place(points), closed=True, facecolor="none" if before else "0.88", edgecolor="0.35",
+                               linewidth=0.8, zorder=3.0 if before else 0.4))
+
+
+def cut_box(point, normal, low, high):
+    """Corners of the part of a plane within a box, in order around it (n, 3)."""
+    corners = box_corners(low, high)
+    side = (corners - point) @ normal
+    found = []
+    for k in range(8):
+        for bit in (1, 2, 4):
+            other = k ^ bit
+            if k < other and side[k] * side[other] < 0.0:
+                found.append(corners[k] + side[k] / (side[k] - side[other]) * (corners[other] - corners[k]))
+    found = numpy.array(found).reshape(-1, 3)
+    if len(found) < 3:
+        return found
+    first = found[0] - found.mean(axis=0)
+    first /= numpy.linalg.norm(first)
+    around = numpy.arctan2((found - found.mean(axis=0)) @ numpy.cross(normal, first), (found - found.mean(axis=0)) @ first)
+    return found[numpy.argsort(around)]
+
+
+def draw_cylinder(axes, view, cylinder, low, high):
+    """A cylinder from end to end of the box: the far end and the side filled, the near end as an outline."""
+    point, axis, radius = cylinder
+    one = numpy.cross(axis, numpy.eye(3)[numpy.argmin(numpy.abs(axis))])
+    one /= numpy.linalg.norm(one)
+    ring = radius * (numpy.outer(numpy.cos(ARC), one) + numpy.outer(numpy.sin(ARC), numpy.cross(axis, one)))
+    along = (box_corners(low, high) - point) @ axis
+    towards = 1.0 if numpy.dot(axis, view.eye) > 0.0 else -1.0
+    far, near = (point + place * axis for place in sorted((along.min(), along.max()), key=lambda place: towards * place))
+    draw_wall(axes, view, far + ring, before=False)
+    draw_wall(axes, view, near + ring, before=True)
+    side = numpy.cross(axis, view.eye)
+    if numpy.linalg.norm(side) > 1e-6:
+        for sign in (-1.0, 1.0):
+            reach = sign * radius * side / numpy.linalg.norm(side)
+            axes.plot(*view.place(numpy.array([far + reach, near + reach])).T, color="0.35", linewidth=0.8, zorder=0.45)
+
+
+def draw_box(axes, view, walls, low, high):
+    """The three faces of a box that are behind the bodies, grey where a plane is there, and axes with numbers on its outline."""
+    places, normals = walls.planes()
+    ends, size = (low, high), numpy.max(high - low)
+    for a in range(3):
+        side = int(view.eye[a] < 0.0)
+        corners = box_corners(low, high)
+        face = corners[numpy.isclose(corners[:, a], ends[side][a], atol=1e-9 * size)][[0, 1, 3, 2]]
+        wall = numpy.any((normals[:, a] * (1 - 2 * side) > 0.999) & (numpy.abs(places[:, a] - ends[side][a]) < 0.02 * size))
+        axes.add_patch(plt.Polygon(view.place(face), closed=True, facecolor="0.94" if wall else "none", edgecolor="0.6", linewidth=0.6, zorder=0.2))
+    numbered = []
+    for a in range(3):
+        edge = outline_edge(view, a, low, high)
+        if edge is not None:
+            draw_axis(axes, view, a, edge, 0.5 * (low + high), numbered)
+
+
+def outline_edge(view, a, low, high):
+    """Ends of the edge along axis a that is on the outline of the box, the lowest of two, of the vertical ones the leftmost; None for an
+    axis that the eye looks along."""
+    if numpy.linalg.norm(view.axes[:, a]) < 0.15:
+        return None
+    b, c = [k for k in range(3) if k != a]
+    found = []
+    for at_b in (0, 1):
+        for at_c in (0, 1):
+            if (view.eye[b] >= 0.0) == bool(at_b) and (view.eye[c] >= 0.0) == bool(at_c):
+                continue
+            if (view.eye[b] >= 0.0) != bool(at_b) and (view.eye[c] >= 0.0) != bool(at_c):
+                continue
+            edge = numpy.array([low, high])
+            edge[:, b], edge[:, c] = (low, high)[at_b][b], (low, high)[at_c][c]
+            found.append(edge)
+    upright = numpy.abs(view.axes[1, a]) > numpy.abs(view.axes[0, a])
+    return min(found, key=lambda edge: view.place(edge).mean(axis=0)[0 if upright else 1])
+
+
+def draw_axis(axes, view, a, edge, middle, numbered):
+    """Numbers and a name along an edge of the box, outside of it. `numbered` are the places of numbers [inches]: none stands on another."""
+    ends = view.place(edge)
+    along = (ends[1] - ends[0]) / numpy.linalg.norm(ends[1] - ends[0])
+    out = ends.mean(axis=0) - view.place(middle)
+    out -= numpy.dot(out, along) * along
+    out /= numpy.linalg.norm(out)
+    style = {"ha": "right" if out[0] < -0.35 else "left" if out[0] > 0.35 else "center",
+             "va": "top" if out[1] < -0.35 else "bottom" if out[1] > 0.35 else "center", "fontsize": 8, "color": "0.3", "zorder": 4}
+    # about a number for every inch
+    length = numpy.linalg.norm(axes.transData.transform(ends[1]) - axes.transData.transform(ends[0])) / axes.figure.dpi
+    low, high = edge[:, a]
+    values = MaxNLocator(nbins=int(numpy.clip(1.6 * length, 2, 6)), steps=[1, 2, 5, 10]).tick_values(low, high)
+    for value in values[(values >= low - 1e-9 * (high - low)) & (values <= high + 1e-9 * (high - low))]:
+        place = ends[0] + (value - low) / (high - low) * (ends[1] - ends[0])
+        inches = axes.transData.transform(place) / axes.figure.dpi
+        if any(numpy.linalg.norm(inches - other) < 0.2 for other in numbered):
+            continue
+        numbered.append(inches)
+        axes.annotate("", place, xytext=4.0 * out, textcoords="offset points", annotation_clip=False,
+                      arrowprops={"arrowstyle": "-", "color": "0.6", "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 0.0})
+        axes.annotate(f"{0.0 if abs(value) < 1e-9 * (high - low) else value:g}", place, xytext=6.0 * out, textcoords="offset points",
+                      annotation_clip=False, **style)
+    axes.annotate(f"{'xyz'[a]} [m]", ends.mean(axis=0), xytext=(31.0 if abs(out[0]) > 0.8 else 21.0) * out, textcoords="offset points",
+                  annotation_clip=False, **style)

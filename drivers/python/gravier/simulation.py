@@ -1,0 +1,417 @@
+"""A run whose loop is the user's: steps one by one, arrays of its bodies, drives and loads that change between steps.
+
+    with gravier.Simulation("case.nml") as s:
+        while s.goes_on:
+            s.step()
+
+On several ranks every rank runs the script: mpiexec -n 2 python3 script.py.
+"""
+import atexit
+import ctypes
+import os
+import sys
+import traceback
+
+import numpy as np
+
+from .library import SimulationError, call, load
+
+RESTART, QUIET, FORCES = 1, 2, 4
+KINDS = {0: "<f8", 1: "<i8", 2: "<i4"}
+
+
+class StaleArray(Exception):
+    """An array of bodies is used after the step for which it is valid."""
+
+
+class View(np.ndarray):
+    """Where the library keeps a field, without a copy: to be read, until the next step."""
+
+    def __array_finalize__(self, other):
+        self._owner, self._mark = getattr(other, "_owner", None), getattr(other, "_mark", None)
+
+    def _plain(self):
+        if self._owner is not None and self._owner.mark != self._mark:
+            raise StaleArray("this array of bodies is of a step that is over; expected one that is taken anew, or a copy: numpy.array(...)")
+        return self.view(np.ndarray)
+
+    def __getitem__(self, key):
+        self._plain()
+        return super().__getitem__(key)
+
+    def __iter__(self):
+        return iter(self._plain())
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
+        return getattr(ufunc, method)(*(_plain(one) for one in inputs), **{key: _plain(one) for key, one in keywords.items()})
+
+    def __array_function__(self, function, types, arguments, keywords):
+        return function(*_plain(arguments), **_plain(keywords))
+
+    def copy(self, order="C"):
+        return self._plain().copy(order)
+
+    def __repr__(self):
+        return repr(self._plain())
+
+
+def _plain(value):
+    """Views in arguments as arrays of numpy."""
+    if isinstance(value, View):
+        return value._plain()
+    if isinstance(value, (list, tuple)):
+        return type(value)(_plain(one) for one in value)
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    return value
+
+
+class _Memory:
+    """What numpy asks of memory that is not its own."""
+
+    def __init__(self, address, shape, kind):
+        self.__array_interface__ = {"data": (address, True), "shape": shape, "typestr": kind, "version": 3}
+
+
+def _reals(values, what, shape=None):
+    """An array of doubles, of a shape where one is asked for."""
+    try:
+        found = np.array(_plain(values), dtype=np.float64, order="C", ndmin=0)
+    except (TypeError, ValueError):
+        raise SimulationError(f"{what}: expected numbers") from None
+    if shape is not None and found.shape != shape:
+        raise SimulationError(f"{what}: an array of shape {found.shape}; expected {shape}")
+    return found
+
+
+class Subdomain:
+    """Bodies of a subdomain of this rank, in the order of `id`. Arrays are read where the library keeps them, until the next step; `velocity`,
+    `spin` and, with forces, `force` are set as a whole."""
+
+    def __init__(self, simulation, number):
+        self._simulation, self._number = simulation, number
+
+    def _field(self, name):
+        address, shape, kind = ctypes.c_void_p(), (ctypes.c_int64 * 2)(), ctypes.c_int()
+        call("array", self._simulation.handle, name.encode(), self._number, ctypes.byref(address), shape, ctypes.byref(kind))
+        size = (shape[0], shape[1])
+        if not address.value:
+            return np.zeros(size, KINDS[kind.value])
+        view = np.asarray(_Memory(address.value, size, KINDS[kind.value])).view(View)
+        view._owner, view._mark = self._simulation, self._simulation.mark
+        return view
+
+    def _set(self, name, values):
+        shape = (ctypes.c_int64 * 2)(*values.shape)
+        call("set_array", self._simulation.handle, name.encode(), self._number, values.ctypes.data, shape)
+
+    def __len__(self):
+        return len(self.id)
+
+    @property
+    def id(self):
+        return self._field("id")[:, 0]
+
+    @property
+    def radius(self):
+        return self._field("radius")[:, 0]
+
+    @property
+    def mass(self):
+        return self._field("mass")[:, 0]
+
+    @property
+    def material(self):
+        return self._field("material")[:, 0]
+
+    @property
+    def glued(self):
+        return self._field("glued")[:, 0]
+
+    @property
+    def position(self):
+        return self._field("position")
+
+    @property
+    def orientation(self):
+        return self._field("orientation")
+
+    @property
+    def velocity(self):
+        return self._field("velocity")[:, :self._simulation.dimension]
+
+    @velocity.setter
+    def velocity(self, values):
+        self._set_part("velocity", slice(None, self._simulation.dimension), values)
+
+    @property
+    def spin(self):
+        return self._field("velocity")[:, self._simulation.dimension:]
+
+    @spin.setter
+    def spin(self, values):
+        self._set_part("spin", slice(self._simulation.dimension, None), values)
+
+    def _set_part(self, what, columns, values):
+        whole = np.array(self._field("velocity"))
+        whole[:, columns] = _reals(values, what, whole[:, columns].shape)
+        self._set("velocity", whole)
+
+    @property
+    def force(self):
+        return self._field("force")
+
+    @force.setter
+    def force(self, values):
+        self._set("force", _reals(values, "force", (len(self), self._simulation.dimension)))
+
+
+class Bodies:
+    """Bodies of this rank: those of its subdomains, one after the other. With one subdomain a rank the arrays are those of the library, to be
+    read until the next step; with several they are copies. They are set in the same way."""
+
+    def __init__(self, subdomains, columns):
+        object.__setattr__(self, "_subdomains", subdomains)
+        #: numbers of a body in the arrays that have several
+        object.__setattr__(self, "_columns", columns)
+
+    def __len__(self):
+        return sum(len(one) for one in self._subdomains)
+
+    def __getattr__(self, name):
+        if not isinstance(getattr(Subdomain, name, None), property):
+            raise AttributeError(f"no array {name} of bodies")
+        arrays = [getattr(one, name) for one in self._subdomains]
+        if not arrays:
+            return np.zeros((0, self._columns[name]) if name in self._columns else 0)
+        return arrays[0] if len(arrays) == 1 else _frozen(np.concatenate(arrays))
+
+    def __setattr__(self, name, values):
+        if getattr(getattr(Subdomain, name, None), "fset", None) is None:
+            raise AttributeError(f"array {name} of bodies cannot be set; expected one of velocity, spin, force")
+        counts = [len(one) for one in self._subdomains]
+        values = _reals(values, name)
+        if values.ndim != 2 or len(values) != sum(counts):
+            raise SimulationError(f"{name}: an array of shape {values.shape}; expected a row for each of the {sum(counts)} bodies of this rank")
+        for one, part in zip(self._subdomains, np.split(values, np.cumsum(counts)[:-1])):
+            setattr(one, name, part)
+
+
+def _frozen(array):
+    """An array that is not to be written to, since nobody would notice."""
+    array.flags.writeable = False
+    return array
+
+
+class Boundary:
+    """A boundary: `position`, `normal`, `velocity`, `spin`, `force` of the grains on it in the last step, `applied_force`, `pressure` and
+    `friction`. velocity, spin, applied_force, pressure and friction can be set, on all ranks alike, and hold from the next step on."""
+
+    def __init__(self, simulation, number, name):
+        object.__setattr__(self, "_place", (simulation, number))
+        object.__setattr__(self, "name", name)
+
+    def __getattr__(self, what):
+        if what not in BOUNDARY_READS:
+            raise AttributeError(f"no {what} of a boundary; expected one of {', '.join(BOUNDARY_READS)}")
+        values, count = (ctypes.c_double * 3)(), ctypes.c_int()
+        simulation, number = self._place
+        call("get_boundary", simulation.handle, number, what.encode(), values, ctypes.byref(count))
+        if what in ("pressure", "friction") or (what == "spin" and count.value == 1):
+            return values[0]
+        return np.array(values[:count.value])
+
+    def __setattr__(self, what, values):
+        if what not in BOUNDARY_SETS:
+            raise AttributeError(f"{what} of a boundary cannot be set; expected one of {', '.join(BOUNDARY_SETS)}")
+        values = _reals(values, f"boundary '{self.name}': {what}").ravel()
+        simulation, number = self._place
+        call("set_boundary", simulation.handle, number, what.encode(), values.ctypes.data, len(values))
+
+
+BOUNDARY_SETS = ("velocity", "spin", "applied_force", "pressure", "friction")
+BOUNDARY_READS = ("position", "normal", "force", *BOUNDARY_SETS)
+
+
+class Boundaries:
+    """Boundaries by name."""
+
+    def __init__(self, simulation):
+        self._simulation = simulation
+
+    def __len__(self):
+        return self._simulation.whole("boundaries")
+
+    def __iter__(self):
+        handle = self._simulation.handle
+        return iter([load().gravier_boundary_name(handle, k).decode() for k in range(len(self))])
+
+    def __getitem__(self, name):
+        number = ctypes.c_int()
+        call("boundary", self._simulation.handle, str(name).encode(), ctypes.byref(number))
+        return Boundary(self._simulation, number.value, name)
+
+
+class Simulation:
+    """A run that is open. `restart` goes on from the checkpoint of the case, `quiet` keeps the log off the terminal, `forces` gives bodies an
+    array `force` [N]; `communicator` is one of mpi4py. All ranks of it make the same calls."""
+
+    def __init__(self, case, restart=False, quiet=False, forces=False, communicator=None):
+        #: counts steps: arrays of bodies are of one of them
+        self.mark = 0
+        #: exit status of the program for such a run, once it is closed
+        self.status = None
+        self._handle = ctypes.c_void_p()
+        options = RESTART * bool(restart) + QUIET * bool(quiet) + FORCES * bool(forces)
+        number = None if communicator is None else ctypes.pointer(ctypes.c_int(communicator.py2f()))
+        command = " ".join(["gravier.Simulation", *sys.argv]).encode(errors="replace")
+        sys.stdout.flush()
+        call("open", os.fsencode(case), command, options, number, ctypes.byref(self._handle))
+        # a script that ends without close
+        atexit.register(self.close)
+        self.dimension = self.whole("dimension")
+        #: bodies by subdomain of this rank, bodies of this rank, boundaries by name
+        self.subdomains = [Subdomain(self, k) for k in range(self.whole("subdomains"))]
+        d = self.dimension
+        self.bodies = Bodies(self.subdomains, {"position": d, "velocity": d, "force": d, "spin": self.whole("velocity_entries") - d, "orientation": 0})
+        self.boundaries = Boundaries(self)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if self._handle is None:
+            return
+        if error is not None and not isinstance(error, (SimulationError, StaleArray)) and self.ranks > 1:
+            # the other ranks wait for this one
+            traceback.print_exception(kind, error, trace)
+            sys.stderr.flush()
+            load().gravier_abort()
+        try:
+            if error is not None and self.goes_on:
+                self.stop(f"an exception in its loop, {kind.__name__}")
+            self.close()
+        except SimulationError:
+            if error is None:
+                raise
+
+    @property
+    def handle(self):
+        if self._handle is None:
+            raise SimulationError("this simulation is closed; expected one that is open")
+        return self._handle
+
+    def whole(self, name):
+        """A whole number by its name in gravier.h."""
+        value = ctypes.c_int64()
+        call("whole", self.handle, name.encode(), ctypes.byref(value))
+        return value.value
+
+    def real(self, name):
+        """A real number by its name in gravier.h."""
+        value = ctypes.c_double()
+        call("real", self.handle, name.encode(), ctypes.byref(value))
+        return value.value
+
+    def step(self):
+        """Make one step, with its log and its outputs. Arrays of bodies that were taken before are no longer valid."""
+        handle = self.handle
+        self.mark += 1
+        call("step", handle)
+
+    def stop(self, reason="its loop has stopped it"):
+        """End the run after the present step, with its last state and checkpoint written. Without effect once it is over."""
+        call("stop", self.handle, str(reason).encode())
+
+    def checkpoint(self):
+        """Write checkpoint.h5 now."""
+        call("checkpoint", self.handle)
+
+    def close(self):
+        """End the run, which is stopped if it goes on. Sets and returns `status`: 0, 3 where a solve missed its tolerance, 4 where the run was
+        interrupted. An error of the run is raised."""
+        if self._handle is None:
+            return self.status
+        atexit.unregister(self.close)
+        handle, self._handle = self._handle, None
+        self.mark += 1
+        self.status = load().gravier_close(handle)
+        line = load().gravier_error().decode(errors="replace")
+        if line:
+            raise SimulationError(line, self.status)
+        return self.status
+
+    goes_on = property(lambda self: bool(self.whole("goes_on")), doc="there is a step to make")
+    made = property(lambda self: self.whole("step"), doc="steps made so far")
+    steps = property(lambda self: self.whole("steps"), doc="steps of the case")
+    time = property(lambda self: self.real("time"), doc="[s]")
+    time_step = property(lambda self: self.real("time_step"), doc="[s]")
+    rank = property(lambda self: self.whole("rank"), doc="of this process, from 0")
+    ranks = property(lambda self: self.whole("ranks"), doc="number of ranks")
+    restarted = property(lambda self: bool(self.whole("restarted")), doc="the run goes on from a checkpoint")
+    converged = property(lambda self: bool(self.whole("converged")), doc="the solve of the last step has reached its goal")
+    iterations = property(lambda self: self.whole("iterations"), doc="of the last step")
+    contacts = property(lambda self: self.whole("contacts"), doc="of the last step, on all ranks")
+    kinetic_energy = property(lambda self: self.real("kinetic_energy"), doc="of all free bodies after the last step [J]")
+
+    @property
+    def gravity(self):
+        """[m/s^2]; can be set, on all ranks alike."""
+        return np.array([self.real("gravity_" + axis) for axis in "xyz"[:self.dimension]])
+
+    @gravity.setter
+    def gravity(self, values):
+        values = _reals(values, "gravity").ravel()
+        call("set_gravity", self.handle, values.ctypes.data, len(values))
+
+    @property
+    def friction(self):
+        """Coefficient between bodies; can be set, on all ranks alike."""
+        return self.real("friction")
+
+    @friction.setter
+    def friction(self, value):
+        call("set_friction", self.handle, float(_reals(value, "friction", ())))
+
+    def add_bodies(self, position, radius, velocity=None, mass=None, material=None):
+        """Let disks or spheres enter at the start of the next step, in free places; on all ranks alike. They get the next identifiers. Their mass
+        is that of the density of the material unless it is given."""
+        position = _reals(position, "position")
+        if position.ndim != 2 or position.shape[1] != self.dimension:
+            raise SimulationError(f"position: an array of shape {position.shape}; expected (bodies, {self.dimension})")
+        n = len(position)
+
+        def column(values, what, missing):
+            return np.full(n, missing, float) if values is None else np.ascontiguousarray(np.broadcast_to(_reals(values, what), n))
+
+        try:
+            radius, mass, material = column(radius, "radius", 0.0), column(mass, "mass", 0.0), column(material, "material", 1.0)
+        except ValueError:
+            raise SimulationError(f"radius, mass, material: expected one number, or one for each of {n} bodies") from None
+        if not (np.isfinite(material).all() and (material == np.round(material)).all() and (np.abs(material) < 2**31).all()):
+            raise SimulationError("material: expected whole numbers")
+        velocity = np.zeros_like(position) if velocity is None else _reals(velocity, "velocity", position.shape)
+        material = material.astype(np.int32)
+        call("add_bodies", self.handle, n, *(array.ctypes.data for array in (radius, mass, material, position, velocity)))
+
+    def remove(self, ids):
+        """Take free bodies out of the scene at the start of the next step; on all ranks alike."""
+        ids = np.atleast_1d(np.array(ids))
+        if ids.ndim != 1 or (ids.size and ids.dtype.kind not in "iu"):
+            raise SimulationError("remove: expected identifiers, which are whole numbers")
+        ids = ids.astype(np.int64)
+        call("remove_bodies", self.handle, len(ids), ids.ctypes.data)
+
+    def sum(self, values):
+        """Sum of a number, or of each number of an array, over the ranks; the same bits whatever their order."""
+        return self._reduced("sum", values)
+
+    def highest(self, values):
+        """The highest of a number, or of each number of an array, over the ranks."""
+        return self._reduced("highest", values)
+
+    def _reduced(self, name, values):
+        found = _reals(values, name)
+        shape, found = found.shape, found.ravel()
+        getattr(load(), "gravier_" + name)(self.handle, len(found), found.ctypes.data)
+        return found.reshape(shape) if shape else float(found[0])

@@ -1,0 +1,129 @@
+"""Was the run right? What the log and history.csv say, question by question, from good to bad."""
+import re
+
+import numpy
+
+GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
+#: as the last words of the program judge: the fraction of steps with mended overlaps, the velocity error over U
+OFTEN, FAR_OFF = 0.1, 0.5
+
+
+class Answer:
+    """A question, how good the answer is, and the answer in words."""
+
+    def __init__(self, question, grade, text):
+        self.question, self.grade, self.text = question, grade, text
+
+
+def number(keys, name, usual):
+    """A value of a group, where it is a number; `usual` else."""
+    value = keys.get(name)
+    return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else usual
+
+
+def percent(share):
+    return "none" if share == 0.0 else "less than 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
+
+
+def ended(log, history, steps):
+    made = f"{int(history.step[-1]) if len(history) > 0 else 0} of {steps if steps is not None else '?'} steps"
+    word, text = log.end()
+    early = next((f"{begin} {log.value(begin)}" for begin in ("at rest", "ended") if log.value(begin)), None)
+    if word == "finished":
+        return Answer("Did it come to its end?", GOOD, f"Yes, {early}." if early else f"Yes: {made}.")
+    if word:
+        return Answer("Did it come to its end?", BAD, f"No, {word}: {text.removeprefix('***').strip()}.")
+    return Answer("Did it come to its end?", DOUBT, f"Not so far: the log has no last words. The run goes on, or it was killed. It has made {made}.")
+
+
+def converged(log, history):
+    question = "Did every solve converge?"
+    said = log.value("converged")
+    if said:
+        return Answer(question, BAD if said.startswith("NO") else GOOD, said[0].upper() + said[1:] + ".")
+    if "converged" not in history or len(history) == 0:
+        return Answer(question, UNKNOWN, "Not known: no solve is recorded.")
+    missed = int((history.converged == 0).sum())
+    if missed > 0:
+        return Answer(question, BAD, f"No: {missed} of {len(history)} solves so far did not.")
+    return Answer(question, GOOD, f"Yes, all {len(history)} solves so far.")
+
+
+def accurate(history, solver):
+    question = "Was the accuracy reached?"
+    if "velocity_error" not in history or len(history) == 0:
+        return Answer(question, UNKNOWN, "Not known: no solve is recorded.")
+    ratio = error_ratio(history)
+    if not numpy.isfinite(ratio).any():
+        return Answer(question, UNKNOWN, "Not known: no step has an estimate of its velocity error.")
+    worst = float(numpy.nanmax(ratio))
+    words = f"the velocity error was at most {worst:.2g} of U, the velocity that a step is judged by"
+    if solver.get("criterion", "velocity_error") == "velocity_error":
+        goal = number(solver, "accuracy", 0.1)
+        # the criterion weighs the error, so that the estimate may be a little above
+        reached = worst <= goal * (1.0 + 1e-6)
+        if "converged" in history and (history.converged == 0).any():
+            missed = ratio[history.converged == 0]
+            return Answer(question, BAD, f"Not in every step: {words}, with a goal of {goal:g}; it was missed in {len(missed)} steps.")
+        return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}, with a goal of {goal:g}.")
+    grade = GOOD if worst <= 0.1 else DOUBT if worst <= FAR_OFF else BAD
+    return Answer(question, grade, f"The criterion '{solver.get('criterion')}' does not bound it; as estimated, {words}.")
+
+
+def mended(log, history):
+    """As the log counts projections at its end, which leaves out those that shift by rounding; before that, as history.csv does."""
+    question = "Was the geometry mended?"
+    if "projected" not in history or "max_overlap" not in history or len(history) == 0:
+        return Answer(question, UNKNOWN, "Not known: no step is recorded.")
+    overlap = f"The largest overlap was {history.max_overlap.max():.2g} m."
+    lines = [line.strip() for line in log.lines]
+    if "overlaps are not projected" in lines:
+        return Answer(question, GOOD, f"No: overlaps are not projected in this case. {overlap}")
+    told = next((line for line in lines if line.startswith("projected in ")), None)
+    share = float((history.projected > 0).mean())
+    words = f"projected in {percent(share)} of the steps"
+    if told:
+        part = re.match(r"projected in (\d+) of (\d+) steps", told)
+        share, words = int(part[1]) / max(1, int(part[2])), told
+    if share == 0.0 or "no step projected overlaps" in lines:
+        return Answer(question, GOOD, f"No step projected overlaps. {overlap}")
+    grade = BAD if share > OFTEN else DOUBT
+    return Answer(question, grade, f"{'Yes, often' if grade == BAD else 'A little'}: {words}. {overlap}")
+
+
+def balanced(log):
+    said = log.value("energy")
+    return [Answer("Do the energies balance?", GOOD, said[0].upper() + said[1:] + ".")] if said.startswith("balance") else []
+
+
+def readable(notes):
+    return [Answer("Can its files be read?", BAD, f"Not all: {' '.join(notes)}")] if notes else []
+
+
+def error_ratio(history):
+    """Velocity error over U of each step; NaN where one is not known."""
+    scale = history.velocity_scale if "velocity_scale" in history else numpy.zeros(len(history))
+    ratio = numpy.divide(history.velocity_error, scale, out=numpy.full(len(history), numpy.nan), where=scale > 0.0)
+    return numpy.where(ratio < 1e6, ratio, numpy.nan)
+
+
+def answers(log, history, options, notes):
+    """Answers to all questions of a run; `notes` name files that are missing or damaged."""
+    solver = (options.get("solver") or [{}])[0]
+    steps = (options.get("time") or [{}])[0].get("steps")
+    return [ended(log, history, steps), converged(log, history), accurate(history, solver), mended(log, history), *balanced(log), *readable(notes)]
+
+
+def headline(found, log):
+    """The grade of the whole, and a sentence."""
+    grades = [answer.grade for answer in found]
+    word, _ = log.end()
+    if not word:
+        return (BAD if BAD in grades else DOUBT), "This run has not come to its end."
+    if word != "finished":
+        return BAD, "This run did not come to its end."
+    if BAD in grades:
+        return BAD, "This run ended, but its results are not what was asked for."
+    if DOUBT in grades:
+        return DOUBT, "This run ended; mind what is marked below."
+    return GOOD, "This run converged, with the accuracy that was asked for."

@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+"""Dense flow in sheared periodic cells under constant pressure, against published simulations: the friction and the solid fraction of disks
+(F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Physical Review E 72 (2005) 021309) and of spheres (S. Chialvo, J. Sun and
+S. Sundaresan, Physical Review E 85 (2012) 021305; T. Hatano, Physical Review E 75 (2007) 060301).
+
+    python3 drivers/studies/study_rheology.py OUT [--quick | --least I]
+
+The cell is sheared at the rate g along x over y, and its length along y is driven by a pressure P. With the mean diameter d, the mean mass m
+and the inertial number I = g sqrt(m/P) of disks, g d sqrt(rho/P) of spheres, the flow has a friction mu = -sigma_xy/sigma_yy and a solid
+fraction phi, means over the strain after the start. For disks with friction 0.4 the publication has mu = 0.25 + 1.1 I and
+phi = 0.81 - 0.3 I. For spheres with friction 0.3 slow flow has mu = 0.357 and phi = 0.596, and mu rises as a power of I, with the exponent
+0.28 +- 0.05 in the third publication.
+
+Leaves OUT/study_rheology.csv, OUT/study_rheology_flow.csv, OUT/study_rheology.png and the runs. Exit status: 0 all rows are within their
+bounds; 1 one is not."""
+import sys
+from pathlib import Path
+
+import numpy as np
+from oracle_table import Table
+from study_support import plt, read_history, run, write_csv
+
+from one_line import OneLineParser
+from whole_file import save_figure
+
+#: friction between grains, counts of the lattice that each run begins with, and its spacing, by dimension
+FRICTION = {2: 0.4, 3: 0.3}
+COUNTS = {2: [14, 14], 3: [6, 10, 6]}
+SPACING = 1.28
+NUMBERS = {2: (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1), 3: (1e-4, 1e-3, 1e-2, 3e-2, 1e-1)}
+LEAST = {2: 1e-3, 3: 1e-2}
+QUICK = {2: (1e-2, 1e-1), 3: (1e-1,)}
+#: flows up to here are slow: errors of their solves are compared with the rate times ten diameters, as between walls so far apart
+SLOW = 1e-3
+#: what the publications say of disks, and of slow flow of spheres
+DISKS = {"mu": (0.25, 1.1), "phi": (0.81, -0.3)}
+SPHERES = {"mu": 0.357, "phi": 0.596}
+#: accepted differences; that of the friction of the fastest flow, whose shocks are inelastic here
+NEAR, FAST, NEAR_FAST = {"mu": 0.05, "phi": 0.02}, 0.05, 0.12
+#: strain left out, and strain taken; of slower flows, which take more steps, half of it
+START, TAKEN = 0.4, 1.6
+
+
+def step_of(number):
+    """A step in units of d sqrt(rho/P): a strain of 0.005 sqrt(I)."""
+    return 0.005 / np.sqrt(number)
+
+
+def flow(folder, dimension, number, share):
+    """Shear at an inertial number: mu, phi and the standard errors of both, from means over eight parts of the strain."""
+    # grains of mean diameter 1 and of that mass, and P = 1
+    density = {2: 4.0 / np.pi, 3: 6.0 / np.pi}[dimension]
+    rate = number if dimension == 2 else number / np.sqrt(density)
+    step = step_of(number)
+    strain = (START + TAKEN * (0.5 if number <= SLOW else 1.0)) * share
+    # the loose lattice comes together in some twenty units of time
+    steps = int(20.0 / step + strain / (rate * step))
+    groups = {"scene": {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "lattice", "lattice_count": COUNTS[dimension],
+                        "radius_min": 0.4, "radius_max": 0.6, "density": float(density), "friction": FRICTION[dimension],
+                        "period": [SPACING * n for n in COUNTS[dimension]], "cell_shear_rate": [float(rate)], "cell_pressure": [0.0, 1.0]},
+              "time": {"step": float(step), "steps": steps}, "solver": {"max_iterations": 2000},
+              "output": {"directory": ".", "every": steps, "stress": True}}
+    if number <= SLOW:
+        groups["solver"]["velocity_scale"] = float(10.0 * rate)
+    run(folder, groups)
+    history = read_history(folder)
+    late = history["time"] * rate >= 20.0 * rate + START * share
+    parts = [np.array_split(history[name][late], 8) for name in ("stress_xy", "stress_yy", "solid_fraction")]
+    mu = [-np.mean(a) / np.mean(b) for a, b in zip(parts[0], parts[1])]
+    phi = [np.mean(c) for c in parts[2]]
+    return np.mean(mu), np.mean(phi), np.std(mu) / np.sqrt(8.0), np.std(phi) / np.sqrt(8.0)
+
+
+def power_law(numbers, values):
+    """mu_0, s and n of mu = mu_0 + s I^n by least squares, n between 0.1 and 1.5."""
+    best = None
+    for n in np.linspace(0.1, 1.5, 281):
+        columns = np.stack([np.ones(len(numbers)), np.asarray(numbers)**n], axis=1)
+        fit, *_ = np.linalg.lstsq(columns, np.asarray(values), rcond=None)
+        miss = np.sum((columns @ fit - values)**2)
+        if best is None or miss < best[0]:
+            best = (miss, fit[0], fit[1], n)
+    return best[1:]
+
+
+def draw(path, found):
+    figure, axes = plt.subplots(1, 2, figsize=(8.6, 3.6), layout="constrained")
+    line = np.geomspace(1e-4, 0.12, 100)
+    for dimension, colour, mark, name in ((2, "#0072B2", "o", "disks, friction 0.4"), (3, "#D55E00", "s", "spheres, friction 0.3")):
+        rows = np.array(found[dimension])
+        for k, ax in enumerate(axes):
+            ax.errorbar(rows[:, 0], rows[:, 1 + k], rows[:, 3 + k], fmt=mark, color=colour, markersize=5, capsize=2, label=name)
+    for ax, key in zip(axes, ("mu", "phi")):
+        a, b = DISKS[key]
+        ax.plot(line, a + b * line, "-", color="#0072B2", linewidth=0.9, label="da Cruz et al. 2005")
+        ax.axhline(SPHERES[key], color="#D55E00", linestyle="--", linewidth=0.9, label="slow limit, Chialvo et al. 2012")
+        ax.set_xscale("log")
+        ax.set_xlabel("inertial number I")
+    axes[0].set_ylabel("friction of the flow, mu")
+    axes[1].set_ylabel("solid fraction, phi")
+    axes[0].legend(fontsize=8)
+    save_figure(figure, path)
+
+
+def compare(table, found):
+    """The rows of disks at each I, and of spheres in slow flow."""
+    for number, mu, phi, mu_error, phi_error in found[2]:
+        for key, value, error in (("mu", mu, mu_error), ("phi", phi, phi_error)):
+            a, b = DISKS[key]
+            near = NEAR_FAST if key == "mu" and number > FAST else NEAR[key]
+            table.add("disks", f"{key} at I = {number:g}, standard error {error:.0e}", value, a + b * number, None, near)
+    for number, mu, phi, mu_error, phi_error in found[3]:
+        slow = number <= 1e-2
+        for key, value, error in (("mu", mu, mu_error), ("phi", phi, phi_error)):
+            expected = SPHERES[key] if slow else ""
+            table.add("spheres", f"{key} at I = {number:g}, standard error {error:.0e}", value, expected, None, NEAR[key] if slow else None)
+    if len(found[3]) > 3:
+        rows = np.array(found[3])
+        mu_0, s, n = power_law(rows[:, 0], rows[:, 1])
+        table.add("spheres", f"exponent of mu = {mu_0:.3f} + {s:.2f} I^n", n, 0.28)
+
+
+def main():
+    parser = OneLineParser(description=__doc__)
+    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and half of the strain")
+    parser.add_argument("--least", type=float, metavar="I", help="smallest inertial number, 1e-4 at least (1e-3 of disks, 1e-2 of spheres)")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    found = {}
+    for dimension in (2, 3):
+        least = LEAST[dimension] if options.least is None else options.least
+        numbers = [number for number in (QUICK if options.quick else NUMBERS)[dimension] if number >= least]
+        found[dimension] = [(number, *flow(options.out / f"{dimension}d_{number:g}", dimension, number, 0.5 if options.quick else 1.0))
+                            for number in numbers]
+    table = Table()
+    compare(table, found)
+    write_csv(options.out / "study_rheology.csv", {name: [row[k] for row in table.rows] for k, name in enumerate(table.HEADER)})
+    rows = [(dimension, *row) for dimension in found for row in found[dimension]]
+    write_csv(options.out / "study_rheology_flow.csv", {name: [row[k] for row in rows] for k, name in enumerate(
+        ("dimension", "inertial_number", "mu", "phi", "mu_error", "phi_error"))})
+    draw(options.out / "study_rheology.png", found)
+    sys.exit(1 if table.misses else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,175 @@
+!> Boundaries in the loop of a user: where they are, what grains do to them, and their drives.
+module gravier_user_boundaries
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
+  use gravier_magnitude, only: is_bounded, bounded_text
+  use gravier_user_loop, only: user_loop_t
+  implicit none
+  private
+  public :: get_boundary, set_boundary
+
+  character(len=*), parameter :: readable = "position, normal, velocity, spin, force, applied_force, pressure, friction", &
+    & settable = "velocity, spin, applied_force, pressure, friction"
+  character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+
+contains
+
+  !> A quantity of boundary `b` now; `force` is what grains did to it in the last step, velocity and spin are those of the last step.
+  !> Failure (status_input): an unknown name.
+  subroutine get_boundary(loop, b, name, values, error)
+    type(user_loop_t), intent(in) :: loop
+    integer, intent(in) :: b
+    character(len=*), intent(in) :: name
+    !> one number for each axis; of a spin in the plane, a pressure or a coefficient, one
+    real(dp), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: place(3)
+    integer :: nd
+
+    associate (simulation => loop%run%simulation, boundary => loop%run%simulation%decomposition%boundaries(b))
+      nd = simulation%decomposition%nd
+      select case (name)
+      case ("position")
+        call boundary%find_place(place)
+        values = place(1:nd)
+      case ("normal")
+        place(:) = 0.0_dp
+        if (boundary%is_plane()) place(:) = boundary%surface%axis
+        values = place(1:nd)
+      case ("velocity")
+        values = boundary%velocity(1:nd)
+      case ("spin")
+        values = boundary%spin(merge(3, 1, nd == 2):)
+      case ("force")
+        values = simulation%boundary_impulses(:, b)/simulation%physics%h
+      case ("applied_force")
+        values = boundary%given_force(1:nd)
+      case ("pressure")
+        allocate (values(1), source=boundary%given_pressure)
+      case ("friction")
+        allocate (values(1), source=boundary%contact%friction)
+      case default
+        call raise(error, status_input, "boundary '"//boundary%name//"': "//name//": unknown; expected one of "//readable)
+      end select
+    end associate
+  end subroutine get_boundary
+
+  !> Set a drive or the friction of boundary `b` from the next step on. Failures (status_input): an unknown name, another count of numbers,
+  !> a number that is none to reckon with, a component that a table or a force gives or that the boundary does not have.
+  subroutine set_boundary(loop, b, name, values, error)
+    type(user_loop_t), intent(inout) :: loop
+    integer, intent(in) :: b
+    character(len=*), intent(in) :: name
+    real(dp), intent(in) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: nd, expected
+
+    nd = loop%run%simulation%decomposition%nd
+    associate (boundary => loop%run%simulation%decomposition%boundaries(b))
+      select case (name)
+      case ("velocity", "applied_force")
+        expected = nd
+      case ("spin")
+        expected = 2*nd - 3
+      case ("pressure", "friction")
+        expected = 1
+      case default
+        call refuse("cannot be set; expected one of "//settable)
+        return
+      end select
+      if (size(values) /= expected) call refuse("has "//to_text(size(values))//" numbers; expected "//to_text(expected))
+      if (.not. all(is_bounded(values))) call refuse("is not a number to reckon with; expected "//bounded_text)
+      if (allocated(error)) return
+      select case (name)
+      case ("velocity")
+        call set_velocity()
+      case ("spin")
+        call set_spin()
+      case ("applied_force")
+        call set_force()
+      case ("pressure")
+        call set_pressure()
+      case ("friction")
+        call loop%set_friction(b, values(1), error)
+        if (allocated(error)) error%message = "boundary '"//boundary%name//"': "//error%message
+      end select
+      if (allocated(error) .or. name == "friction") return
+      boundary%steered = .true.
+    end associate
+    call loop%run%simulation%wake()
+    call loop%note(name, b, values)
+
+  contains
+
+    subroutine set_velocity()
+      integer :: d
+
+      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
+        do d = 1, nd
+          if (boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse("along "//axes(d)//": forces move it; expected 0 there")
+          if (in_table(d)) call refuse("along "//axes(d)//": its table gives it; expected a boundary without this column")
+        end do
+        if (.not. allocated(error)) boundary%given_velocity(1:nd) = values
+      end associate
+    end subroutine set_velocity
+
+    subroutine set_spin()
+      integer :: d, k
+
+      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
+        do d = 1, size(values)
+          k = merge(3, d, nd == 2)
+          if (in_table(nd + d)) call refuse("about "//axes(k)//": its table gives it; expected a boundary without this column")
+          if (abs(values(d)) > 0.0_dp .and. .not. loop%turns(k, b)) call refuse("about "//axes(k)// &
+            & ": the boundary does not turn about it in the case; expected 0, or a rotation in the case")
+        end do
+        if (.not. allocated(error)) boundary%given_spin(merge(3, 1, nd == 2):) = values
+      end associate
+    end subroutine set_spin
+
+    subroutine set_force()
+      integer :: d
+
+      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
+        do d = 1, nd
+          if (.not. boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse("along "//axes(d)// &
+            & ": not a free component; expected 0 there")
+          if (in_table(merge(3, 6, nd == 2) + d)) call refuse("along "//axes(d)// &
+            & ": its table gives it; expected a boundary without this column")
+        end do
+        if (.not. allocated(error)) boundary%given_force(1:nd) = values
+      end associate
+    end subroutine set_force
+
+    subroutine set_pressure()
+      logical :: pressed
+
+      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
+        pressed = boundary%is_plane()
+        if (pressed) pressed = any(boundary%free .and. abs(boundary%surface%axis) > 0.0_dp)
+        if (.not. pressed) call refuse("is for a plane of which a component along its normal is free")
+        if (in_table(merge(6, 10, nd == 2))) call refuse("is given by its table; expected a boundary without this column")
+        if (.not. allocated(error)) boundary%given_pressure = values(1)
+      end associate
+    end subroutine set_pressure
+
+    !> Whether the table of the boundary has column `k`.
+    logical function in_table(k)
+      integer, intent(in) :: k
+
+      in_table = .false.
+      associate (table => loop%run%simulation%decomposition%boundaries(b)%table)
+        if (allocated(table%has)) in_table = table%has(k)
+      end associate
+    end function in_table
+
+    subroutine refuse(text)
+      character(len=*), intent(in) :: text
+
+      call raise(error, status_input, "boundary '"//loop%run%simulation%decomposition%boundaries(b)%name//"': "//name//" "//text)
+    end subroutine refuse
+
+  end subroutine set_boundary
+
+end module gravier_user_boundaries

@@ -1,0 +1,125 @@
+!> A periodic cell that deforms: what moves it without contacts, what it adds to their velocities, and the balance of a component that
+!> a stress drives with the virial of the contacts of a solved step, in two subdomains.
+program test_cell_motion
+  use gravier_kinds, only: dp
+  use gravier_errors, only: error_t
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_periodic, only: period_t
+  use gravier_moving_cell, only: cell_motion_t
+  use gravier_cell_response, only: respond, image_velocity, subtract_images
+  use gravier_cell_drive, only: cell_drive_t
+  use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_config, only: config_t, parse_config
+  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_check, only: check, check_close, finish_checks
+  implicit none
+
+  type(communicator_t), target :: comm
+
+  call start_parallel()
+  call comm%init()
+  call check_drive()
+  call check_solved_steps()
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  !> Rates that are given, and a stress that accelerates what it drives: free = before - h V s/K, K = i M L^2.
+  subroutine check_drive()
+    type(cell_drive_t) :: drive
+    type(period_t) :: period
+    type(cell_motion_t) :: motion
+    real(dp) :: branch(2), way(2), added(2)
+
+    period = period_t(length=[2.0_dp, 3.0_dp, 0.0_dp], tilt=[0.5_dp, 0.0_dp, 0.0_dp], moves=.true.)
+    drive%rate(1, 2) = 0.25_dp
+    drive%stress(2, 2) = 7.0_dp
+    drive%driven(2, 2) = .true.
+    drive%inertia = 0.5_dp
+    period%length_rate(2) = -0.3_dp
+    call drive%begin_step(period, 2, 4.0_dp, 0.01_dp, motion)
+    call check(motion%moves .and. motion%is_driven, "a stress drives it")
+    call check_close(motion%before(2, 2), -0.1_dp, 1.0e-15_dp, "gradient at the start")
+    call check_close(motion%inertia(2, 2), 0.5_dp*4.0_dp*9.0_dp, 1.0e-14_dp, "inertia")
+    call check_close(motion%free(2, 2), -0.1_dp - 0.01_dp*6.0_dp*7.0_dp/18.0_dp, 1.0e-14_dp, "gradient without contacts")
+    call check_close(motion%free(1, 2), 0.25_dp, 0.0_dp, "a rate that is given")
+    branch(:) = [0.2_dp, -0.4_dp]
+    way(:) = [0.5_dp, 3.0_dp]
+    added(:) = motion%added(motion%free, branch, way)
+    call check_close(added(1), 0.25_dp*(-0.4_dp), 1.0e-15_dp, "what is added along x")
+    call check_close(added(2), (motion%free(2, 2) + 0.1_dp)*(-0.4_dp) + 0.1_dp*3.0_dp, 1.0e-15_dp, "what is added along y")
+  end subroutine check_drive
+
+  !> Disks come together under a pressure while they are sheared.
+  subroutine check_solved_steps()
+    type(simulation_t) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    integer :: k, contacts
+
+    call parse_config("cell", "&scene bodies = 'lattice', lattice_count = 6, 6, radius_min = 0.4, radius_max = 0.6, "// &
+      & "friction = 0.4, density = 1, gravity = 0, 0, period = 7.6, 7.6, cell_shear_rate = 0.2, cell_pressure = 0, 1, "// &
+      & "overlap_projection = F /"// &
+      & new_line("a")//"&time step = 0.1, steps = 60 /"//new_line("a")// &
+      & "&solver method = 'nscdd', criterion = 'residual', tolerance = 1e-10, max_iterations = 20000 /"//new_line("a")// &
+      & "&decomposition grid = 2, 1 /", config, error)
+    if (.not. allocated(error)) call sim%init(comm, config, error)
+    call check(.not. allocated(error), "the scene is made")
+    contacts = 0
+    do k = 1, 40
+      call sim%advance(figures, error)
+      call check(.not. allocated(error), "a step is made")
+      if (mod(k, 10) > 0) cycle
+      contacts = contacts + int(figures%contacts)
+      call check_step(sim)
+    end do
+    call check(contacts > 60, "enough contacts to tell")
+    call sim%free()
+  end subroutine check_solved_steps
+
+  !> K (now - before) = sum of p l - h V s, and contacts that press do not part or close, relative to the images that they meet.
+  subroutine check_step(sim)
+    type(simulation_t), intent(inout) :: sim
+    real(dp), allocatable :: v(:, :, :), rows(:, :)
+    real(dp) :: parts(1, size(sim%problem%sub)), sums(1), p(2), volume, image(2), worst
+    integer :: s, c
+
+    parts(:, :) = 0.0_dp
+    worst = 0.0_dp
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        allocate (v, mold=sub%impulse)
+        call sim%problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+        rows = v(:, 1, :)
+        call subtract_images(sim%problem, s, v)
+        do c = 1, sub%n_contacts
+          call sim%problem%impulse_on_candidate(s, c, p)
+          parts(1, s) = parts(1, s) + p(2)*sub%cell%branch(2, c)
+          image(:) = image_velocity(sub, 2, c, sim%problem%cell%now)
+          call check_close(v(lane_of(c), 1, block_of(c)), rows(lane_of(c), block_of(c)) - image(1), 1.0e-14_dp, &
+            & "the image is taken")
+          ! gaps close within the step
+          if (sub%impulse(lane_of(c), 1, block_of(c)) > 1.0e-6_dp) worst = max(worst, &
+            & abs(v(lane_of(c), 1, block_of(c)) + max(sub%gap(c), 0.0_dp)/sim%physics%h))
+        end do
+        deallocate (v)
+      end associate
+    end do
+    call comm%sum_parts(parts, sums)
+    associate (cell => sim%problem%cell)
+      ! the step's box: that of q_m, half a step of its rates before the end
+      volume = product(sim%decomposition%period%length(1:2) - 0.05_dp*sim%decomposition%period%length_rate(1:2))
+      call check_close(cell%inertia(2, 2)*(cell%now(2, 2) - cell%before(2, 2)), sums(1) - 0.1_dp*volume*1.0_dp, 1.0e-9_dp, &
+        & "the pressure drives it against the virial")
+      call check_close(cell%now(1, 2), 0.2_dp, 0.0_dp, "the rate of shear")
+    end associate
+    call check(worst < 1.0e-6_dp, "contacts that press hold")
+    ! nothing changes where the impulses do not
+    call respond(sim%problem)
+    call check_close(sim%problem%cell%now(2, 2), sim%physics%cell%now(2, 2), 0.0_dp, "the response to the same impulses")
+  end subroutine check_step
+
+end program test_cell_motion

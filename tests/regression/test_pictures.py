@@ -1,0 +1,265 @@
+"""What gravier_plot draws: axes that fit the data, colours that the colour-blind tell apart, legends that cover nothing, walls and numbers in
+space, regions and their profiles; and, where a python3 with vtk is found ($GRAVIER_VTK_PYTHON, or the one that runs this), a picture by VTK."""
+import itertools
+import os
+import subprocess
+import sys
+import types
+import unittest
+
+import matplotlib.image
+import matplotlib.pyplot as plt
+import numpy as np
+from gravier_runs import SOURCE, RunTestCase, merged, write
+
+import gravier
+
+sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
+import curve_pictures  # noqa: E402
+import gravier_plot  # noqa: E402
+import packing_picture  # noqa: E402
+import palette  # noqa: E402
+import picture_space  # noqa: E402
+from picture_style import SPEEDS, TURNS, PictureError, colours_of_kinds  # noqa: E402
+
+VTK = next((python for python in (os.environ.get("GRAVIER_VTK_PYTHON"), sys.executable) if python
+            and subprocess.run([python, "-c", "import vtk"], capture_output=True, check=False).returncode == 0), None)
+#: what is left of linear colours to eyes without red, green or blue cones (Machado, Oliveira, Fernandes 2009, severity 1)
+EYES = {"protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+        "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+        "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]}
+DISKS = {"scene": {"bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3,
+                   "wall_material": "plate"},
+         "material": [{"name": "sand"}, {"name": "plate"}],
+         "law": [{"materials": ["sand", "sand"], "kind": "coulomb", "friction": 0.3}, {"materials": ["sand", "plate"], "kind": "coulomb",
+                                                                                          "friction": 0.3}],
+         "region": [{"name": "middle", "lower": [0.03, 0.02], "upper": [0.1, 0.08]}, {"name": "layers", "axis": "y", "bins": 4}],
+         "time": {"step": 1e-3, "steps": 150},
+         "output": {"directory": "results", "every": 50, "vtk": True}}
+CYLINDER = {"scene": {"dimension": 3, "bodies": "file", "bodies_file": "bodies.csv"},
+            "boundary": [{"name": "drum", "shape": "cylinder", "axis": [0.0, 1.0, 0.0], "point": [0.0, 0.0, 0.0], "radius": 0.1},
+                         {"name": "front", "shape": "plane", "normal": [0.0, 1.0, 0.0]},
+                         {"name": "back", "shape": "plane", "point": [0.0, 0.06, 0.0], "normal": [0.0, -1.0, 0.0]}],
+            "region": [], "material": [], "law": [],
+            "time": {"step": 1e-3, "steps": 1}, "output": {"directory": "results"}}
+
+
+def lightness_and_hue(colours, eye=None):
+    """CIELAB coordinates (n, 3) of colours of a screen, as such eyes see them."""
+    colours = np.array(colours)[:, :3]
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055)**2.4)
+    if eye:
+        linear = np.clip(linear @ np.array(EYES[eye]).T, 0.0, 1.0)
+    xyz = linear @ np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]).T
+    ratio = xyz / np.array([0.95047, 1.0, 1.08883])
+    f = np.where(ratio > 216 / 24389, np.cbrt(ratio), (24389 / 27 * ratio + 16) / 116)
+    return np.column_stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])])
+
+
+class Colours(unittest.TestCase):
+
+    def test_kinds_and_curves(self):
+        """No two colours of a list are alike to any eyes; a difference of 2 is just seen, one of 10 at a glance."""
+        for name, colours in (("LINES", palette.LINES), ("KINDS", palette.KINDS), ("grades", ["#0072B2", "#B45F00", "#A3210F", "#666666"])):
+            numbers = [[int(colour[k:k + 2], 16) / 255 for k in (1, 3, 5)] for colour in colours]
+            for eye in (None, *EYES):
+                seen = lightness_and_hue(numbers, eye)
+                for (a, one), (b, other) in itertools.combinations(enumerate(seen), 2):
+                    self.assertGreater(np.linalg.norm(one - other), 12.0, f"{name}: {colours[a]} and {colours[b]} to {eye} eyes")
+
+    def test_maps(self):
+        """Of quantities the lightness falls all the way, of those with a sign from the middle to both ends, to all eyes."""
+        for eye in (None, *EYES):
+            for cmap in (SPEEDS, curve_pictures.TIMES):
+                light = lightness_and_hue(cmap(np.linspace(0.0, 1.0, 33)), eye)[:, 0]
+                self.assertTrue(np.all(np.diff(light) < 0.0), f"{cmap.name}: {eye}")
+            light = lightness_and_hue(plt.get_cmap(TURNS)(np.linspace(0.0, 1.0, 33)), eye)[:, 0]
+            self.assertTrue(np.all(np.diff(light[:15]) > 0.0) and np.all(np.diff(light[18:]) < 0.0), f"{TURNS}: {eye}")
+        kinds = colours_of_kinds(20)
+        found = [tuple(kinds["cmap"](kinds["norm"](number))) for number in range(1, 21)]
+        self.assertEqual(len(set(found)), 16)
+        self.assertEqual(found[16:], found[:4])
+
+
+class Axes(unittest.TestCase):
+
+    def test_limits(self):
+        flat = np.full(50, 3.0)
+        for values, scale, low, high in ((np.linspace(0.0, 2.0, 11), "linear", 0.0, 2.1), (np.linspace(10.0, 11.0, 11), "linear", 9.95, 11.05),
+                                         (flat, "linear", 2.85, 3.15), (np.zeros(3), "linear", -0.5, 0.5),
+                                         (np.linspace(-2.0, 0.0, 5), "linear", -2.1, 0.0), (np.array([np.nan]), "linear", 0.0, 1.0),
+                                         (np.geomspace(1e-4, 1.0, 41), "log", 1e-4 / 1.5, 1.5)):
+            found = curve_pictures.limits_of(values)
+            self.assertEqual(found[0], scale)
+            np.testing.assert_allclose(found[1:], (low, high), rtol=1e-12)
+        # a few small values do not make logarithms, and on logarithms they do not take the space of the others
+        self.assertEqual(curve_pictures.limits_of(np.append(flat, [1e-12, 1e-9]))[0], "linear")
+        scale, low, _ = curve_pictures.limits_of(np.append(np.geomspace(1e-3, 1.0, 99), 1e-30))
+        self.assertEqual(scale, "log")
+        self.assertGreater(low, 1e-7)
+        self.assertEqual(curve_pictures.limits_of(np.geomspace(1e-4, 1.0, 41), logarithms=False)[:2], ("linear", 0.0))
+
+    def test_labels(self):
+        for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
+                                       ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
+                                       ("force_x:lid", 3, "force x:lid [N]"), ("energy_error", 2, "energy error [J]"),
+                                       ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]")):
+            self.assertEqual(curve_pictures.label_of(name, dimension), label)
+        figure, axes = plt.subplots()
+        curve_pictures.fit_axis(axes.yaxis, np.array([0.0, 25000.0]), "pressure [Pa]")
+        self.assertEqual((axes.get_ylabel(), axes.yaxis.get_major_formatter()(20000.0, 0)), ("pressure [$10^{3}$ Pa]", "20"))
+        plt.close(figure)
+
+
+class Pictures(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        gravier.run(DISKS, cls.here(cls, "disks"))
+        gravier.run(merged(DISKS, {"time": {"steps": 60}}), cls.here(cls, "fewer"))
+        os.makedirs(cls.here(cls, "cylinder"))
+        write(cls.here(cls, "cylinder/bodies.csv"), "id,x,y,z,radius\n1,0,0.03,-0.08,0.02\n2,0.03,0.03,0,0.01\n")
+        gravier.run(CYLINDER, cls.here(cls, "cylinder"))
+        cls.disks, cls.cylinder = gravier.Run(cls.here(cls, "disks/results")), gravier.Run(cls.here(cls, "cylinder/results"))
+
+    def options(self, **changes):
+        return types.SimpleNamespace(**{"view": (-60.0, 20.0), "size": 5.0, "colour": "speed", "chains": False, "regions": False, **changes})
+
+    def boxes(self, figure, things):
+        """Where things are on the picture, in points: (left, bottom, right, top) each."""
+        figure.canvas.draw()
+        return [thing.get_window_extent().extents for thing in things]
+
+    def assert_apart(self, one, other, words):
+        apart = one[2] <= other[0] + 1.0 or other[2] <= one[0] + 1.0 or one[3] <= other[1] + 1.0 or other[3] <= one[1] + 1.0
+        self.assertTrue(apart, f"{words}: {one} and {other} overlap")
+
+    def test_legends_cover_nothing(self):
+        """Legends of curves and chains are over the panels, the bar of colours beside it, and none covers a title."""
+        fewer = gravier.Run(self.here("fewer/results"))
+        figures = [curve_pictures.draw_history([self.disks, fewer], ["iterations", "kinetic_energy"]),
+                   packing_picture.draw_packing(self.disks, None, self.options(chains=True)),
+                   curve_pictures.draw_profile(self.disks, "layers", None, ["solid_fraction", "velocity", "stress"], False)]
+        for figure, number in zip(figures, (1, 1, 2)):
+            legends = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+            self.assertEqual(len(legends), number)
+            panels = self.boxes(figure, [axes for axes in figure.axes if axes.get_visible()])
+            for legend in self.boxes(figure, legends):
+                for panel in panels:
+                    self.assert_apart(legend, panel, "legend and panel")
+            titles = self.boxes(figure, [axes.title for axes in figure.axes] + [axes._left_title for axes in figure.axes])
+            for legend, title in itertools.product(self.boxes(figure, legends), titles):
+                if title[2] - title[0] > 1.0:
+                    self.assert_apart(legend, title, "legend and title")
+            plt.close(figure)
+
+    def test_colours_of_bodies(self):
+        bodies = self.disks.bodies()
+        values, label, how = packing_picture.colours(self.disks, 150, bodies, "velocity_y")
+        factor = values[0] / bodies.velocity[0, 1]
+        np.testing.assert_allclose(values, factor * bodies.velocity[:, 1], rtol=1e-12)
+        self.assertIn("velocity along y", label)
+        self.assertEqual(how["norm"].vmin, -how["norm"].vmax)
+        with self.assertRaisesRegex(PictureError, "a scene of the plane has no velocity_z; expected velocity_x or velocity_y"):
+            packing_picture.colours(self.disks, 150, bodies, "velocity_z")
+        figure = packing_picture.draw_packing(self.disks, None, self.options(colour="material"))
+        figure.canvas.draw()
+        bar = figure.axes[0].child_axes[0]
+        self.assertEqual([text.get_text() for text in bar.get_yticklabels()], ["sand"])
+        plt.close(figure)
+
+    def test_walls_in_space(self):
+        """The box holds the whole drum between its planes; circles are drawn at both ends; numbers lie on no other and on no body."""
+        bodies, walls = self.cylinder.bodies(), picture_space.Walls(self.cylinder, 1)
+        low, high = picture_space.box_around(bodies, walls)
+        np.testing.assert_allclose([low, high], [[-0.1, 0.0, -0.1], [0.1, 0.06, 0.1]], atol=1e-12)
+        figure = packing_picture.draw_packing(self.cylinder, None, self.options())
+        axes = figure.axes[0]
+        view = picture_space.View(3, -60.0, 20.0)
+        for y in (0.0, 0.06):
+            ring = view.place(np.array([[0.1 * np.cos(a), y, 0.1 * np.sin(a)] for a in np.linspace(0.0, 6.28, 30)]))
+            drawn = [patch.get_xy() for patch in axes.patches]
+            self.assertTrue(any(all(np.linalg.norm(points - place, axis=1).min() < 0.004 for place in ring) for points in drawn), f"no circle at y = {y}")
+        # two planes are behind the drum or before it: one face of the box is grey
+        grey = [patch for patch in axes.patches if patch.get_facecolor()[:3] == (0.94, 0.94, 0.94)]
+        self.assertEqual(len(grey), 1)
+        numbers = [text for text in axes.texts if text.get_text()]
+        self.assertEqual(sorted(text.get_text() for text in numbers if "[m]" in text.get_text()), ["x [m]", "y [m]", "z [m]"])
+        self.assertGreater(len(numbers), 9)
+        places = self.boxes(figure, numbers)
+        for (a, one), (b, other) in itertools.combinations(enumerate(places), 2):
+            self.assert_apart(one, other, f"{numbers[a].get_text()} and {numbers[b].get_text()}")
+        centres = axes.transData.transform(view.place(bodies.position))
+        reach = np.linalg.norm(axes.transData.transform([[1.0, 0.0]]) - axes.transData.transform([[0.0, 0.0]])) * bodies.radius
+        for box, (centre, radius) in itertools.product(places, zip(centres, reach)):
+            self.assert_apart(box, (*(centre - radius), *(centre + radius)), "a number and a sphere")
+        plt.close(figure)
+
+    def test_cut_box(self):
+        """A plane through the middle of a cube across its diagonal cuts a regular hexagon out of it."""
+        points = picture_space.cut_box(np.full(3, 0.5), np.full(3, 3.0**-0.5), np.zeros(3), np.ones(3))
+        self.assertEqual(len(points), 6)
+        sides = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
+        np.testing.assert_allclose(sides, np.full(6, 0.5**0.5), rtol=1e-12)
+        self.assertEqual(len(picture_space.cut_box(np.full(3, 5.0), np.full(3, 3.0**-0.5), np.zeros(3), np.ones(3))), 0)
+
+    def test_regions(self):
+        """Boxes are where the means are taken; regions of insertion make the picture larger; entries may be given one by one."""
+        figure = packing_picture.draw_packing(self.disks, None, self.options(regions=True))
+        lines = np.concatenate([segment for one in figure.axes[0].collections if hasattr(one, "get_segments") for segment in one.get_segments()])
+        rows = self.disks.region("layers")
+        for corner in (*rows.lower, *rows.upper, [0.03, 0.02], [0.1, 0.08]):
+            self.assertLess(np.linalg.norm(lines - corner, axis=1).min(), 1e-12, corner)
+        self.assertEqual([text.get_text() for text in figure.axes[0].texts], ["region middle", "region layers"])
+        plt.close(figure)
+        case = {"insertion": [{"lower": [0.0, 1.0], "upper(1)": 2.0, "upper(2)": 3.0}, {"region": "ball", "centre": [5.0, 5.0], "region_radius": 1.0}]}
+        np.testing.assert_array_equal(packing_picture.region_corners(case, 2), [[0, 1], [2, 3], [4, 4], [6, 6]])
+        np.testing.assert_array_equal(gravier.entries({"a(2:3)": [7, 8], "b": 1}, "a", [0, 0, 0]), [0, 7, 8])
+        np.testing.assert_array_equal(gravier.entries({"a": [None, 5]}, "a", [1, 2, 3]), [1, 5, 3])
+
+    def test_profiles(self):
+        """Curves are the means of the bins, the mean is that over the steps."""
+        rows = [self.disks.region("layers", step) for step in (50, 100, 150)]
+        figure = curve_pictures.draw_profile(self.disks, None, [150], ["solid_fraction", "velocity", "stress"], False)
+        curves = [[line.get_xdata() for line in axes.lines] for axes in figure.axes]
+        np.testing.assert_array_equal(curves[0], [rows[2].solid_fraction])
+        np.testing.assert_array_equal(curves[1], rows[2].velocity.T)
+        np.testing.assert_array_equal(curves[2], [rows[2].stress[:, 0, 0], rows[2].stress[:, 1, 1], rows[2].stress[:, 0, 1]])
+        np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), rows[2].centre[:, 1])
+        plt.close(figure)
+        figure = curve_pictures.draw_profile(self.disks, "layers", "all", ["pressure"], True)
+        np.testing.assert_allclose(figure.axes[0].lines[0].get_xdata(), np.mean([row.pressure for row in rows], axis=0), rtol=1e-12)
+        self.assertIn("step 50 to 150: mean of 3 states", figure._suptitle.get_text())
+        plt.close(figure)
+        figure = curve_pictures.draw_profile(self.disks, "layers", "all", ["pressure"], False)
+        self.assertEqual(len(figure.axes[0].lines), 3)
+        plt.close(figure)
+        gravier_plot.main(["profile", self.here("disks/results"), "--out", self.here("profile.png")])
+        self.assertGreater(matplotlib.image.imread(self.here("profile.png"))[:, :, :3].std(), 0.03)
+        for name, columns, words in (("middle", ["pressure"], "no region middle with bins; expected one of layers"),
+                                     (None, ["speed"], "no column speed of a profile; expected one of solid_fraction")):
+            with self.assertRaisesRegex(PictureError, words):
+                curve_pictures.draw_profile(self.disks, name, None, columns, False)
+        with self.assertRaisesRegex(PictureError, "no single region has bins; expected one of none, the case has none"):
+            curve_pictures.draw_profile(self.cylinder, None, None, ["pressure"], False)
+
+    @unittest.skipUnless(VTK, "NO VTK: no python3 with vtk; set GRAVIER_VTK_PYTHON")
+    def test_by_vtk(self):
+        """A scene in 2D fills its picture, with a legend of the colours beside it."""
+        out = self.here("vtk.png")
+        done = subprocess.run([VTK, os.path.join(SOURCE, "drivers/plot/render_vtk.py"), self.here("disks/results"), "--out", out], capture_output=True,
+                              text=True, check=False)
+        self.assertEqual((done.returncode, done.stdout), (0, out + "\n"), done.stderr)
+        picture = matplotlib.image.imread(out)[:, :, :3]
+        height, width = picture.shape[:2]
+        blue = (picture[:, :, 2] > picture[:, :, 0] + 0.01)
+        scene, legend = blue[:, :width - 150], blue[:, width - 150:]
+        for axis in (0, 1):
+            found = np.flatnonzero(scene.any(axis=axis))
+            self.assertGreater(np.ptp(found), 0.75 * scene.shape[1 - axis])
+        self.assertGreater(np.ptp(np.flatnonzero(legend.any(axis=1))), 0.6 * height)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,57 @@
+"""The study of rheology: its power law on values of a known one, its bounds, and a quick run."""
+import csv
+import os
+import subprocess
+import sys
+import unittest
+
+import numpy as np
+
+from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase
+
+sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
+import oracle_table  # noqa: E402
+import study_rheology  # noqa: E402
+
+PROGRAM = os.path.join(SOURCE, "drivers/studies/study_rheology.py")
+
+
+class Rheology(RunTestCase):
+
+    def run_study(self, *arguments):
+        environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
+        return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+
+    def test_power_law(self):
+        numbers = np.array([1e-4, 1e-3, 1e-2, 3e-2, 1e-1])
+        for mu_0, s, n in ((0.36, 0.3, 0.5), (0.25, 1.1, 1.0), (0.3, 0.2, 0.28)):
+            found = study_rheology.power_law(numbers, mu_0 + s * numbers**n)
+            np.testing.assert_allclose(found, (mu_0, s, n), atol=0.02)
+
+    def test_bounds(self):
+        """Values of the publications are within the bounds; those beyond are not."""
+        def misses(mu, phi):
+            table = oracle_table.Table(quiet=True)
+            study_rheology.compare(table, {2: [(1e-3, 0.2511 + mu, 0.8097 + phi, 0.01, 0.001)], 3: [(1e-4, 0.357 + mu, 0.596 + phi, 0.01, 0.001)]})
+            return len(table.misses)
+        self.assertEqual([misses(0.0, 0.0), misses(0.049, -0.019), misses(0.051, 0.0), misses(0.0, 0.021)], [0, 0, 2, 2])
+
+    def test_quick(self):
+        """Friction and solid fraction of disks are those of the publication; the status says what the table does."""
+        done = self.run_study("out", "--quick")
+        with open(self.here("out", "study_rheology.csv"), encoding="ascii", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(done.returncode, int(any(row["within"] == "NO" for row in rows)), done.stderr)
+        self.assertEqual([row["oracle"] for row in rows], ["disks"] * 4 + ["spheres"] * 2)
+        self.assertEqual([row["within"] for row in rows], ["yes"] * 4 + [""] * 2, rows)
+        self.assertTrue(os.path.exists(self.here("out", "study_rheology.png")))
+
+    def test_refused(self):
+        done = self.run_study()
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(done.stderr.count("\n"), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
