@@ -4,15 +4,16 @@ import unittest
 from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks, steps_of, write
 
 FEW = {"solver": {"criterion": "residual", "tolerance": 3e-3}, "time": {"steps": 2}}
+# a tolerance at which momentum steers for many iterations; a first solve that does not reach it is compared as it ends
+STEERED = {"solver": {"acceleration": "momentum", "criterion": "residual", "tolerance": 1e-5, "max_iterations": 1500}}
 METHODS = {
     # so many sweeps that the relaxation has to be lowered
     "schwarz": {"solver": {"method": "schwarz", "sweeps": 10}},
-    "schwarz, momentum": {"solver": {"method": "schwarz", "acceleration": "momentum", "criterion": "residual", "tolerance": 1e-5}},
+    "schwarz, momentum": merged(STEERED, {"solver": {"method": "schwarz"}}),
     # a direction of 1 on all contacts does not converge on every packing (user guide, choosing a method)
     "schwarz_ec": merged(FEW, {"solver": {"method": "schwarz_ec"}, "enriched": {"direction": 0.3}}),
     "nscdd": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "none"}},
-    # a tolerance at which it steers for many iterations
-    "nscdd, momentum": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "momentum", "criterion": "residual", "tolerance": 1e-5}},
+    "nscdd, momentum": merged(STEERED, {"solver": {"method": "nscdd", "sweeps": 2}}),
     # a direction on active contacts only: the matrices change from one iteration to the next
     "nscdd_ep, mumps": merged(FEW, {"solver": {"method": "nscdd_ep", "sweeps": 30},
                                     "enriched": {"direction": 30.0, "contacts": "active"}}),
@@ -23,9 +24,9 @@ METHODS = {
 
 class RankInvariance(RunTestCase):
 
-    def assert_same_runs(self, first, second, what):
-        self.assert_status(first, 0)
-        self.assert_status(second, 0)
+    def assert_same_runs(self, first, second, what, statuses=(0,)):
+        self.assertIn(first.status, statuses, str(first))
+        self.assert_status(second, first.status)
         self.assertEqual(differences(first.results(), second.results()), [], what)
         tables = [run.history() for run in (first, second)]
         for table in tables:
@@ -42,7 +43,9 @@ class RankInvariance(RunTestCase):
         for title in cases:
             for n in ranks[1:]:
                 with self.subTest(title, ranks=n):
-                    self.assert_same_runs(runs[title, ranks[0]], runs[title, n], f"on {ranks[0]} and {n} ranks")
+                    # a solve that ends at max_iterations is the same on any number of ranks, too
+                    self.assert_same_runs(runs[title, ranks[0]], runs[title, n], f"on {ranks[0]} and {n} ranks",
+                                          (0, 3) if "momentum" in title else (0,))
         return runs
 
 
