@@ -1,9 +1,7 @@
 !> The algorithm of a time step: what it takes to make one step after the other, without output. `advance` is the step.
 module gravier_time_stepper
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t, raise, status_failure
-  use gravier_text, only: to_text
-  use gravier_finite, only: is_finite
+  use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_bodies, phase_neighbourhood, phase_setup
   use gravier_time_table, only: time_table_t
@@ -11,14 +9,13 @@ module gravier_time_stepper
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_convergence_history, only: effort_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
+  use gravier_solve, only: solve_control_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
   use gravier_decomposition, only: decomposition_t
   use gravier_removal, only: some_leave, remove_grains, drop_grains
   use gravier_inflow, only: inflow_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_repartition, only: repartition_rule_t, repartition, repartition_is_due
-  use gravier_interface, only: interface_statistics_t
   use gravier_physics, only: physics_t
   use gravier_load_areas, only: find_load_areas
   use gravier_problem_builder, only: build_problem
@@ -28,56 +25,29 @@ module gravier_time_stepper
   use gravier_body_motion, only: move_to_middle, drive, count_fast, move_to_end
   use gravier_velocity_return, only: take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities
-  use gravier_cell_drive, only: cell_drive_t, take_cell, check_cell_size
+  use gravier_cell_drive, only: cell_drive_t, take_cell
   use gravier_cell_response, only: start_response
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
   use gravier_impulse_memory, only: keep_impulses, recall_impulses
   use gravier_memory_carrying, only: carry_memory
   use gravier_given_contacts, only: given_contacts_t
-  use gravier_given_impulses, only: take_given_impulses, started_t
+  use gravier_given_impulses, only: take_given_impulses
   use gravier_schedule, only: schedule_t
   use gravier_diagnostic, only: solved_step_t
   use gravier_diagnostics, only: diagnostics_t
   use gravier_grain_balance, only: grain_balance_t
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
+  use gravier_step_figures, only: step_figures_t
   use gravier_run_tally, only: run_tally_t
   use gravier_population, only: population_t
   implicit none
   private
-  public :: time_stepper_t, step_figures_t
+  public :: time_stepper_t
 
   !> shifts of all grains by a projection, over the overlap allowed, that are rounding: grains that a projection has left at the
   !> overlap allowed are projected again where it is exceeded by rounding
   real(dp), parameter :: rounded_shift = 1.0e-6_dp
-
-  !> Figures of a step, the same on every rank.
-  type :: step_figures_t
-    type(solve_report_t) :: solve
-    type(interface_statistics_t) :: interface_statistics
-    integer(i8) :: contacts = 0
-    !> grains that left by an outlet; grains that move by more than their radius in a step
-    integer(i8) :: left = 0, fast = 0
-    !> grains that have entered, and their mass [kg]
-    integer(i8) :: entered = 0
-    real(dp) :: entered_mass = 0.0_dp
-    !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
-    logical :: listed = .false., divided = .false., refused = .false.
-    !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
-    !> space was divided anew
-    real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
-    !> contacts that slept at the start of the solve; where they can
-    integer(i8) :: asleep = 0
-    !> of the first step, where a file gives contacts with forces: what the solve started from
-    type(started_t) :: started
-    !> places were projected, because some overlap exceeded what is allowed
-    logical :: projected = .false.
-    !> of rigid contacts [m], 0 where nothing overlaps; [J]
-    real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
-    !> after a solve that diverged to NaN or infinity: a contact where it did; after one whose impulses grow without bound: the
-    !> contact with the largest
-    character(len=:), allocatable :: cause
-  end type step_figures_t
 
   type :: time_stepper_t
     type(communicator_t), pointer :: comm => null()
@@ -193,7 +163,7 @@ contains
     if (figures%projected) call project_overlaps(self%decomposition, self%problem, self%physics%h, self%overlap_left, shifts)
     call note_step(self, figures, shifts)
     call self%diagnostics%measure(solved, self%written_steps%due(self%step))
-    call check_numbers(self, figures, error)
+    call figures%check_numbers(self%decomposition, self%diagnostics, self%step, error)
   end subroutine time_stepper_advance
 
   !> Move grains and boundaries to q_m, bring the neighbour lists up to date, find the contacts and start them from the
@@ -239,9 +209,8 @@ contains
     if (self%physics%laws%yields) call measure_springs(self)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
-    if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, &
-      & dp)*self%decomposition%n_subdomains/ &
-      & real(figures%contacts, dp)
+    if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
+      & *self%decomposition%n_subdomains/real(figures%contacts, dp)
     if (figures%divided) then
       self%reached_imbalance = self%imbalance
       call self%method%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
@@ -421,52 +390,6 @@ contains
     call self%halo%build(self%decomposition)
     if (remembered) call carry_memory(self%decomposition, before, self%halo)
   end subroutine list_neighbours
-
-  !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
-  subroutine check_numbers(self, figures, error)
-    class(time_stepper_t), intent(in) :: self
-    type(step_figures_t), intent(in) :: figures
-    type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: place(3)
-    integer :: s, k, b
-
-    if (.not. is_finite(figures%kinetic_energy)) then
-      do s = 1, size(self%decomposition%owned)
-        associate (owned => self%decomposition%owned(s))
-          do k = 1, owned%n
-            if (.not. is_finite(owned%mass(k)*sum(owned%velocity(:, k)**2))) &
-              & call refuse("kinetic energy of body "//to_text(owned%id(k)))
-          end do
-        end associate
-      end do
-      call self%comm%agree(error)
-    end if
-    do b = 1, size(self%decomposition%boundaries)
-      associate (boundary => self%decomposition%boundaries(b))
-        call boundary%find_place(place)
-        if (.not. (all(is_finite(place)) .and. all(is_finite(boundary%velocity)))) &
-          & call refuse("motion of boundary '"//boundary%name//"'")
-      end associate
-    end do
-    if (self%decomposition%period%moves) call check_cell_size(self%decomposition, self%step, error)
-    if (.not. is_finite(figures%kinetic_energy)) call refuse("kinetic energy")
-    if (.not. is_finite(figures%max_overlap)) call refuse("largest overlap")
-    if (.not. is_finite(figures%solve%residual)) call refuse("residual")
-    if (.not. is_finite(figures%solve%jump)) call refuse("jump")
-    do k = 1, self%diagnostics%n_columns
-      if (.not. is_finite(self%diagnostics%value(k))) call refuse(trim(self%diagnostics%name(k)))
-    end do
-
-  contains
-
-    subroutine refuse(what)
-      character(len=*), intent(in) :: what
-
-      call raise(error, status_failure, "step "//to_text(self%step)//": "//what//": not a finite number; expected speeds, "// &
-        & "loads and a &time step that give finite ones")
-    end subroutine refuse
-
-  end subroutine check_numbers
 
   !> Give back what the method holds, and go back to step 0.
   subroutine time_stepper_free(self)

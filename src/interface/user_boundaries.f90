@@ -4,6 +4,7 @@ module gravier_user_boundaries
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_bounded, bounded_text
+  use gravier_boundary, only: boundary_t
   use gravier_user_loop, only: user_loop_t
   implicit none
   private
@@ -75,21 +76,23 @@ contains
       case ("pressure", "friction")
         expected = 1
       case default
-        call refuse("cannot be set; expected one of "//settable)
+        call refuse(boundary, name, "cannot be set; expected one of "//settable, error)
         return
       end select
-      if (size(values) /= expected) call refuse("has "//to_text(size(values))//" numbers; expected "//to_text(expected))
-      if (.not. all(is_bounded(values))) call refuse("is not a number to reckon with; expected "//bounded_text)
+      if (size(values) /= expected) call refuse(boundary, name, "has "//to_text(size(values))//" numbers; expected "// &
+        & to_text(expected), error)
+      if (.not. all(is_bounded(values))) call refuse(boundary, name, "is not a number to reckon with; expected "// &
+        & bounded_text, error)
       if (allocated(error)) return
       select case (name)
       case ("velocity")
-        call set_velocity()
+        call set_velocity(boundary, values, error)
       case ("spin")
-        call set_spin()
+        call set_spin(boundary, loop%turns(4 - size(values):, b), values, error)
       case ("applied_force")
-        call set_force()
+        call set_force(boundary, values, error)
       case ("pressure")
-        call set_pressure()
+        call set_pressure(boundary, nd, values(1), error)
       case ("friction")
         call loop%set_friction(b, values(1), error)
         if (allocated(error)) error%message = "boundary '"//boundary%name//"': "//error%message
@@ -99,77 +102,91 @@ contains
     end associate
     call loop%run%simulation%wake()
     call loop%note(name, b, values)
-
-  contains
-
-    subroutine set_velocity()
-      integer :: d
-
-      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
-        do d = 1, nd
-          if (boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse("along "//axes(d)//": forces move it; expected 0 there")
-          if (in_table(d)) call refuse("along "//axes(d)//": its table gives it; expected a boundary without this column")
-        end do
-        if (.not. allocated(error)) boundary%given_velocity(1:nd) = values
-      end associate
-    end subroutine set_velocity
-
-    subroutine set_spin()
-      integer :: d, k
-
-      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
-        do d = 1, size(values)
-          k = merge(3, d, nd == 2)
-          if (in_table(nd + d)) call refuse("about "//axes(k)//": its table gives it; expected a boundary without this column")
-          if (abs(values(d)) > 0.0_dp .and. .not. loop%turns(k, b)) call refuse("about "//axes(k)// &
-            & ": the boundary does not turn about it in the case; expected 0, or a rotation in the case")
-        end do
-        if (.not. allocated(error)) boundary%given_spin(merge(3, 1, nd == 2):) = values
-      end associate
-    end subroutine set_spin
-
-    subroutine set_force()
-      integer :: d
-
-      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
-        do d = 1, nd
-          if (.not. boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse("along "//axes(d)// &
-            & ": not a free component; expected 0 there")
-          if (in_table(merge(3, 6, nd == 2) + d)) call refuse("along "//axes(d)// &
-            & ": its table gives it; expected a boundary without this column")
-        end do
-        if (.not. allocated(error)) boundary%given_force(1:nd) = values
-      end associate
-    end subroutine set_force
-
-    subroutine set_pressure()
-      logical :: pressed
-
-      associate (boundary => loop%run%simulation%decomposition%boundaries(b))
-        pressed = boundary%is_plane()
-        if (pressed) pressed = any(boundary%free .and. abs(boundary%surface%axis) > 0.0_dp)
-        if (.not. pressed) call refuse("is for a plane of which a component along its normal is free")
-        if (in_table(merge(6, 10, nd == 2))) call refuse("is given by its table; expected a boundary without this column")
-        if (.not. allocated(error)) boundary%given_pressure = values(1)
-      end associate
-    end subroutine set_pressure
-
-    !> Whether the table of the boundary has column `k`.
-    logical function in_table(k)
-      integer, intent(in) :: k
-
-      in_table = .false.
-      associate (table => loop%run%simulation%decomposition%boundaries(b)%table)
-        if (allocated(table%has)) in_table = table%has(k)
-      end associate
-    end function in_table
-
-    subroutine refuse(text)
-      character(len=*), intent(in) :: text
-
-      call raise(error, status_input, "boundary '"//loop%run%simulation%decomposition%boundaries(b)%name//"': "//name//" "//text)
-    end subroutine refuse
-
   end subroutine set_boundary
+
+  subroutine set_velocity(boundary, values, error)
+    type(boundary_t), intent(inout) :: boundary
+    !> one for each axis [m/s]
+    real(dp), intent(in) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: d
+
+    do d = 1, size(values)
+      if (boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse(boundary, "velocity", "along "//axes(d)// &
+        & ": forces move it; expected 0 there", error)
+      if (in_table(boundary, d)) call refuse(boundary, "velocity", "along "//axes(d)// &
+        & ": its table gives it; expected a boundary without this column", error)
+    end do
+    if (.not. allocated(error)) boundary%given_velocity(1:size(values)) = values
+  end subroutine set_velocity
+
+  subroutine set_spin(boundary, turns, values, error)
+    type(boundary_t), intent(inout) :: boundary
+    !> whether the case turns the boundary about each axis of `values`
+    logical, intent(in) :: turns(:)
+    !> about z, or about each axis in space [rad/s]
+    real(dp), intent(in) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: d, k
+
+    do d = 1, size(values)
+      k = 3 - size(values) + d
+      if (in_table(boundary, merge(2, 3, size(values) == 1) + d)) call refuse(boundary, "spin", "about "//axes(k)// &
+        & ": its table gives it; expected a boundary without this column", error)
+      if (abs(values(d)) > 0.0_dp .and. .not. turns(d)) call refuse(boundary, "spin", "about "//axes(k)// &
+        & ": the boundary does not turn about it in the case; expected 0, or a rotation in the case", error)
+    end do
+    if (.not. allocated(error)) boundary%given_spin(4 - size(values):) = values
+  end subroutine set_spin
+
+  subroutine set_force(boundary, values, error)
+    type(boundary_t), intent(inout) :: boundary
+    !> one for each axis [N]
+    real(dp), intent(in) :: values(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: d
+
+    do d = 1, size(values)
+      if (.not. boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse(boundary, "applied_force", "along "//axes(d)// &
+        & ": not a free component; expected 0 there", error)
+      if (in_table(boundary, merge(3, 6, size(values) == 2) + d)) call refuse(boundary, "applied_force", "along "//axes(d)// &
+        & ": its table gives it; expected a boundary without this column", error)
+    end do
+    if (.not. allocated(error)) boundary%given_force(1:size(values)) = values
+  end subroutine set_force
+
+  subroutine set_pressure(boundary, nd, value, error)
+    type(boundary_t), intent(inout) :: boundary
+    integer, intent(in) :: nd
+    !> [Pa], in the plane [N/m]
+    real(dp), intent(in) :: value
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: pressed
+
+    pressed = boundary%is_plane()
+    if (pressed) pressed = any(boundary%free .and. abs(boundary%surface%axis) > 0.0_dp)
+    if (.not. pressed) call refuse(boundary, "pressure", "is for a plane of which a component along its normal is free", error)
+    if (in_table(boundary, merge(6, 10, nd == 2))) call refuse(boundary, "pressure", &
+      & "is given by its table; expected a boundary without this column", error)
+    if (.not. allocated(error)) boundary%given_pressure = value
+  end subroutine set_pressure
+
+  !> Whether the table of the boundary has column `k`.
+  pure logical function in_table(boundary, k)
+    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: k
+
+    in_table = .false.
+    if (allocated(boundary%table%has)) in_table = boundary%table%has(k)
+  end function in_table
+
+  subroutine refuse(boundary, name, text, error)
+    type(boundary_t), intent(in) :: boundary
+    !> of the quantity
+    character(len=*), intent(in) :: name, text
+    type(error_t), allocatable, intent(inout) :: error
+
+    call raise(error, status_input, "boundary '"//boundary%name//"': "//name//" "//text)
+  end subroutine refuse
 
 end module gravier_user_boundaries

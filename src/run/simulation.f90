@@ -15,7 +15,8 @@ module gravier_simulation
   use gravier_sleeping, only: sleeping_rule_t
   use gravier_pair_places, only: has_facets
   use gravier_impulse_memory, only: memory_of
-  use gravier_time_stepper, only: time_stepper_t, step_figures_t
+  use gravier_step_figures, only: step_figures_t
+  use gravier_time_stepper, only: time_stepper_t
   use gravier_config_types, only: config_t
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period

@@ -7,7 +7,8 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks
+from gravier_runs import RunTestCase, differences, each, merged, run_case
+from packings import settled_disks
 
 RADIUS = 0.01
 ALLOWED = 0.005 * RADIUS

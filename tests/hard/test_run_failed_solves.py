@@ -5,7 +5,8 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each, how_often, merged, run_case, settled_disks, steps_of, write
+from gravier_runs import RunTestCase, differences, each, how_often, merged, run_case, steps_of, write
+from packings import settled_disks
 
 # the packing 0.25 s after its start, dense and still moving: a step of it takes work
 DIVERGING = {

@@ -37,7 +37,7 @@ UNPROVOKED = {
     "not a finite number; expected speeds": "as the motion of boundaries",
     "cannot read this dataset": "within HDF5",
     "cannot remove this group": "within HDF5",
-    "decomposition%boundaries(b)%name//": "made of the name of a boundary and of messages that are expected by themselves",
+    '"boundary \'"//boundary%name//"\': "//name//" "//text': "made of the name of a boundary and of messages that are expected by themselves",
     "cannot copy ": "within HDF5",
     "cannot cut this table": "within HDF5",
     "cannot write rows of this table: is the disk full?": "within HDF5; a full disk is met by test_run_full_disk at other places",

@@ -8,7 +8,8 @@ import subprocess
 import termios
 import threading
 
-from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, PATIENCE, RunTestCase, merged, namelist, run_case, settled_disks, write
+from gravier_runs import ENVIRONMENT, GRAVIER, MPIEXEC, PATIENCE, RunTestCase, merged, namelist, run_case, write
+from packings import settled_disks
 
 #: begin of the line of a step: number, time, contacts
 STEP = re.compile(r"^ +(\d+) +\d\.\d{6}E[+-]\d+ +\d+ ", re.M)

@@ -1,7 +1,8 @@
 """The results do not depend on the number of ranks: not in one bit, for every method, partition and rule."""
 import unittest
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks, steps_of, write
+from gravier_runs import RunTestCase, differences, each, merged, run_case, steps_of, write
+from packings import settled_disks
 
 FEW = {"solver": {"criterion": "residual", "tolerance": 3e-3}, "time": {"steps": 2}}
 # a tolerance at which momentum steers for many iterations; a first solve that does not reach it is compared as it ends

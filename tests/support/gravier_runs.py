@@ -279,18 +279,3 @@ class RunTestCase(unittest.TestCase):
         for name, value in arrays.items():
             if np.asarray(value).dtype.kind == "f":
                 self.assertTrue(np.all(np.isfinite(value)), f"{name} has NaN or infinity")
-
-
-def settled_disks(directory, steps=400, count=(24, 25)):
-    """Fill a box with disks, 600 of them: path of the bodies file of the packing. After 250 steps of 1 ms the disks lie on each
-    other and still move (kinetic energy 1 % of its peak), after 400 steps they are at rest (0.01 %)."""
-    run = run_case({
-        "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": list(count), "radius_min": 0.008, "radius_max": 0.012,
-                  "friction": 0.3},
-        "time": {"step": 1e-3, "steps": steps},
-        "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 2000},
-        "output": {"directory": ".", "every": 0, "final_bodies": True},
-    }, directory=directory)
-    if run.status != 0:
-        raise AssertionError(f"the packing was not made: {run}")
-    return run.path("final_bodies.h5")

@@ -5,7 +5,8 @@ often they hold is in doc/accuracy.md."""
 import os
 import re
 
-from gravier_runs import SOURCE, RunTestCase, merged, run_case, settled_disks
+from gravier_runs import SOURCE, RunTestCase, merged, run_case
+from packings import settled_disks
 
 from gravier import parse_namelist
 

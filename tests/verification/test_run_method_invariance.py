@@ -10,7 +10,8 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, each, merged, run_case, settled_disks
+from gravier_runs import RunTestCase, each, merged, run_case
+from packings import settled_disks
 
 TOLERANCE = 1e-10
 STEP = 1e-3

@@ -6,7 +6,8 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks
+from gravier_runs import RunTestCase, differences, each, merged, run_case
+from packings import settled_disks, settled_spheres
 
 TOLERANCES = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4]
 CHECK_EVERY = 5
@@ -51,21 +52,13 @@ class Momentum(RunTestCase):
         }
         cls.column = merged(cls.disks, {"scene": {"bodies": "column", "bodies_file": None, "column_count": 40, "radius": 0.05,
                                                   "friction": 0.0}})
-        cls.spheres = cls.settled_spheres(7, 350)
+        cls.spheres = cls.step_of_spheres(7, 350)
 
     @classmethod
-    def settled_spheres(cls, edge, steps):
+    def step_of_spheres(cls, edge, steps):
         """A step of edge^3 spheres that have settled in so many steps."""
-        spheres = run_case({
-            "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [edge] * 3, "radius_min": 0.008, "radius_max": 0.012,
-                      "friction": 0.3},
-            "time": {"step": 1e-3, "steps": steps},
-            "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 1000},
-            "output": {"directory": ".", "every": 0, "final_bodies": True},
-        }, directory=f"{cls.scratch}/spheres_{edge}")
-        if spheres.status != 0:
-            raise AssertionError(f"the packing of spheres was not made: {spheres}")
-        return merged(cls.disks, {"scene": {"dimension": 3, "bodies_file": spheres.path("final_bodies.h5")}})
+        spheres = settled_spheres(f"{cls.scratch}/spheres_{edge}", edge, steps)
+        return merged(cls.disks, {"scene": {"dimension": 3, "bodies_file": spheres}})
 
     def pairs(self, cases):
         """{title: (iterations to each tolerance, plain and with momentum)}."""
@@ -103,7 +96,7 @@ class Momentum(RunTestCase):
 
     def test_gains(self):
         """What it is for: a sixth of the iterations, or fewer, to 1e-4 on settled packings."""
-        spheres = self.settled_spheres(10, 450)
+        spheres = self.step_of_spheres(10, 450)
         cases = {"disks 0.0": merged(self.disks, NLGS, {"scene": {"friction": 0.0}}), "disks 0.3": merged(self.disks, NLGS),
                  "spheres 0.3": merged(spheres, NLGS), "spheres 0.3 in 8": merged(spheres, METHODS["nscdd"])}
         for title, (plain, momentum) in self.pairs(cases).items():

@@ -8,7 +8,8 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, merged, run_case, settled_disks, write
+from gravier_runs import RunTestCase, merged, run_case, write
+from packings import settled_disks
 
 TIGHT = 1e-10
 

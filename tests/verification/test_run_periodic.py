@@ -5,7 +5,8 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, merged, run_case, settled_disks, write
+from gravier_runs import RunTestCase, differences, merged, run_case, write
+from packings import settled_disks
 from small_scenes import G, Grain, SmallScene, floats, plane
 
 LENGTH = 0.504

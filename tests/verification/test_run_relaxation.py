@@ -4,7 +4,8 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case, settled_disks
+from gravier_runs import RunTestCase, differences, each, merged, run_case
+from packings import settled_disks, settled_spheres
 
 # exit status of a solve that missed its tolerance
 MISSED = 3
@@ -54,17 +55,9 @@ class Relaxation(RunTestCase):
     def test_packings(self):
         """Where a factor of 1 diverges, the automatic one meets the tolerance, and no slower than NSCDD to 1e-3."""
         disks = settled_disks(self.scratch)
-        fall = {
-            "scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [7, 7, 7], "radius_min": 0.008, "radius_max": 0.012,
-                      "friction": 0.3},
-            "time": {"step": 1e-3, "steps": 350},
-            "solver": {"acceleration": "none", "criterion": "residual", "tolerance": 1e-3, "max_iterations": 1000},
-            "output": {"directory": ".", "every": 0, "final_bodies": True},
-        }
-        spheres = run_case(fall, directory=self.here("spheres"))
-        self.assert_status(spheres, 0)
+        spheres = settled_spheres(self.here("spheres"), 7, 350)
         packings = {"disks in 8, 10 sweeps": (2, disks, 8, {"solver": {"sweeps": 10}}),
-                    "spheres in 32": (3, spheres.path("final_bodies.h5"), 32)}
+                    "spheres in 32": (3, spheres, 32)}
         cases = {f"{name}, {method}": merged(METHODS[method], self.packed(*packing))
                  for name, packing in packings.items() for method in ("schwarz", "schwarz_ec")}
         del cases["spheres in 32, schwarz_ec"]

@@ -289,7 +289,7 @@ contains
       sub%pair(1, c) = number(sub%pair(1, c))
       sub%pair(2, c) = number(sub%pair(2, c))
     end do
-    call reorder()
+    call reorder_grains(sub, grain)
 
   contains
 
@@ -301,55 +301,50 @@ contains
       grain(n) = b
     end subroutine give_number
 
-    !> What is known of the grains.
-    subroutine reorder()
-      type(subproblem_t) :: old
-
-      call move_alloc(sub%id, old%id)
-      call move_alloc(sub%owner, old%owner)
-      call move_alloc(sub%place, old%place)
-      call move_alloc(sub%multiplicity, old%multiplicity)
-      call move_alloc(sub%radius, old%radius)
-      call move_alloc(sub%volume, old%volume)
-      call move_alloc(sub%applied, old%applied)
-      call move_alloc(sub%v_free, old%v_free)
-      call move_alloc(sub%inverse_mass, old%inverse_mass)
-      allocate (sub%id, source=old%id)
-      allocate (sub%owner, source=old%owner)
-      allocate (sub%place, mold=old%place)
-      allocate (sub%multiplicity, source=old%multiplicity)
-      allocate (sub%radius, mold=old%radius)
-      if (allocated(old%volume)) allocate (sub%volume, mold=old%volume)
-      if (allocated(old%applied)) allocate (sub%applied, mold=old%applied)
-      allocate (sub%v_free, source=old%v_free)
-      allocate (sub%inverse_mass, source=old%inverse_mass)
-      do n = 1, sub%n_grains
-        b = grain(n)
-        sub%id(n) = old%id(b)
-        sub%owner(n) = old%owner(b)
-        sub%place(n) = old%place(b)
-        sub%multiplicity(n) = old%multiplicity(b)
-        sub%radius(n) = old%radius(b)
-        if (allocated(old%volume)) sub%volume(n) = old%volume(b)
-        if (allocated(old%applied)) sub%applied(:, n) = old%applied(:, b)
-        sub%v_free(:, n) = old%v_free(:, b)
-        sub%inverse_mass(:, n) = old%inverse_mass(:, b)
-      end do
-      if (allocated(sub%cell%place)) call reorder_places(sub%cell%place)
-    end subroutine reorder
-
-    !> Places of the grains in a cell that moves.
-    subroutine reorder_places(place)
-      real(dp), intent(inout), contiguous :: place(:, :)
-      real(dp) :: before(size(place, 1), size(place, 2))
-
-      before(:, :) = place
-      do n = 1, sub%n_grains
-        place(:, n) = before(:, grain(n))
-      end do
-    end subroutine reorder_places
-
   end subroutine number_shared_first
+
+  !> Bring what is known of the grains into another order; columns of boundaries stay.
+  subroutine reorder_grains(sub, grain)
+    type(subproblem_t), intent(inout) :: sub
+    !> number so far of each grain
+    integer, intent(in), contiguous :: grain(:)
+    type(subproblem_t) :: old
+    integer :: n, b
+
+    call move_alloc(sub%id, old%id)
+    call move_alloc(sub%owner, old%owner)
+    call move_alloc(sub%place, old%place)
+    call move_alloc(sub%multiplicity, old%multiplicity)
+    call move_alloc(sub%radius, old%radius)
+    call move_alloc(sub%volume, old%volume)
+    call move_alloc(sub%applied, old%applied)
+    call move_alloc(sub%v_free, old%v_free)
+    call move_alloc(sub%inverse_mass, old%inverse_mass)
+    call move_alloc(sub%cell%place, old%cell%place)
+    allocate (sub%id, source=old%id)
+    allocate (sub%owner, source=old%owner)
+    allocate (sub%place, mold=old%place)
+    allocate (sub%multiplicity, source=old%multiplicity)
+    allocate (sub%radius, mold=old%radius)
+    if (allocated(old%volume)) allocate (sub%volume, mold=old%volume)
+    if (allocated(old%applied)) allocate (sub%applied, mold=old%applied)
+    allocate (sub%v_free, source=old%v_free)
+    allocate (sub%inverse_mass, source=old%inverse_mass)
+    if (allocated(old%cell%place)) allocate (sub%cell%place, mold=old%cell%place)
+    do n = 1, sub%n_grains
+      b = grain(n)
+      sub%id(n) = old%id(b)
+      sub%owner(n) = old%owner(b)
+      sub%place(n) = old%place(b)
+      sub%multiplicity(n) = old%multiplicity(b)
+      sub%radius(n) = old%radius(b)
+      if (allocated(old%volume)) sub%volume(n) = old%volume(b)
+      if (allocated(old%applied)) sub%applied(:, n) = old%applied(:, b)
+      sub%v_free(:, n) = old%v_free(:, b)
+      sub%inverse_mass(:, n) = old%inverse_mass(:, b)
+      if (allocated(old%cell%place)) sub%cell%place(:, n) = old%cell%place(:, b)
+    end do
+  end subroutine reorder_grains
 
   !> Count the interface. Each grain is counted in the first of the subdomains that share it. Collective.
   subroutine count_figures(decomposition, halo, problem, figures)

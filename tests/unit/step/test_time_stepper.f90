@@ -15,7 +15,8 @@ program test_time_stepper
   use gravier_run_tally, only: run_tally_t
   use gravier_search_direction, only: search_direction_t, chosen_direction
   use gravier_method_options, only: method_options_t
-  use gravier_time_stepper, only: time_stepper_t, step_figures_t
+  use gravier_step_figures, only: step_figures_t
+  use gravier_time_stepper, only: time_stepper_t
   use gravier_simulation, only: simulation_t
   use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, check_close, check_equal, finish_checks

@@ -1,0 +1,98 @@
+!> Figures of a step, and the check that they are numbers.
+module gravier_step_figures
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_text, only: to_text
+  use gravier_finite, only: is_finite
+  use gravier_solve, only: solve_report_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_interface, only: interface_statistics_t
+  use gravier_given_impulses, only: started_t
+  use gravier_cell_drive, only: check_cell_size
+  use gravier_diagnostics, only: diagnostics_t
+  implicit none
+  private
+  public :: step_figures_t
+
+  !> Figures of a step, the same on every rank.
+  type :: step_figures_t
+    type(solve_report_t) :: solve
+    type(interface_statistics_t) :: interface_statistics
+    integer(i8) :: contacts = 0
+    !> grains that left by an outlet; grains that move by more than their radius in a step
+    integer(i8) :: left = 0, fast = 0
+    !> grains that have entered, and their mass [kg]
+    integer(i8) :: entered = 0
+    real(dp) :: entered_mass = 0.0_dp
+    !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
+    logical :: listed = .false., divided = .false., refused = .false.
+    !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
+    !> space was divided anew
+    real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
+    !> contacts that slept at the start of the solve; where they can
+    integer(i8) :: asleep = 0
+    !> of the first step, where a file gives contacts with forces: what the solve started from
+    type(started_t) :: started
+    !> places were projected, because some overlap exceeded what is allowed
+    logical :: projected = .false.
+    !> of rigid contacts [m], 0 where nothing overlaps; [J]
+    real(dp) :: max_overlap = 0.0_dp, kinetic_energy = 0.0_dp
+    !> after a solve that diverged to NaN or infinity: a contact where it did; after one whose impulses grow without bound: the
+    !> contact with the largest
+    character(len=:), allocatable :: cause
+  contains
+    procedure :: check_numbers => step_figures_check_numbers
+  end type step_figures_t
+
+contains
+
+  !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
+  subroutine step_figures_check_numbers(self, decomposition, diagnostics, step, error)
+    class(step_figures_t), intent(in) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(diagnostics_t), intent(in) :: diagnostics
+    !> steps made with this one
+    integer, intent(in) :: step
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: place(3)
+    integer :: s, k, b
+
+    if (.not. is_finite(self%kinetic_energy)) then
+      do s = 1, size(decomposition%owned)
+        associate (owned => decomposition%owned(s))
+          do k = 1, owned%n
+            if (.not. is_finite(owned%mass(k)*sum(owned%velocity(:, k)**2))) &
+              & call refuse("kinetic energy of body "//to_text(owned%id(k)))
+          end do
+        end associate
+      end do
+      call decomposition%comm%agree(error)
+    end if
+    do b = 1, size(decomposition%boundaries)
+      associate (boundary => decomposition%boundaries(b))
+        call boundary%find_place(place)
+        if (.not. (all(is_finite(place)) .and. all(is_finite(boundary%velocity)))) &
+          & call refuse("motion of boundary '"//boundary%name//"'")
+      end associate
+    end do
+    if (decomposition%period%moves) call check_cell_size(decomposition, step, error)
+    if (.not. is_finite(self%kinetic_energy)) call refuse("kinetic energy")
+    if (.not. is_finite(self%max_overlap)) call refuse("largest overlap")
+    if (.not. is_finite(self%solve%residual)) call refuse("residual")
+    if (.not. is_finite(self%solve%jump)) call refuse("jump")
+    do k = 1, diagnostics%n_columns
+      if (.not. is_finite(diagnostics%value(k))) call refuse(trim(diagnostics%name(k)))
+    end do
+
+  contains
+
+    subroutine refuse(what)
+      character(len=*), intent(in) :: what
+
+      call raise(error, status_failure, "step "//to_text(step)//": "//what//": not a finite number; expected speeds, "// &
+        & "loads and a &time step that give finite ones")
+    end subroutine refuse
+
+  end subroutine step_figures_check_numbers
+
+end module gravier_step_figures
