@@ -2,7 +2,8 @@
 !>
 !> A residual costs as much as two sweeps, the estimate of the velocity error as much again. What sweeps move impulses by goes with
 !> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from
-!> the goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence.
+!> the goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence. The
+!> estimate follows these sums loosely and costs more: checks that ask for it keep longer pauses, and none comes before it is trusted.
 module gravier_check_schedule
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -22,6 +23,11 @@ module gravier_check_schedule
   integer, parameter :: early_check = 2
   !> iterations between two checks, over those made: at least where they are not due, and at most
   real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
+  !> the least pause where the estimate is asked for, over the iterations made, and in iterations: what such a check costs
+  real(dp), parameter :: estimate_pause = 0.15_dp
+  integer, parameter :: estimate_cost = 3
+  !> times the goal: a figure of the start that may meet it in the first iterations
+  real(dp), parameter :: near_the_goal = 3.0_dp
   !> what is left of the figure since the last check where the next one need not wait twice as long
   real(dp), parameter :: falling = 0.85_dp
   !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, for accelerated sweeps
@@ -32,12 +38,16 @@ module gravier_check_schedule
     integer :: check_every = 10
     !> regular checks may be left out and others come before them: not for a trace or the error, which are of all regular ones alone
     logical :: chooses = .false.
-    !> no pause is longer than a part of the iterations made
-    logical :: short_pauses = .false.
+    !> checks ask for the estimate of the velocity error, which is trusted from iteration `trusted` on; no pause between them is
+    !> longer than a part of the iterations made
+    logical :: by_estimate = .false.
+    integer :: trusted = 0
     !> figure at the last check over what the sweeps before it moved impulses by, relative to them; 0 where it is not known
     real(dp), private :: ratio = 0.0_dp, progress = 0.0_dp
     real(dp), private :: last_figure = huge(1.0_dp), pause = 0.0_dp
     integer, private :: skips = 0, last_check = 0
+    !> the first iteration that a check of accelerated sweeps may follow before it is due
+    integer, private :: earliest = early_check
   contains
     procedure :: first_check => check_schedule_first_check
     procedure :: calls => check_schedule_calls
@@ -69,7 +79,7 @@ contains
 
     calls = mod(iteration, self%check_every) == 0
     ! sums of the iterations before are there where sweeps are accelerated
-    if (self%chooses .and. (calls .or. (method%acceleration%on .and. iteration >= early_check))) &
+    if (self%chooses .and. (calls .or. (method%acceleration%on .and. iteration >= self%earliest))) &
       & calls = is_worth_a_check(self, problem, method, iteration, goal, reference, history)
   end function check_schedule_calls
 
@@ -91,7 +101,7 @@ contains
     is_worth = regular
     expected = 0.0_dp
     due = self%skips >= most_skips
-    if (self%short_pauses) due = due .or. iteration - self%last_check >= most_pause*iteration
+    if (self%by_estimate) due = due .or. iteration - self%last_check >= most_pause*iteration
     if (all(ieee_is_finite(sums))) then
       if (sums(2) > 0.0_dp) self%progress = sqrt(sums(1)/sums(2))
       expected = self%ratio*self%progress
@@ -100,8 +110,7 @@ contains
         if (.not. self%ratio > 0.0_dp) expected = first_ratio*self%progress
         enough = 1.0_dp
       end if
-      if (expected > 0.0_dp) is_worth = (expected <= enough*goal .and. &
-        & (regular .or. iteration - self%last_check > max(self%pause, least_pause*iteration))) .or. &
+      if (expected > 0.0_dp) is_worth = (expected <= enough*goal .and. has_paused(self, iteration, regular)) .or. &
         & (regular .and. (.not. self%ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth(method)*reference))
     end if
     if (is_worth) then
@@ -112,6 +121,22 @@ contains
     end if
   end function is_worth_a_check
 
+  !> Whether the last check lies far enough back.
+  pure logical function has_paused(self, iteration, regular)
+    class(check_schedule_t), intent(in) :: self
+    integer, intent(in) :: iteration
+    logical, intent(in) :: regular
+
+    associate (pause => iteration - self%last_check)
+      has_paused = pause > max(self%pause, least_pause*iteration)
+      if (self%by_estimate) then
+        has_paused = has_paused .and. pause >= max(real(estimate_cost, dp), estimate_pause*iteration)
+      else
+        has_paused = has_paused .or. regular
+      end if
+    end associate
+  end function has_paused
+
   !> Growth of the changes that is worth a check: methods that lower what makes them grow are left to do so.
   pure real(dp) function watched_growth(method) result(growth)
     class(method_t), intent(in) :: method
@@ -119,12 +144,15 @@ contains
   end function watched_growth
 
   !> A check was made after an iteration, and found this figure.
-  pure subroutine check_schedule_note_check(self, iteration, figure)
+  pure subroutine check_schedule_note_check(self, iteration, figure, goal)
     class(check_schedule_t), intent(inout) :: self
     integer, intent(in) :: iteration
-    real(dp), intent(in) :: figure
+    real(dp), intent(in) :: figure, goal
 
-    if (iteration > 0) then
+    if (iteration == 0) then
+      ! before the estimate is trusted only what is nearly at rest may meet the goal
+      if (self%by_estimate .and. .not. figure <= near_the_goal*goal) self%earliest = max(early_check, self%trusted)
+    else
       if (self%progress > 0.0_dp) self%ratio = figure/self%progress
       self%pause = merge(0.0_dp, min(2.0_dp*max(self%pause, 1.0_dp), most_pause*iteration), figure < falling*self%last_figure)
     end if

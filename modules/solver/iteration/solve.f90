@@ -192,7 +192,8 @@ contains
     state%by_estimate = control%criterion == by_velocity
     state%schedule%check_every = control%check_every
     state%schedule%chooses = .not. (control%trace .or. control%criterion == by_error)
-    state%schedule%short_pauses = state%by_estimate
+    state%schedule%by_estimate = state%by_estimate
+    state%schedule%trusted = copies_ready
     report%goal = merge(control%accuracy, control%tolerance, state%by_estimate)
     report%velocity_scale = problem%error_scale
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
@@ -248,7 +249,7 @@ contains
     call judge(state, problem, method, control, report, defect, finished)
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
-    call state%schedule%note_check(report%iterations, report%figure)
+    call state%schedule%note_check(report%iterations, report%figure, report%goal)
     if (.not. finished .and. problem%n_asleep > 0) call wake_if_due(state, problem, control, report)
     state%checking = state%checking + clock() - start
     call stop_timer(phase_check)

@@ -49,6 +49,7 @@ program test_solver_parts
   call check_layer_trial()
   call test_schedule(.false.)
   call test_schedule(.true.)
+  call test_schedule_of_estimates()
   call check_vain_impulses()
   call check_stagnation()
   call check_creep(1)
@@ -293,7 +294,7 @@ contains
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(.not. calls(schedule, sim%problem, method, 9), "no check before it is due")
     call check(calls(schedule, sim%problem, method, 10), "the first one is made")
-    call schedule%note_check(10, 0.05_dp)
+    call schedule%note_check(10, 0.05_dp, 1.0e-3_dp)
     ! the ratio is 5 from here on
     call set_progress(sim%problem, 2.3e-4_dp)
     call check(calls(schedule, sim%problem, method, 20), "1.15 times the goal is expected")
@@ -311,13 +312,46 @@ contains
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(calls(schedule, sim%problem, method, 210), "and so with momentum")
     ! the figure has fallen, the ratio is 4, and no pause is longer than 0.06 of the iterations made
-    call schedule%note_check(210, 0.04_dp)
+    call schedule%note_check(210, 0.04_dp, 1.0e-3_dp)
     call set_progress(sim%problem, 2.0e-4_dp)
     call check(.not. calls(schedule, sim%problem, method, 223), "0.8 times the goal is expected, but too soon")
     call check(calls(schedule, sim%problem, method, 225) .eqv. chooses, "and late enough")
     call check_equal(schedule%first_check(method), merge(2, 10, chooses), "the first check of sweeps with momentum")
     call sim%free()
   end subroutine test_schedule
+
+  !> Checks that ask for the estimate: none before it is trusted, unless what is nearly at rest may end the solve, then none three
+  !> iterations or 0.15 of those made after another.
+  subroutine test_schedule_of_estimates()
+    type(simulation_t) :: sim
+    type(check_schedule_t) :: schedule
+    type(nlgs_t) :: method
+    integer :: iteration
+
+    call make_column(3, 2, "&solver method = 'nscdd' /", sim)
+    method%acceleration%on = .true.
+    schedule%chooses = .true.
+    schedule%by_estimate = .true.
+    schedule%trusted = 4
+    call set_progress(sim%problem, 1.0e-4_dp)
+    call schedule%note_check(0, 2.9e-3_dp, 1.0e-3_dp)
+    call check(.not. calls(schedule, sim%problem, method, 2), "nearly at rest, but just checked")
+    call check(calls(schedule, sim%problem, method, 3), "nearly at rest: a check before the estimate is trusted")
+    call schedule%note_check(0, 3.1e-3_dp, 1.0e-3_dp)
+    call check(.not. calls(schedule, sim%problem, method, 3), "far from rest: none before it is trusted")
+    call check(calls(schedule, sim%problem, method, 4), "the first when it is trusted")
+    ! the ratio is 15 from here on
+    call schedule%note_check(4, 1.5e-3_dp, 1.0e-3_dp)
+    call set_progress(sim%problem, 6.0e-5_dp)
+    call check(.not. calls(schedule, sim%problem, method, 6), "0.9 times the goal is expected, but a check costs three iterations")
+    call check(calls(schedule, sim%problem, method, 7), "and after three")
+    call schedule%note_check(40, 9.0e-4_dp, 1.0e-3_dp)
+    do iteration = 41, 60
+      if (calls(schedule, sim%problem, method, iteration)) exit
+    end do
+    call check_equal(iteration, 48, "0.15 of the iterations made")
+    call sim%free()
+  end subroutine test_schedule_of_estimates
 
   !> Whether a schedule calls for a check after an iteration, with the goal 1e-3.
   logical function calls(schedule, problem, method, iteration)
