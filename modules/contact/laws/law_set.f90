@@ -34,6 +34,8 @@ module gravier_law_set
     integer, private, allocatable :: of_pair(:, :)
     !> some law has other terms for each pair
     logical :: varies = .false.
+    !> some law has restitution, or a default law had
+    logical :: returns = .false.
     !> some law attracts, has a memory, has springs, is one of spheres alone
     logical :: attracts = .false., remembers = .false., yields = .false., of_spheres = .false.
     !> the largest of all laws; range in [m]
@@ -85,6 +87,7 @@ contains
     values(3) = coefficients%tangential_restitution
     values(4) = coefficients%rolling_friction
     values(5) = coefficients%pivoting_friction
+    self%returns = self%returns .or. any(values(2:3) > 0.0_dp)
     call make_law("coulomb", coulomb_names, values, self%of(-b))
   end subroutine law_set_set_default
 
@@ -149,6 +152,7 @@ contains
       self%yields = self%yields .or. law%yields
       self%of_spheres = self%of_spheres .or. law%of_spheres
       self%varies = self%varies .or. .not. law%is_constant
+      self%returns = self%returns .or. max(law%largest%restitution, law%largest%tangential_restitution) > 0.0_dp
       call self%largest%raise_to(law%largest)
       self%range = max(self%range, law%range)
     end associate

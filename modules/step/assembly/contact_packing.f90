@@ -3,12 +3,13 @@ module gravier_contact_packing
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_terms_t
+  use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: subproblem_t
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, find_start_velocity, approach_velocity, add_image_velocity
-  use gravier_pair_laws, only: boundary_of, law_of, terms_of
+  use gravier_pair_laws, only: law_of, terms_of
   use gravier_contact_springs, only: pack_spring
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, place_of
@@ -25,6 +26,8 @@ module gravier_contact_packing
   !> candidate and its antagonist, a grain or minus a boundary, and the boundary that takes part, 0 for none.
   type :: packed_t
     integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0
+    !> what its law makes of the step
+    type(contact_terms_t) :: terms
   end type packed_t
 
 contains
@@ -39,7 +42,7 @@ contains
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: pair(:, :), order(:)
-    integer :: c
+    integer :: c, before
     type(packed_t) :: this
 
     allocate (pair(2, found%n), order(found%n))
@@ -57,6 +60,7 @@ contains
     if (physics%laws%yields) allocate (sub%spring(found%n))
     if (physics%cell%moves) allocate (sub%cell%branch(kernels%nd, found%n), sub%cell%way(kernels%nd, found%n), &
       & sub%cell%shift(kernels%nd, found%n))
+    before = -1
     do c = 1, found%n
       this%c = c
       this%q = lane_of(c)
@@ -65,7 +69,7 @@ contains
       this%p = found%source(this%f)
       this%i = view%list%candidate(this%p)
       this%j = view%list%antagonist(this%p)
-      this%b = boundary_of(view, this%p)
+      this%b = found%boundary(this%f)
       sub%source(c) = this%p
       sub%gap(c) = found%gap(this%f)
       sub%pair(:, c) = pair(:, this%f)
@@ -73,10 +77,33 @@ contains
         if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub)
       end if
       if (physics%cell%moves) call pack_image(view, this, sub)
+      call take_terms(view, found, boundaries, physics%laws, before, this)
       call pack_terms(view, found, boundaries, kernels, physics, this, sub)
       if (physics%cell%moves) call keep_shifts(kernels, this, sub)
     end do
   end subroutine pack_contacts
+
+  !> What the law of a contact makes of the step. Without laws of materials, and where no law has other terms for each pair, all contacts
+  !> with one boundary have the same, and so have all between grains.
+  pure subroutine take_terms(view, found, boundaries, laws, before, this)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(law_set_t), intent(in) :: laws
+    !> boundary of the contact before, negative for the first
+    integer, intent(inout) :: before
+    !> with the terms of the contact before
+    type(packed_t), intent(inout) :: this
+
+    if (size(found%terms) > 0) then
+      this%terms = found%terms(this%f)
+    else if (this%b /= before .or. laws%n > 0) then
+      this%terms = terms_of(laws, law_of(view, boundaries, laws, this%p), found%gap(this%f))
+      before = this%b
+    else
+      this%terms%free_gap = max(found%gap(this%f), 0.0_dp)
+    end if
+  end subroutine take_terms
 
   !> Branch of a contact and way to the image that it meets, in a cell that moves.
   pure subroutine pack_image(view, this, sub)
@@ -120,7 +147,7 @@ contains
       p = found%source(f)
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
-      b = boundary_of(view, p)
+      b = found%boundary(f)
       if (b > 0) then
         column = merge(sub%n_bodies + 1, numbers%of_boundary(b), boundaries(b)%turns())
         pair(1, f) = merge(column, numbers%of_grain(i), view%bodies%glued(i) > 0)
@@ -183,14 +210,8 @@ contains
     type(physics_t), intent(in) :: physics
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
-    type(contact_terms_t) :: terms
 
-    if (size(found%terms) > 0) then
-      terms = found%terms(this%f)
-    else
-      terms = terms_of(physics%laws, law_of(view, boundaries, physics%laws, this%p), found%gap(this%f))
-    end if
-    associate (q => this%q, g => this%g, i => this%i, j => this%j, row => kernels%row)
+    associate (q => this%q, g => this%g, i => this%i, j => this%j, row => kernels%row, terms => this%terms)
       sub%hot(q, 1:kernels%nd, g) = found%normal(:, this%f)
       if (row%arm_i > 0) then
         call pack_arms(view, found, kernels, this, sub)

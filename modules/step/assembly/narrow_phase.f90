@@ -10,7 +10,7 @@ module gravier_narrow_phase
   use gravier_surface_velocity, only: contact_place_t, round_place
   use gravier_pair_points, only: pair_points_t, carry_memory
   use gravier_shape_contacts, only: shape_work_t, find_points
-  use gravier_pair_laws, only: law_of, terms_of, evaluate_pair
+  use gravier_pair_laws, only: boundary_of, law_of, terms_of, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none
   private
@@ -23,6 +23,8 @@ module gravier_narrow_phase
     integer :: n_awake = 0
     !> place in the list (n)
     integer, allocatable :: source(:)
+    !> the boundary that takes part, by itself or by a grain glued to it; 0 between free grains (n)
+    integer, allocatable :: boundary(:)
     !> (n) [m], (nd, n)
     real(dp), allocatable :: gap(:), normal(:, :)
     !> where some law has other terms for each pair (n)
@@ -47,8 +49,9 @@ contains
     integer :: nd
 
     nd = decomposition%nd
-    if (allocated(found%source)) deallocate (found%source, found%gap, found%normal, found%terms, found%spring, found%place)
-    allocate (found%source(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
+    if (allocated(found%source)) deallocate (found%source, found%boundary, found%gap, found%normal, found%terms, &
+      & found%spring, found%place)
+    allocate (found%source(view%list%n), found%boundary(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
     allocate (found%terms(merge(view%list%n, 0, physics%laws%varies)))
     allocate (found%spring(merge(view%list%n, 0, physics%laws%yields)))
     allocate (found%place(merge(view%list%n, 0, decomposition%no > 0)))
@@ -196,11 +199,11 @@ contains
     if (physics%laws%varies) then
       call add_with_terms(view, decomposition, physics, p, gap, normal, found, place)
     else
-      ! the law of a contact that is closed is looked up where its terms are packed
-      if (gap > 0.0_dp) then
+      ! where some law has restitution; the law of a contact that is closed is looked up where its terms are packed
+      if (physics%laws%returns .and. gap > 0.0_dp) then
         if (is_closed_under(terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, p), gap))) return
       end if
-      call keep_contact(p, gap, normal, found, place)
+      call keep_contact(view, p, gap, normal, found, place)
     end if
   end subroutine add_contact
 
@@ -238,7 +241,7 @@ contains
     end if
     if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
     if (gap > 0.0_dp .and. is_closed_under(pair%terms)) return
-    call keep_contact(p, gap, normal, found, place)
+    call keep_contact(view, p, gap, normal, found, place)
     found%terms(found%n) = pair%terms
     if (size(found%spring) > 0) found%spring(found%n) = pair%spring
   end subroutine add_with_terms
@@ -251,7 +254,8 @@ contains
   end function is_closed_under
 
   !> Put a contact into the list.
-  pure subroutine keep_contact(p, gap, normal, found, place)
+  pure subroutine keep_contact(view, p, gap, normal, found, place)
+    type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
     real(dp), intent(in) :: gap
     real(dp), intent(in), contiguous :: normal(:)
@@ -260,6 +264,7 @@ contains
 
     found%n = found%n + 1
     found%source(found%n) = p
+    found%boundary(found%n) = boundary_of(view, p)
     found%gap(found%n) = gap
     found%normal(:, found%n) = normal
     if (present(place)) found%place(found%n) = place

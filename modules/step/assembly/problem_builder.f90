@@ -9,7 +9,6 @@ module gravier_problem_builder
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_pair_laws, only: boundary_of
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_contact_packing, only: numbers_t, pack_contacts
@@ -83,7 +82,7 @@ contains
         p = found%source(c)
         call number(list%candidate(p))
         if (list%antagonist(p) > 0) call number(list%antagonist(p))
-        b = boundary_of(view, p)
+        b = found%boundary(c)
         if (b == 0) cycle
         numbers%of_boundary(b) = 1
         if (boundaries(b)%turns()) n = n + 1

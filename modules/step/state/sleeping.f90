@@ -19,7 +19,6 @@ module gravier_sleeping
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_pair_laws, only: boundary_of
   use gravier_narrow_phase, only: contact_list_t
   implicit none
   private
@@ -85,7 +84,7 @@ contains
     allocate (asleep(found%n))
     do c = 1, found%n
       asleep(c) = view%list%state(view%list%memory%rest_row, found%source(c)) >= after
-      b = boundary_of(view, found%source(c))
+      b = found%boundary(c)
       if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
     end do
     found%n_awake = min(found%n, lanes*n_blocks(count(.not. asleep)))
@@ -104,6 +103,7 @@ contains
         if (asleep(c) .neqv. round == 2) cycle
         n = n + 1
         found%source(n) = old%source(c)
+        found%boundary(n) = old%boundary(c)
         found%gap(n) = old%gap(c)
         found%normal(:, n) = old%normal(:, c)
         if (size(old%terms) > 0) found%terms(n) = old%terms(c)
