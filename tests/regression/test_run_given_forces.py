@@ -111,7 +111,8 @@ class GivenForces(RunTestCase):
         off = {}
         for name, file in (("with", path), ("without", bare)):
             run = self.start(name, {"scene": {"friction": 0.3}, "solver": {"accuracy": accuracy}, "time": {"steps": steps}}, file)
-            self.assert_status(run, 0)
+            # the first solve without forces may stagnate at a hundredth of U, in groups of grains that stick
+            self.assertIn(run.status, (0,) if name == "with" else (0, 3), str(run))
             self.assertEqual("start       from forces" in run.stdout, name == "with")
             results = run.results()
             rows = zip(*(results[f"/steps/{steps}/contacts/{key}"] for key in ("candidate", "antagonist", "impulse")))

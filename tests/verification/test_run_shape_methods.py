@@ -1,17 +1,14 @@
 """One step of a pour of bodies with shapes by every method, in 1 to 4 subdomains: the velocities are those of nonlinear Gauss-Seidel on
 one domain, to the tolerance where they are unique, as they are without friction."""
-import os
-import shutil
 import unittest
 
 import numpy as np
 
 from gravier_runs import RunTestCase, each, run_case
-from shaped_scenes import box, lattice, prepare, shaped_case
+from packings import POURS, poured_shapes
+from shaped_scenes import box, shaped_case
 
 TOLERANCE = 1e-10
-SPACING = {2: 0.17, 3: 0.19}
-COUNTS = {2: (6, 6), 3: (3, 3, 4)}
 METHODS = {
     "nlgs, momentum": {"solver": {"method": "nlgs", "acceleration": "momentum"}},
     "nscdd": {"solver": {"method": "nscdd", "sweeps": 2, "acceleration": "none"}},
@@ -30,27 +27,18 @@ PARTS = [(1, "grid", "dual"), (2, "metis", "primal"), (4, "grid", "dual")]
 
 class ShapeMethods(RunTestCase):
 
-    def pour(self, dimension):
-        """Path of the bodies of a pour that falls together."""
-        counts, spacing = COUNTS[dimension], SPACING[dimension]
-        directory = prepare(self.here(f"pour {dimension}"), dimension, lattice(counts, spacing=spacing))
-        run = run_case(shaped_case(dimension, box(counts, spacing), {
-            "scene": {"friction": 0.3}, "time": {"steps": 300 if dimension == 2 else 210}, "output": {"final_bodies": True}}), 1, directory)
-        self.assert_status(run, 0)
-        return run.path("results", "final_bodies.h5")
-
-    def step(self, dimension, pour, title, friction, method, part):
+    def step(self, dimension, title, friction, method, part):
         subdomains, partition, kind = part
-        directory = prepare(self.here(f"{title} {dimension} {friction} {subdomains}"), dimension, [])
-        shutil.copy(pour, os.path.join(directory, "bodies.h5"))
-        return run_case(shaped_case(dimension, box(COUNTS[dimension], SPACING[dimension]), {
+        counts, spacing, _ = POURS[dimension]
+        directory = self.here(f"{title} {dimension} {friction} {subdomains}")
+        poured_shapes(directory, dimension)
+        return run_case(shaped_case(dimension, box(counts, spacing), {
             "scene": {"bodies_file": "bodies.h5", "friction": friction}, "time": {"steps": 1},
             "solver": {"criterion": "residual", "tolerance": TOLERANCE, "max_iterations": 40000, "check_every": 5, "warm_start": False},
             "decomposition": {"subdomains": subdomains, "partition": partition, "kind": kind}, "output": {"every": 1}}, method), 1, directory)
 
     def compare(self, dimension, friction, titles):
-        pour = self.pour(dimension)
-        reference = self.step(dimension, pour, "nlgs", friction, {"solver": {"method": "nlgs", "acceleration": "none"}}, PARTS[0])
+        reference = self.step(dimension, "nlgs", friction, {"solver": {"method": "nlgs", "acceleration": "none"}}, PARTS[0])
         self.assert_status(reference, 0)
         wanted = reference.results()["/steps/1/bodies/velocity"]
         # in space the cones of several points of a face leave room: what the points share is not unique
@@ -59,7 +47,7 @@ class ShapeMethods(RunTestCase):
         self.assertGreater(np.abs(reference.results()["/steps/0/bodies/velocity"] - wanted).max(), 0.1)
         jobs = [(title, part) for title in titles for part in PARTS if part[0] == 1 or not title.startswith("nlgs")
                 if part[0] > 1 or not title.endswith("cg")]
-        runs = each(lambda title, part: self.step(dimension, pour, title, friction, METHODS[title], part), jobs)
+        runs = each(lambda title, part: self.step(dimension, title, friction, METHODS[title], part), jobs)
         print()
         for (title, part), run in zip(jobs, runs):
             with self.subTest(title, dimension=dimension, friction=friction, part=part):
