@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""The four decomposition methods side by side: iterations to a residual and seconds of one step of settled packings, and on columns.
+"""The four decomposition methods side by side: iterations to a velocity error and to a residual, and seconds, of one step of settled
+packings, and on columns.
 
     python3 drivers/studies/study_methods.py [--out DIR] [--quick | --large] [--redraw]
 
 Packings of disks and spheres settle in a box; then each method solves one step of them from zero impulses: NSCDD, NSCDD-EP,
 Schwarz and Schwarz-EC, with 1 to 64 subdomains, 1 to 50 sweeps an iteration, friction 0 and 0.3, search directions from 0 to
 1e12, plain and with momentum. Columns of 4 disks a subdomain show what a growing number of subdomains costs. Writes
-methods.csv, methods_columns.csv and methods.svg into DIR; --redraw draws from the CSV files that are there. --quick takes few
-iterations. --large takes packings of 10^4 and 10^5 grains instead, without columns, and writes methods_large.csv and
+methods.csv, methods_columns.csv and methods.svg into DIR and prints the tables of doc/methods.md; --redraw draws and prints from the CSV
+files that are there. --quick takes few iterations. --large takes packings of 10^4 and 10^5 grains instead, without columns, and writes methods_large.csv and
 methods_large.svg; an enriched method is left out of it where its interface solves, or its factors, take more than minutes.
 """
 
@@ -27,7 +28,10 @@ PACKINGS = {"disks 1e3": (2, [32, 31], 500), "disks 1e4": (2, [100, 100], 900), 
 SMALL = ("disks 1e3", "spheres 1e3")
 # packings whose interfaces are solved by conjugate gradients
 BY_CG = ("spheres 1e4", "spheres 1e5")
+#: residuals; velocity errors over g h
 TOLERANCES = (1e-2, 1e-3, 1e-4)
+ERRORS = (0.3, 0.1, 0.03)
+SPEED = 9.81e-3
 PHASES = {"seconds in sweeps": "sweeps", "in interface": "interface solve", "in factors": "factorisation"}
 COLUMNS = ["packing", "friction", "method", "direction", "contacts", "momentum", "subdomains", "sweeps"]
 COLOURS = {"nscdd": "#0072b2", "nscdd_ep": "#d55e00", "schwarz": "#009e73", "schwarz_ec": "#cc79a7"}
@@ -56,14 +60,15 @@ def phase_seconds(log):
 
 
 def solve(directory, bodies, case, iterations):
-    """One step: iterations to each tolerance, '' where not in `iterations` iterations, and seconds by phase."""
+    """One step: iterations to each tolerance, '' where not in `iterations` iterations, and seconds by phase. An error is met from the
+    iteration on after which the estimate stays below it; the solve goes on until its criterion meets the least of them."""
     groups = {
         "scene": {"dimension": PACKINGS[case["packing"]][0], "bodies": "file", "bodies_file": str(bodies.resolve()),
                   "friction": case["friction"]},
         "time": {"step": 1e-3, "steps": 1},
-        "solver": {"method": case["method"], "sweeps": case["sweeps"], "criterion": "residual", "tolerance": TOLERANCES[-1], "check_every": 1,
+        "solver": {"method": case["method"], "sweeps": case["sweeps"], "accuracy": ERRORS[-1], "tolerance": TOLERANCES[1], "check_every": 1,
                    "max_iterations": iterations, "acceleration": "momentum" if case["momentum"] else "none",
-                   "warm_start": False},
+                   "warm_start": False, "layered_start": False},
         "decomposition": {"subdomains": case["subdomains"], "partition": "metis" if case["subdomains"] > 1 else "grid"},
         "output": {"directory": "results", "every": 0, "contacts": False, "trace": True},
     }
@@ -78,13 +83,17 @@ def solve(directory, bodies, case, iterations):
     place = directory / "runs" / name
     run(place, groups)
     with open(place / "results" / "trace.csv", encoding="ascii") as file:
-        trace = [(int(row["iteration"]), float(row["residual"])) for row in csv.DictReader(file)]
+        trace = [(int(row["iteration"]), float(row["residual"]), float(row["velocity_error"]) / SPEED) for row in csv.DictReader(file)]
     row = dict(case)
     for tolerance in TOLERANCES:
-        row[f"to {tolerance:g}"] = next((k for k, residual in trace if residual <= tolerance), "")
+        row[f"to {tolerance:g}"] = next((k for k, residual, _ in trace if residual <= tolerance), "")
+    for bound in ERRORS:
+        late = [place for place, (_, _, error) in enumerate(trace) if error > bound]
+        after = late[-1] + 1 if late else 0
+        row[f"to error {bound:g}"] = trace[after][0] if after < len(trace) else ""
     log = (place / "results" / "run.log").read_text()
     row.update(phase_seconds(log))
-    row["done"], row["residual"] = trace[-1]
+    row["done"], row["residual"], row["error"] = trace[-1]
     lowered = re.search(r"; (\d+) reductions? of l$", log, re.MULTILINE)
     row["lowered"] = int(lowered.group(1)) if lowered else 0
     return row
@@ -183,22 +192,22 @@ def read_rows(path):
 
 
 def draw(rows, columns, path):
-    """Iterations to 1e-3 against sweeps and against subdomains, and on columns."""
-    figure, axes = plt.subplots(1, 3, figsize=(13, 4))
+    """Iterations to an error of 0.3 against sweeps and against subdomains, and on columns."""
+    figure, axes = plt.subplots(1, 3, figsize=(13, 5))
     labels = {"nscdd": "NSCDD", "nscdd_ep": "NSCDD-EP"}
     for axis, along, fixed in ((axes[0], "sweeps", ("subdomains", "8")), (axes[1], "subdomains", ("sweeps", "3"))):
         for method in ("nscdd", "nscdd_ep"):
             for momentum in ("False", "True"):
-                points = sorted((int(row[along]), int(row["to 0.001"])) for row in rows
+                points = sorted((int(row[along]), int(row["to error 0.3"])) for row in rows
                                 if row["packing"] == "disks 1e3" and row["friction"] == "0.3" and row["method"] == method and
                                 row["momentum"] == momentum and row["direction"] in ("", "automatic") and
-                                row[fixed[0]] == fixed[1] and row["to 0.001"] != "")
+                                row[fixed[0]] == fixed[1] and row["to error 0.3"] != "")
                 if points:
                     axis.loglog(*np.array(points).T, "o-" if momentum == "False" else "s--", color=COLOURS[method],
                                 label=labels[method] + (", momentum" if momentum == "True" else ""))
         axis.set_xlabel({"sweeps": "sweeps an iteration", "subdomains": "subdomains"}[along])
-        axis.set_ylabel("iterations to a residual of 1e-3")
-        axis.legend(frameon=False, fontsize=8)
+        axis.set_ylabel("iterations to a velocity error of 0.3 g h")
+        mark(axis, {"sweeps": (1, 3, 10, 50), "subdomains": (1, 2, 4, 8, 16, 32, 64)}[along], (30, 100, 300))
     axes[0].set_title("1000 disks, friction 0.3, 8 subdomains", fontsize=9)
     axes[1].set_title("1000 disks, friction 0.3, 3 sweeps", fontsize=9)
     for name in dict.fromkeys(row["method"] for row in columns):
@@ -209,9 +218,54 @@ def draw(rows, columns, path):
     axes[2].set_xlabel("subdomains of 4 disks")
     axes[2].set_ylabel("iterations to an error of 1e-6")
     axes[2].set_title("columns, 10 sweeps", fontsize=9)
-    axes[2].legend(frameon=False, fontsize=8)
+    mark(axes[2], sorted({int(row["subdomains"]) for row in columns}), (10, 100, 1000))
     figure.tight_layout()
     save_figure(figure, path)
+
+
+def mark(axis, across, up):
+    """Ticks at given numbers, and a legend below that covers nothing."""
+    for one, values in ((axis.xaxis, across), (axis.yaxis, up)):
+        one.set_ticks(values, [str(value) for value in values])
+        one.set_ticks([], minor=True)
+    axis.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncol=2)
+
+
+def cell(rows, **wanted):
+    """Iterations to errors of 0.3 and 0.1 and, in brackets, to a residual of 1e-3 of the row that has what is wanted."""
+    for row in rows:
+        if has(row, wanted):
+            return "{} / {} ({})".format(*(row[f"to {goal}"] or "-" for goal in ("error 0.3", "error 0.1", "0.001")))
+    return ""
+
+
+def has(row, wanted):
+    """Whether a row of a CSV file has some values."""
+    return all(row[key] == (f"{value:g}" if isinstance(value, float) else str(value)) for key, value in wanted.items())
+
+
+def print_tables(rows):
+    """The tables of the page, each cell as `cell` says."""
+    pairs = [("nscdd", "", False), ("nscdd_ep", "automatic", False), ("nscdd", "", True), ("nscdd_ep", "automatic", True)]
+    for packing in SMALL:
+        print(f"\n{packing}\n\n| friction | sweeps | NSCDD | NSCDD-EP | NSCDD, accelerated | NSCDD-EP, accelerated | Schwarz | Schwarz-EC |")
+        for friction in (0.3, 0.0):
+            for sweeps in (1, 3, 10, 50):
+                same = {"packing": packing, "friction": friction, "subdomains": 8, "sweeps": sweeps}
+                cells = [cell(rows, **same, method=method, direction=direction, momentum=momentum) for method, direction, momentum in pairs]
+                cells += [cell(rows, **same, method=method) for method in ("schwarz", "schwarz_ec")]
+                print(f"| {friction:g} | {sweeps} | {' | '.join(cells)} |")
+        print("\n| subdomains | NSCDD | NSCDD-EP | NSCDD, accelerated | NSCDD-EP, accelerated |")
+        for subdomains in (1, 2, 4, 8, 16, 32, 64):
+            same = {"packing": packing, "friction": 0.3, "subdomains": subdomains, "sweeps": 3}
+            cells = [cell(rows, **same, method=method, direction=direction, momentum=momentum) for method, direction, momentum in pairs]
+            print(f"| {subdomains} | {' | '.join(cells)} |")
+        print("\n| l, in 1/W_aa | active contacts | active, accelerated | all contacts | lowered |")
+        for direction in ("1", "3", "10", "100", "automatic", "1000", "1e12"):
+            same = {"packing": packing, "friction": 0.3, "subdomains": 8, "sweeps": 3, "method": "nscdd_ep", "direction": direction}
+            cells = [cell(rows, **same, contacts="active", momentum=momentum) for momentum in (False, True)] + [cell(rows, **same, contacts="all")]
+            lowered = [row["lowered"] for row in rows if row["contacts"] == "all" and has(row, same)]
+            print(f"| {direction} | {' | '.join(cells)} | {''.join(lowered)} |")
 
 
 def draw_large(rows, path):
@@ -265,6 +319,7 @@ def main():
         columns = study_columns(directory, options.quick)
         write_csv(directory / "methods_columns.csv", {key: [row[key] for row in columns] for key in columns[0]})
         study(directory, cases(options.quick), directory / "methods.csv")
+    print_tables(read_rows(directory / "methods.csv"))
     draw(read_rows(directory / "methods.csv"), read_rows(directory / "methods_columns.csv"), directory / "methods.svg")
 
 

@@ -56,8 +56,8 @@ class Effects(LoopTestCase):
         self.check_as_in_case("gravity", HEAP, "s.gravity = (3.0, -7.0)", merged(HEAP, {"scene": {"gravity": [3.0, -7.0]}}))
 
     def test_friction(self):
-        lines = "s.friction = 0.7; s.boundaries['floor'].friction = 0.6; s.boundaries['left'].friction = 0.6"
-        walls = [{**wall, "friction": 0.6} for wall in HEAP["boundary"]]
+        lines = "s.friction = 0.7; s.boundaries['floor'].friction = 0.1; s.boundaries['left'].friction = 0.1"
+        walls = [{**wall, "friction": 0.1} for wall in HEAP["boundary"]]
         self.check_as_in_case("friction", HEAP, lines, merged(HEAP, {"scene": {"friction": 0.7}, "boundary": walls}))
 
     def test_force_on_a_lid(self):

@@ -23,9 +23,8 @@ module gravier_check_schedule
   integer, parameter :: early_check = 2
   !> iterations between two checks, over those made: at least where they are not due, and at most
   real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
-  !> the least pause where the estimate is asked for, over the iterations made, and in iterations: what such a check costs
-  real(dp), parameter :: estimate_pause = 0.15_dp
-  integer, parameter :: estimate_cost = 3
+  !> what a check costs that asks for the estimate, in iterations
+  real(dp), parameter :: estimate_cost = 3.0_dp
   !> times the goal: a figure of the start that may meet it in the first iterations
   real(dp), parameter :: near_the_goal = 3.0_dp
   !> what is left of the figure since the last check where the next one need not wait twice as long
@@ -121,7 +120,9 @@ contains
     end if
   end function is_worth_a_check
 
-  !> Whether the last check lies far enough back.
+  !> Whether the last check lies far enough back. Where the estimate is asked for, pauses of p iterations until a solve ends, which it may do
+  !> in the next T, cost p/2 iterations made in vain and T/p checks: least with p^2 = 2 T estimate_cost. T is a quarter of the iterations
+  !> made.
   pure logical function has_paused(self, iteration, regular)
     class(check_schedule_t), intent(in) :: self
     integer, intent(in) :: iteration
@@ -130,7 +131,7 @@ contains
     associate (pause => iteration - self%last_check)
       has_paused = pause > max(self%pause, least_pause*iteration)
       if (self%by_estimate) then
-        has_paused = has_paused .and. pause >= max(real(estimate_cost, dp), estimate_pause*iteration)
+        has_paused = has_paused .and. pause >= sqrt(0.5_dp*iteration*estimate_cost)
       else
         has_paused = has_paused .or. regular
       end if

@@ -229,8 +229,7 @@ contains
       if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction
-      if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, physics, terms%tangential_restitution, &
-        & this, sub)
+      if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, physics, this, sub)
       if (row%rolling_radius == 0) return
       sub%hot(q, row%rolling_radius, g) = rolling_radius(sub%hot(q, row%lever_i, g), sub%hot(q, row%lever_j, g))
       sub%hot(q, row%rolling_friction, g) = terms%rolling_friction
@@ -300,14 +299,12 @@ contains
   end function cell_adds
 
   !> Tangential velocity at the start of the step as far as the contact sends it back (Newton), or what springs make of it.
-  subroutine pack_tangential_shift(view, found, boundaries, kernels, physics, restitution, this, sub)
+  subroutine pack_tangential_shift(view, found, boundaries, kernels, physics, this, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
-    !> tangential
-    real(dp), intent(in) :: restitution
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
     real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), v(kernels%nd)
@@ -319,7 +316,7 @@ contains
       v(d) = sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
     end do
     do d = 2, kernels%nd
-      sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = restitution*v(d)
+      sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = this%terms%tangential_restitution*v(d)
     end do
     if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics%h, this%c, v, sub)
   end subroutine pack_tangential_shift

@@ -320,8 +320,8 @@ contains
     call sim%free()
   end subroutine test_schedule
 
-  !> Checks that ask for the estimate: none before it is trusted, unless what is nearly at rest may end the solve, then none three
-  !> iterations or 0.15 of those made after another.
+  !> Checks that ask for the estimate: none before it is trusted, unless what is nearly at rest may end the solve, then none
+  !> within the root of 1.5 times the iterations made.
   subroutine test_schedule_of_estimates()
     type(simulation_t) :: sim
     type(check_schedule_t) :: schedule
@@ -335,21 +335,20 @@ contains
     schedule%trusted = 4
     call set_progress(sim%problem, 1.0e-4_dp)
     call schedule%note_check(0, 2.9e-3_dp, 1.0e-3_dp)
-    call check(.not. calls(schedule, sim%problem, method, 2), "nearly at rest, but just checked")
-    call check(calls(schedule, sim%problem, method, 3), "nearly at rest: a check before the estimate is trusted")
+    call check(calls(schedule, sim%problem, method, 2), "nearly at rest: a check before the estimate is trusted")
     call schedule%note_check(0, 3.1e-3_dp, 1.0e-3_dp)
     call check(.not. calls(schedule, sim%problem, method, 3), "far from rest: none before it is trusted")
     call check(calls(schedule, sim%problem, method, 4), "the first when it is trusted")
     ! the ratio is 15 from here on
     call schedule%note_check(4, 1.5e-3_dp, 1.0e-3_dp)
     call set_progress(sim%problem, 6.0e-5_dp)
-    call check(.not. calls(schedule, sim%problem, method, 6), "0.9 times the goal is expected, but a check costs three iterations")
-    call check(calls(schedule, sim%problem, method, 7), "and after three")
+    call check(.not. calls(schedule, sim%problem, method, 7), "0.9 times the goal is expected, but too soon")
+    call check(calls(schedule, sim%problem, method, 8), "and late enough")
     call schedule%note_check(40, 9.0e-4_dp, 1.0e-3_dp)
     do iteration = 41, 60
       if (calls(schedule, sim%problem, method, iteration)) exit
     end do
-    call check_equal(iteration, 48, "0.15 of the iterations made")
+    call check_equal(iteration, 49, "the root of 1.5 times the iterations made")
     call sim%free()
   end subroutine test_schedule_of_estimates
 
