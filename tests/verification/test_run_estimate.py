@@ -68,7 +68,8 @@ class Estimates(RunTestCase):
     def test_settling(self):
         for acceleration in ("none", "momentum"):
             self.check(f"settling {acceleration}", DISKS, (1e-3, 1e-4), 2, acceleration=acceleration, criterion="residual")
-            self.check(f"settling {acceleration} velocity", DISKS, (1.0, 0.1), 0 if acceleration == "none" else 2, acceleration=acceleration)
+            # to an accuracy of 1.0 solves of eight iterations have two checks, which do not show how errors decrease
+            self.check(f"settling {acceleration} velocity", DISKS, (0.5, 0.05), 0 if acceleration == "none" else 2, acceleration=acceleration)
         self.assert_most_hold()
 
     def test_rest(self):
