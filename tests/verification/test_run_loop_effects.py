@@ -58,7 +58,9 @@ class Effects(LoopTestCase):
     def test_friction(self):
         lines = "s.friction = 0.7; s.boundaries['floor'].friction = 0.1; s.boundaries['left'].friction = 0.1"
         walls = [{**wall, "friction": 0.1} for wall in HEAP["boundary"]]
-        self.check_as_in_case("friction", HEAP, lines, merged(HEAP, {"scene": {"friction": 0.7}, "boundary": walls}))
+        # grains slide along the floor
+        slope = merged(HEAP, {"scene": {"gravity": [5.0, -8.0]}, "time": {"steps": 120}})
+        self.check_as_in_case("friction", slope, lines, merged(slope, {"scene": {"friction": 0.7}, "boundary": walls}))
 
     def test_force_on_a_lid(self):
         heavy = PRESS["boundary"][:3] + [{**PRESS["boundary"][3], "force": [0.0, -500.0]}]
