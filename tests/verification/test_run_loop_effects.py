@@ -56,11 +56,15 @@ class Effects(LoopTestCase):
         self.check_as_in_case("gravity", HEAP, "s.gravity = (3.0, -7.0)", merged(HEAP, {"scene": {"gravity": [3.0, -7.0]}}))
 
     def test_friction(self):
-        lines = "s.friction = 0.7; s.boundaries['floor'].friction = 0.1; s.boundaries['left'].friction = 0.1"
-        walls = [{**wall, "friction": 0.1} for wall in HEAP["boundary"]]
-        # grains slide along the floor
-        slope = merged(HEAP, {"scene": {"gravity": [5.0, -8.0]}, "time": {"steps": 120}})
+        """Between grains and at boundaries, along which the grains slide."""
+        slope = merged(PRESS, {"boundary": PRESS["boundary"][:3], "scene": {"friction": 0.3, "gravity": [5.0, -8.0]}, "time": {"steps": 120},
+                               "output": {"every": 20}})
+        lines = "s.friction = 0.7; s.boundaries['floor'].friction = 0.1; s.boundaries['right'].friction = 0.1"
+        walls = [{**wall, "friction": 0.3 if wall["name"] == "left" else 0.1} for wall in slope["boundary"]]
         self.check_as_in_case("friction", slope, lines, merged(slope, {"scene": {"friction": 0.7}, "boundary": walls}))
+        # grains alone
+        walls = [{**wall, "friction": 0.3} for wall in slope["boundary"]]
+        self.check_as_in_case("grains", slope, "s.friction = 0.7", merged(slope, {"scene": {"friction": 0.7}, "boundary": walls}))
 
     def test_force_on_a_lid(self):
         heavy = PRESS["boundary"][:3] + [{**PRESS["boundary"][3], "force": [0.0, -500.0]}]
