@@ -279,3 +279,15 @@ class RunTestCase(unittest.TestCase):
         for name, value in arrays.items():
             if np.asarray(value).dtype.kind == "f":
                 self.assertTrue(np.all(np.isfinite(value)), f"{name} has NaN or infinity")
+
+
+class StudyTestCase(RunTestCase):
+    """Runs of a study, a script in drivers/studies."""
+
+    #: path of the script
+    study = ""
+
+    def run_study(self, *arguments):
+        environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
+        return subprocess.run([sys.executable, self.study, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)

@@ -1,26 +1,20 @@
 """The study of forces: its exponents on forces drawn from known distributions, and a quick run."""
 import csv
 import os
-import subprocess
 import sys
 import unittest
 
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase
+from gravier_runs import SOURCE, StudyTestCase
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
 import study_forces  # noqa: E402
 
-PROGRAM = os.path.join(SOURCE, "drivers/studies/study_forces.py")
 
+class Forces(StudyTestCase):
 
-class Forces(RunTestCase):
-
-    def run_study(self, *arguments):
-        environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
-        return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    study = os.path.join(SOURCE, "drivers/studies/study_forces.py")
 
     def test_exponents(self):
         """Forces above 1 fall as exp(-beta f), and those below go as f^alpha, by construction."""

@@ -1,27 +1,21 @@
 """The study of rheology: its power law on values of a known one, its bounds, and a quick run."""
 import csv
 import os
-import subprocess
 import sys
 import unittest
 
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase
+from gravier_runs import SOURCE, StudyTestCase
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
 import oracle_table  # noqa: E402
 import study_rheology  # noqa: E402
 
-PROGRAM = os.path.join(SOURCE, "drivers/studies/study_rheology.py")
 
+class Rheology(StudyTestCase):
 
-class Rheology(RunTestCase):
-
-    def run_study(self, *arguments):
-        environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
-        return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    study = os.path.join(SOURCE, "drivers/studies/study_rheology.py")
 
     def test_power_law(self):
         numbers = np.array([1e-4, 1e-3, 1e-2, 3e-2, 1e-1])

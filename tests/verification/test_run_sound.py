@@ -1,7 +1,6 @@
 """The study of sound: its matrix of springs on a pair that is known, the quick run, and a verdict that can fail."""
 import csv
 import os
-import subprocess
 import sys
 import unittest
 from pathlib import Path
@@ -9,20 +8,15 @@ from unittest import mock
 
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase
+from gravier_runs import PROGRAMS, SOURCE, StudyTestCase
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
 import study_sound  # noqa: E402
 
-PROGRAM = os.path.join(SOURCE, "drivers/studies/study_sound.py")
 
+class Sound(StudyTestCase):
 
-class Sound(RunTestCase):
-
-    def run_study(self, *arguments):
-        environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
-        return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    study = os.path.join(SOURCE, "drivers/studies/study_sound.py")
 
     def test_matrix_of_a_pair(self):
         """Two disks through the side of the cell: a stretch costs k, a slide the tangential stiffness, a common turn about the middle

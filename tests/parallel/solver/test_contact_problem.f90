@@ -4,15 +4,13 @@ program test_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_is_nan, ieee_quiet_nan
   use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_invalid
   use gravier_kinds, only: dp, i8
-  use gravier_errors, only: error_t
-  use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_config, only: config_t, parse_config
-  use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_simulation, only: simulation_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_test_contact_columns, only: contact_column, put_contact_column, pack_columns, pack_pairs
+  use gravier_test_simulations, only: make_lattice
   use gravier_check, only: check, check_close, check_equal, finish_checks
   use gravier_contact_operator, only: find_local_operator
   implicit none
@@ -22,7 +20,6 @@ program test_contact_problem
     real(dp), allocatable :: values(:, :)
   end type shared_field_t
 
-  character(len=*), parameter :: newline = new_line("a")
   type(communicator_t), target :: comm
   integer :: dimension, k
   integer, parameter :: counts(*) = [2, 3, 9]
@@ -46,39 +43,6 @@ program test_contact_problem
   call stop_parallel()
 
 contains
-
-  !> A lattice of random grains near each other, with an alert distance that makes them all touch: the velocities that
-  !> follow from their identifiers press some together and part others.
-  subroutine make(dimension, n_subdomains, friction, sim)
-    integer, intent(in) :: dimension, n_subdomains
-    real(dp), intent(in) :: friction
-    type(simulation_t), intent(inout) :: sim
-    type(config_t) :: config
-    type(error_t), allocatable :: error
-    type(step_figures_t) :: figures
-    character(len=:), allocatable :: counts
-    integer :: s, b, d
-
-    counts = "9, 8"
-    if (dimension == 3) counts = "5, 4, 4"
-    call parse_config("lattice", "&scene dimension = "//to_text(dimension)//", bodies = 'lattice', lattice_count = "//counts// &
-      & ", radius_min = 0.05, radius_max = 0.1, density = 100, alert_distance = 0.07, friction = "//to_text(friction)//" /"// &
-      & newline//"&time step = 1, steps = 1, theta = 1 / &solver method = 'nscdd' /"//newline// &
-      & "&decomposition subdomains = "//to_text(n_subdomains)//" /", config, error)
-    call check(.not. allocated(error), "configuration")
-    call sim%init(comm, config, error)
-    call sim%assemble(figures)
-    call check(.not. allocated(error), "assembly")
-    do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s))
-        do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
-            sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
-          end do
-        end do
-      end associate
-    end do
-  end subroutine make
 
   !> Impulses that follow from the pair, in the cone of friction.
   subroutine set_impulses(problem)
@@ -113,8 +77,8 @@ contains
     integer :: s
     logical :: same
 
-    call make(dimension, 1, friction, one)
-    call make(dimension, n_subdomains, friction, many)
+    call make_lattice(comm, dimension, 1, friction, "&solver method = 'nscdd' /", one)
+    call make_lattice(comm, dimension, n_subdomains, friction, "&solver method = 'nscdd' /", many)
     call check_equal(many%problem%n_contacts, one%problem%n_contacts, "contacts")
     call set_impulses(one%problem)
     call set_impulses(many%problem)
@@ -165,7 +129,7 @@ contains
     integer :: s, b, c, d, k
     logical :: same, alike, as_loads
 
-    call make(dimension, 3, 0.3_dp, sim)
+    call make_lattice(comm, dimension, 3, 0.3_dp, "&solver method = 'nscdd' /", sim)
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
         call check(.not. allocated(sub%attraction_load), "no attraction_load without attractions")
@@ -267,7 +231,7 @@ contains
     real(dp) :: factor, w(2), share(3)
     logical :: right
 
-    call make(dimension, 9, friction, sim)
+    call make_lattice(comm, dimension, 9, friction, "&solver method = 'nscdd' /", sim)
     right = .true.
     do round = 1, 3
       do s = 1, size(sim%problem%sub)
@@ -343,7 +307,7 @@ contains
     type(simulation_t) :: sim
     integer :: s, k
 
-    call make(dimension, 9, 0.3_dp, sim)
+    call make_lattice(comm, dimension, 9, 0.3_dp, "&solver method = 'nscdd' /", sim)
     sim%problem%velocity_scale = 4.0_dp
     do s = 1, size(sim%problem%sub)
       sim%problem%sub(s)%velocity(:, :) = sim%problem%sub(s)%v_free
@@ -376,7 +340,7 @@ contains
     real(dp) :: residual, defect
     integer :: s
 
-    call make(dimension, 3, 0.3_dp, sim)
+    call make_lattice(comm, dimension, 3, 0.3_dp, "&solver method = 'nscdd' /", sim)
     call check(.not. sim%problem%any_impulse(), "no impulse")
     sim%problem%force_scale = 0.5_dp
     call sim%problem%evaluate()
@@ -402,7 +366,7 @@ contains
     ! builds for debugging stop at the first operation on a NaN
     call ieee_get_halting_mode(ieee_invalid, halting)
     if (halting) return
-    call make(2, 4, 0.3_dp, sim)
+    call make_lattice(comm, 2, 4, 0.3_dp, "&solver method = 'nscdd' /", sim)
     call set_impulses(sim%problem)
     do s = 1, size(sim%problem%sub)
       if (sim%problem%sub(s)%subdomain == 4) sim%problem%sub(s)%impulse(1, 1, 1) = ieee_value(1.0_dp, ieee_quiet_nan)
