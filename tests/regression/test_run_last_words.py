@@ -247,15 +247,18 @@ class LastWords(RunTestCase):
             self.assertGreater(package.velocity_scale(), 0.0)
 
     def test_layers(self):
-        """Deep cold starts go through layers, and the log says so."""
+        """Deep cold starts go through layers, continue from them where that is better, and the log says so. A column of 60 disks continues
+        from each pass, with half of the relaxations that it takes without (measured: 0.48)."""
         tower = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../tower.csv", "friction": 0.0},
                  "boundary": {"shape": "plane", "normal": [0.0, 1.0]},
                  "time": {"step": 1e-3, "steps": 3}, "solver": {"warm_start": False}, "output": {"directory": "results"}}
         write(self.here("tower.csv"), "id,x,y,radius\n" + "".join(f"{k},0,{0.1 * k - 0.05},0.05\n" for k in range(1, 61)))
         run = run_case(tower, 1, self.here("layers"))
-        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, [0-3] of them continued from it; the passes took as much work as \d+ sweeps\n")
+        self.assertRegex(run.stdout, r"\nlayers      3 solves made a pass over layers, 3 of them continued from it; the passes took as much work as \d+ sweeps\n")
         none = run_case(merged(tower, {"solver": {"layered_start": False}}), 1, self.here("no layers"))
         self.assertNotIn("\nlayers  ", none.stdout)
+        relaxed = [int(re.search(r"sweeps, (\d+) contact relaxations", each.stdout).group(1)) for each in (run, none)]
+        self.assertLess(relaxed[0], 0.7 * relaxed[1])
 
 
 if __name__ == "__main__":

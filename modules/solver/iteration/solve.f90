@@ -13,6 +13,7 @@ module gravier_solve
   use gravier_stagnation, only: stagnation_t
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
+  use gravier_waking, only: waking_t
   use gravier_vain_impulses, only: normals_are_in_vain
   implicit none
   private
@@ -121,6 +122,7 @@ module gravier_solve
     type(check_schedule_t) :: schedule
     type(stagnation_t) :: stagnation
     type(layer_trial_t) :: trial
+    type(waking_t) :: waking
     !> the first defect, or the scale of forces where that is larger [N s]
     real(dp) :: reference = 0.0_dp
     !> when the solve began, and what its checks have taken [s]
@@ -250,25 +252,18 @@ contains
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
     call state%schedule%note_check(report%iterations, report%figure, report%goal)
-    if (.not. finished .and. problem%n_asleep > 0) call wake_if_due(state, problem, control, report)
+    if (.not. finished .and. problem%n_asleep > 0) then
+      if (state%waking%is_due(problem%asleep_share, report%residual <= control%tolerance, &
+        & .not. state%by_estimate .or. report%iterations >= copies_ready, report%figure)) then
+        call problem%wake()
+        report%woken = .true.
+        ! changes of all contacts are other changes
+        call state%schedule%forget_ratio()
+      end if
+    end if
     state%checking = state%checking + clock() - start
     call stop_timer(phase_check)
   end subroutine check
-
-  !> Where most of the defect lies in contacts that sleep, no sweep would lower it: they wake. Else the other contacts'
-  !> part has to fall first, and may do.
-  subroutine wake_if_due(state, problem, control, report)
-    type(solve_state_t), intent(inout) :: state
-    type(contact_problem_t), intent(inout) :: problem
-    type(solve_control_t), intent(in) :: control
-    type(solve_report_t), intent(inout) :: report
-
-    if (problem%asleep_share < 0.5_dp .and. report%residual > control%tolerance) return
-    call problem%wake()
-    report%woken = .true.
-    ! changes of all contacts are other changes
-    call state%schedule%forget_ratio()
-  end subroutine wake_if_due
 
   !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
   subroutine find_whether_met(state, problem, method, control, report, is_met)
@@ -446,12 +441,15 @@ contains
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: has_stagnated
+    real(dp) :: figures(2)
     logical :: due, in_vain
 
     has_stagnated = .false.
     ! the residual of no impulses is relative to something else
     if (report%iterations == 0) return
-    call state%stagnation%note(problem, report%iterations, report%figure, method%acceleration%on, &
+    figures(1) = report%figure
+    figures(2) = report%velocity_error
+    call state%stagnation%note(problem, report%iterations, figures, method%acceleration%on, &
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
     if (.not. due) return
     if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)

@@ -1,8 +1,9 @@
 !> Whether a solve gains anything yet.
 !>
-!> A solve has stagnated if its figure has not fallen by a tenth for so many iterations, accelerated or plain, and for as many as
-!> it has had until then, and if it has had enough iterations for a wave to run from end to end and back. Either its method finds
-!> no solution, or there is none: then the impulses grow in vain (gravier_vain_impulses).
+!> A solve has stagnated if neither its figure nor its estimated velocity error has fallen by a tenth for so many iterations, accelerated
+!> or plain, and for as many as it has had until then, and if it has had enough iterations for a wave to run from end to end and back.
+!> The figure may rise while the error falls, because near rest the criterion allows less. Either the method finds no solution, or there
+!> is none: then the impulses grow in vain (gravier_vain_impulses).
 module gravier_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
@@ -24,9 +25,9 @@ module gravier_stagnation
   integer, parameter :: waves = 6
 
   type :: stagnation_t
-    !> lowest figure and the iteration it was found at; iteration from which on the solve is looked at
-    real(dp), private :: best = huge(1.0_dp)
-    integer, private :: best_at = 0, next_look = 0
+    !> lowest figure and lowest velocity error so far; iteration from which on the solve is looked at
+    real(dp), private :: best(2) = huge(1.0_dp)
+    integer, private :: next_look = 0
     !> impulses after the iteration `kept_at`, of the subdomains of this rank; 0 where there are none
     integer, private :: kept_at = 0
     type(kept_impulses_t), allocatable, private :: kept(:)
@@ -39,21 +40,21 @@ module gravier_stagnation
 
 contains
 
-  !> A check after an iteration found this figure: whether nothing was gained for too long.
-  subroutine stagnation_note(self, problem, iteration, figure, accelerated, missing_residual, due)
+  !> A check after an iteration found these figures: whether nothing was gained for too long.
+  subroutine stagnation_note(self, problem, iteration, figures, accelerated, missing_residual, due)
     class(stagnation_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: iteration
-    real(dp), intent(in) :: figure
+    !> what is compared with the goal of the solve, and the estimated velocity error
+    real(dp), intent(in) :: figures(2)
     logical, intent(in) :: accelerated
     !> the residual where it is above its tolerance, else 0
     real(dp), intent(in) :: missing_residual
     logical, intent(out) :: due
 
     due = .false.
-    if (figure < gained*self%best) then
-      self%best = figure
-      self%best_at = iteration
+    if (any(figures < gained*self%best)) then
+      where (figures < gained*self%best) self%best = figures
       self%next_look = 2*iteration + merge(patience, plain_patience, accelerated)
       if (missing_residual > 0.0_dp .and. missing_residual < small_residual) &
         & self%next_look = iteration + residual_patience*(plain_patience + iteration)

@@ -13,8 +13,9 @@ module gravier_ways
 
   !> length of the way of what none leads to
   real(dp), parameter :: unreached = huge(1.0_dp)
-  !> fraction of the largest free speed below which the shift of a closed contact is rounding of places
-  real(dp), parameter :: rounded = 1.0e-3_dp
+  !> a contact is closed where its shift is below this fraction of the largest free speed, which is rounding of places, or below that
+  !> fraction of the velocity that errors are compared with: gaps that the solve before has left close at once
+  real(dp), parameter :: rounded = 1.0e-3_dp, soon_closed = 0.1_dp
 
   !> Of one subdomain.
   type :: ways_t
@@ -37,14 +38,16 @@ contains
     type(ways_t), intent(out) :: ways(:)
     !> of lengths [m]; absent, each contact counts 1
     real(dp), intent(in), optional :: unit
+    real(dp) :: closed
     integer :: s
 
+    closed = max(rounded*problem%velocity_scale, soon_closed*problem%error_scale)
     do s = 1, size(ways)
       associate (sub => problem%sub(s))
         allocate (ways(s)%length(sub%n_columns), source=unreached)
         allocate (ways(s)%open(sub%n_columns), source=.false.)
         allocate (ways(s)%pair(2, sub%n_contacts), ways(s)%step(sub%n_contacts))
-        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, rounded*problem%velocity_scale, ways(s), unit)
+        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, closed, ways(s), unit)
       end associate
     end do
   end subroutine list_closed

@@ -424,12 +424,13 @@ contains
     type(simulation_t) :: sim
     type(stagnation_t) :: stagnation
     type(creep_t) :: creep
+    real(dp), parameter :: figures(2) = 1.0_dp
     logical :: due, stagnates, in_vain
 
     call make_column(3, 2, "&solver method = 'nscdd' /", sim)
-    call stagnation%note(sim%problem, 10, 1.0_dp, .true., 0.0_dp, due)
+    call stagnation%note(sim%problem, 10, figures, .true., 0.0_dp, due)
     call check(.not. due, "the first figure is a gain")
-    call stagnation%note(sim%problem, 5000, 1.0_dp, .true., 0.0_dp, due)
+    call stagnation%note(sim%problem, 5000, figures, .true., 0.0_dp, due)
     call stagnation%judge(sim%problem, 5000, 834, stagnates, in_vain)
     call check(.not. stagnates, "5000 iterations are too few for a depth of 834")
     call stagnation%judge(sim%problem, 5000, 833, stagnates, in_vain)

@@ -14,21 +14,29 @@ program test_stagnation
   call check_equal(first_due(.true., 0.5_dp, 1.0_dp), 1020, "but not where a large one is")
   call check_equal(first_due(.true., 0.0_dp, 0.9995_dp), 0, "a figure that goes on falling is none")
   call check_equal(first_due(.true., 0.0_dp, 0.99999_dp), 1020, "one that falls by less than a tenth is")
+  call check_equal(first_due(.true., 0.0_dp, 1.0001_dp, 0.9995_dp), 0, "a figure that rises is none while the velocity error falls")
+  call check_equal(first_due(.true., 0.0_dp, 0.9995_dp, 1.0001_dp), 0, "nor is a velocity error that rises while the figure falls")
   call finish_checks()
 
 contains
 
-  !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none is.
-  integer function first_due(accelerated, missing_residual, factor)
+  !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none is. The
+  !> velocity error falls by the same factor, or by its own.
+  integer function first_due(accelerated, missing_residual, factor, factor_of_error)
     logical, intent(in) :: accelerated
     real(dp), intent(in) :: missing_residual, factor
+    real(dp), intent(in), optional :: factor_of_error
+    real(dp) :: factors(2), figures(2)
     type(stagnation_t) :: stagnation
     integer :: iteration
     logical :: due
 
+    factors(:) = factor
+    if (present(factor_of_error)) factors(2) = factor_of_error
     first_due = 0
     do iteration = 10, 20000, 10
-      call stagnation%note(problem, iteration, factor**iteration, accelerated, missing_residual, due)
+      figures(:) = factors**iteration
+      call stagnation%note(problem, iteration, figures, accelerated, missing_residual, due)
       if (.not. due) cycle
       first_due = iteration
       return
