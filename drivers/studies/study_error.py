@@ -94,6 +94,13 @@ def column(count, friction=0.5):
     return make
 
 
+def from_zero(make):
+    """The same scene where each step starts from zero impulses."""
+    def made(directory):
+        return {**make(directory), "solver": {"warm_start": False}}
+    return made
+
+
 def towers(heights):
     def make(directory):
         centres = np.array([[2.0 * DIAMETER * (1 + place), DIAMETER * (0.5 + level)]
@@ -259,6 +266,8 @@ def scenes():
         Scene("column of 100", column(100), rest, "--situations", "program,cold,lost:0.05", quick=True),
         # what sinks in one step opens gaps for the next: rest is not quite the solution then
         Scene("column of 100, run", column(100), "--situations", "none", "--steps", "500", "--every", "25", quick=True),
+        # gaps of a hundredth of g h^2 are left between the disks
+        Scene("column of 400, two steps later", from_zero(column(400)), "--steps", "2", "--situations", "cold", quick=True),
         Scene("column of 1000", column(1000), rest, "--situations", "program,cold,lost:0.05", quick=True),
         Scene("columns of 10 to 160", towers((10, 20, 40, 80, 160)), rest, "--situations", "cold,lost:0.05", quick=True),
         Scene("periodic tower 10 x 40", tower(10, 40), rest, "--situations", "program,cold,lost:0.05", quick=True),
