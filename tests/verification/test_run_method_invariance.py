@@ -50,13 +50,14 @@ class MethodInvariance(RunTestCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        # with friction 0.1 nonlinear Gauss-Seidel stalls above 1e-9, as it may (see above), in packings that have not come to rest
-        cls.packing = settled_disks(cls.scratch, count=(16, 16))
+        # with friction 0.1 velocities of 256 disks differ by more than the bound, as they may (see above), and nonlinear Gauss-Seidel stalls
+        # above 1e-9 on 600 after 280, 300 and 310 steps; after 320 and 340 it does not
+        cls.packings = {0.0: settled_disks(cls.scratch, count=(16, 16)), 0.1: settled_disks(cls.here(cls, "more"), steps=340)}
 
     def step(self, title, friction, method, part=None):
         subdomains, partition, kind = part or (1, "grid", "dual")
         case = merged({
-            "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.packing, "friction": friction},
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.packings[friction], "friction": friction},
             "time": {"step": STEP, "steps": 1},
             "solver": {"criterion": "residual", "tolerance": TOLERANCE, "max_iterations": 160000, "check_every": 10, "warm_start": False},
             "decomposition": {"subdomains": subdomains, "partition": partition, "kind": kind},
