@@ -1,15 +1,21 @@
-# gravier_compile_options(TARGET): the language standard, the warnings and the flags of each build type.
+# gravier_compile_options(TARGET [OPTIMISE LEVEL]): the language standard, the warnings and the flags of each build type. LEVEL is that of
+# Release builds, 3 unless told.
 function(gravier_compile_options target)
+  cmake_parse_arguments(OPTIONS "" "OPTIMISE" "" ${ARGN})
+  if(NOT DEFINED OPTIONS_OPTIMISE)
+    set(OPTIONS_OPTIMISE 3)
+  endif()
   target_compile_options(${target} PRIVATE
     -std=f2008 -Wall -Wextra -Wimplicit-interface -Warray-temporaries
     $<$<BOOL:${GRAVIER_WERROR}>:-Werror>
-    $<$<CONFIG:Release>:-O3 -fno-backtrace> $<$<AND:$<CONFIG:Release>,$<BOOL:${GRAVIER_ARCH}>>:-march=${GRAVIER_ARCH}>
-    $<$<CONFIG:Debug>:-Og -g -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow>
+    $<$<CONFIG:Release>:-O${OPTIONS_OPTIMISE} -fno-backtrace> $<$<AND:$<CONFIG:Release>,$<BOOL:${GRAVIER_ARCH}>>:-march=${GRAVIER_ARCH}>
+    $<$<CONFIG:Debug>:-Og -g${GRAVIER_DEBUG_LEVEL} -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow>
     $<$<CONFIG:Sanitize>:-O1 -g -fbacktrace -fsanitize=address,undefined -fno-omit-frame-pointer>)
   target_link_options(${target} PRIVATE $<$<CONFIG:Sanitize>:-fsanitize=address,undefined>)
 endfunction()
 
 set(GRAVIER_ARCH native CACHE STRING "value of -march in Release builds; empty: none")
+set(GRAVIER_DEBUG_LEVEL 2 CACHE STRING "what Debug builds tell debuggers: 2 of lines and variables, 1 of lines alone, for backtraces")
 
 # gravier_expand(VARIABLE TEMPLATE...): the list of the Fortran files that fypp makes of templates, NAME.f90 of NAME.fypp. Messages of
 # the compiler name the lines of the template. Templates include NAME.fypi, from beside them or by its path below modules/.

@@ -254,8 +254,8 @@ class Drift(RunTestCase):
 
     def test_ranks_under_pistons(self):
         """The same bits on 1, 2 and 4 ranks, of which some know the lid by hearsay; a plane, and glued grains."""
-        grid = {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 8, "grid": [2, 4]}, "time": {"steps": 60}}
-        for build, more in ((self.glued_piston, {"solver": {"tolerance": 1e-3}, "time": {"steps": 30}}),
+        grid = {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 8, "grid": [2, 4]}, "time": {"steps": 30}}
+        for build, more in ((self.glued_piston, {"solver": {"tolerance": 1e-3}, "time": {"steps": 15}}),
                             (self.pressed, {"scene": {"overlap_allowed": 1e-3 * RADIUS}, "output": {"every": 10}})):
             runs = each(build, [(f"{build.__name__} {ranks}", merged(grid, more), ranks) for ranks in (1, 2, 4)])
             self.assertGreater(runs[0].history()["projected"].sum(), 10)

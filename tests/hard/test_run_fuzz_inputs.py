@@ -19,7 +19,7 @@ GRAVIER = os.path.join(PROGRAMS, "gravier")
 class FuzzInputs(RunTestCase):
 
     def test_all_kinds(self):
-        figures = fuzz_inputs.fuzz(1, 200, self.here("fuzz"), keep=self.here("findings"))
+        figures = fuzz_inputs.fuzz(1, 100, self.here("fuzz"), keep=self.here("findings"))
         for figure in figures:
             print(figure, file=sys.stderr)
             self.assertGreater(figure.trials, 0)

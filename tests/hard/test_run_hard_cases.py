@@ -1,5 +1,6 @@
-"""All hard cases by a selection of methods: NSCDD on two ranks, and one of the other methods in turn on one. The table of all
-methods is drivers/studies/study_hard.py."""
+"""All hard cases by a selection of methods: NSCDD on two ranks, but on one where steps are many or solves slow (the bits are the same,
+test_run_rank_invariance.py), and one of the other methods in turn on one. Methods whose iterations are dear make a few steps, in which
+what is thrown meets. The table of all methods is drivers/studies/study_hard.py."""
 import unittest
 
 import numpy as np
@@ -9,13 +10,16 @@ from hard_cases import BASE, METHODS, cases, disagreement, methods_of, play, uni
 
 CASES = cases()
 OTHERS = [title for title in METHODS if title != "nscdd"]
+DEAR_STEPS = 8
 
 
 def selection(number, case):
     """(title, groups, ranks) of the runs of a case."""
     if case.methods:
-        return [(title, groups, 1 + k % 2) for k, (title, groups) in enumerate(case.methods.items())]
-    return [(title, METHODS[title], ranks) for title, ranks in (("nscdd", 2), (OTHERS[number % len(OTHERS)], 1))]
+        # some on two ranks, of each method
+        return [(title, groups, 2 if k % 5 == 0 else 1) for k, (title, groups) in enumerate(case.methods.items())]
+    ranks = 1 if case.slow or case.steps >= 100 else 2
+    return [(title, METHODS[title], ranks) for title, ranks in (("nscdd", ranks), (OTHERS[number % len(OTHERS)], 1))]
 
 
 class HardCases(RunTestCase):
@@ -25,7 +29,7 @@ class HardCases(RunTestCase):
     def run_once(self, case, title, groups, ranks):
         key = case.name, title, ranks
         if key not in self.played:
-            self.played[key] = play(case, title, groups, ranks, self.here(f"{list(CASES).index(case.name)} {title} {ranks}"))
+            self.played[key] = play(case, title, groups, ranks, self.here(f"{list(CASES).index(case.name)} {title} {ranks}"), dear_steps=DEAR_STEPS)
         return self.played[key]
 
     def play(self, number, case):

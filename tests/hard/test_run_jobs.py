@@ -105,12 +105,12 @@ class Jobs(RunTestCase):
             self.assertEqual(len(read_csv(os.path.join(self.work, f"sweep_{k}", "history.csv"))["step"]), 3)
 
     def test_without_a_scheduler_it_goes_on_by_itself(self):
-        write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 200}}))
-        done = self.sh("sh", "mpirun.sh", RANKS=1, SECONDS_EACH=1.05)
+        write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 80}}))
+        done = self.sh("sh", "mpirun.sh", RANKS=1, SECONDS_EACH=1.02)
         self.assertEqual(done.returncode, 0, done.stderr)
         with open(os.path.join(self.work, "case.out"), encoding="utf-8") as file:
             self.assertGreater(file.read().count("interrupted ***"), 0)
-        self.assertEqual(len(self.history("part")), 201)
+        self.assertEqual(len(self.history("part")), 81)
 
     def test_bad_use_and_failures(self):
         write(os.path.join(self.work, "case.nml"), namelist({**CASE, "output": {"directory": "part"}}))

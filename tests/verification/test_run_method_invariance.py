@@ -50,14 +50,14 @@ class MethodInvariance(RunTestCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        # with friction 0.1 nonlinear Gauss-Seidel stalls above 1e-9, as it may (see above), after 280, 300 and 310 steps; after 320
-        # and 340 it does not
-        cls.packing = settled_disks(cls.scratch, steps=340)
+        # with friction 0.1 velocities of 256 disks differ by more than the bound, as they may (see above), and nonlinear Gauss-Seidel stalls
+        # above 1e-9 on 600 after 280, 300 and 310 steps; after 320 and 340 it does not
+        cls.packings = {0.0: settled_disks(cls.scratch, count=(16, 16)), 0.1: settled_disks(cls.here(cls, "more"), steps=340)}
 
     def step(self, title, friction, method, part=None):
         subdomains, partition, kind = part or (1, "grid", "dual")
         case = merged({
-            "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.packing, "friction": friction},
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.packings[friction], "friction": friction},
             "time": {"step": STEP, "steps": 1},
             "solver": {"criterion": "residual", "tolerance": TOLERANCE, "max_iterations": 160000, "check_every": 10, "warm_start": False},
             "decomposition": {"subdomains": subdomains, "partition": partition, "kind": kind},
@@ -138,8 +138,8 @@ class MethodInvariance(RunTestCase):
         self.compare(0.0, [("nscdd_ep, mumps", nscdd_ep(30, "mumps"), part) for part in SOME])
 
     def test_nscdd_ep_by_cg_without_friction(self):
-        # one subdomain has no interface to solve
-        self.compare(0.0, [("nscdd_ep, cg", nscdd_ep(30, "cg"), part) for part in SOME[1:]])
+        # one subdomain has no interface to solve; partitions are those of the direct solve
+        self.compare(0.0, [("nscdd_ep, cg", nscdd_ep(30, "cg"), part) for part in SOME[1:3]])
 
     def test_schwarz_ec_without_friction(self):
         self.compare(0.0, [("schwarz_ec", schwarz_ec(3, 0.7), part) for part in SOME])
@@ -149,7 +149,7 @@ class MethodInvariance(RunTestCase):
         self.compare(0.1, [("nscdd", nscdd(1), part) for part in SOME] + [("schwarz", schwarz(1, 0.7), part) for part in SOME])
 
     def test_nscdd_ep_with_friction(self):
-        self.compare(0.1, [("nscdd_ep, mumps", nscdd_ep(30, "mumps"), part) for part in SOME])
+        self.compare(0.1, [("nscdd_ep, mumps", nscdd_ep(30, "mumps"), part) for part in SOME[1:3]])
 
     def test_schwarz_ec_with_friction(self):
         self.compare(0.1, [("schwarz_ec", schwarz_ec(5, 0.7), part) for part in SOME[1:3]])

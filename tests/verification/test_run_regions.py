@@ -199,17 +199,16 @@ class Regions(RunTestCase):
                 np.testing.assert_array_equal(other.history()[name], values, name)
 
     def test_ranks_and_restart(self):
-        """The same bits on 1, 2 and 4 ranks and through a restart, in 2D and 3D."""
+        """The same bits on 1 and 4 ranks in 2D, on 1 and 2 in 3D, and through a restart on other ranks."""
         for dimension in (2, 3):
             with self.subTest(dimension):
                 case = self.stirred(dimension)
                 whole = self.play(f"whole{dimension}", case)
                 self.assertGreater(whole.history()["box_pressure"].max(), 0.0)
                 self.assertGreater(whole.history()["entered"].sum(), 0)
-                for ranks in (2, 4):
-                    other = self.play(f"ranks{dimension}{ranks}", case, ranks=ranks)
-                    self.same_history(whole, other)
-                    self.assertEqual([name for name in differences(whole.results(), other.results()) if "/run@" not in name], [])
+                other = self.play(f"ranks{dimension}", case, ranks=4 if dimension == 2 else 2)
+                self.same_history(whole, other)
+                self.assertEqual([name for name in differences(whole.results(), other.results()) if "/run@" not in name], [])
                 part = self.play(f"part{dimension}", merged(case, {"time": {"steps": 30}}))
                 write(os.path.join(part.directory, "case.nml"), namelist(case))
                 again = gravier("--restart", "case.nml", ranks=2, directory=part.directory)

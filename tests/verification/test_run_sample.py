@@ -39,6 +39,12 @@ CASES = {
         "count": 100, "preparation": "compacted", "pressure": 2e4, "solid_fraction": 0.3}, "solver": {"tolerance": 1e-4}}),
 }
 UNPREPARED = [name for name, case in CASES.items() if "preparation" not in case["sample"]]
+#: steps of preparations that are compared on four ranks: grains meet, and subdomains are cut anew at step 100
+BEGINNING = {"sample": {"max_steps": 120}}
+CASES.update({f"{name}, beginning": merged(CASES[name], BEGINNING) for name in ("settled", "compacted", "pressed")})
+#: numbers of ranks by case: a preparation to its end is compared on two, for one of each kind
+RANKS = {name: (1, 2, 4) for name in CASES} | {"settled": (1, 2), "compacted": (1, 2), "pressed": (1,)}
+WHOLE = [name for name in CASES if not name.endswith("beginning")]
 
 
 def make(name, directory, ranks=1):
@@ -85,7 +91,7 @@ class Samples(RunTestCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        jobs = [(name, ranks) for name in CASES for ranks in (1, 2, 4)]
+        jobs = [(name, ranks) for name in CASES for ranks in RANKS[name]]
         runs = each(lambda name, ranks: make(name, cls.place(name, ranks), ranks), jobs)
         cls.runs = dict(zip(jobs, runs))
 
@@ -99,14 +105,15 @@ class Samples(RunTestCase):
     def test_same_bytes_on_any_ranks(self):
         for name in CASES:
             digests = set()
-            for ranks in (1, 2, 4):
-                self.assert_status(self.runs[name, ranks], 0)
+            for ranks in RANKS[name]:
+                self.assert_status(self.runs[name, ranks], 0 if name in WHOLE else 3)
                 with open(self.runs[name, ranks].path("sample.h5"), "rb") as file:
                     digests.add(hashlib.sha256(file.read()).hexdigest())
             self.assertEqual(len(digests), 1, name)
 
     def test_bodies(self):
-        for name, case in CASES.items():
+        for name in WHOLE:
+            case = CASES[name]
             with self.subTest(name):
                 bodies = self.bodies(name)
                 self.assert_finite(vars(bodies))
