@@ -148,6 +148,8 @@ FILES = [
         ("plane that tilts in a period", {**PLANE, "rotation": [0.1]}, ("no rotation but about",)),
         ("segment longer than a period", {"shape": "segment", "point": [0.0, -0.1], "end": [0.98, -0.1]}, ("a width", "period of 1.000")),
         ("segment that turns", {"shape": "segment", "point": [0.0, -0.1], "end": [0.0, 0.88], "rotation": [0.1]}, ("a width",)),
+        ("segment round a period that turns", {"shape": "segment", "point": [0.0, -0.1], "end": [1.0, -0.1], "rotation": [0.1]}, ("a width",)),
+        ("segment of a period across it", {"shape": "segment", "point": [0.0, -0.1], "end": [0.98, 0.1]}, ("a width",)),
         ("circle larger than a period", {"shape": "circle", "point": [0.5, 0.0], "radius": 0.51}, ("a width", "here 1.020")),
       )),
     *((title, namelist(merged(CASE_3D, {"scene": {"period": [1.0, 0.0, 0.0]}, "boundary": boundary})),
