@@ -228,8 +228,8 @@ contains
     end if
   end function surface_half_width
 
-  !> The edge that goes once round a period along axis `d`, so that the surface has no end there: 0 where there is none, or where the
-  !> other edge goes along that axis too.
+  !> The edge that goes once round a period along axis `d`, so that the surface has no end there: 0 where there is none, or where
+  !> the other edge goes along that axis too.
   pure integer function surface_edge_round(self, d, period) result(edge)
     class(surface_t), intent(in) :: self
     integer, intent(in) :: d
