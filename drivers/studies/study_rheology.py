@@ -3,7 +3,7 @@
 (F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Physical Review E 72 (2005) 021309) and of spheres (S. Chialvo, J. Sun and
 S. Sundaresan, Physical Review E 85 (2012) 021305; T. Hatano, Physical Review E 75 (2007) 060301).
 
-    python3 drivers/studies/study_rheology.py OUT [--quick | --least I]
+    python3 drivers/studies/study_rheology.py OUT [--quick | --least I [I]]
 
 The cell is sheared at the rate g along x over y, and its length along y is driven by a pressure P. With the mean diameter d, the mean mass m
 and the inertial number I = g sqrt(m/P) of disks, g d sqrt(rho/P) of spheres, the flow has a friction mu = -sigma_xy/sigma_yy and a solid
@@ -27,8 +27,10 @@ from whole_file import save_figure
 FRICTION = {2: 0.4, 3: 0.3}
 COUNTS = {2: [14, 14], 3: [6, 10, 6]}
 SPACING = 1.28
-NUMBERS = {2: (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1), 3: (1e-4, 1e-3, 1e-2, 3e-2, 1e-1)}
-LEAST = {2: 1e-3, 3: 1e-2}
+#: inertial numbers, each with the strain over which means are taken: slower flows take more steps
+NUMBERS = {2: {1e-4: 0.4, 3e-4: 0.8, 1e-3: 1.6, 3e-3: 6.4, 1e-2: 6.4, 3e-2: 6.4, 1e-1: 6.4},
+           3: {1e-4: 0.4, 3e-4: 0.4, 1e-3: 0.8, 3e-3: 0.8, 1e-2: 1.6, 3e-2: 1.6, 1e-1: 1.6}}
+LEAST = {2: 1e-3, 3: 3e-3}
 QUICK = {2: (1e-2, 1e-1), 3: (1e-1,)}
 #: flows up to here are slow: errors of their solves are compared with the rate times ten diameters, as between walls so far apart
 SLOW = 1e-3
@@ -37,24 +39,24 @@ DISKS = {"mu": (0.25, 1.1), "phi": (0.81, -0.3)}
 SPHERES = {"mu": 0.357, "phi": 0.596}
 #: accepted differences; that of the friction of the fastest flow, whose shocks are inelastic here
 NEAR, FAST, NEAR_FAST = {"mu": 0.05, "phi": 0.02}, 0.05, 0.12
-#: strain left out, and strain taken; of slower flows, which take more steps, half of it
-START, TAKEN = 0.4, 1.6
+#: strain left out at the start, and the part of the strain taken that a quick run takes
+START, QUICK_PART = 0.4, 0.25
 
 
 def step_of(number):
-    """A step in units of d sqrt(rho/P): a strain of 0.005 sqrt(I)."""
-    return 0.005 / np.sqrt(number)
+    """A step in units of d sqrt(rho/P): a strain of 0.005 sqrt(I), and of slow flows less. A contact takes up an impulse of about P d h in a
+    step h, to which the velocity d g of the flow has the ratio I/h: where that is too small, solves do not find the velocities."""
+    return 0.005 / np.sqrt(number) * min(1.0, 300.0 * number)
 
 
-def flow(folder, dimension, number, share):
-    """Shear at an inertial number: mu, phi and the standard errors of both, from means over eight parts of the strain."""
+def flow(folder, dimension, number, taken):
+    """Shear at an inertial number: mu, phi and the standard errors of both, from means over eight parts of the strain that is taken."""
     # grains of mean diameter 1 and of that mass, and P = 1
     density = {2: 4.0 / np.pi, 3: 6.0 / np.pi}[dimension]
     rate = number if dimension == 2 else number / np.sqrt(density)
     step = step_of(number)
-    strain = (START + TAKEN * (0.5 if number <= SLOW else 1.0)) * share
     # the loose lattice comes together in some twenty units of time
-    steps = int(20.0 / step + strain / (rate * step))
+    steps = int(20.0 / step + (START + taken) / (rate * step))
     groups = {"scene": {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "lattice", "lattice_count": COUNTS[dimension],
                         "radius_min": 0.4, "radius_max": 0.6, "density": float(density), "friction": FRICTION[dimension],
                         "period": [SPACING * n for n in COUNTS[dimension]], "cell_shear_rate": [float(rate)], "cell_pressure": [0.0, 1.0]},
@@ -64,7 +66,7 @@ def flow(folder, dimension, number, share):
         groups["solver"]["velocity_scale"] = float(10.0 * rate)
     run(folder, groups)
     history = read_history(folder)
-    late = history["time"] * rate >= 20.0 * rate + START * share
+    late = history["time"] * rate >= 20.0 * rate + START
     parts = [np.array_split(history[name][late], 8) for name in ("stress_xy", "stress_yy", "solid_fraction")]
     mu = [-np.mean(a) / np.mean(b) for a, b in zip(parts[0], parts[1])]
     phi = [np.mean(c) for c in parts[2]]
@@ -123,16 +125,19 @@ def compare(table, found):
 def main():
     parser = OneLineParser(description=__doc__)
     parser.add_argument("out", metavar="OUT", type=Path)
-    parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and half of the strain")
-    parser.add_argument("--least", type=float, metavar="I", help="smallest inertial number, 1e-4 at least (1e-3 of disks, 1e-2 of spheres)")
+    parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and a quarter of the strain")
+    parser.add_argument("--least", type=float, nargs="+", metavar="I", help="smallest inertial number of disks and of spheres, one or two "
+                        "numbers (1e-3 of disks, 3e-3 of spheres); the least there are is 1e-4")
     options = parser.parse_args()
+    if options.least and len(options.least) > 2:
+        parser.error("--least takes one or two numbers")
+    least = dict(zip((2, 3), 2 * options.least)) if options.least else LEAST
     options.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for dimension in (2, 3):
-        least = LEAST[dimension] if options.least is None else options.least
-        numbers = [number for number in (QUICK if options.quick else NUMBERS)[dimension] if number >= least]
-        found[dimension] = [(number, *flow(options.out / f"{dimension}d_{number:g}", dimension, number, 0.5 if options.quick else 1.0))
-                            for number in numbers]
+        numbers = QUICK[dimension] if options.quick else [number for number in NUMBERS[dimension] if number >= least[dimension]]
+        found[dimension] = [(number, *flow(options.out / f"{dimension}d_{number:g}", dimension, number,
+                                           NUMBERS[dimension][number] * (QUICK_PART if options.quick else 1.0))) for number in numbers]
     table = Table()
     compare(table, found)
     write_csv(options.out / "study_rheology.csv", {name: [row[k] for row in table.rows] for k, name in enumerate(table.HEADER)})

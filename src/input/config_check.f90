@@ -251,8 +251,29 @@ contains
                   error)
       call expect(report, time%stop_mass_at_least > 0.0_dp .or. .not. time%stop_mass_at_least_given, "time", "stop_mass_at_least", &
                   error)
+      associate (scene => config%scene)
+        call check_stop_strain(report, "strain", time%stop_cell_strain, scene%cell_strain_rate, scene%cell_pressure, error)
+        call check_stop_strain(report, "shear", time%stop_cell_shear, scene%cell_shear_rate, scene%cell_shear_stress, error)
+      end associate
     end associate
   end subroutine check_stops
+
+  !> Strains that end the run are those of components of the cell that move, in the direction of a rate that is given.
+  subroutine check_stop_strain(report, kind, ends, rate, stress, error)
+    type(report_t), intent(in) :: report
+    !> strain or shear
+    character(len=*), intent(in) :: kind
+    real(dp), intent(in) :: ends(3), rate(3), stress(3)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: rate_key, stress_key
+
+    rate_key = "cell_"//kind//"_rate"
+    stress_key = trim(merge("cell_shear_stress", "cell_pressure    ", kind == "shear"))
+    call expect(report, .not. any(abs(ends) > 0.0_dp .and. .not. abs(rate) > 0.0_dp .and. .not. abs(stress) > 0.0_dp), "time", &
+                "stop_cell_"//kind, error, "0 for components of the cell that neither "//rate_key//" nor "//stress_key//" moves")
+    call expect(report, .not. any(ends*sign(1.0_dp, rate) < 0.0_dp .and. abs(rate) > 0.0_dp), "time", "stop_cell_"//kind, error, &
+                "the sign of "//shown_text(report, "scene", rate_key))
+  end subroutine check_stop_strain
 
   subroutine check_solver(report, config, error)
     type(report_t), intent(in) :: report

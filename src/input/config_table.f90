@@ -202,6 +202,11 @@ module gravier_config_table
            "name of a `&boundary`: the run ends when it is `stop_displacement` away from its place at the start of the scene"), &
      key_t("time", "stop_displacement", kind_real, "-1", "> 0", "displacement of `stop_boundary` at which the run ends", &
            unit="m", note="never"), &
+     key_t("time", "stop_cell_strain", kind_real, "3*0", "", &
+           "strains of the period along the axes, extension positive, at any of which the run ends; 0: it does not", count=3), &
+     key_t("time", "stop_cell_shear", kind_real, "3*0", "", &
+           "shears of the period, as in `cell_shear_rate`, at any of which the run ends; 0: it does not; one entry in 2D", &
+           count=3, planar=1), &
      key_t("time", "stop_grains_at_most", kind_integer, "0", ">= 0", &
            "the run ends when the scene has come down to so many grains that are not glued", note="never"), &
      key_t("time", "stop_grains_at_least", kind_integer, "0", ">= 1", &

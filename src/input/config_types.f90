@@ -92,6 +92,8 @@ module gravier_config_types
     !> name of a boundary; blank: none; m: displacement of it that ends the run
     character(len=text_length) :: stop_boundary
     real(dp) :: stop_displacement
+    !> strains of the cell along the axes, and shears xy, xz and yz, that end the run; 0: that component does not
+    real(dp) :: stop_cell_strain(3), stop_cell_shear(3)
     !> free grains, kg: what ends the run when the scene comes down or up to it
     integer :: stop_grains_at_most, stop_grains_at_least
     real(dp) :: stop_mass_at_most, stop_mass_at_least

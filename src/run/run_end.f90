@@ -1,5 +1,5 @@
 !> What ends a run before its last step: grains that have come to rest, that were drained or filled in, a boundary that has gone its
-!> way.
+!> way, a periodic cell that has been strained.
 module gravier_run_end
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
@@ -10,7 +10,7 @@ module gravier_run_end
 
   !> steps, one after the other, of a scene that has come to rest
   integer, parameter :: steps_at_rest = 10
-  !> fraction of a displacement that roundings of many steps take
+  !> fraction of a displacement or of a strain that roundings of many steps take
   real(dp), parameter :: rounding = 1.0e-9_dp
 
 contains
@@ -65,7 +65,41 @@ contains
           & to_text(way, 7)//" m, stop_displacement = "//to_text(time%stop_displacement, 7)//" m"
       end if
     end associate
+    if (why == "" .and. simulation%decomposition%period%moves) why = strain_reason(simulation)
   end function reason
+
+  !> The component of the strain of the cell that ends the run; empty where none does.
+  function strain_reason(simulation) result(why)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: why
+    character(len=*), parameter :: strained(3) = ["strained along x", "strained along y", "strained along z"]
+    character(len=*), parameter :: sheared(3) = ["sheared along x over y", "sheared along x over z", "sheared along y over z"]
+    real(dp) :: strain(3)
+
+    why = ""
+    associate (period => simulation%decomposition%period, time => simulation%config%time)
+      strain(:) = 0.0_dp
+      where (period%length > 0.0_dp) strain = log(period%length/simulation%first_length)
+      call look(strained, strain, "stop_cell_strain", time%stop_cell_strain)
+      call look(sheared, period%shear, "stop_cell_shear", time%stop_cell_shear)
+    end associate
+
+  contains
+
+    !> Strains of which one has come up to its end, in its direction.
+    subroutine look(words, found, key, ends)
+      character(len=*), intent(in) :: words(3), key
+      real(dp), intent(in) :: found(3), ends(3)
+      integer :: d
+
+      do d = 1, 3
+        if (.not. abs(ends(d)) > 0.0_dp .or. why /= "") cycle
+        if (found(d)*sign(1.0_dp, ends(d)) >= (1.0_dp - rounding)*abs(ends(d))) why = "the cell is "//words(d)//" by "// &
+          & to_text(found(d), 7)//", "//key//" = "//to_text(ends(d), 7)
+      end do
+    end subroutine look
+
+  end function strain_reason
 
   !> Whether the scene rests, in a run that ends by that.
   pure logical function rests(simulation)

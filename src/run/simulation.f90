@@ -46,6 +46,8 @@ module gravier_simulation
     !> the boundary whose displacement may end the run, 0 for none, and its place at the start of the scene [m]
     integer :: watched = 0
     real(dp) :: watched_from(3) = 0.0_dp
+    !> lengths of the period at the start of the scene [m]
+    real(dp) :: first_length(3) = 0.0_dp
     !> mass of those that are free [kg]
     real(dp) :: first_mass = 0.0_dp
     !> step written last in results.h5, -1 for none
@@ -125,6 +127,7 @@ contains
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
     if (self%inflow%exists()) call prepare_inflow(self)
     call watch_boundary(self)
+    self%first_length(:) = scene%period%length
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
   end subroutine simulation_make

@@ -55,6 +55,7 @@ contains
 
     subroutine check_width(boundary)
       type(boundary_t), intent(in) :: boundary
+      character(len=:), allocatable :: or_edge
       real(dp) :: width
 
       width = 2.0_dp*boundary%half_width(d)
@@ -63,10 +64,14 @@ contains
           & to_text(scene%period%length(d), 4)//" m, here "//to_text(width, 4)//" m, along")
         return
       end if
+      ! an edge round the period has no end
+      if (boundary%surface%edge_round(d, scene%period%length(d)) > 0 .and. .not. boundary%turns()) return
       if (.not. features%encloses) width = width + reach
-      if (width > scene%period%length(d)) call refuse(boundary, "a width, with a diameter of the largest grain "// &
-        & "and the range of the lists, of at most the period of "//to_text(scene%period%length(d), 4)//" m, here "// &
-        & to_text(width, 4)//" m, along")
+      if (.not. width > scene%period%length(d)) return
+      or_edge = ""
+      if (.not. (boundary%surface%radius > 0.0_dp .or. boundary%turns())) or_edge = ", or an edge of that length along it"
+      call refuse(boundary, "a width, with a diameter of the largest grain and the range of the lists, of at most the "// &
+        & "period of "//to_text(scene%period%length(d), 4)//" m"//or_edge//", here "//to_text(width, 4)//" m, along")
     end subroutine check_width
 
     !> A cylinder lies along the axis or across it, and does not tilt.

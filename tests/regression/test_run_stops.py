@@ -1,5 +1,6 @@
-"""What ends a run before its last step: a boundary that has gone its way, a scene that is drained or filled by number or by mass. The run
-ends at the same step on any ranks and through restarts, with its last state and checkpoint written and the reason in its log."""
+"""What ends a run before its last step: a boundary that has gone its way, a periodic cell that has been strained, a scene that is drained or
+filled by number or by mass. The run ends at the same step on any ranks and through restarts, with its last state and checkpoint written and
+the reason in its log."""
 import os
 import unittest
 
@@ -28,6 +29,14 @@ BELT = {
     "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [8, 3], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3},
     "boundary": [{"name": "belt", "shape": "segment", "point": [0.4, -0.05], "end": [0.0, -0.05], "velocity": [-0.6, -0.8]}],
     "time": {"step": 1e-3, "steps": STEPS, "stop_boundary": "belt", "stop_displacement": 0.05},
+    "output": {"every": 0, "checkpoint_every": 1000},
+}
+
+#: loose grains in a cell that is sheared at a rate while its sides close: a step shears it by 0.01
+CELL = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [8, 8], "radius_min": 0.4, "radius_max": 0.6, "friction": 0.3,
+              "density": 1.0, "gravity": [0.0, 0.0], "period": [12.0, 12.0], "cell_shear_rate": [0.2], "cell_strain_rate": [0.0, -0.02]},
+    "time": {"step": 0.05, "steps": STEPS},
     "output": {"every": 0, "checkpoint_every": 1000},
 }
 
@@ -80,6 +89,40 @@ class Stops(RunTestCase):
         self.assertEqual(count, 50)
         more = self.again(whole, BELT, {"time": {"stop_displacement": 0.06}})
         self.assertEqual(len(more.history()["step"]), 60)
+
+    def edges(self, run):
+        """Edges of the cell at the end of a run, a row each."""
+        return run.results()[f"/steps/{steps_of(run.results())[-1]}/cell/edge"]
+
+    def test_sheared(self):
+        """The shear is counted over more than a whole length of the cell, whose edges are replaced on the way. The cell does not move in the
+        first half of the first step."""
+        whole, count = self.check_ways("sheared", CELL, {"time": {"stop_cell_shear": [1.25]}},
+                                       reason="the cell is sheared along x over y by 1.255")
+        self.assertEqual(count, 126)
+        self.assertLess(abs(self.edges(whole)[1, 0]), 6.1)
+        more = self.again(whole, CELL, {"time": {"stop_cell_shear": [1.351]}})
+        self.assertEqual(len(more.history()["step"]), 136)
+
+    def test_compressed(self):
+        """A strain is the logarithm of the length over that of the start, negative where the cell is compressed."""
+        whole, count = self.check_ways("compressed", CELL, {"time": {"stop_cell_strain": [0.0, -0.1]}},
+                                       reason="the cell is strained along y by -1.00")
+        # 1e-3 a step, without half of the first
+        self.assertEqual(count, 101)
+        length = self.edges(whole)[1, 1] / 12.0
+        self.assertLessEqual(length, np.exp(-0.1))
+        self.assertGreater(length, np.exp(-0.101))
+
+    def test_sheared_by_a_stress(self):
+        """A cell that stresses drive, in three dimensions and along another component."""
+        scene = {"scene": {"dimension": 3, "lattice_count": [6, 6, 6], "period": [9.0] * 3, "gravity": [0.0] * 3, "cell_shear_rate": None,
+                           "cell_strain_rate": None, "cell_pressure": [0.0, 1.0, 1.0], "cell_shear_stress": [0.0, 0.0, -2.0]}}
+        whole, count = self.check_ways("stress", CELL, scene, {"time": {"stop_cell_shear": [0.0, 0.0, -0.3], "stop_cell_strain": [0.0, 3.0, -3.0]}},
+                                       reason="the cell is sheared along y over z by -3.")
+        edges = self.edges(whole)
+        self.assertAlmostEqual(edges[0, 1], 0.0)
+        self.assertLess(count, STEPS)
 
     def test_drained(self):
         """Fewer grains at the beginning are no end: the scene has to come down to the number."""
@@ -135,6 +178,8 @@ class Stops(RunTestCase):
                 {"stop_displacement": None},
             "&time stop_boundary is missing: expected a text in quotes": {"stop_boundary": None},
             "&time stop_displacement = 0.0: expected a finite real number > 0 (m)": {"stop_displacement": 0.0},
+            "&time stop_cell_shear = 0.5: expected 0 for components of the cell that neither cell_shear_rate nor cell_shear_stress moves":
+                {"stop_cell_shear": [0.5]},
             "&time stop_grains_at_most = -1: expected an integer >= 0": {"stop_grains_at_most": -1},
             "&time stop_grains_at_least = 0: expected an integer >= 1": {"stop_grains_at_least": 0},
             "&time stop_mass_at_most = -1.0: expected a finite real number >= 0 (kg)": {"stop_mass_at_most": -1.0},

@@ -1,6 +1,8 @@
-"""The site that `./gravier docs` builds: every link and anchor leads somewhere, formulas are drawn, the search finds words.
+"""The site that `./gravier docs` builds: every link and anchor leads somewhere, formulas are drawn, the search finds words, and a browser shows
+tables, pictures and formulas whole.
 
-A python3 with mkdocs is looked for as GRAVIER_DOCS_PYTHON and in build/docs; without one the test says so and is skipped.
+A python3 with mkdocs is looked for as GRAVIER_DOCS_PYTHON and in build/docs, a browser as GRAVIER_BROWSER, chromium, chromium-browser or
+google-chrome; without one the test says so and is skipped.
 """
 import html.parser
 import json
@@ -15,6 +17,17 @@ from pathlib import Path
 
 SOURCE = Path(os.environ.get("GRAVIER_SOURCE_DIR", Path(__file__).resolve().parents[2])).resolve()
 PYTHON = os.environ.get("GRAVIER_DOCS_PYTHON") or str(SOURCE / "build/docs/bin/python")
+
+BROWSER = os.environ.get("GRAVIER_BROWSER") or next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+#: measures a page within the browser: widths of the window, and of tables and formulas with that of what they show, and pictures
+MEASURE = """<script>window.addEventListener('load', () => setTimeout(() => {
+  const cut = (one) => [one.scrollWidth, one.clientWidth, one.textContent.trim().slice(0, 60)];
+  const found = { across: document.documentElement.scrollWidth, window: window.innerWidth,
+    tables: [...document.querySelectorAll('.rst-content table, .wy-table-responsive')].map(cut),
+    formulas: [...document.querySelectorAll('math')].map((one) => one.getBoundingClientRect().height),
+    images: [...document.images].map((one) => [one.complete, one.naturalWidth, one.clientWidth, one.parentElement.clientWidth, one.src]) };
+  const place = document.createElement('pre'); place.id = 'measured'; place.textContent = JSON.stringify(found);
+  document.body.append(place); }, 500));</script>"""
 
 
 def has_mkdocs():
@@ -111,6 +124,36 @@ class Site(unittest.TestCase):
             if not name.startswith("tree/"):
                 left = re.search(r"^\s*\|.*\|\s*$|^```|\*\*\w", "".join(page.words), re.M)
                 self.assertIsNone(left, f"{name}: {left and left[0]}")
+
+    def measured(self, name, width):
+        """What MEASURE finds on a page in a window of a width [pixels]."""
+        page = self.place / name
+        copy = page.with_name("measured_" + page.name)
+        copy.write_text(page.read_text(encoding="utf-8").replace("</head>", MEASURE + "</head>"), encoding="utf-8")
+        try:
+            done = subprocess.run([BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=20000",
+                                   f"--user-data-dir={self.place / 'profile'}", f"--window-size={width},900", "--dump-dom", f"file://{copy}"],
+                                  capture_output=True, text=True, timeout=300, check=False, env={**os.environ, "HOME": str(self.place)})
+        finally:
+            copy.unlink()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(html.unescape(re.search(r'<pre id="measured">(.*?)</pre>', done.stdout, re.S)[1]))
+
+    @unittest.skipUnless(BROWSER, "NO BROWSER: no chromium is found; apt-get install chromium, or set GRAVIER_BROWSER")
+    def test_in_a_browser(self):
+        """On a screen no table is wider than its place, pictures are there and fit, formulas have a height; on a telephone nothing makes the
+        page wider than the window."""
+        for name in ("index.html", "validation.html", "reference/effect_stops.html", "theory.html"):
+            found = self.measured(name, 1300)
+            self.assertLessEqual(found["across"], 1300, name)
+            for whole, shown, words in found["tables"]:
+                self.assertLessEqual(whole, shown + 1, f"{name}: the table '{words}' is cut")
+            self.assertGreaterEqual(len(found["tables"]), 1, name)
+            for complete, natural, width, place, source in found["images"]:
+                self.assertTrue(complete and natural > 100 and 100 < width <= place, f"{name}: {source}")
+            self.assertTrue(all(height > 5 for height in found["formulas"]), name)
+            self.assertLessEqual(self.measured(name, 500)["across"], 500, name)
+        self.assertGreater(len(found["formulas"]), 300)
 
     def test_all_pages_of_the_sources_are_there(self):
         for path in [*(SOURCE / "doc").glob("*.md"), *(SOURCE / "doc/reference").glob("*.md")]:

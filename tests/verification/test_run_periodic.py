@@ -7,6 +7,7 @@ import numpy as np
 
 from gravier_runs import RunTestCase, differences, merged, run_case, write
 from packings import settled_disks
+from shaped_scenes import FLAT, bodies_csv, body
 from small_scenes import G, Grain, SmallScene, floats, plane
 
 LENGTH = 0.504
@@ -185,6 +186,59 @@ class Boundaries(SmallScene):
         free = [([0.5 + x, y, z], None, 0) for x, y, z in ((-0.12, 0.1, 0.06), (0.02, 0.2, 0.05), (0.14, 0.3, 0.08))]
         self.compare("rectangle", 3, free, [{"shape": "rectangle", "point": [0.35, 0.0, 0.03], "edge_a": [0.3, 0.0, -0.06],
                                              "edge_b": [0.0, 0.4, 0.0]}], [0.0, 0.0, -G])
+
+    def test_slot(self):
+        """A slot between two plates that go round the cell: a sphere falls through, one rolls off an edge into it, and one slides along over
+        the place where a plate meets itself, which nothing feels: a plate that begins elsewhere along the axis is the same."""
+        free = [([0.5, 0.0, 0.1], None, 0), ([0.3, 0.075, 0.06], [0.0, -0.3, 0.0], 0), ([0.9, -0.2, 0.04], [2.0, 0.0, 0.0], 0)]
+
+        def plates(start):
+            return [{"shape": "rectangle", "point": [start, 0.05, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 0.4, 0.0]},
+                    {"shape": "rectangle", "point": [start, -0.05, 0.0], "edge_a": [0.0, -0.4, 0.0], "edge_b": [1.0, 0.0, 0.0]}]
+        found = [self.compare(f"slot {start}", 3, free, plates(start), [0.0, 0.0, -G]) for start in (0.0, 0.35)]
+        place, other = (one.position + self.length * np.pad(one.image[..., :1], ((0, 0), (0, 0), (0, 2))) for one in found)
+        self.verify("slot", "places [m]", place, other, 1e-9)
+        self.assertTrue((place[-1, :2, 2] < -0.1).all(), place[-1])
+        # the third stays on its plate, on which it slides and rolls
+        self.verify("slot", "height of the sliding grain [m]", place[:, 2, 2], 0.04, 1e-5)
+        self.assertGreater(place[-1, 2, 0], 1.2)
+
+    def test_slot_on_ranks(self):
+        """The same bits on one rank and on two."""
+        free = [Grain(np.array([0.1 + 0.27 * i, y, 0.06 + 0.02 * i]), radius=0.04) for i in range(4) for y in (-0.1, 0.0, 0.1)]
+        plates = [{"shape": "rectangle", "point": [0.2, side * 0.05, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, side * 0.4, 0.0]}
+                  for side in (1.0, -1.0)]
+        runs = [self.play(f"slot on {ranks}", free, plates, [0.0, 0.0, -G], 150, ranks, solver={"method": "nscdd", "tolerance": 1e-4},
+                          decomposition={"subdomains": 2}, scene={"period": [1.0, 0.0, 0.0], "friction": 0.5}) for ranks in (1, 2)]
+        for name in ("position", "velocity", "image"):
+            np.testing.assert_array_equal(getattr(runs[0], name), getattr(runs[1], name))
+        # some are in the slot, others lie on the plates
+        self.assertLess(runs[0].position[-1, :, 2].min(), -0.05)
+        self.assertGreater(runs[0].position[-1, :, 2].max(), 0.03)
+
+    def test_box_on_a_plate_round_the_cell(self):
+        """A box of corners that slides over the place where a segment meets itself stays flat on it."""
+        case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "bodies.csv", "shapes": "a.shapes", "friction": 0.2,
+                          "period": [1.0, 0.0]}, "time": {"step": 1e-3, "steps": 200}, "solver": {"tolerance": 1e-10},
+                "output": {"directory": "results", "every": 10}}
+        runs = []
+        for start in (0.0, 0.45):
+            here = self.here(f"box {start}")
+            os.makedirs(here)
+            write(os.path.join(here, "a.shapes"), FLAT)
+            write(os.path.join(here, "bodies.csv"), bodies_csv([body("square", [0.9, 0.05], velocity=[1.0, 0.0])]))
+            plate = {"name": "plate", "shape": "segment", "point": [start, 0.0], "end": [start + 1.0, 0.0]}
+            run = run_case(merged(case, {"boundary": [plate]}), directory=here)
+            self.assert_status(run, 0)
+            runs.append(run.results())
+        for step in range(10, 201, 10):
+            for name in ("position", "velocity"):
+                found = [one[f"/steps/{step}/bodies/{name}"] for one in runs]
+                np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-9)
+            self.assertAlmostEqual(found[0][0, 1], 0.0, delta=1e-6)
+            # over the end, too, it rests on two corners
+            self.assertEqual(len(runs[0][f"/steps/{step}/contacts/candidate"]), 2)
+        self.assertEqual(runs[0]["/steps/200/bodies/image"][0, 0], 1)
 
     def test_cylinders(self):
         """Across the periodic axis, and along it."""

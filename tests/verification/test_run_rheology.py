@@ -41,10 +41,16 @@ class Rheology(StudyTestCase):
         self.assertEqual([row["within"] for row in rows], ["yes"] * 4 + [""] * 2, rows)
         self.assertTrue(os.path.exists(self.here("out", "study_rheology.png")))
 
+    def test_steps(self):
+        """Slow flows have steps in which the flow is not lost against the impulses, fast ones those of a strain of 0.005 sqrt(I)."""
+        for number, step in ((1e-4, 0.015), (1e-3, 0.0474342), (1e-2, 0.05), (1e-1, 0.0158114)):
+            self.assertAlmostEqual(study_rheology.step_of(number), step, places=6)
+
     def test_refused(self):
-        done = self.run_study()
-        self.assertEqual(done.returncode, 2)
-        self.assertEqual(done.stderr.count("\n"), 1)
+        for arguments in ((), ("out", "--least", "1e-3", "1e-3", "1e-3"), ("out", "--least", "slow")):
+            done = self.run_study(*arguments)
+            self.assertEqual(done.returncode, 2)
+            self.assertEqual(done.stderr.count("\n"), 1)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ module gravier_periodic
     real(dp) :: tilt(3) = 0.0_dp
     !> rates of the lengths and tilts [m/s]
     real(dp) :: length_rate(3) = 0.0_dp, tilt_rate(3) = 0.0_dp
+    !> rates of shear xy, xz and yz, integrated since the start of the scene
+    real(dp) :: shear(3) = 0.0_dp
     !> whether lengths or tilts change in this scene
     logical :: moves = .false.
   contains
@@ -40,8 +42,8 @@ module gravier_periodic
   !> images of a place that may lie near the cell
   integer, parameter :: most_images = 125
   !> words of the state of a cell, and what they are: the version of checkpoints, which changes with them
-  integer, parameter :: period_words = 15
-  character(len=*), parameter :: period_record = "length origin tilt length_rate tilt_rate"
+  integer, parameter :: period_words = 18
+  character(len=*), parameter :: period_record = "length origin tilt length_rate tilt_rate shear"
 
 contains
 
@@ -230,13 +232,27 @@ contains
     centre(:) = self%origin + 0.5_dp*self%length
   end function period_centre
 
-  !> Move the edges for a time at their rates.
+  !> Rates of shear xy, xz and yz [1/s].
+  pure subroutine find_shear_rate(cell, rate)
+    type(period_t), intent(in) :: cell
+    real(dp), intent(out) :: rate(3)
+    real(dp) :: g(3, 3)
+
+    g(:, :) = cell%gradient()
+    rate(1:2) = g(1, 2:3)
+    rate(3) = g(2, 3)
+  end subroutine find_shear_rate
+
+  !> Move the edges for a time at their rates, and count the shear.
   pure subroutine period_move(self, duration)
     class(period_t), intent(inout) :: self
     !> [s]
     real(dp), intent(in) :: duration
+    real(dp) :: rate(3)
 
     if (.not. self%moves) return
+    call find_shear_rate(self, rate)
+    self%shear(:) = self%shear + duration*rate
     self%length(:) = self%length + duration*self%length_rate
     self%origin(:) = self%origin - 0.5_dp*duration*self%length_rate
     self%tilt(:) = self%tilt + duration*self%tilt_rate
@@ -299,6 +315,7 @@ contains
     reals(7:9) = self%tilt
     reals(10:12) = self%length_rate
     reals(13:15) = self%tilt_rate
+    reals(16:18) = self%shear
     do k = 1, period_words
       words(k) = transfer(reals(k), 0_i8)
     end do
@@ -318,6 +335,7 @@ contains
     self%tilt(:) = reals(7:9)
     self%length_rate(:) = reals(10:12)
     self%tilt_rate(:) = reals(13:15)
+    self%shear(:) = reals(16:18)
   end subroutine period_set_state
 
   !> The image of `x` in [origin, origin + period), also after rounding, and the whole periods between: `x` is about

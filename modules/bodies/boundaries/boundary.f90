@@ -272,9 +272,9 @@ contains
     !> (nd) [m]
     real(dp), intent(in) :: x(:)
     integer, intent(out) :: n
-    !> (3, n), those of the image that is nearest to the point [m]
+    !> (3, n), those of the image that is nearest to the point, without ends where it goes round a period [m]
     real(dp), intent(out) :: corners(3, 4)
-    real(dp) :: from(3)
+    real(dp) :: from(3), edge(3, 2)
 
     n = 0
     corners(:, :) = 0.0_dp
@@ -283,9 +283,10 @@ contains
     call find_image(self, x, from)
     n = merge(2, 4, .not. any(abs(self%surface%edge(:, 2)) > 0.0_dp))
     corners(:, 1) = self%surface%point - from
-    corners(:, 2) = corners(:, 1) + self%surface%edge(:, 1)
-    corners(:, 3) = corners(:, 2) + self%surface%edge(:, 2)
-    corners(:, 4) = corners(:, 1) + self%surface%edge(:, 2)
+    call self%surface%stretch(self%period, corners(:, 1), edge)
+    corners(:, 2) = corners(:, 1) + edge(:, 1)
+    corners(:, 3) = corners(:, 2) + edge(:, 2)
+    corners(:, 4) = corners(:, 1) + edge(:, 2)
   end subroutine boundary_find_corners
 
   !> Velocity of the material point at `x` [m/s].

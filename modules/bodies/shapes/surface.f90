@@ -10,6 +10,9 @@ module gravier_surface
   !> least component along an axis of the unit normal of what faces along it
   real(dp), parameter :: facing = 0.99_dp
 
+  !> how far the edge of a surface that goes round a period may be from it in length and direction, over the period
+  real(dp), parameter :: round_error = 1.0e-9_dp
+
   !> the key that all shapes have
   type(declared_key_t), parameter :: point_key = declared_key_t("point", "3*0", "", "m", &
     & "a point of a plane, of an outlet or of the axis of a cylinder, "// &
@@ -64,6 +67,8 @@ module gravier_surface
     procedure :: digest => surface_digest
     procedure :: find_middle => surface_find_middle
     procedure :: half_width => surface_half_width
+    procedure :: edge_round => surface_edge_round
+    procedure :: stretch => surface_stretch
     procedure :: way => surface_way
     procedure :: own_area => surface_own_area
     procedure :: level => surface_level
@@ -222,6 +227,46 @@ contains
       half = self%radius + 0.5_dp*sum(abs(self%edge(d, :)))
     end if
   end function surface_half_width
+
+  !> The edge that goes once round a period along axis `d`, so that the surface has no end there: 0 where there is none, or where
+  !> the other edge goes along that axis too.
+  pure integer function surface_edge_round(self, d, period) result(edge)
+    class(surface_t), intent(in) :: self
+    integer, intent(in) :: d
+    !> [m]
+    real(dp), intent(in) :: period
+    real(dp) :: round(3)
+    integer :: k
+
+    edge = 0
+    if (.not. period > 0.0_dp .or. self%radius > 0.0_dp) return
+    round(:) = 0.0_dp
+    round(d) = period
+    do k = 1, 2
+      if (maxval(abs(abs(self%edge(:, k)) - round)) <= round_error*period .and. &
+        & abs(self%edge(d, 3 - k)) <= round_error*period) edge = k
+    end do
+  end function surface_edge_round
+
+  !> A corner and the edges from it, those that go round a period three times as long: what is near the middle, and smaller than the
+  !> period, is far from their ends.
+  pure subroutine surface_stretch(self, period, corner, edge)
+    class(surface_t), intent(in) :: self
+    !> 0 along axes that are not periodic [m]
+    real(dp), intent(in) :: period(3)
+    !> from any point [m]
+    real(dp), intent(inout) :: corner(3)
+    real(dp), intent(out) :: edge(3, 2)
+    integer :: d, k
+
+    edge(:, :) = self%edge
+    do d = 1, 3
+      k = self%edge_round(d, period(d))
+      if (k == 0) cycle
+      corner(:) = corner - self%edge(:, k)
+      edge(:, k) = 3.0_dp*self%edge(:, k)
+    end do
+  end subroutine surface_stretch
 
   !> How far some point of the surface has moved at most, without a tilt of `axis` [m]: a rigid motion takes some corner farthest.
   pure real(dp) function surface_way(self, before) result(way)

@@ -8,8 +8,8 @@ program test_config
   use gravier_config, only: config_t, scene_config_t, boundary_config_t, parse_config, write_active, write_key_reference
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
-  character(len=*), parameter :: time_keys = "step steps theta rest_energy stop_boundary stop_displacement stop_grains_at_most "// &
-    & "stop_grains_at_least stop_mass_at_most stop_mass_at_least"
+  character(len=*), parameter :: time_keys = "step steps theta rest_energy stop_boundary stop_displacement stop_cell_strain "// &
+    & "stop_cell_shear stop_grains_at_most stop_grains_at_least stop_mass_at_most stop_mass_at_least"
 
   character(len=*), parameter :: newline = achar(10), tab = achar(9), carriage = achar(13)
   !> a group &time that is in order
@@ -781,6 +781,28 @@ contains
       "&scene density = -1: " // positive // " (kg/m^3, kg/m^2 in 2D)")
   end subroutine test_rules_of_lattice
 
+  !> A strain ends a run where that component of the cell moves, and in its direction.
+  subroutine test_rules_of_stop_strains()
+    character(len=*), parameter :: steps = " / &time step = 1 steps = 1 "
+    type(config_t) :: config
+
+    call accept("&scene bodies = 'column' cell_strain_rate = 0, -2, cell_shear_stress = 3" // steps &
+      // "stop_cell_strain = 0, -0.5 stop_cell_shear = -0.25 /", "strains that end the run", config)
+    call check_vector(config%time%stop_cell_strain, [0.0_dp, -0.5_dp, 0.0_dp], "stop_cell_strain")
+    call check_vector(config%time%stop_cell_shear, [-0.25_dp, 0.0_dp, 0.0_dp], "stop_cell_shear")
+    call accept("&scene bodies = 'column' cell_pressure = 4" // steps // "stop_cell_strain = 0.5 /", "of a pressure", config)
+    call refuse("&scene bodies = 'column'" // steps // "stop_cell_strain = 0, 0.5 /", "&time stop_cell_strain = 0, 0.5: expected " &
+      // "0 for components of the cell that neither cell_strain_rate nor cell_pressure moves")
+    call refuse("&scene bodies = 'column' cell_strain_rate = 1, 1" // steps // "stop_cell_shear = 1 /", &
+      "&time stop_cell_shear = 1: expected 0 for components of the cell that neither cell_shear_rate nor cell_shear_stress moves")
+    call refuse("&scene bodies = 'column' cell_strain_rate = 0, -2" // steps // "stop_cell_strain = 0, 0.5 /", &
+      "&time stop_cell_strain = 0, 0.5: expected the sign of cell_strain_rate = 0, -2")
+    call refuse("&scene bodies = 'column' cell_shear_rate = 2" // steps // "stop_cell_shear = -1 /", &
+      "&time stop_cell_shear = -1: expected the sign of cell_shear_rate = 2")
+    call refuse("&scene bodies = 'column' cell_shear_rate = 2" // steps // "stop_cell_shear = 1, 1 /", &
+      "&time stop_cell_shear = 1, 1: expected one entry where dimension = 2")
+  end subroutine test_rules_of_stop_strains
+
   subroutine test_rules_of_time_and_solver()
     character(len=*), parameter :: bodies = "&scene bodies = 'column' / "
 
@@ -791,6 +813,7 @@ contains
       "&time theta = 0.25: expected a finite real number in [0.5, 1]")
     call refuse(bodies // "&time step = 1 steps = 1 theta = 1.5 /", &
       "&time theta = 1.5: expected a finite real number in [0.5, 1]")
+    call test_rules_of_stop_strains()
     call refuse(scene("bodies = 'lattice'" // lattice_keys, "&solver criterion = 'error' /"), &
       "&solver criterion = 'error': expected 'residual': the exact solution, and so the error, is known for " &
       // "bodies = 'column' only")

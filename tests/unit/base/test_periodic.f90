@@ -94,12 +94,18 @@ contains
     call again%add_shift(shift_code(shift), 1, y)
     w(:) = gradient_times(f, x)
     call check(maxval(abs(w - y)) < 1.0e-14_dp, "F takes images along")
+    ! a quarter of a second at these rates, by any edges
+    w(:) = 0.25_dp*[0.7_dp, -0.3_dp, 0.4_dp]
+    call check(all(abs(later%shear) <= 0.0_dp) .and. maxval(abs(again%shear - w)) < 1.0e-14_dp, "the shear is counted")
+    call again%straighten(k)
+    call check(maxval(abs(again%shear - w)) < 1.0e-14_dp, "other edges are no shear")
     call again%get_state(words)
     later = cell
     call later%set_state(words)
     call check(all(abs(later%tilt - again%tilt) <= 0.0_dp) .and. all(abs(later%length - again%length) <= 0.0_dp) .and. &
       & all(abs(later%origin - again%origin) <= 0.0_dp) .and. all(abs(later%length_rate - again%length_rate) <= 0.0_dp) .and. &
       & all(abs(later%tilt_rate - again%tilt_rate) <= 0.0_dp), "the state comes back")
+    call check(all(abs(later%shear - again%shear) <= 0.0_dp), "and its shear")
   end subroutine test_moving
 
   !> Images of a place within a margin of the box, by trial.

@@ -124,7 +124,32 @@ contains
       & "an edge at right angles to {edge_a}, within 1e-6", "edges that are not at right angles")
     call expect(rectangle, reshape([zero, [2.0_dp, 0.0_dp, 0.0_dp], [1.0e-6_dp, 3.0_dp, 0.0_dp]], [3, 3]), "", "", &
       & "edges nearly at right angles")
+    call test_round_a_period()
   end subroutine test_flat_pieces
+
+  !> An edge of the length of a period along its axis has no end; any other one has.
+  subroutine test_round_a_period()
+    type(rectangle_t) :: plate
+    type(cylinder_t) :: cylinder
+    real(dp) :: corner(3), edge(3, 2)
+    real(dp), parameter :: across(3) = [2.0_dp, 0.0_dp, 1.0_dp]
+
+    call expect(plate, reshape([zero, across, [0.0_dp, -3.0_dp, 0.0_dp]], [3, 3]), "", "", "a plate")
+    call check_equal(plate%edge_round(2, 3.0_dp), 2, "its edge along y goes round")
+    call check_equal(plate%edge_round(2, 3.0_dp*(1.0_dp + 1.0e-10_dp)), 2, "but for rounding")
+    call check_equal(plate%edge_round(2, 3.0_dp*(1.0_dp + 1.0e-8_dp)), 0, "a longer period")
+    call check_equal(plate%edge_round(2, 2.9_dp), 0, "a shorter period")
+    call check_equal(plate%edge_round(2, 0.0_dp), 0, "no period")
+    call check_equal(plate%edge_round(1, 2.0_dp), 0, "an edge that is not along the axis")
+    call check_equal(cylinder%edge_round(1, 2.0_dp), 0, "a cylinder has no edge")
+    corner(:) = [0.5_dp, 0.25_dp, 0.0_dp]
+    call plate%stretch([0.0_dp, 3.0_dp, 0.0_dp], corner, edge)
+    call check(all(abs(corner - [0.5_dp, 3.25_dp, 0.0_dp]) <= rounding), "a period before its corner")
+    call check(all(abs(edge(:, 1) - across) <= 0.0_dp) .and. all(abs(edge(:, 2) - [0.0_dp, -9.0_dp, 0.0_dp]) <= rounding), &
+      & "three periods long")
+    call plate%stretch([2.0_dp, 0.0_dp, 0.0_dp], corner, edge)
+    call check(all(abs(edge - plate%edge) <= 0.0_dp), "edges that end stay")
+  end subroutine test_round_a_period
 
   subroutine test_drums()
     type(circle_t) :: circle

@@ -7,8 +7,8 @@ except ImportError:  # before Spack 1.0
 
 
 class Gravier(CMakePackage):
-    """Dense granular matter by nonsmooth contact dynamics, with domain decomposition: disks and spheres under unilateral contact and
-    friction, in Fortran 2008 and MPI."""
+    """Dense granular matter by nonsmooth contact dynamics, with domain decomposition: rigid bodies
+    under unilateral contact and friction, in Fortran 2008 and MPI."""
 
     license("BSD-3-Clause")
 
