@@ -208,8 +208,8 @@ contains
     call alone%free()
   end subroutine make_problem
 
-  !> The same contacts for the kernels of bodies with shapes, which may touch anywhere on them: the arms are those of the grains, and
-  !> the inverse inertia is a matrix. Each pair touches in one point, so that no two contacts in a row share their bodies.
+  !> The same contacts for the kernels of bodies with shapes, which may touch anywhere on them: the arms are those of the grains,
+  !> and the inverse inertia is a matrix. Each pair touches in one point, so that no two contacts in a row share their bodies.
   subroutine let_touch_anywhere(nd, effects, kernels, sub)
     integer, intent(in) :: nd
     !> of the scene

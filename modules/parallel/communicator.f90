@@ -74,7 +74,8 @@ contains
     if (.not. running) call MPI_Init()
   end subroutine start_parallel
 
-  !> Start MPI for a library in the process of another program, unless that has started it. Failure (status_input): MPI has been ended.
+  !> Start MPI for a library in the process of another program, unless that has started it. Failure (status_input): MPI has been
+  !> ended.
   subroutine join_parallel(started, error)
     !> MPI was started here, and is to be ended by stop_parallel; kept where it was
     logical, intent(inout) :: started

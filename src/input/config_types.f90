@@ -55,8 +55,8 @@ module gravier_config_types
     real(dp) :: period(3)
     !> m: lower corner of the period, and of the box of a sample
     real(dp) :: period_origin(3)
-    !> what moves the cell: rates of strain along the axes, of shear xy, xz and yz [1/s], stresses in their place [Pa, N/m in 2D], and
-    !> the inertia of what stresses drive over M L^2
+    !> what moves the cell: rates of strain along the axes, of shear xy, xz and yz [1/s], stresses in their place [Pa, N/m in 2D],
+    !> and the inertia of what stresses drive over M L^2
     real(dp) :: cell_strain_rate(3), cell_shear_rate(3), cell_pressure(3), cell_shear_stress(3), cell_inertia
     !> N/m^3 (N/m^2 in 2D); the third component is 0 in 2D
     real(dp) :: body_force(3)

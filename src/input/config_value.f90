@@ -124,8 +124,8 @@ contains
     if (key%count > 1) where (touched(:key%count)) slot%logicals = values(:key%count)
   end subroutine read_logical
 
-  !> Are the entries of a list, each perhaps after a repeat count and a star, all written as values of a kind are? The intrinsic read
-  !> would take `tomato` as true, `1-1` as 0.1 and `inf` as a number. Texts are not looked at.
+  !> Are the entries of a list, each perhaps after a repeat count and a star, all written as values of a kind are? The intrinsic
+  !> read would take `tomato` as true, `1-1` as 0.1 and `inf` as a number. Texts are not looked at.
   pure logical function are_of_kind(kind, list)
     integer, intent(in) :: kind
     character(len=*), intent(in) :: list

@@ -1,6 +1,6 @@
-!> The C interface of a run, which gravier.h describes and the Python class gravier.Simulation uses: how it is opened, stepped and closed, and
-!> its figures. Handles point to a user_loop_t. Every function that can fail returns 0 or the exit status of its error, whose line
-!> gravier_error tells; none ends the process.
+!> The C interface of a run, which gravier.h describes and the Python class gravier.Simulation uses: how it is opened, stepped and
+!> closed, and its figures. Handles point to a user_loop_t. Every function that can fail returns 0 or the exit status of its error,
+!> whose line gravier_error tells; none ends the process.
 module gravier_c_run
   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
   use gravier_kinds, only: dp

@@ -26,8 +26,8 @@ module gravier_user_bodies
 contains
 
   !> Let bodies enter at the start of the next step, as insertions do; they get the next identifiers, in their order. Failures
-  !> (status_input): values that no body has; a radius above the largest of the scene; a place that is not free. The same on all ranks.
-  !> Collective.
+  !> (status_input): values that no body has; a radius above the largest of the scene; a place that is not free. The same on all
+  !> ranks. Collective.
   subroutine add_bodies(loop, bodies, error)
     type(user_loop_t), intent(inout) :: loop
     type(newcomers_t), intent(in) :: bodies
@@ -176,8 +176,8 @@ contains
     given%material(old%n + 1:) = more%material
   end subroutine join
 
-  !> Take bodies out of the scene at the start of the next step, as outlets do. Failures (status_input): an identifier that no free body
-  !> has, or that stands twice. The same on all ranks. Collective.
+  !> Take bodies out of the scene at the start of the next step, as outlets do. Failures (status_input): an identifier that no free
+  !> body has, or that stands twice. The same on all ranks. Collective.
   subroutine remove_bodies(loop, id, error)
     type(user_loop_t), intent(inout) :: loop
     integer(i8), intent(in) :: id(:)

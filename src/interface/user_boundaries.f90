@@ -16,8 +16,8 @@ module gravier_user_boundaries
 
 contains
 
-  !> A quantity of boundary `b` now; `force` is what grains did to it in the last step, velocity and spin are those of the last step.
-  !> Failure (status_input): an unknown name.
+  !> A quantity of boundary `b` now; `force` is what grains did to it in the last step, velocity and spin are those of the last
+  !> step. Failure (status_input): an unknown name.
   subroutine get_boundary(loop, b, name, values, error)
     type(user_loop_t), intent(in) :: loop
     integer, intent(in) :: b
@@ -56,8 +56,8 @@ contains
     end associate
   end subroutine get_boundary
 
-  !> Set a drive or the friction of boundary `b` from the next step on. Failures (status_input): an unknown name, another count of numbers,
-  !> a number that is none to reckon with, a component that a table or a force gives or that the boundary does not have.
+  !> Set a drive or the friction of boundary `b` from the next step on. Failures (status_input): an unknown name, another count of
+  !> numbers, a number that is none to reckon with, a component that a table or a force gives or that the boundary does not have.
   subroutine set_boundary(loop, b, name, values, error)
     type(user_loop_t), intent(inout) :: loop
     integer, intent(in) :: b

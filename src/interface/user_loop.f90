@@ -44,8 +44,8 @@ module gravier_user_loop
 
 contains
 
-  !> Begin a run on the communicator of the loop, which is initialised. Errors are the same on all ranks; after one, `close` gives back
-  !> what is held. Collective.
+  !> Begin a run on the communicator of the loop, which is initialised. Errors are the same on all ranks; after one, `close` gives
+  !> back what is held. Collective.
   subroutine user_loop_open(self, path, command, restart, quiet, forces, error)
     class(user_loop_t), target, intent(inout) :: self
     !> of the input file; who runs it, for the record
@@ -77,7 +77,8 @@ contains
     if (goes_on) goes_on = self%run%goes_on()
   end function user_loop_goes_on
 
-  !> Make one step. Failures: as of the program; status_input where the run is over, or where ranks have set different values. Collective.
+  !> Make one step. Failures: as of the program; status_input where the run is over, or where ranks have set different values.
+  !> Collective.
   subroutine user_loop_step(self, error)
     class(user_loop_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
@@ -279,9 +280,9 @@ contains
     end associate
   end subroutine user_loop_set_gravity
 
-  !> Set the coefficient of friction between grains (b = 0), or between grains and boundary b. Failures (status_input): a value below 0;
-  !> laws of materials, which have coefficients of their own; a scene whose contacts have no friction, and others that lack what the
-  !> coefficient would bring.
+  !> Set the coefficient of friction between grains (b = 0), or between grains and boundary b. Failures (status_input): a value
+  !> below 0; laws of materials, which have coefficients of their own; a scene whose contacts have no friction, and others that lack
+  !> what the coefficient would bring.
   subroutine user_loop_set_friction(self, b, friction, error)
     class(user_loop_t), intent(inout) :: self
     integer, intent(in) :: b

@@ -31,6 +31,7 @@ module gravier_output
     !> Whether an input asks for it.
     pure logical function wanted_interface(config)
       import :: config_t
+      implicit none
       type(config_t), intent(in) :: config
     end function wanted_interface
 
@@ -38,6 +39,7 @@ module gravier_output
     !> hold of later steps goes. It sets stage and schedule even after an error. Rank 0 may fail alone. Collective.
     subroutine open_interface(self, simulation, directory, command, error)
       import :: output_t, simulation_t, error_t
+      implicit none
       class(output_t), intent(inout) :: self
       type(simulation_t), intent(in) :: simulation
       !> with a slash at its end; the command line of the program
@@ -48,6 +50,7 @@ module gravier_output
     !> Write the present step; without effect after an error. Rank 0 may fail alone. Collective.
     subroutine write_interface(self, simulation, figures, seconds, error)
       import :: output_t, simulation_t, step_figures_t, error_t, dp
+      implicit none
       class(output_t), intent(inout) :: self
       !> nothing of its motion is changed
       type(simulation_t), intent(inout) :: simulation

@@ -1,5 +1,5 @@
-!> A run that is under way: what it begins with, its steps one by one, and its end. The program makes all steps; a loop of the user's
-!> own (gravier_user_loop) may change the scene between two of them.
+!> A run that is under way: what it begins with, its steps one by one, and its end. The program makes all steps; a loop of the
+!> user's own (gravier_user_loop) may change the scene between two of them.
 module gravier_open_run
   use mpi_f08, only: MPI_Wtime
   use gravier_kinds, only: dp, i8
@@ -49,7 +49,8 @@ module gravier_open_run
     type(simulation_t) :: simulation
     !> of the last step
     type(step_figures_t) :: figures
-    !> from `finish` on: status_ok, status_unconverged where a solve missed its tolerance, status_failure where the run was interrupted
+    !> from `finish` on: status_ok, status_unconverged where a solve missed its tolerance, status_failure where the run was
+    !> interrupted
     integer :: status = status_ok
     type(run_log_t), private :: log
     type(run_output_t), private :: output
@@ -121,7 +122,8 @@ contains
     if (goes_on) goes_on = .not. is_over(self)
   end function open_run_goes_on
 
-  !> Make one step and write what is due then. After an error, which is the same on all ranks, the run is to be finished. Collective.
+  !> Make one step and write what is due then. After an error, which is the same on all ranks, the run is to be finished.
+  !> Collective.
   subroutine open_run_step(self, error)
     class(open_run_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error

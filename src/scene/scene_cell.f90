@@ -26,8 +26,8 @@ contains
       & any(config%cell_pressure > 0.0_dp) .or. any(abs(config%cell_shear_stress) > 0.0_dp)
   end function cell_moves
 
-  !> What moves the cell. A shear stress drives the cell along itself: it is held where the contacts resist with a negative component
-  !> of the mean stress, in which compression is positive.
+  !> What moves the cell. A shear stress drives the cell along itself: it is held where the contacts resist with a negative
+  !> component of the mean stress, in which compression is positive.
   pure subroutine make_cell_drive(config, drive)
     type(scene_config_t), intent(in) :: config
     type(cell_drive_t), intent(out) :: drive

@@ -1,6 +1,6 @@
-!> Random and degenerate pairs of convex polyhedra: the distance of the cores, proved for every pair by duality and for some compared
-!> with quadruple precision; what a manifold must be; no corner of two parallel faces without a point; nothing that jumps along a line.
-!> Arguments: count of pairs, seed.
+!> Random and degenerate pairs of convex polyhedra: the distance of the cores, proved for every pair by duality and for some
+!> compared with quadruple precision; what a manifold must be; no corner of two parallel faces without a point; nothing that jumps
+!> along a line. Arguments: count of pairs, seed.
 program test_polyhedron_fuzz
   use mpi_f08, only: MPI_Init, MPI_Finalize, MPI_Comm_rank, MPI_Comm_size, MPI_COMM_WORLD
   use gravier_kinds, only: dp, i8
@@ -21,8 +21,8 @@ program test_polyhedron_fuzz
   type :: tally_t
     !> pairs, overlaps, steps and the most of them, points
     integer(i8) :: pairs = 0, overlaps = 0, steps = 0, most_steps = 0, points = 0, contacts = 0
-    !> largest gap of duality in parts of what rounding allows, error of distance and of the normal times the distance in parts of the
-    !> size
+    !> largest gap of duality in parts of what rounding allows, error of distance and of the normal times the distance in parts of
+    !> the size
     real(dp) :: duality = 0.0_dp, distance = 0.0_dp, normal = 0.0_dp
   end type tally_t
   type(fuzz_library_t) :: library
@@ -338,8 +338,8 @@ contains
     pair%rotation(:, :) = turned
   end subroutine advance
 
-  !> Largest turn of the normal times the distance in one of 64 parts of a step. Edges that are nearly parallel turn their common normal
-  !> fast: parts of the step then turn it by parts. What jumps does so in one of them.
+  !> Largest turn of the normal times the distance in one of 64 parts of a step. Edges that are nearly parallel turn their common
+  !> normal fast: parts of the step then turn it by parts. What jumps does so in one of them.
   real(dp) function parts_of(a, b, before, way, axis, step, first_normal) result(largest)
     type(body_shape_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: before

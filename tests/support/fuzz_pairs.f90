@@ -1,5 +1,5 @@
-!> Random pairs of convex pieces for tests, most of them in places that are hard to tell: hulls of 4 to 100 points, flat and thin ones,
-!> prisms with faces and edges that are parallel but for any angle, corners on corners.
+!> Random pairs of convex pieces for tests, most of them in places that are hard to tell: hulls of 4 to 100 points, flat and thin
+!> ones, prisms with faces and edges that are parallel but for any angle, corners on corners.
 module gravier_fuzz_pairs
   use gravier_kinds, only: dp
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, place_a, place_b

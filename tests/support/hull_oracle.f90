@@ -1,5 +1,5 @@
-!> The distance of the convex hulls of two sets of points in quadruple precision, by Wolfe's active set method (Math. Program. 11 (1976)
-!> 128): independent of the search that the program uses, and slow.
+!> The distance of the convex hulls of two sets of points in quadruple precision, by Wolfe's active set method (Math. Program. 11
+!> (1976) 128): independent of the search that the program uses, and slow.
 module gravier_hull_oracle
   use, intrinsic :: iso_fortran_env, only: real128
   use gravier_kinds, only: dp

@@ -1,5 +1,5 @@
-!> Space that repeats itself along some axes. The cell that repeats may deform: its edges a along x, b in the plane of x and y, and c
-!> change with time, and images of bodies move with the velocity that the edges give them.
+!> Space that repeats itself along some axes. The cell that repeats may deform: its edges a along x, b in the plane of x and y, and
+!> c change with time, and images of bodies move with the velocity that the edges give them.
 module gravier_periodic
   use gravier_kinds, only: dp, i8
   implicit none

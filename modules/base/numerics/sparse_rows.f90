@@ -101,7 +101,8 @@ contains
     matrix%start(:) = 1
   end function no_columns
 
-  !> On which side of the diagonal of a square matrix the entries other than 0 are: 1 above alone, -1 below alone, 0 on both or none.
+  !> On which side of the diagonal of a square matrix the entries other than 0 are: 1 above alone, -1 below alone, 0 on both or
+  !> none.
   pure integer function half_of(matrix) result(side)
     type(sparse_rows_t), intent(in) :: matrix
     integer :: i, k
@@ -118,8 +119,8 @@ contains
     end do
   end function half_of
 
-  !> The symmetric matrix of which one half is given. `bad_row` is 0 where every entry allows it to be positive, or negative, semidefinite,
-  !> a_ij^2 <= a_ii a_jj, and otherwise a row with one that does not: that was no half.
+  !> The symmetric matrix of which one half is given. `bad_row` is 0 where every entry allows it to be positive, or negative,
+  !> semidefinite, a_ij^2 <= a_ii a_jj, and otherwise a row with one that does not: that was no half.
   subroutine mirrored(half, whole, bad_row)
     !> square, with entries on one side of its diagonal
     type(sparse_rows_t), intent(in) :: half

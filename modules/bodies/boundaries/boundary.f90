@@ -238,8 +238,8 @@ contains
     normal(:) = away(1:size(x))
   end subroutine boundary_locate
 
-  !> The facets within `reach` of a point, seen from there, of a faceted surface. One that does not turn may be as wide as the period,
-  !> so that its images are looked at as well. In 2D facets that continue each other are one.
+  !> The facets within `reach` of a point, seen from there, of a faceted surface. One that does not turn may be as wide as the
+  !> period, so that its images are looked at as well. In 2D facets that continue each other are one.
   pure subroutine boundary_find_facets(self, x, reach, near)
     class(boundary_t), intent(in) :: self
     !> (nd) [m], and [m]; what `near` held is lost

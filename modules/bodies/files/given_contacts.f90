@@ -19,7 +19,8 @@ module gravier_given_contacts
   !> a force that pulls by less than this part of it is rounded
   real(dp), parameter :: rounded = 1.0e-6_dp
 
-  !> Contacts of this rank, in the order of the file. They hold forces, and not impulses, so that they do not depend on the time step.
+  !> Contacts of this rank, in the order of the file. They hold forces, and not impulses, so that they do not depend on the time
+  !> step.
   type :: given_contacts_t
     !> of this rank, and of all ranks
     integer :: n = 0
@@ -38,8 +39,8 @@ module gravier_given_contacts
     real(dp), allocatable :: force(:, :)
     !> (dimension, n): the place of the contact [m]; not allocated where the file has none
     real(dp), allocatable :: point(:, :)
-    !> 2D (1, n), 3D (3, n): of rolling and pivoting resistance, on the candidate, along the axes of space [N m]; not allocated where
-    !> the file has none
+    !> 2D (1, n), 3D (3, n): of rolling and pivoting resistance, on the candidate, along the axes of space [N m]; not allocated
+    !> where the file has none
     real(dp), allocatable :: moment(:, :)
   end type given_contacts_t
 

@@ -39,7 +39,8 @@ module gravier_convex_piece
 
 contains
 
-  !> Find the vertices from which searches start, if the piece has many. It needs `vertex`, of which later only the scale may change.
+  !> Find the vertices from which searches start, if the piece has many. It needs `vertex`, of which later only the scale may
+  !> change.
   pure subroutine find_starts(piece)
     type(convex_piece_t), intent(inout) :: piece
     real(dp) :: middle(3), farthest, reach

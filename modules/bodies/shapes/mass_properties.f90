@@ -23,7 +23,8 @@ module gravier_mass_properties
 contains
 
   !> Those of a polyhedron, exact: sums over the tetrahedra that triangles of its surface span with a point inside. (The second
-  !> moments of a tetrahedron are those of Tonon, J. Math. Stat. 1 (2005) 8; the sums are those of Mirtich, J. Graph. Tools 1 (1996) 31.)
+  !> moments of a tetrahedron are those of Tonon, J. Math. Stat. 1 (2005) 8; the sums are those of Mirtich, J. Graph. Tools 1 (1996)
+  !> 31.)
   pure function mass_of_polyhedron(polyhedron) result(mass)
     type(sharp_polyhedron_t), intent(in) :: polyhedron
     type(mass_t) :: mass

@@ -1,4 +1,5 @@
-!> Shapes of the plane: convex polygons with rounded corners, disks and capsules as pieces, and bodies made of one or several of them.
+!> Shapes of the plane: convex polygons with rounded corners, disks and capsules as pieces, and bodies made of one or several of
+!> them.
 module gravier_polygon
   use gravier_kinds, only: dp
   use gravier_text, only: to_text

@@ -44,8 +44,8 @@ contains
     call make_shape(name, piece, mass, shape, error)
   end subroutine make_polyhedron
 
-  !> A body with the faces of a closed surface. Failures (status_input) beside those above: the surface is not closed, has no volume,
-  !> is inside out or not convex, or has a face without area.
+  !> A body with the faces of a closed surface. Failures (status_input) beside those above: the surface is not closed, has no
+  !> volume, is inside out or not convex, or has a face without area.
   subroutine make_polyhedron_of_faces(name, points, first, corner, rounding, shape, error)
     character(len=*), intent(in) :: name
     !> (3, n); points at one place become one
@@ -116,8 +116,8 @@ contains
     call make_shape(name, pieces, mass_of_sum(masses), shape, error)
   end subroutine make_union
 
-  !> A body of several pieces that may overlap, as spheres of a cluster do: its mass, centre and inertia are integrals along parallel
-  !> lines through the pieces, which gravier_union_grid describes with their error.
+  !> A body of several pieces that may overlap, as spheres of a cluster do: its mass, centre and inertia are integrals along
+  !> parallel lines through the pieces, which gravier_union_grid describes with their error.
   subroutine make_overlapping_union(name, pieces, lines, shape, error)
     character(len=*), intent(in) :: name
     type(convex_piece_t), intent(in) :: pieces(:)

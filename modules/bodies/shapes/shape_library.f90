@@ -8,8 +8,8 @@ module gravier_shape_library
 
   !> stands for a boundary in the place of the number of a shape
   integer, parameter :: boundary_number = -1
-  !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge, a face in the plane and in
-  !> space
+  !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge, a face in the plane and
+  !> in space
   integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 8
   !> pairs of pieces that two bodies touch with at most, besides as many as both have pieces
   integer, parameter :: more_pairs = 4

@@ -17,8 +17,8 @@ module gravier_sharp_polyhedron
 
 contains
 
-  !> Planes of all faces: normals by sums of the triangles of a fan (Newell), offsets as means over the corners. A face without area has the
-  !> normal 0.
+  !> Planes of all faces: normals by sums of the triangles of a fan (Newell), offsets as means over the corners. A face without area
+  !> has the normal 0.
   pure subroutine find_planes(polyhedron)
     type(sharp_polyhedron_t), intent(inout) :: polyhedron
     real(dp) :: normal(3), part(3), mean(3), length

@@ -1,7 +1,7 @@
 !> Mass, centre and inertia of a union of convex pieces that may overlap.
 !>
-!> The union is cut by parallel lines through the middles of a grid of squares; along each line the integrals are exact. The error is
-!> that of the rule of the middle across the lines: it was measured on spheres, alone and in overlapping pairs, as less than
+!> The union is cut by parallel lines through the middles of a grid of squares; along each line the integrals are exact. The error
+!> is that of the rule of the middle across the lines: it was measured on spheres, alone and in overlapping pairs, as less than
 !> 0.5 n^(-3/2) of the volume and of the moments of inertia, with n lines along the longer side.
 module gravier_union_grid
   use gravier_kinds, only: dp

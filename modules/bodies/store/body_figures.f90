@@ -75,8 +75,8 @@ contains
     energy = energy + 0.5_dp*bodies%inertia(k)*sum(velocity(bodies%nd + 1:)**2)
   end subroutine body_figures_add_rotation
 
-  !> One over the inertia of body `k`: a number or, in space with shapes, the entries xx, yy, zz, xy, xz and yz of a symmetric matrix in
-  !> global axes [1/(kg m^2)].
+  !> One over the inertia of body `k`: a number or, in space with shapes, the entries xx, yy, zz, xy, xz and yz of a symmetric
+  !> matrix in global axes [1/(kg m^2)].
   pure subroutine body_figures_find_inverse_inertia(self, bodies, k, inverse)
     class(body_figures_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies

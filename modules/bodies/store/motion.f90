@@ -55,8 +55,8 @@ contains
 
   !> The spin of a body with three principal moments of inertia after a time without moments. In the axes of the body it obeys
   !> Euler's equations I w' = (I w) x w, which are integrated by the midpoint rule: it keeps the energy and the size of the angular
-  !> momentum of the body exactly, whatever the time step, and is of second order. A rotation about the spin changes neither, so that
-  !> the axes at the middle of the step serve for all of it. Equal moments leave the spin as it is.
+  !> momentum of the body exactly, whatever the time step, and is of second order. A rotation about the spin changes neither, so
+  !> that the axes at the middle of the step serve for all of it. Equal moments leave the spin as it is.
   pure subroutine free_spin(principal, orientation, duration, spin)
     !> principal moments of inertia over any one scale
     real(dp), intent(in) :: principal(3)

@@ -10,8 +10,8 @@ module gravier_cell_order
 
 contains
 
-  !> Order of points along rows of cells, the last axis slowest, then by identifier. Cells are counted from a given corner, so that two
-  !> points keep their order whatever other points there are.
+  !> Order of points along rows of cells, the last axis slowest, then by identifier. Cells are counted from a given corner, so that
+  !> two points keep their order whatever other points there are.
   subroutine sweep_order(points, corner, edge, id, order)
     !> (nd, n) [m]
     real(dp), intent(in), contiguous :: points(:, :)

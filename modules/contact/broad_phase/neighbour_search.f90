@@ -34,7 +34,8 @@ module gravier_neighbour_search
     procedure :: find => search_find
   end type neighbour_search_t
 
-  !> The grains and periodic images of them, where pairs are searched, in the order of the cells of grids: one for each class of radii.
+  !> The grains and periodic images of them, where pairs are searched, in the order of the cells of grids: one for each class of
+  !> radii.
   type :: entries_t
     integer :: n = 0
     !> place among the bodies (n)

@@ -41,8 +41,8 @@ module gravier_contact_feature
 
 contains
 
-  !> The feature that lies across a direction and has the given vertices: the face most along the direction, else the edge most across
-  !> it, each within an angle, else a vertex. Ties go to the lowest number.
+  !> The feature that lies across a direction and has the given vertices: the face most along the direction, else the edge most
+  !> across it, each within an angle, else a vertex. Ties go to the lowest number.
   pure subroutine find_feature(piece, along, known, feature)
     type(convex_piece_t), intent(in) :: piece
     !> unit vector out of the piece, in its axes
@@ -119,8 +119,8 @@ contains
     if (length > 0.0_dp) sine_of = abs(dot_product(side, along))/length
   end function sine_of
 
-  !> Corners of a face or an edge in the axes of a frame, blended: between those of the core and the sharp ones, the nearer to these the
-  !> more a side lies in the plane of contact.
+  !> Corners of a face or an edge in the axes of a frame, blended: between those of the core and the sharp ones, the nearer to these
+  !> the more a side lies in the plane of contact.
   pure subroutine lay_out_feature(piece, feature, frame, m, vertex, place)
     type(convex_piece_t), intent(in) :: piece
     type(feature_t), intent(in) :: feature
@@ -233,8 +233,8 @@ contains
     x(:) = x + share_of(sine, sqrt(dot_product(way, way)), piece%rounding)*way
   end subroutine blend_along
 
-  !> Share of a way to a sharp corner, by the sine of the angle out of the plane of contact. Long ways, of thin corners, get theirs at
-  !> smaller angles, so that no corner is moved out of the plane by more than a two-hundredth of the rounding.
+  !> Share of a way to a sharp corner, by the sine of the angle out of the plane of contact. Long ways, of thin corners, get theirs
+  !> at smaller angles, so that no corner is moved out of the plane by more than a two-hundredth of the rounding.
   pure real(dp) function share_of(sine, length, rounding)
     real(dp), intent(in) :: sine, length, rounding
     real(dp) :: over

@@ -98,8 +98,8 @@ contains
     end do
   end subroutine sort_points
 
-  !> Of more points keep the deepest, the one farthest from it, the one farthest from the line of both, and the one farthest from the
-  !> line on its other side. Differences that rounding could make do not count: ties go to the lowest key.
+  !> Of more points keep the deepest, the one farthest from it, the one farthest from the line of both, and the one farthest from
+  !> the line on its other side. Differences that rounding could make do not count: ties go to the lowest key.
   pure subroutine keep_four(most, size_of_pair, same_gap, n, point)
     integer, intent(in) :: most
     real(dp), intent(in) :: size_of_pair, same_gap

@@ -1,9 +1,9 @@
 !> The distance of two convex cores in space, exact up to rounding (GJK: Gilbert, Johnson and Keerthi 1988).
 !>
-!> The point nearest to the origin in the set of all differences of a point of one core and one of the other is found by simplices of
-!> up to four such differences, with signed volumes (Montanari, Petrinic and Barbieri, ACM Trans. Graph. 36 (2017) 30). Nothing is
-!> kept between calls, so that the same two places give the same bits; vertices that are equally far in a direction give way to the
-!> lowest of them.
+!> The point nearest to the origin in the set of all differences of a point of one core and one of the other is found by simplices
+!> of up to four such differences, with signed volumes (Montanari, Petrinic and Barbieri, ACM Trans. Graph. 36 (2017) 30). Nothing
+!> is kept between calls, so that the same two places give the same bits; vertices that are equally far in a direction give way to
+!> the lowest of them.
 module gravier_convex_distance
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t, sector_of
@@ -156,8 +156,8 @@ contains
     n = m
   end subroutine drop_idle
 
-  !> Nearest points, distance and normal from the vertices that take part. The way between the points is made normal to both features
-  !> up to rounding, once as a whole and once more as a unit vector, which matters where it is short.
+  !> Nearest points, distance and normal from the vertices that take part. The way between the points is made normal to both
+  !> features up to rounding, once as a whole and once more as a unit vector, which matters where it is short.
   pure subroutine finish(w, x, v, found)
     !> differences and vertices of a (3, n)
     real(dp), intent(in) :: w(:, :), x(:, :)

@@ -1,8 +1,8 @@
 !> The direction of least separation of two convex cores that overlap.
 !>
 !> Overlapping convex polyhedra are least separated along the normal of a face of one of them or along the common normal of two
-!> edges. Pairs of edges come into question where the arcs of their normals cross (the Gauss map, Gregorius 2013). Its cost grows with
-!> the product of the numbers of edges, so that it is meant for the rare cores that overlap.
+!> edges. Pairs of edges come into question where the arcs of their normals cross (the Gauss map, Gregorius 2013). Its cost grows
+!> with the product of the numbers of edges, so that it is meant for the rare cores that overlap.
 module gravier_core_overlap
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
@@ -90,8 +90,8 @@ contains
     found%share(1) = 1.0_dp
   end subroutine try_axis
 
-  !> Common normals of edges of both. A normal comes into question where the arcs of the normals of both edges cross, those of b seen
-  !> from behind. Then the two edges are the outermost parts of their pieces along it.
+  !> Common normals of edges of both. A normal comes into question where the arcs of the normals of both edges cross, those of b
+  !> seen from behind. Then the two edges are the outermost parts of their pieces along it.
   pure subroutine try_edges(a, b, pair, edges_a, edges_b, found)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair

@@ -100,9 +100,9 @@ contains
     end if
   end subroutine find_plane
 
-  !> What a corner of the common part is on each piece: a corner k of its feature as -k, a side as k, anything within as 0. Corners of
-  !> both that are at one place, and ends of sides near a crossing, are taken for corners, first of a: so a name does not depend on
-  !> which of two corners at one place is by rounding within the other piece.
+  !> What a corner of the common part is on each piece: a corner k of its feature as -k, a side as k, anything within as 0. Corners
+  !> of both that are at one place, and ends of sides near a crossing, are taken for corners, first of a: so a name does not depend
+  !> on which of two corners at one place is by rounding within the other piece.
   pure subroutine name_corner(before, behind, x, y, room, place, key)
     !> sides that meet there: of a above 0, of b below
     integer, intent(in) :: before, behind

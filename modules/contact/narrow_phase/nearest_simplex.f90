@@ -1,6 +1,6 @@
-!> The point of a simplex of up to four points that is nearest to the origin, by signed volumes (Montanari, Petrinic and Barbieri, ACM
-!> Trans. Graph. 36 (2017) 30): where the origin lies beside the simplex, the nearest point is sought in those faces that the origin
-!> can be seen from.
+!> The point of a simplex of up to four points that is nearest to the origin, by signed volumes (Montanari, Petrinic and Barbieri,
+!> ACM Trans. Graph. 36 (2017) 30): where the origin lies beside the simplex, the nearest point is sought in those faces that the
+!> origin can be seen from.
 module gravier_nearest_simplex
   use gravier_kinds, only: dp
   implicit none
@@ -68,8 +68,8 @@ contains
     end if
   end subroutine nearest_of_two
 
-  !> Of a triangle: areas of the parts that the nearest point of its plane cuts it into, seen along the axis along which the triangle
-  !> is largest.
+  !> Of a triangle: areas of the parts that the nearest point of its plane cuts it into, seen along the axis along which the
+  !> triangle is largest.
   pure subroutine nearest_of_three(w, a, b, c, share, v)
     real(dp), intent(in) :: w(3, 4)
     integer, intent(in) :: a, b, c
@@ -108,8 +108,8 @@ contains
       share(a) = part(1)
       share(b) = part(2)
       share(c) = part(3)
-      ! of a thin triangle the point of these shares is in the plane more exactly than the foot, whose error is that of the normal times
-      ! the way to a corner
+      ! of a thin triangle the point of these shares is in the plane more exactly than the foot, whose error is that of the normal
+      ! times the way to a corner
       v(:) = w(:, a) + part(2)*u + part(3)*t
       v(:) = v - dot_product(u, v)/dot_product(u, u)*u
       call remove_across(u, t, v)

@@ -323,8 +323,8 @@ contains
     ends(:, 2) = side%ends(:, 2) + share*sum(side%along*(piece%corner(:, next) - side%ends(:, 2)))*side%along
   end subroutine blend_ends
 
-  !> The ends of the part that two sides have in common, where they face each other. The side that faces the other piece more, or that
-  !> of a, gives the normal; keys and the order of points do not depend on which it is.
+  !> The ends of the part that two sides have in common, where they face each other. The side that faces the other piece more, or
+  !> that of a, gives the normal; keys and the order of points do not depend on which it is.
   pure subroutine clip_sides(a, b, side_a, side_b, alert, manifold)
     type(placed_piece_t), intent(in) :: a, b
     type(side_t), intent(in) :: side_a, side_b

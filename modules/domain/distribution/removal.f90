@@ -109,8 +109,8 @@ contains
     if (n_free > 0) mass = decomposition%comm%sum_real(parts)
   end subroutine remove_grains
 
-  !> Take the grains that leave out of views and lists, which stay valid for the others, before `remove_grains` takes them out of the
-  !> scene. The views are up to date.
+  !> Take the grains that leave out of views and lists, which stay valid for the others, before `remove_grains` takes them out of
+  !> the scene. The views are up to date.
   subroutine drop_grains(decomposition, halo)
     type(decomposition_t), intent(in) :: decomposition
     type(halo_t), intent(inout) :: halo

@@ -271,9 +271,9 @@ contains
     ignored = c_close(descriptor)
   end subroutine reserve_space
 
-  !> Columns of the terminal on which a person looks at the standard output of this process, 0 where nobody does. Open MPI gives a rank
-  !> a pseudo terminal whatever its own output is: where it has started the process, the first process above that writes elsewhere
-  !> is asked, the launcher. Where the terminal does not say, 80.
+  !> Columns of the terminal on which a person looks at the standard output of this process, 0 where nobody does. Open MPI gives a
+  !> rank a pseudo terminal whatever its own output is: where it has started the process, the first process above that writes
+  !> elsewhere is asked, the launcher. Where the terminal does not say, 80.
   integer function terminal_width() result(width)
     character(len=:), allocatable :: mine, place
     integer :: process, level, length

@@ -1,8 +1,8 @@
 !> The function of Alart and Curnier on a packed contact problem: zero where impulses and velocities satisfy Signorini's condition
 !> and Coulomb's law, and piecewise smooth, with the blocks of its generalised Jacobian.
 !>
-!> With x = r - v/s, s the stiffness of each contact, P_n = max(x_n, 0) and P_t = x_t cut to the disc of radius mu P_n (gravier_friction_cone), it is
-!> F = s (r - P) [m/s]: v where a contact sticks, s r where it is open.
+!> With x = r - v/s, s the stiffness of each contact, P_n = max(x_n, 0) and P_t = x_t cut to the disc of radius mu P_n
+!> (gravier_friction_cone), it is F = s (r - P) [m/s]: v where a contact sticks, s r where it is open.
 module gravier_alart_curnier
   use gravier_kinds, only: dp
   use gravier_friction_cone, only: project_by_parts, is_open, sticks

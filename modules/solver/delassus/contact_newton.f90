@@ -75,8 +75,8 @@ contains
     if (allocated(self%x)) deallocate (self%centre, self%x, self%v, self%trial, self%direction)
   end subroutine contact_newton_free
 
-  !> Solve the problem given to `init`, from the impulses given. Ends early where impulses grow without bound, or where rounding hides
-  !> what a step could change. A proximal point that is found without a step counts as one.
+  !> Solve the problem given to `init`, from the impulses given. Ends early where impulses grow without bound, or where rounding
+  !> hides what a step could change. A proximal point that is found without a step counts as one.
   subroutine contact_newton_solve(self, problem, control, r, steps, figure, growth)
     class(contact_newton_t), intent(inout) :: self
     type(delassus_t), intent(in) :: problem

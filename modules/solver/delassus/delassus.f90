@@ -237,7 +237,8 @@ contains
     literature = ratio(sqrt(literature), max(scale, norm2(r), norm2(v)))
   end subroutine delassus_measure
 
-  !> Largest velocity of approach max(-v_n, 0), and largest impulse as a velocity s |r|, both relative to max|q|, with their contacts.
+  !> Largest velocity of approach max(-v_n, 0), and largest impulse as a velocity s |r|, both relative to max|q|, with their
+  !> contacts.
   pure subroutine delassus_find_extremes(self, r, v, approach, impulse, contacts)
     class(delassus_t), intent(in) :: self
     !> impulses and their velocities W r + q (dimension, contacts)
@@ -269,8 +270,8 @@ contains
     impulse = ratio(impulse, scale)
   end subroutine delassus_find_extremes
 
-  !> What a tolerance is compared with: the consistent measure, or a tenth of the largest velocity of approach, relative to max|q|, if
-  !> that is larger. No tolerance is met where an impulse is beyond what loads can make: rounding hides its velocities then.
+  !> What a tolerance is compared with: the consistent measure, or a tenth of the largest velocity of approach, relative to max|q|,
+  !> if that is larger. No tolerance is met where an impulse is beyond what loads can make: rounding hides its velocities then.
   pure real(dp) function delassus_figure(self, r, v) result(figure)
     class(delassus_t), intent(in) :: self
     !> impulses and their velocities W r + q (dimension, contacts)

@@ -1,10 +1,10 @@
 !> Contact problems without a solution, told by impulses that grow without bound.
 !>
 !> Where v = W r + q and the law contradict each other, iterations add nearly the same impulses z in each window of sweeps, and z
-!> tends to impulses in the cones that bodies balance, W z = 0, while z.q < 0: they push where bodies or walls of prescribed velocity
-!> approach, to no avail (the same holds for convex problems and other methods: G. Banjac, P. Goulart, B. Stellato and S. Boyd,
-!> Infeasibility detection in the alternating direction method of multipliers for convex optimization, J. Optim. Theory Appl. 183,
-!> 2019). Any z gives a bound. With z >= 0 along the normals alone, a solution has v_n >= 0 and so
+!> tends to impulses in the cones that bodies balance, W z = 0, while z.q < 0: they push where bodies or walls of prescribed
+!> velocity approach, to no avail (the same holds for convex problems and other methods: G. Banjac, P. Goulart, B. Stellato and S.
+!> Boyd, Infeasibility detection in the alternating direction method of multipliers for convex optimization, J. Optim. Theory Appl.
+!> 183, 2019). Any z gives a bound. With z >= 0 along the normals alone, a solution has v_n >= 0 and so
 !>
 !>     0 <= z.v = z.W r + z.q,   -z.q <= r.W^T z <= max(s |r|) sum(|W^T z|/s),
 !>

@@ -3,8 +3,8 @@
 !> A residual costs as much as two sweeps, the estimate of the velocity error as much again. What sweeps move impulses by goes with
 !> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from
 !> the goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence. The
-!> estimate follows these sums loosely and costs more: checks that ask for it keep longer pauses, and come after it is trusted, unless the
-!> scene is nearly at rest.
+!> estimate follows these sums loosely and costs more: checks that ask for it keep longer pauses, and come after it is trusted,
+!> unless the scene is nearly at rest.
 module gravier_check_schedule
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -121,9 +121,9 @@ contains
     end if
   end function is_worth_a_check
 
-  !> Whether the last check lies far enough back. Where the estimate is asked for, a solve that ends in the next T iterations, with a check
-  !> after each p of them, takes T/p checks and makes p/2 iterations in vain. The sum is least with p^2 = 2 T estimate_cost. T is taken
-  !> as a quarter of the iterations made.
+  !> Whether the last check lies far enough back. Where the estimate is asked for, a solve that ends in the next T iterations, with
+  !> a check after each p of them, takes T/p checks and makes p/2 iterations in vain. The sum is least with p^2 = 2 T estimate_cost.
+  !> T is taken as a quarter of the iterations made.
   pure logical function has_paused(self, iteration, regular)
     class(check_schedule_t), intent(in) :: self
     integer, intent(in) :: iteration

@@ -43,8 +43,8 @@ module gravier_levels
     integer :: most_depth = -1
     !> L, and the largest |e_l|, by the last `add` [m/s]
     real(dp) :: error = 0.0_dp, fastest = 0.0_dp
-    !> largest |e_b|, and the root of the mean of its square, each body counting the same; bounds on both as long as `follow` has not
-    !> been called [m/s]
+    !> largest |e_b|, and the root of the mean of its square, each body counting the same; bounds on both as long as `follow` has
+    !> not been called [m/s]
     real(dp) :: fastest_body = 0.0_dp, mean_of_bodies = 0.0_dp
   contains
     procedure :: start => levels_start
@@ -179,8 +179,8 @@ contains
     level = merge(max(i, j), 0, abs(i - j) == 1 .and. min(i, j) /= afloat)
   end function level_of
 
-  !> How fast each body sinks, one depth after the other, after `add`. Subdomains exchange what they have found of the bodies that they
-  !> share after each depth that has such. Collective.
+  !> How fast each body sinks, one depth after the other, after `add`. Subdomains exchange what they have found of the bodies that
+  !> they share after each depth that has such. Collective.
   subroutine levels_follow(self, problem, largest_violation)
     class(levels_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem

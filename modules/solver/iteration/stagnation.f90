@@ -1,9 +1,9 @@
 !> Whether a solve gains anything yet.
 !>
-!> A solve has stagnated if neither its figure nor its estimated velocity error has fallen by a tenth for so many iterations, accelerated
-!> or plain, and for as many as it has had until then, and if it has had enough iterations for a wave to run from end to end and back.
-!> The figure may rise while the error falls, because near rest the criterion allows less. Either the method finds no solution, or there
-!> is none: then the impulses grow in vain (gravier_vain_impulses).
+!> A solve has stagnated if neither its figure nor its estimated velocity error has fallen by a tenth for so many iterations,
+!> accelerated or plain, and for as many as it has had until then, and if it has had enough iterations for a wave to run from end to
+!> end and back. The figure may rise while the error falls, because near rest the criterion allows less. Either the method finds no
+!> solution, or there is none: then the impulses grow in vain (gravier_vain_impulses).
 module gravier_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t

@@ -205,8 +205,8 @@ contains
       & self%levels%mean_of_bodies/bodies_allowed)
   end function velocity_error_criterion
 
-  !> What tells whether one start is better than another [m/s]: E, because single contacts that are far off are soon mended; but where
-  !> few heavy bodies have most of the mass, in which the others hide, what the criterion compares.
+  !> What tells whether one start is better than another [m/s]: E, because single contacts that are far off are soon mended; but
+  !> where few heavy bodies have most of the mass, in which the others hide, what the criterion compares.
   pure real(dp) function velocity_error_measure_of_start(self) result(measure)
     class(velocity_error_t), intent(in) :: self
     measure = self%estimate()

@@ -19,10 +19,10 @@ module gravier_waking
 
 contains
 
-  !> Whether contacts that sleep wake after a check that did not end the solve, because sweeps over the others would not bring it to its
-  !> end. They wake where most of the defect lies in them. Where the residual is within its tolerance and the velocity error is not,
-  !> they also wake where the error has not fallen since the last check; before the estimate of the error is trusted, such a residual is
-  !> no reason to wake anything.
+  !> Whether contacts that sleep wake after a check that did not end the solve, because sweeps over the others would not bring it to
+  !> its end. They wake where most of the defect lies in them. Where the residual is within its tolerance and the velocity error is
+  !> not, they also wake where the error has not fallen since the last check; before the estimate of the error is trusted, such a
+  !> residual is no reason to wake anything.
   logical function waking_is_due(self, asleep_share, is_within, is_trusted, figure) result(is_due)
     class(waking_t), intent(inout) :: self
     !> share of the squared defect that lies in contacts that sleep

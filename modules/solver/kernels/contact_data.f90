@@ -44,8 +44,8 @@ module gravier_contact_data
     integer :: rolling_friction = 0, pivoting_friction = 0
     !> of bodies with shapes: what couples the normal to the tangential directions, W_nt and, in space, W_ns [1/kg]
     integer :: w_nt = 0, w_ns = 0
-    !> of bodies with shapes: in the plane, c x n of the arm c from the centre of the candidate, and of the antagonist, to the contact;
-    !> in space, the first of the three components of either arm in global axes; 0 of boundaries [m]
+    !> of bodies with shapes: in the plane, c x n of the arm c from the centre of the candidate, and of the antagonist, to the
+    !> contact; in space, the first of the three components of either arm in global axes; 0 of boundaries [m]
     integer :: arm_i = 0, arm_j = 0
     !> compliances a along the normal and the tangents, 0 of a rigid contact: the law holds for v + shift + a r [1/kg]
     integer :: compliance_n = 0, compliance_t = 0

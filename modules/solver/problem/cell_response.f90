@@ -54,8 +54,8 @@ contains
     end associate
   end subroutine prepare
 
-  !> Let what stresses drive move as the present impulses have it, and tell the contacts. It is called between iterations, which see a
-  !> cell that moves as before. Collective.
+  !> Let what stresses drive move as the present impulses have it, and tell the contacts. It is called between iterations, which see
+  !> a cell that moves as before. Collective.
   subroutine respond(problem)
     type(contact_problem_t), intent(inout) :: problem
     real(dp) :: parts(count(problem%cell%driven), size(problem%sub)), virial(count(problem%cell%driven))
@@ -156,8 +156,8 @@ contains
     end do
   end function image_velocity
 
-  !> Relative velocities of the contacts of a solved subdomain: from those of grains that are carried along, those of the images that
-  !> contacts meet are taken.
+  !> Relative velocities of the contacts of a solved subdomain: from those of grains that are carried along, those of the images
+  !> that contacts meet are taken.
   pure subroutine subtract_images(problem, s, v)
     type(contact_problem_t), intent(in) :: problem
     !> subdomain of this rank

@@ -7,8 +7,8 @@
 !> still to be added, v = H^T V + (G' - G) l - G D: what is added to H^T V is a constant of the contact, as a shift of its law is.
 !>
 !> A component of G is given, or a stress s drives it. Then it has an inertia K, and the mean stress of the contacts resists,
-!> K (G' - G) = sum over the contacts of p l^T - h V s: the virial on the left of a Cauchy stress, compression positive, that is held
-!> (M. Parrinello and A. Rahman, J. Appl. Phys. 52, 1981). The solve finds such a component along with the impulses.
+!> K (G' - G) = sum over the contacts of p l^T - h V s: the virial on the left of a Cauchy stress, compression positive, that is
+!> held (M. Parrinello and A. Rahman, J. Appl. Phys. 52, 1981). The solve finds such a component along with the impulses.
 module gravier_moving_cell
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times

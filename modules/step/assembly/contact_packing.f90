@@ -22,8 +22,8 @@ module gravier_contact_packing
     integer, allocatable :: of_grain(:), of_boundary(:)
   end type numbers_t
 
-  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs, its
-  !> candidate and its antagonist, a grain or minus a boundary, and the boundary that takes part, 0 for none.
+  !> A contact while it is packed: its place in the sweep, lane and block, its places among those found and in the list of pairs,
+  !> its candidate and its antagonist, a grain or minus a boundary, and the boundary that takes part, 0 for none.
   type :: packed_t
     integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0
     !> what its law makes of the step
@@ -83,8 +83,8 @@ contains
     end do
   end subroutine pack_contacts
 
-  !> What the law of a contact makes of the step. Without laws of materials, and where no law has other terms for each pair, all contacts
-  !> with one boundary have the same, and so have all between grains.
+  !> What the law of a contact makes of the step. Without laws of materials, and where no law has other terms for each pair, all
+  !> contacts with one boundary have the same, and so have all between grains.
   pure subroutine take_terms(view, found, boundaries, laws, before, this)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
@@ -321,9 +321,9 @@ contains
     if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics%h, this%c, v, sub)
   end subroutine pack_tangential_shift
 
-  !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched. Loads
-  !> give grains no spin, so that the spin without contacts is that of the start, which in space goes round with the body and has its
-  !> energy.
+  !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched.
+  !> Loads give grains no spin, so that the spin without contacts is that of the start, which in space goes round with the body and
+  !> has its energy.
   subroutine find_start_velocities(view, found, boundaries, this, sub, vi, vj)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found

@@ -207,8 +207,8 @@ contains
     end if
   end subroutine add_contact
 
-  !> The same in a scene where some law has other terms for each pair. Such a law asks for more than the gap: it gives the contact its
-  !> terms and springs, and the pair its state.
+  !> The same in a scene where some law has other terms for each pair. Such a law asks for more than the gap: it gives the contact
+  !> its terms and springs, and the pair its state.
   subroutine add_with_terms(view, decomposition, physics, p, gap, normal, found, place)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition

@@ -134,8 +134,8 @@ contains
     points%n = n
   end subroutine drop
 
-  !> Bring the impulses, elongations and states that the pair at place `p` keeps to the points of now: to those with the same keys first, then
-  !> what is left, in its order, to the new points. Points take the places of the pair in their order.
+  !> Bring the impulses, elongations and states that the pair at place `p` keeps to the points of now: to those with the same keys
+  !> first, then what is left, in its order, to the new points. Points take the places of the pair in their order.
   pure subroutine carry_memory(points, p, list)
     type(pair_points_t), intent(in) :: points
     integer, intent(in) :: p

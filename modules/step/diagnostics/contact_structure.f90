@@ -19,8 +19,8 @@ module gravier_contact_structure
 
   !> The same on every rank. A contact carries where its bodies touch: where the normal impulse of its solve is not zero.
   type, extends(diagnostic_t) :: contact_structure_t
-    !> neighbours of a free grain that carry, on average: of all, and of those that two or more contacts hold. Bodies with shapes may
-    !> touch a neighbour in several contacts; else each carrying contact is a neighbour
+    !> neighbours of a free grain that carry, on average: of all, and of those that two or more contacts hold. Bodies with shapes
+    !> may touch a neighbour in several contacts; else each carrying contact is a neighbour
     real(dp) :: coordination = 0.0_dp, mechanical_coordination = 0.0_dp
     !> free grains with less than two carrying contacts
     integer(i8) :: rattlers = 0
@@ -42,7 +42,8 @@ module gravier_contact_structure
     procedure :: get_histogram => structure_get_histogram
   end type contact_structure_t
 
-  !> Of a subdomain: numbers of carrying contacts of its bodies, in the first row, and of their neighbours, in the second (nv, n_columns).
+  !> Of a subdomain: numbers of carrying contacts of its bodies, in the first row, and of their neighbours, in the second (nv,
+  !> n_columns).
   type :: tally_t
     real(dp), allocatable :: ends(:, :)
   end type tally_t

@@ -92,12 +92,14 @@ module gravier_diagnostic
     !> What it is, whatever its state.
     pure function features_interface() result(features)
       import :: diagnostic_features_t
+      implicit none
       type(diagnostic_features_t) :: features
     end function features_interface
 
     !> Measure the step when it is over, in the steps of `features%measures`. Collective.
     subroutine measure_interface(self, step)
       import :: diagnostic_t, solved_step_t
+      implicit none
       class(diagnostic_t), intent(inout) :: self
       type(solved_step_t), intent(in) :: step
     end subroutine measure_interface
@@ -105,6 +107,7 @@ module gravier_diagnostic
     !> Add names and values of its columns, the same names in the same order from `begin` on.
     subroutine columns_interface(self, list)
       import :: diagnostic_t, column_list_t
+      implicit none
       class(diagnostic_t), intent(in) :: self
       type(column_list_t), intent(inout) :: list
     end subroutine columns_interface

@@ -292,8 +292,8 @@ contains
 
   end subroutine add_contacts
 
-  !> Velocities of the columns of a subproblem at the start of the step; spins as they are at its end without moments, which have the
-  !> same energy.
+  !> Velocities of the columns of a subproblem at the start of the step; spins as they are at its end without moments, which have
+  !> the same energy.
   subroutine find_start(step, earlier, s, start)
     type(solved_step_t), intent(in) :: step
     type(boundary_t), intent(in) :: earlier(:)

@@ -1,5 +1,5 @@
-!> The impulses that the first solve of a run starts from, where its bodies file gives forces of contacts. They enter the memory that
-!> carries impulses from step to step, so that nothing else knows where they come from.
+!> The impulses that the first solve of a run starts from, where its bodies file gives forces of contacts. They enter the memory
+!> that carries impulses from step to step, so that nothing else knows where they come from.
 !>
 !> A given contact belongs to the contact of the first step that has the same two bodies or the same body and boundary and a normal
 !> within a right angle of its own; of several the nearest one. Rank `mod(candidate, ranks)` brings the two together: it is told of
@@ -68,9 +68,9 @@ contains
     started%share = started%share/max(decomposition%comm%sum_real(pressing), tiny(h))
   end subroutine take_given_impulses
 
-  !> The given contacts of this rank as records: candidate, antagonist (minus the number of a boundary of the scene), 0, row, normal,
-  !> force, point and moment. Of two bodies the candidate is that of the lower identifier. Boundaries that the scene does not have are
-  !> left out.
+  !> The given contacts of this rank as records: candidate, antagonist (minus the number of a boundary of the scene), 0, row,
+  !> normal, force, point and moment. Of two bodies the candidate is that of the lower identifier. Boundaries that the scene does
+  !> not have are left out.
   subroutine pack_given(given, boundaries, records)
     type(given_contacts_t), intent(in) :: given
     type(boundary_t), intent(in) :: boundaries(:)

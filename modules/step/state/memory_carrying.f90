@@ -1,5 +1,6 @@
-!> Impulses and states of pairs from neighbour lists to those that are made anew. They stay where they are: a pair whose subdomain has
-!> not changed takes them from the list before, by the places of its bodies. Only pairs that belong to another subdomain now travel.
+!> Impulses and states of pairs from neighbour lists to those that are made anew. They stay where they are: a pair whose subdomain
+!> has not changed takes them from the list before, by the places of its bodies. Only pairs that belong to another subdomain now
+!> travel.
 module gravier_memory_carrying
   use gravier_kinds, only: dp, i8
   use gravier_sorting, only: argsort, argsort_rows

@@ -34,8 +34,8 @@ contains
     call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 
-  !> Move the grains in contact by what v_global holds in the place of velocities [m], and turn those with shapes [rad], which takes and
-  !> gives no energy. Collective.
+  !> Move the grains in contact by what v_global holds in the place of velocities [m], and turn those with shapes [rad], which takes
+  !> and gives no energy. Collective.
   subroutine take_displacements(decomposition, problem)
     type(decomposition_t), intent(inout) :: decomposition
     type(contact_problem_t), intent(in) :: problem

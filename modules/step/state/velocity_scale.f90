@@ -3,7 +3,8 @@
 !> against what loads do in a step, in fast flow against the motion itself.
 !>
 !>     load   what loads do to the mean grain in a step (mass m, diameter d):
-!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds; attraction
+!>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds;
+!> attraction
 !>            of the laws where there is no other load, which are internal forces else; the root mean square of what applied forces
 !>            add to velocities
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d

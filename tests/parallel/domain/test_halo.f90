@@ -267,8 +267,8 @@ contains
     if (fresh) call check(all(owner == right), "pairs in the subdomains of their owner points")
   end subroutine check_pairs
 
-  !> Grains behind an outlet leave views and lists as they are: the others keep their order, their pairs with what these hold, and the
-  !> copies that other subdomains see of them.
+  !> Grains behind an outlet leave views and lists as they are: the others keep their order, their pairs with what these hold, and
+  !> the copies that other subdomains see of them.
   subroutine test_departures(nd, n_subdomains)
     integer, intent(in) :: nd, n_subdomains
     type(cloud_t) :: cloud

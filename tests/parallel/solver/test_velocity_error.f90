@@ -113,8 +113,8 @@ contains
     call sim%free()
   end subroutine test_ways
 
-  !> Gaps that close within less than a tenth of the velocity that errors are compared with do not cut a column off its ground; of others
-  !> that no impulse crosses, the disks above have no way to it.
+  !> Gaps that close within less than a tenth of the velocity that errors are compared with do not cut a column off its ground; of
+  !> others that no impulse crosses, the disks above have no way to it.
   subroutine test_gaps(n_subdomains)
     integer, intent(in) :: n_subdomains
     integer, parameter :: count = 23, cut = 11

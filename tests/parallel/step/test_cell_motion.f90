@@ -1,5 +1,5 @@
-!> A periodic cell that deforms: what moves it without contacts, what it adds to their velocities, and the balance of a component that
-!> a stress drives with the virial of the contacts of a solved step, in two subdomains.
+!> A periodic cell that deforms: what moves it without contacts, what it adds to their velocities, and the balance of a component
+!> that a stress drives with the virial of the contacts of a solved step, in two subdomains.
 program test_cell_motion
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t

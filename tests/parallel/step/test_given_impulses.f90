@@ -110,7 +110,8 @@ contains
     end do
   end subroutine forget
 
-  !> The same contacts in another order, spread over the ranks by turns; of every other pair of bodies the other one is the candidate.
+  !> The same contacts in another order, spread over the ranks by turns; of every other pair of bodies the other one is the
+  !> candidate.
   subroutine shuffle(contacts, shuffled)
     type(given_contacts_t), intent(in) :: contacts
     type(given_contacts_t), intent(out) :: shuffled
@@ -153,8 +154,8 @@ contains
     end do
   end subroutine shuffle
 
-  !> Forces are sums of three products of numbers below 1 and are taken apart by as many: 64 roundings are more than they can be off.
-  !> Moments are divided by lengths of 0.025 and more, which adds a rounding.
+  !> Forces are sums of three products of numbers below 1 and are taken apart by as many: 64 roundings are more than they can be
+  !> off. Moments are divided by lengths of 0.025 and more, which adds a rounding.
   subroutine test_round_trip(dimension, n_subdomains, law)
     integer, intent(in) :: dimension, n_subdomains
     character(len=*), intent(in) :: law

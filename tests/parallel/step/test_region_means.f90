@@ -1,5 +1,5 @@
-!> Means over regions in a scene of many subdomains: the whole scene has the mean stress, bins have what their region has, and what is
-!> known of a lattice at rest. Extents of scenes, branches of contacts.
+!> Means over regions in a scene of many subdomains: the whole scene has the mean stress, bins have what their region has, and what
+!> is known of a lattice at rest. Extents of scenes, branches of contacts.
 program test_region_means
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t

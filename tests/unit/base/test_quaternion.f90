@@ -26,8 +26,8 @@ contains
     q(:) = q/norm2(q)
   end subroutine make
 
-  !> All turns by ratios from -2 to 2: half turns about any axis are among them, and any component is the largest of some. Of the two
-  !> quaternions of a turn that with a real part of 0 or more comes back.
+  !> All turns by ratios from -2 to 2: half turns about any axis are among them, and any component is the largest of some. Of the
+  !> two quaternions of a turn that with a real part of 0 or more comes back.
   subroutine test_there_and_back()
     real(dp) :: q(4), found(4), axes(3, 3)
     integer :: i, whole(4)

@@ -247,7 +247,7 @@ contains
   subroutine test_space_refused()
     call refuse("shape a"//lf//"polygon 0 0 1 0 0 1", 3, &
       & 'line 2: "polygon": expected shape, rounding, hull, box, sphere, capsule, file, tetrahedron, cube, '// &
-      & 'octahedron, dodecahedron, icosahedron or random_hull')
+      & "octahedron, dodecahedron, icosahedron or random_hull")
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0", 3, &
       & "line 2: hull with 9 numbers: expected x, y and z of four corners or more")
     call refuse("shape a"//lf//"hull 0 0 0 1 0 0 0 1 0 1", 3, "line 2: hull with 10 numbers: expected x, y and z of four corners")

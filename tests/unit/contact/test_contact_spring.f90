@@ -1,4 +1,5 @@
-!> Springs of contacts against formulas: the law of a step, elongations after it, dashpots, energies, and the restitution of impacts.
+!> Springs of contacts against formulas: the law of a step, elongations after it, dashpots, energies, and the restitution of
+!> impacts.
 program test_contact_spring
   use gravier_kinds, only: dp
   use gravier_contact_spring, only: spring_t, spring_step_t, damping_ratio, rebound_of

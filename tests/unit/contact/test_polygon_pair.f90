@@ -1,4 +1,5 @@
-!> Contacts of pieces of the plane: bricks, disks and capsules in known places, and random pairs whose distance is proved by duality.
+!> Contacts of pieces of the plane: bricks, disks and capsules in known places, and random pairs whose distance is proved by
+!> duality.
 program test_polygon_pair
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
@@ -176,8 +177,8 @@ contains
     end do
   end subroutine test_swap
 
-  !> Random polygons: no direction separates the cores by more than the shortest way between them, and the normal found separates them
-  !> by just that.
+  !> Random polygons: no direction separates the cores by more than the shortest way between them, and the normal found separates
+  !> them by just that.
   subroutine test_random_pairs()
     integer, parameter :: n_pairs = 20000
     type(placed_piece_t) :: a, b

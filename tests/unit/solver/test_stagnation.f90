@@ -20,8 +20,8 @@ program test_stagnation
 
 contains
 
-  !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none is. The
-  !> velocity error falls by the same factor, or by its own.
+  !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none
+  !> is. The velocity error falls by the same factor, or by its own.
   integer function first_due(accelerated, missing_residual, factor, factor_of_error)
     logical, intent(in) :: accelerated
     real(dp), intent(in) :: missing_residual, factor
