@@ -570,7 +570,8 @@ class Import(RunTestCase):
         self.assertIn("body 2 DISKx: no grain sees it, left out", message)
 
     def test_a_ground_as_wide_as_the_period(self):
-        """A ground that reaches round the cell is a plane; one between grains above and below cannot be one, and gravier refuses it."""
+        """A ground that reaches round the cell is a plane. One between grains above and below has two sides: they have no ends where the ground
+        is as long as the period, and carry the grain above; a longer one is refused."""
         for dimension, shape, wall, half in ((2, "DISKx", "JONCx", {"axe1": 0.5, "axe2": 0.01}),
                                              (3, "SPHER", "PLANx", {"axe1": 0.6, "axe2": 0.3, "axe3": 0.01})):
             rigid = f"RBDY{dimension}"
@@ -586,10 +587,18 @@ class Import(RunTestCase):
             weight = 2500.0 * G * (math.pi * 0.05**2 if dimension == 2 else 4.0 / 3.0 * math.pi * 0.05**3)
             self.assertLess(abs(forces[-1][0, dimension - 1] + weight), 0.01 * weight)
             below = body(dimension, 3, [*up, -0.07], [(shape, "BLUEx", values(byrd=0.05))])
-            folder, message = self.convert(self.box(dimension, grain + ground + below, laws, still(dimension, 2)), *period, status=2)
-            self.assertRegex(message, r"^gravier_import: error: case.nml: gravier --check refuses the case that was made: case.nml: boundary "
-                                      r"'body 2 above': expected a width, .* at most the period of 1.000E\+00 m, .*\n$")
-            self.assertEqual(os.listdir(folder), [])
+            box = self.box(dimension, grain + ground + below, laws, still(dimension, 2))
+            if half["axe1"] > 0.5:
+                folder, message = self.convert(box, *period, status=2)
+                self.assertRegex(message, r"^gravier_import: error: case.nml: gravier --check refuses the case that was made: case.nml: boundary "
+                                          r"'body 2 above': expected a width, .* at most the period of 1.000E\+00 m, .*\n$")
+                self.assertEqual(os.listdir(folder), [])
+            else:
+                folder, notes = self.convert(box, *period)
+                self.assertNotIn("becomes an endless plane", notes)
+                self.assertIn("name = 'body 2 above'", self.case_of(folder))
+                _, forces = self.run_case(folder)
+                self.assertLess(abs(forces[-1][:, dimension - 1].sum() + weight), 0.01 * weight)
             # a wall narrower than the period stays what it is
             half["axe1"] = 0.3
             small = body(dimension, 2, [*up, -0.01], [(wall, "WALLx", values(**half))])

@@ -105,7 +105,8 @@ class Sleeping(RunTestCase):
 
     def test_velocity_error(self):
         """Solves that end by the velocity error let contacts sleep as well. A residual that meets its tolerance before the error is known wakes
-        nothing: of the 170 solves after the impact a few do, until the heap rests again (measured: 2), and sleep saves iterations."""
+        nothing: of the 170 solves after the impact a few do, until the heap rests again (measured: 3). Of the relaxations after the first fall
+        sleep saves all but a fifth (measured: 3872 of 41 460)."""
         case = merged(self.case, {"solver": {"criterion": "velocity_error", "tolerance": None}, "output": {"checkpoint_every": 0}})
         plain, sleeping = each(lambda name, more: run_case(merged(case, more), 1, f"{self.scratch}/error {name}"),
                                [("plain", {}), ("sleeping", SLEEPING)])
@@ -117,7 +118,8 @@ class Sleeping(RunTestCase):
         self.assertGreater(asleep[-1], 0.95)
         self.assertGreater(history["woken"].sum(), 0)
         self.assertLessEqual(history["woken"].sum(), 6)
-        self.assertLess(history["iterations"].sum(), plain.history()["iterations"].sum())
+        relaxed = [(each["iterations"] * (each["contacts"] - each["sleeping"]))[REST:].sum() for each in (plain.history(), history)]
+        self.assertLess(5 * relaxed[1], relaxed[0])
 
     def test_schwarz_and_nlgs(self):
         """The same sleep under the other methods; a boundary that begins to move, and gravity that changes, wake it."""
