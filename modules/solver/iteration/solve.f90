@@ -13,7 +13,7 @@ module gravier_solve
   use gravier_stagnation, only: stagnation_t
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
-  use gravier_waking, only: waking_t
+  use gravier_waking, only: wake_is_due
   use gravier_vain_impulses, only: normals_are_in_vain
   implicit none
   private
@@ -122,7 +122,6 @@ module gravier_solve
     type(check_schedule_t) :: schedule
     type(stagnation_t) :: stagnation
     type(layer_trial_t) :: trial
-    type(waking_t) :: waking
     !> the first defect, or the scale of forces where that is larger [N s]
     real(dp) :: reference = 0.0_dp
     !> when the solve began, and what its checks have taken [s]
@@ -253,8 +252,8 @@ contains
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
     call state%schedule%note_check(report%iterations, report%figure, report%goal)
     if (.not. finished .and. problem%n_asleep > 0) then
-      if (state%waking%is_due(problem%asleep_share, report%residual <= control%tolerance, &
-        & .not. state%by_estimate .or. report%iterations >= copies_ready, report%figure)) then
+      if (wake_is_due(problem%asleep_share, report%residual <= control%tolerance, &
+        & .not. state%by_estimate .or. report%iterations >= copies_ready, 2*problem%n_asleep > problem%n_contacts)) then
         call problem%wake()
         report%woken = .true.
         ! changes of all contacts are other changes
@@ -288,7 +287,8 @@ contains
 
   !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
   !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
-  !> zero impulses neither before some iterations. Collective.
+  !> zero impulses neither before some iterations. Where all contacts sleep, iterations change nothing, and none is waited for.
+  !> Collective.
   subroutine find_whether_velocity_met(state, problem, method, control, report, is_met)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
@@ -305,7 +305,7 @@ contains
       if (state%velocity%rests()) then
         is_met = state%velocity%all_are_slow(problem)
         if (is_met) return
-      else if (report%iterations < copies_ready) then
+      else if (report%iterations < copies_ready .and. problem%n_asleep < problem%n_contacts) then
         return
       end if
       call state%velocity%assess(problem, method, report%iterations, report%residual, defect)
