@@ -63,7 +63,7 @@ function(gravier_test name)
       gravier_compile_options(${target})
     else()
       gravier_compile_options(${target} OPTIMISE 0)
-      # without optimisation the compiler takes descriptors that an allocation sets for uninitialised ones; the debug build warns of those that are
+      # without optimisation the compiler warns falsely of descriptors that an allocation sets; the debug build warns of those that are never set
       target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Wno-maybe-uninitialized>)
     endif()
     if(GRAVIER_LINKER_GOLD)

@@ -251,18 +251,25 @@ contains
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
     call state%schedule%note_check(report%iterations, report%figure, report%goal)
-    if (.not. finished .and. problem%n_asleep > 0) then
-      if (wake_is_due(problem%asleep_share, report%residual <= control%tolerance, &
-        & .not. state%by_estimate .or. report%iterations >= copies_ready, 2*problem%n_asleep > problem%n_contacts)) then
-        call problem%wake()
-        report%woken = .true.
-        ! changes of all contacts are other changes
-        call state%schedule%forget_ratio()
-      end if
-    end if
+    if (.not. finished .and. problem%n_asleep > 0) call wake_if_due(state, problem, control, report)
     state%checking = state%checking + clock() - start
     call stop_timer(phase_check)
   end subroutine check
+
+  !> Wake the contacts that sleep, where it is time. Collective.
+  subroutine wake_if_due(state, problem, control, report)
+    type(solve_state_t), intent(inout) :: state
+    type(contact_problem_t), intent(inout) :: problem
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+
+    if (.not. wake_is_due(problem%asleep_share, report%residual <= control%tolerance, &
+      & .not. state%by_estimate .or. report%iterations >= copies_ready, 2*problem%n_asleep > problem%n_contacts)) return
+    call problem%wake()
+    report%woken = .true.
+    ! changes of all contacts are other changes
+    call state%schedule%forget_ratio()
+  end subroutine wake_if_due
 
   !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
   subroutine find_whether_met(state, problem, method, control, report, is_met)

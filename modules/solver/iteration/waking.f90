@@ -10,10 +10,10 @@ module gravier_waking
 
 contains
 
-  !> Whether contacts that sleep wake after a check that did not end the solve. Where the residual is above its tolerance, they wake if
-  !> most of the defect lies in them; otherwise sweeps over the others have to lower it first, and may do. Where the residual is within
-  !> its tolerance, the velocity error is too large for the solve to end: they wake, unless that error is not known yet and so many
-  !> sleep that it is worth while to wait for it.
+  !> Whether contacts that sleep wake after a check that did not end the solve. Where the residual is above its tolerance, they wake
+  !> if most of the defect lies in them; otherwise sweeps over the others have to lower it first, and may do. Where the residual is
+  !> within its tolerance, the velocity error is too large for the solve to end: they wake, unless that error is not known yet and
+  !> so many sleep that it is worth while to wait for it.
   pure logical function wake_is_due(asleep_share, is_within, is_trusted, many_sleep) result(is_due)
     !> share of the squared defect that lies in contacts that sleep
     real(dp), intent(in) :: asleep_share

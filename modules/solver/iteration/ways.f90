@@ -13,8 +13,8 @@ module gravier_ways
 
   !> length of the way of what none leads to
   real(dp), parameter :: unreached = huge(1.0_dp)
-  !> a contact is closed where its shift is below this fraction of the largest free speed, which is rounding of places, or below
-  !> that fraction of the velocity that errors are compared with: gaps that the solve before has left close at once
+  !> a contact is closed if its shift is below `rounded` times the largest free speed, because places are rounded, or below
+  !> `soon_closed` times the velocity that errors are compared with, because errors of the step before leave such gaps
   real(dp), parameter :: rounded = 1.0e-3_dp, soon_closed = 0.1_dp
 
   !> Of one subdomain.
