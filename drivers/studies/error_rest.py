@@ -22,7 +22,8 @@ def play(groups, directory, steps, program):
         speeds = np.array([np.sqrt((file[f"steps/{int(step)}/bodies/velocity"][:, :2]**2).sum(1)).max() for step in history["step"]])
     (directory / "results/results.h5").unlink()
     weight = groups["scene"]["density"] * np.pi * (radii**2).sum() * 9.81
-    return status, -history["force_y:floor"] / weight, speeds / (9.81 * h), history["solve_seconds"].sum(), history["iterations"].sum()
+    carried = -sum(history[name] for name in history if name.startswith("force_y:"))
+    return status, carried / weight, speeds / (9.81 * h), history["solve_seconds"].sum(), history["iterations"].sum()
 
 
 def study_rest(scenes, out, steps, beside):

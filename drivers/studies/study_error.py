@@ -427,9 +427,10 @@ def study_estimate(out, quick, only):
 
 def at_rest(quick):
     """(name, make) of scenes that stay at rest."""
-    found = [("column of 10", towers((10,))), ("column of 100", towers((100,))), ("columns of 10 to 160", towers((10, 20, 40, 80, 160)))]
+    found = [("column of 10", towers((10,))), ("column of 100", towers((100,))), ("columns of 10 to 160", towers((10, 20, 40, 80, 160))),
+             ("periodic tower 10 x 40", tower(10, 40)), ("bonded beam 60 x 10", beam(60, 10))]
     if quick:
-        return [*found[:2], ("periodic tower 10 x 40", tower(10, 40))]
+        return found
     return [*found, ("column of 300", towers((300,))), ("column of 1000", towers((1000,))),
             ("periodic tower 10 x 200", tower(10, 200))]
 

@@ -46,6 +46,8 @@ module gravier_levels
     !> largest |e_b|, and the root of the mean of its square, each body counting the same; bounds on both as long as `follow` has
     !> not been called [m/s]
     real(dp) :: fastest_body = 0.0_dp, mean_of_bodies = 0.0_dp
+    !> largest over the bodies of the smaller of |e_b| and the body's speed, by the last `follow`; 0 before it [m/s]
+    real(dp) :: fastest_that_moves = 0.0_dp
   contains
     procedure :: start => levels_start
     procedure :: forget => levels_forget
@@ -71,6 +73,7 @@ contains
     self%error = 0.0_dp
     self%fastest = 0.0_dp
     self%fastest_body = 0.0_dp
+    self%fastest_that_moves = 0.0_dp
     self%mean_of_bodies = 0.0_dp
   end subroutine levels_forget
 
@@ -193,12 +196,13 @@ contains
       real(dp), allocatable :: sinks(:)
     end type sum_t
     type(sum_t) :: sums(size(self%part))
-    real(dp) :: parts(2, size(self%part)), means(2)
+    real(dp) :: parts(2, size(self%part)), means(2), fastest(2), sinking
     !> 1 for depths that subdomains share bodies of
     real(dp), allocatable :: shared(:)
     integer :: s, b, l
 
     self%fastest_body = 0.0_dp
+    self%fastest_that_moves = 0.0_dp
     self%mean_of_bodies = 0.0_dp
     if (self%most_depth < 1) return
     allocate (shared(self%most_depth), source=0.0_dp)
@@ -234,19 +238,24 @@ contains
       end do
     end do
     parts(:, :) = 0.0_dp
+    fastest(:) = 0.0_dp
     do s = 1, size(self%part)
       associate (sub => problem%sub(s))
         do b = 1, sub%n_grains
           if (self%part(s)%depth(b) == afloat) cycle
-          self%fastest_body = max(self%fastest_body, abs(sums(s)%sinks(b)))
-          parts(1, s) = parts(1, s) + sums(s)%sinks(b)**2/sub%multiplicity(b)
+          sinking = abs(sums(s)%sinks(b))
+          fastest(1) = max(fastest(1), sinking)
+          if (sinking > fastest(2)) fastest(2) = max(fastest(2), min(sinking, norm2(sub%v_global(1:problem%kernels%nd, b))))
+          parts(1, s) = parts(1, s) + sinking**2/sub%multiplicity(b)
           parts(2, s) = parts(2, s) + 1.0_dp/sub%multiplicity(b)
         end do
       end associate
     end do
     call start_timer(phase_reduction)
     call problem%comm%sum_parts(parts, means)
-    self%fastest_body = problem%comm%highest(self%fastest_body)
+    call problem%comm%highest_of(fastest)
+    self%fastest_body = fastest(1)
+    self%fastest_that_moves = fastest(2)
     call stop_timer(phase_reduction)
     if (means(2) > 0.0_dp) self%mean_of_bodies = sqrt(means(1)/means(2))
   end subroutine levels_follow

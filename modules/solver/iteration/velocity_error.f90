@@ -13,7 +13,8 @@
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C.
 !> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
-!> law by much, and no body sink by much onto what is below it. See doc/theory.md, section 24.
+!> law by much, and no body sink by much onto what is below it. Where nearly all bodies are at rest and some are faster, these may
+!> roll or be in error: E has to be at most a third of what moves there. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
@@ -38,6 +39,9 @@ module gravier_velocity_error
   real(dp), parameter :: even_share = 0.25_dp
   !> times the error allowed by which what lies above a level may sink where what moves is at most so many times the error allowed
   real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
+  !> times the error allowed above which a body counts as moving among bodies that are nearly at rest; least share of the error
+  !> allowed that is asked for then
+  real(dp), parameter :: speed_at_rest = 0.3_dp, least_share = 0.2_dp
   !> fraction of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> plain sweeps: ratio between the iterations at which impulses are copied, and the first of them
@@ -81,6 +85,8 @@ module gravier_velocity_error
     logical, private :: is_uneven = .false.
     !> whether it is known how fast bodies sink
     logical, private :: has_followed = .false.
+    !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
+    logical, private :: is_restless = .false.
     type(error_part_t), allocatable, private :: part(:)
   contains
     procedure :: start => velocity_error_start
@@ -93,6 +99,7 @@ module gravier_velocity_error
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
     procedure :: measure_of_start => velocity_error_measure_of_start
+    procedure, private :: share_of_motion => velocity_error_share_of_motion
     procedure, private :: wave => velocity_error_wave
     procedure :: all_are_slow => velocity_error_all_are_slow
     procedure :: begin_anew => velocity_error_begin_anew
@@ -166,6 +173,7 @@ contains
     self%projection = unknown
     call self%levels%forget()
     self%has_followed = .false.
+    self%is_restless = .false.
     self%largest_violation = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
@@ -176,7 +184,17 @@ contains
   logical function velocity_error_all_are_slow(self, problem) result(are_slow)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp) :: fastest, rim, limit
+    real(dp) :: limit
+
+    limit = merge(bodies_allowed, min(violations_allowed, body_allowed), self%is_uneven)*self%allowed
+    are_slow = 2.0_dp*fastest_speed(self, problem) <= limit
+  end function velocity_error_all_are_slow
+
+  !> The largest speed of a body, with that of its rim [m/s]. Collective.
+  real(dp) function fastest_speed(self, problem) result(fastest)
+    class(velocity_error_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    real(dp) :: rim
     integer :: s, b
 
     fastest = 0.0_dp
@@ -189,13 +207,12 @@ contains
         end do
       end associate
     end do
-    limit = merge(bodies_allowed, min(violations_allowed, body_allowed), self%is_uneven)*self%allowed
-    are_slow = 2.0_dp*problem%comm%highest(fastest) <= limit
-  end function velocity_error_all_are_slow
+    fastest = problem%comm%highest(fastest)
+  end function fastest_speed
 
   !> What is compared with the error that is allowed [m/s]: E with a larger factor of L, or C over a fraction of that error. What
   !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much,
-  !> and no body sink by much.
+  !> and no body sink by much. What moves where nearly all bodies are at rest has to be known better.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
     criterion = max(self%largest_violation/violations_allowed, &
@@ -203,7 +220,15 @@ contains
     if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%levels%fastest/sinking_allowed)
     if (self%has_followed) criterion = max(criterion, self%levels%fastest_body/body_allowed, &
       & self%levels%mean_of_bodies/bodies_allowed)
+    if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
+      & self%levels%fastest_that_moves/speed_at_rest)
   end function velocity_error_criterion
+
+  !> The share of the error allowed that E may have where nearly all bodies are at rest and some move: C is what moves there.
+  pure real(dp) function velocity_error_share_of_motion(self) result(share)
+    class(velocity_error_t), intent(in) :: self
+    share = max(least_share, min(1.0_dp, self%bound_by_rest/(nearly_at_rest*self%allowed)))
+  end function velocity_error_share_of_motion
 
   !> What tells whether one start is better than another [m/s]: E, because single contacts that are far off are soon mended; but
   !> where few heavy bodies have most of the mass, in which the others hide, what the criterion compares.
@@ -386,16 +411,26 @@ contains
     end do
   end function projection_of
 
-  !> L, after `assess`; and how fast each body sinks, where all else is within the error allowed and bounds do not tell enough.
-  !> Where few heavy bodies have most of the mass, E says little of the others. Collective.
+  !> L, after `assess`; and, where all else is within the error allowed, whether some body moves among bodies at rest, and how fast
+  !> each body sinks if bounds do not tell enough. Where few heavy bodies have most of the mass, E says little of the others.
+  !> Collective.
   subroutine velocity_error_add_levels(self, problem)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    !> times the error allowed that no body may sink by
+    real(dp) :: limit
 
     call self%levels%add(problem, self%mass, self%largest_violation)
     self%has_followed = .false.
     if (self%criterion() > self%allowed) return
-    if (self%levels%fastest_body <= merge(bodies_allowed, body_allowed, self%is_uneven)*self%allowed) return
+    limit = merge(bodies_allowed, body_allowed, self%is_uneven)
+    if (self%bound_by_rest <= nearly_at_rest*self%allowed) then
+      if (max(self%wave(weight_of_sinking)/self%share_of_motion(), self%levels%fastest_body/speed_at_rest) > self%allowed) &
+        & self%is_restless = fastest_speed(self, problem) > speed_at_rest*self%allowed
+      if (self%criterion() > self%allowed) return
+      if (self%is_restless) limit = speed_at_rest
+    end if
+    if (self%levels%fastest_body <= limit*self%allowed) return
     call self%levels%follow(problem, self%largest_violation)
     self%has_followed = .true.
   end subroutine velocity_error_add_levels

@@ -178,6 +178,8 @@ contains
     call velocity%levels%follow(sim%problem, velocity%largest_violation)
     call check_close(velocity%levels%fastest_body, expected/0.65_dp, 1e-9_dp*expected, "each disk sinks by as much")
     call check_close(velocity%levels%mean_of_bodies, expected/0.65_dp, 1e-9_dp*expected, "mean over disks that sink by as much")
+    ! more than the disks move with, which is the velocity itself
+    call check_close(velocity%levels%fastest_that_moves, expected, 1e-9_dp*expected, "each disk moves with the smaller of the two")
     call check_close(velocity%estimate(), expected, 1e-9_dp*expected, "estimate")
     ! Y counts 2.4 times and L 4 times where errors are compared with what is allowed
     call check_close(velocity%criterion(), hypot(2.4_dp, 4.0_dp/0.65_dp)*expected, 1e-9_dp*expected, "criterion")
