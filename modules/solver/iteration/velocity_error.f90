@@ -42,6 +42,8 @@ module gravier_velocity_error
   !> times the error allowed above which a body counts as moving among bodies that are nearly at rest; least share of the error
   !> allowed that is asked for then
   real(dp), parameter :: speed_at_rest = 0.3_dp, least_share = 0.2_dp
+  !> fraction of the velocity scale that the bodies of a scene nearly at rest have at most, however large the error allowed is
+  real(dp), parameter :: slow = 0.3_dp
   !> fraction of the square of a test's velocity below which what the others have left of it counts as 0
   real(dp), parameter :: rank_cut = 1.0e-10_dp
   !> plain sweeps: ratio between the iterations at which impulses are copied, and the first of them
@@ -67,8 +69,8 @@ module gravier_velocity_error
   type :: velocity_error_t
     !> mass of the grains in contact, or of all that can move where there are none [kg]
     real(dp) :: mass = 0.0_dp
-    !> error allowed [m/s]
-    real(dp), private :: allowed = 0.0_dp
+    !> error allowed, and the C up to which what moves is asked for [m/s]
+    real(dp), private :: allowed = 0.0_dp, most_at_rest = 0.0_dp
     !> whether Y and the largest violation are known
     logical :: is_assessed = .false.
     !> C and Y, as far as they are known, by the last `bound` or `assess` [m/s]
@@ -119,6 +121,7 @@ contains
     integer :: s, b
 
     self%allowed = allowed
+    self%most_at_rest = min(nearly_at_rest*allowed, slow*problem%error_scale)
     allocate (self%part(size(problem%sub)))
     call self%levels%start(problem)
     parts(:, :) = 0.0_dp
@@ -227,7 +230,7 @@ contains
   !> The share of the error allowed that E may have where nearly all bodies are at rest and some move: C is what moves there.
   pure real(dp) function velocity_error_share_of_motion(self) result(share)
     class(velocity_error_t), intent(in) :: self
-    share = max(least_share, min(1.0_dp, self%bound_by_rest/(nearly_at_rest*self%allowed)))
+    share = max(least_share, min(1.0_dp, self%bound_by_rest/self%most_at_rest))
   end function velocity_error_share_of_motion
 
   !> What tells whether one start is better than another [m/s]: E, because single contacts that are far off are soon mended; but
@@ -424,7 +427,7 @@ contains
     self%has_followed = .false.
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
-    if (self%bound_by_rest <= nearly_at_rest*self%allowed) then
+    if (self%bound_by_rest <= self%most_at_rest) then
       if (max(self%wave(weight_of_sinking)/self%share_of_motion(), self%levels%fastest_body/speed_at_rest) > self%allowed) &
         & self%is_restless = fastest_speed(self, problem) > speed_at_rest*self%allowed
       if (self%criterion() > self%allowed) return
