@@ -18,7 +18,7 @@ SAMPLE = {
     "sample": {"preparation": "settled", "count": 150, "radii": "uniform", "radius_min": 0.008, "radius_max": 0.012, "box": 0.25,
                "solid_fraction": 0.5, "file": "sample.h5", "max_steps": 5000},
     "time": {"step": STEP, "steps": 0},
-    "solver": {"tolerance": 1e-3, "max_iterations": 5000},
+    "solver": {"accuracy": 1e-3, "max_iterations": 5000},
 }
 
 
