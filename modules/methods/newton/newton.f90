@@ -26,8 +26,7 @@ module gravier_newton
 
   !> turns of accelerated sweeps; in later ones they are plain
   integer, parameter :: accelerated_turns = 3
-  !> iterations of a window of sweeps in the first turn, doubled in the next ones; what is left of the least change of the last
-  !> window where sweeps do well
+  !> iterations of a window of sweeps in the first turn, doubled in the next ones; what is left of its least change if they do well
   integer, parameter :: first_window = 100
   real(dp), parameter :: little_gain = 0.5_dp
   !> plain sweeps of the first turn that has them, doubled from turn to turn, so often at most
@@ -78,6 +77,7 @@ module gravier_newton
     procedure :: held => newton_held
     procedure :: start => newton_start
     procedure :: iterate => newton_iterate
+    procedure :: see => newton_see
     procedure :: conclude => newton_conclude
     procedure :: free => newton_free
     procedure :: work_done => newton_work_done
@@ -219,28 +219,20 @@ contains
     self%least_swept = self%least
     self%mark = residual
     self%before = residual
-    call begin_point(self)
-    call restart_point(self, problem)
+    call restart_point(self, problem, moves=.true.)
     call take_best(self, problem)
   end subroutine begin_steps
 
-  !> The next proximal point is one around the iterate.
-  subroutine begin_point(self)
-    class(newton_t), intent(inout) :: self
-    integer :: s
-
-    do s = 1, size(self%part)
-      self%part(s)%law%centre(:, :, :) = self%part(s)%r
-    end do
-  end subroutine begin_point
-
   !> Newton's method for the proximal point starts from its centre. Collective.
-  subroutine restart_point(self, problem)
+  subroutine restart_point(self, problem, moves)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    !> the iterate is the next centre
+    logical, intent(in) :: moves
     integer :: s
 
     do s = 1, size(self%part)
+      if (moves) self%part(s)%law%centre(:, :, :) = self%part(s)%r
       self%part(s)%r(:, :, :) = self%part(s)%law%centre
       problem%sub(s)%impulse(:, :, :) = self%part(s)%r
     end do
@@ -295,8 +287,7 @@ contains
     call stop_timer(phase_check)
   end subroutine make_step
 
-  !> Sweeps go on from where they were left, as if nothing had been between; plain ones from the best impulses where Newton's steps
-  !> have found them. Collective.
+  !> Sweeps go on from where they were left, or, plain ones, from the best impulses if Newton's steps have found them. Collective.
   subroutine resume_sweeps(self, problem)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -428,12 +419,22 @@ contains
     end do
     call problem%evaluate()
     call problem%residual(residual, ignored)
+    call self%see(problem, residual)
+  end subroutine keep_best
+
+  !> Keep the impulses of the problem if they are the best so far.
+  subroutine newton_see(self, problem, residual)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(in) :: residual
+    integer :: s
+
     if (.not. residual < self%least) return
     self%least = residual
     do s = 1, size(self%part)
       self%part(s)%best(:, :, :) = problem%sub(s)%impulse
     end do
-  end subroutine keep_best
+  end subroutine newton_see
 
   !> The impulses of the problem are the best so far.
   subroutine take_best(self, problem)
@@ -453,7 +454,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     !> of the iterate
     real(dp), intent(in) :: residual
-    logical :: found
+    logical :: found, moves
 
     found = self%size_of_f <= self%goal
     call self%weight%adapt(found, self%inner)
@@ -465,9 +466,9 @@ contains
       call begin_sweeps(self)
       return
     end if
-    if (found .or. residual < self%before) call begin_point(self)
+    moves = found .or. residual < self%before
     self%before = residual
-    call restart_point(self, problem)
+    call restart_point(self, problem, moves)
   end subroutine end_point
 
   !> The end of a solve without success. Collective.

@@ -1,6 +1,6 @@
 !> Nesterov's extrapolation between the iterations of a method, which steers itself by what each iteration changes.
 module gravier_acceleration
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   implicit none
@@ -9,13 +9,29 @@ module gravier_acceleration
 
   !> a change not measured yet; its multiples by growth_allowed are numbers still [N^2 s^2]
   real(dp), parameter :: unknown = 0.5_dp*huge(1.0_dp)
-  !> growth of |r - y|^2 between iterations that shortens the memory, and what is left of t then
-  real(dp), parameter :: growth_allowed = 1.02_dp, memory_kept = 0.7_dp
-  !> least 1 - beta: at the start, after an idle phase, ever; its factor after a window that grew, and after one that shrank
-  real(dp), parameter :: first_margin = 0.1_dp, wary_margin = 0.3_dp, least_margin = 0.02_dp, widen = 3.0_dp, narrow = 0.7_dp
-  !> iterations of a window; windows without progress to plain iterations; ratio of window sums taken for progress
-  integer, parameter :: window = 10, idle_limit = 20
+  !> growth of |r - y|^2 between iterations that shortens the memory
+  real(dp), parameter :: growth_allowed = 1.02_dp
+  !> least 1 - beta after an idle phase; its factor after a window that grew, and after one that shrank
+  real(dp), parameter :: wary_margin = 0.3_dp, widen = 3.0_dp, narrow = 0.7_dp
+  !> iterations without progress to plain ones; ratio of window sums taken for progress
+  integer, parameter :: idle_limit = 200
   real(dp), parameter :: progress_made = 0.8_dp
+  !> How strongly acceleration answers to growth.
+  type :: steering_t
+    !> what is left of t after a growth
+    real(dp) :: memory_kept
+    !> 1 - beta at the start, and the least ever
+    real(dp) :: first_margin, least_margin
+    !> iterations of a window
+    integer :: window
+  end type steering_t
+
+  !> Long waves cross a scene by what acceleration remembers. With friction changes grow by single per cent where contacts begin to
+  !> slide, so that little memory is given up at once. Where so few contacts are that a wave crosses them within a window, growth
+  !> tells that it comes back, and to begin anew ends a solve soonest.
+  type(steering_t), parameter :: of_many = steering_t(memory_kept=0.95_dp, first_margin=0.05_dp, least_margin=0.01_dp, window=20)
+  type(steering_t), parameter :: of_few = steering_t(memory_kept=0.7_dp, first_margin=0.1_dp, least_margin=0.02_dp, window=10)
+  integer, parameter :: few_contacts = 100
   !> relaxation factors of local solves in accelerated sweeps after the first window, of the normal, tangential and rolling
   !> part, of disks and of spheres
   real(dp), parameter :: relaxation_2d(3) = [1.0_dp, 0.7_dp, 1.0_dp], relaxation_3d(3) = [1.1_dp, 0.7_dp, 1.0_dp]
@@ -41,15 +57,17 @@ module gravier_acceleration
     logical :: whole_in_place = .true.
     !> times that the memory was restarted in this solve
     integer :: restarted = 0
-    real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = first_margin
+    real(dp) :: t = 1.0_dp, beta = 0.0_dp, margin = of_many%first_margin
+    type(steering_t), private :: steering = of_many
     !> largest beta
     real(dp), private :: most = 1.0_dp
     !> |r - y|^2 of the last iteration, sums of it over this window and the last, and the lowest such sum [N^2 s^2]
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
-    !> iterations of this solve, windows since `lowest`, plain iterations to come
-    integer :: iterations = 0, idle_windows = 0, plain = 0
+    !> iterations of this solve, those of the windows since `lowest`, plain iterations to come
+    integer :: iterations = 0, idle = 0, plain = 0
     type(acceleration_part_t), allocatable :: part(:)
   contains
+    procedure :: choose_steering => acceleration_choose_steering
     procedure :: steer => acceleration_steer
     procedure :: whole => acceleration_whole
   end type acceleration_t
@@ -63,6 +81,7 @@ contains
     integer :: s
 
     acceleration = acceleration_t(on=.true.)
+    call acceleration%choose_steering(problem%n_contacts)
     if (problem%kernels%row%compliance_n > 0) acceleration%most = most_extrapolation(problem)
     allocate (acceleration%part(size(problem%sub)))
     do s = 1, size(problem%sub)
@@ -93,6 +112,17 @@ contains
     most = (1.0_dp - root)/(1.0_dp + root)
   end function most_extrapolation
 
+  !> Answer to growth as it suits a problem of so many contacts, before the first iteration.
+  pure subroutine acceleration_choose_steering(self, n_contacts)
+    class(acceleration_t), intent(inout) :: self
+    !> of all subdomains
+    integer(i8), intent(in) :: n_contacts
+
+    self%steering = of_many
+    if (n_contacts < few_contacts) self%steering = of_few
+    self%margin = self%steering%first_margin
+  end subroutine acceleration_choose_steering
+
   !> Choose beta of the next iteration by what this one has changed, or whether it is a plain one.
   pure subroutine acceleration_steer(self, change)
     class(acceleration_t), intent(inout) :: self
@@ -101,13 +131,13 @@ contains
     real(dp) :: t
 
     if (change > growth_allowed*self%change) then
-      self%t = max(1.0_dp, memory_kept*self%t)
+      self%t = max(1.0_dp, self%steering%memory_kept*self%t)
       self%restarted = self%restarted + 1
     end if
     self%change = change
     self%window_change = self%window_change + change
     self%iterations = self%iterations + 1
-    if (mod(self%iterations, window) == 0) call close_window(self)
+    if (mod(self%iterations, self%steering%window) == 0) call close_window(self)
     self%resting = self%plain > 0
     self%beta = 0.0_dp
     if (self%resting) return
@@ -120,7 +150,7 @@ contains
   !> and plain ones do.
   pure logical function acceleration_whole(self) result(whole)
     class(acceleration_t), intent(in) :: self
-    whole = self%resting .or. self%iterations < window
+    whole = self%resting .or. self%iterations < self%steering%window
   end function acceleration_whole
 
   !> The end of a window of iterations: the margin, and whether acceleration still pays.
@@ -130,22 +160,22 @@ contains
     if (acceleration%window_change > acceleration%last_window_change) then
       acceleration%margin = min(1.0_dp, widen*acceleration%margin)
     else
-      acceleration%margin = max(least_margin, narrow*acceleration%margin)
+      acceleration%margin = max(acceleration%steering%least_margin, narrow*acceleration%margin)
     end if
     if (acceleration%plain > 0) then
-      acceleration%plain = acceleration%plain - window
+      acceleration%plain = acceleration%plain - acceleration%steering%window
       if (acceleration%plain <= 0) then
         acceleration%t = 1.0_dp
         acceleration%margin = wary_margin
-        acceleration%idle_windows = 0
+        acceleration%idle = 0
         acceleration%lowest = acceleration%window_change
       end if
     else if (acceleration%window_change < progress_made*acceleration%lowest) then
       acceleration%lowest = acceleration%window_change
-      acceleration%idle_windows = 0
+      acceleration%idle = 0
     else
-      acceleration%idle_windows = acceleration%idle_windows + 1
-      if (acceleration%idle_windows >= idle_limit) acceleration%plain = acceleration%iterations
+      acceleration%idle = acceleration%idle + acceleration%steering%window
+      if (acceleration%idle >= idle_limit) acceleration%plain = acceleration%iterations
     end if
     acceleration%last_window_change = acceleration%window_change
     acceleration%window_change = 0.0_dp

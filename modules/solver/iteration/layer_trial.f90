@@ -107,6 +107,7 @@ contains
     type(threshold_t), intent(in) :: above
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: sweeps
+    logical :: carried
     integer :: s
 
     if (velocity%levels%most_depth < 0) call velocity%levels%find_depth(problem)
@@ -122,13 +123,16 @@ contains
       self%before(s)%value = problem%sub(s)%impulse
     end do
     self%error_before = velocity%measure_of_start()
-    call carry_loads(problem, above%way, method%work, sweeps)
+    call carry_loads(problem, above%way, method%work, sweeps, carried)
     if (.not. sweeps > 0.0_dp) return
     self%sweeps = self%sweeps + sweeps
+    if (.not. carried) then
+      call go_back(self, problem, method, velocity, iteration, error)
+      return
+    end if
     self%layered = .true.
     self%ends = iteration + trial
     call begin_anew(self, problem, method, velocity, iteration, error)
-    self%anew = .true.
   end subroutine try
 
   !> Go on from the pass where it has brought something, else from the impulses before it. Collective.
@@ -139,7 +143,6 @@ contains
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
     type(error_t), allocatable, intent(inout) :: error
-    integer :: s
 
     call velocity%complete(problem, method, iteration)
     if (velocity%measure_of_start() < worth_keeping*self%error_before) then
@@ -147,17 +150,29 @@ contains
       self%may_try = velocity%levels%most_depth > very_deep
       return
     end if
+    call go_back(self, problem, method, velocity, iteration, error)
+  end subroutine judge
+
+  !> The method starts anew from the impulses before the pass. Collective.
+  subroutine go_back(self, problem, method, velocity, iteration, error)
+    type(layer_trial_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(inout) :: method
+    type(velocity_error_t), intent(inout) :: velocity
+    integer, intent(in) :: iteration
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: s
+
     self%layered = .false.
     do s = 1, size(problem%sub)
       problem%sub(s)%impulse(:, :, :) = self%before(s)%value
     end do
     call begin_anew(self, problem, method, velocity, iteration, error)
-    self%anew = .true.
-  end subroutine judge
+  end subroutine go_back
 
   !> The method starts anew from the impulses that the problem holds now. Collective.
   subroutine begin_anew(self, problem, method, velocity, iteration, error)
-    type(layer_trial_t), intent(in) :: self
+    type(layer_trial_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(velocity_error_t), intent(inout) :: velocity
@@ -167,6 +182,7 @@ contains
     call method%start(problem, error)
     method%work%solves = method%work%solves - 1
     call velocity%begin_anew(iteration, self%layered)
+    self%anew = .true.
   end subroutine begin_anew
 
 end module gravier_layer_trial

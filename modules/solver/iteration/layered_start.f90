@@ -10,6 +10,9 @@
 !>   layer   `thickness` diameters of way; the first is the farthest. A contact belongs to the layer of its farther body.
 !>   halo    the bodies of the next `halo` diameters below a layer move with it; their impulses are thrown away afterwards.
 !>
+!> A layer that goes on moving is not held by what lies below: its error would be handed to all further layers, and would be more
+!> than sweeps over the whole have to mend without a pass. The pass is then given up.
+!>
 !> Subdomains go through the layers together; a layer is solved by iterations of NSCDD. Results do not depend on ranks. See
 !> doc/theory.md, section 25.
 module gravier_layered_start
@@ -33,6 +36,8 @@ module gravier_layered_start
   !> cube, because each hands its error on; sweeps of a layer at least and at most
   real(dp), parameter :: change_allowed = 9.0e-4_dp, few_layers = 12.0_dp
   integer, parameter :: least_sweeps = 20, most_sweeps = 200
+  !> root mean square velocity of the bodies of a layer, over the velocity scale, at which the pass is given up
+  real(dp), parameter :: motion_allowed = 0.3_dp
 
   !> What one subdomain holds while the layers are gone through.
   type :: layers_t
@@ -67,7 +72,7 @@ contains
 
   !> Replace the impulses of the problem by those of a pass over all layers, which starts from them. Nothing changes where no
   !> boundary supports the load, or the longest way is too short. Collective.
-  subroutine carry_loads(problem, least_way, work, sweeps)
+  subroutine carry_loads(problem, least_way, work, sweeps, carried)
     !> with a uniform load
     type(contact_problem_t), intent(inout) :: problem
     !> longest way from which on it is worth while [mean diameters]
@@ -76,12 +81,15 @@ contains
     type(work_t), intent(inout) :: work
     !> over all contacts, that relax as many as the pass did; 0 where there are no layers
     real(dp), intent(out) :: sweeps
+    !> all layers are done; otherwise there are none, or the pass was given up and the impulses are those of no use
+    logical, intent(out) :: carried
     type(layers_t) :: layers(size(problem%sub))
     real(dp) :: relaxed(1, size(problem%sub)), sums(1)
     integer :: n_layers, l, s, inner
     real(dp) :: change
 
     sweeps = 0.0_dp
+    carried = .false.
     call find_ways(problem, layers)
     call cut_layers(problem, least_way, layers, n_layers)
     if (n_layers < 2) return
@@ -98,6 +106,8 @@ contains
         relaxed(1, s) = relaxed(1, s) + real(inner, dp)*size(layers(s)%taken)
       end do
       call hand_on(problem, layers)
+      carried = motion_of(problem, l, layers) <= motion_allowed*problem%error_scale
+      if (.not. carried) exit
     end do
     call stop_timer(phase_sweep)
     work%relaxations = work%relaxations + nint(sum(relaxed), kind(work%relaxations))
@@ -428,5 +438,29 @@ contains
       end associate
     end do
   end subroutine hand_on
+
+  !> Root mean square velocity of the bodies of layer `l`, on which no further layer acts [m/s]. Collective.
+  real(dp) function motion_of(problem, l, layers) result(motion)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: l
+    type(layers_t), intent(in) :: layers(:)
+    !> m v^2 [J] and m [kg]; a body that subdomains share counts with a part in each of them
+    real(dp) :: parts(2, size(layers)), sums(2)
+    integer :: s, b
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(layers)
+      associate (this => layers(s), sub => problem%sub(s), nd => problem%kernels%nd)
+        do b = 1, sub%n_bodies
+          if (this%layer(b) /= l .or. .not. all(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
+          parts(1, s) = parts(1, s) + sum(this%loaded(1:nd, b)**2)/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+          parts(2, s) = parts(2, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+        end do
+      end associate
+    end do
+    call problem%comm%sum_parts(parts, sums)
+    motion = 0.0_dp
+    if (sums(2) > 0.0_dp) motion = sqrt(sums(1)/sums(2))
+  end function motion_of
 
 end module gravier_layered_start

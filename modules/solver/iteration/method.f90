@@ -53,6 +53,7 @@ module gravier_method
     procedure(iterate_once), deferred :: iterate
     procedure :: set => take_options
     procedure :: held => method_held
+    procedure :: see => method_see
     procedure :: conclude => method_conclude
     procedure :: mends_growth => method_mends_growth
     procedure :: free => method_free
@@ -114,6 +115,16 @@ contains
     call held%add("impulse before (acceleration)", .true., 8, nc)
     call held%add("velocity before (acceleration)", .false., 8, nv)
   end subroutine method_held
+
+  !> A check has found this residual of the impulses of the problem; methods that keep the best ones override it.
+  subroutine method_see(self, problem, residual)
+    class(method_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(in) :: residual
+
+    associate (unused_self => self, unused_problem => problem, unused => residual)
+    end associate
+  end subroutine method_see
 
   !> The end of a solve without success, with v_global evaluated: what is left are the impulses of the last iteration; methods
   !> that keep better ones override it. Collective.

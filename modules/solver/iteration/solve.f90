@@ -246,6 +246,7 @@ contains
       call problem%residual(report%residual, defect)
       call state%velocity%bound(problem)
     end if
+    call method%see(problem, report%residual)
     if (control%criterion == by_error) report%error = exact%error(problem)
     call judge(state, problem, method, control, report, defect, finished)
     if (control%trace) call keep_trace(report, start - state%began - state%checking)

@@ -274,17 +274,19 @@ contains
     type(simulation_t) :: sim
     type(velocity_error_t) :: velocity
     real(dp) :: residual, defect, sweeps
+    logical :: carried
 
     call make(count, n_subdomains, sim)
     call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
-    call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps)
+    call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps, carried)
     call check(sweeps >= 20.0_dp .and. sweeps <= 1.5_dp*200.0_dp, "sweeps of a pass: "//to_text(sweeps, 3))
+    call check(carried, "all layers are held by what lies below")
     call sim%problem%evaluate()
     call velocity%assess(sim%problem, sim%method, 0, residual, defect)
     call check(velocity%bound_by_rest <= 0.1_dp*gravity*step, "velocities after a pass: "//to_text(velocity%bound_by_rest, 3))
     call sim%free()
     call make(count/5, n_subdomains, sim)
-    call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps)
+    call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps, carried)
     call check_close(sweeps, 0.0_dp, 0.0_dp, "no pass on what is not deep")
     call sim%free()
   end subroutine test_layers

@@ -1,7 +1,7 @@
 !> How momentum chooses its extrapolation from the changes it sees: memory, margin, plain iterations.
 program test_momentum
   use mpi_f08, only: MPI_Init, MPI_Finalize
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_acceleration, only: acceleration_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -11,12 +11,13 @@ program test_momentum
   call test_growth_between_iterations()
   call test_growth_between_windows()
   call test_idle_windows()
+  call test_few_contacts()
   call finish_checks()
   call MPI_Finalize()
 
 contains
 
-  !> While changes decay, beta follows Nesterov's sequence up to the margin, which narrows to 0.02.
+  !> While changes decay, beta follows Nesterov's sequence up to the margin, which narrows to 0.01.
   subroutine test_decay()
     type(acceleration_t) :: momentum
     real(dp) :: change, t, next
@@ -25,7 +26,7 @@ contains
     change = 1.0_dp
     t = 1.0_dp
     call check(momentum%whole(), "decay: the first iteration takes whole local solves")
-    do k = 1, 9
+    do k = 1, 19
       call momentum%steer(change)
       call check(momentum%whole(), "decay: the first window takes whole local solves")
       next = 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*t**2))
@@ -33,16 +34,16 @@ contains
       t = next
       change = 0.9_dp*change
     end do
-    do k = 10, 2000
+    do k = 20, 2000
       call momentum%steer(change)
       call check(.not. momentum%whole(), "decay: later windows take shares")
       change = 0.9_dp*change
     end do
-    call check_close(momentum%beta, 0.98_dp, 1e-15_dp, "decay: beta in the end")
+    call check_close(momentum%beta, 0.99_dp, 1e-15_dp, "decay: beta in the end")
     call check_equal(momentum%plain, 0, "decay: no plain iterations")
   end subroutine test_decay
 
-  !> Growth by more than 2 % shortens the memory by three tenths; less growth does not.
+  !> Growth by more than 2 % shortens the memory by a twentieth; less growth does not.
   subroutine test_growth_between_iterations()
     type(acceleration_t) :: momentum, grown
     integer :: k
@@ -54,7 +55,7 @@ contains
     call momentum%steer(1.01_dp)
     call grown%steer(1.03_dp)
     call check(grown%beta > 0.0_dp, "growth: some memory is kept")
-    call check_close(grown%t, 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*(0.7_dp*sequence(6))**2)), 1e-14_dp, "growth: memory")
+    call check_close(grown%t, 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*(0.95_dp*sequence(6))**2)), 1e-14_dp, "growth: memory")
     call check_close(momentum%t, sequence(7), 1e-14_dp, "growth: slight growth forgets nothing")
   end subroutine test_growth_between_iterations
 
@@ -69,47 +70,70 @@ contains
     end do
   end function sequence
 
-  !> Windows that grow, too slowly for one iteration to tell, take beta to zero within four.
+  !> Windows that grow, too slowly for one iteration to tell, take beta to zero within five.
   subroutine test_growth_between_windows()
     type(acceleration_t) :: momentum
     real(dp) :: change
     integer :: k
 
     change = 1.0_dp
-    do k = 1, 50
+    do k = 1, 100
       change = 1.01_dp*change
       call momentum%steer(change)
     end do
     call check_close(momentum%beta, 0.0_dp, tiny(1.0_dp), "windows that grow: beta")
     do k = 1, 200
-      change = 0.99_dp*change
+      change = 0.97_dp*change
       call momentum%steer(change)
     end do
     call check(momentum%beta > 0.5_dp, "windows that shrink again: beta")
   end subroutine test_growth_between_windows
 
-  !> Twenty windows without a fifth less: as many plain iterations as there were, then momentum again.
+  !> Ten windows without a fifth less: as many plain iterations as there were, then momentum again.
   subroutine test_idle_windows()
     type(acceleration_t) :: momentum
     integer :: k, plain
 
-    do k = 1, 209
+    do k = 1, 219
       call momentum%steer(1.0_dp)
     end do
     call check(momentum%beta > 0.5_dp, "idle: momentum until the limit")
     plain = 0
-    do k = 210, 419
+    do k = 220, 439
       call momentum%steer(1.0_dp)
       if (abs(momentum%beta) <= 0.0_dp .and. momentum%resting .and. momentum%whole()) plain = plain + 1
     end do
-    call check_equal(plain, 210, "idle: plain iterations")
+    call check_equal(plain, 220, "idle: plain iterations")
     call momentum%steer(1.0_dp)
     call check(.not. momentum%resting, "idle: the last impulses are kept again")
     call check_close(momentum%beta, 0.0_dp, tiny(1.0_dp), "idle: nothing to extrapolate from yet")
-    do k = 421, 450
+    do k = 441, 480
       call momentum%steer(1.0_dp)
     end do
     call check(momentum%beta > 0.5_dp, "idle: momentum again")
   end subroutine test_idle_windows
+
+  !> With few contacts growth shortens the memory by three tenths, and windows are shorter.
+  subroutine test_few_contacts()
+    type(acceleration_t) :: few, many
+    integer :: k
+
+    call few%choose_steering(99_i8)
+    call many%choose_steering(100_i8)
+    do k = 1, 9
+      call few%steer(1.0_dp)
+      call many%steer(1.0_dp)
+    end do
+    call check(few%whole() .and. many%whole(), "few contacts: the first window takes whole local solves")
+    call few%steer(1.03_dp)
+    call many%steer(1.03_dp)
+    call check(many%whole() .and. .not. few%whole(), "few contacts: the first window is shorter")
+    call check_close(few%t, 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*(0.7_dp*sequence(9))**2)), 1e-14_dp, "few contacts: memory")
+    call check_close(many%t, 0.5_dp*(1.0_dp + sqrt(1.0_dp + 4.0_dp*(0.95_dp*sequence(9))**2)), 1e-14_dp, "many contacts: memory")
+    do k = 11, 2000
+      call few%steer(0.9_dp**k)
+    end do
+    call check_close(few%beta, 0.98_dp, 1e-15_dp, "few contacts: beta in the end")
+  end subroutine test_few_contacts
 
 end program test_momentum
