@@ -169,7 +169,7 @@ contains
         if (allocated(error)) return
         if (anew) call state%schedule%forget_ratio()
       end if
-      call state%velocity%keep_copy(problem, method, report%iterations)
+      call state%velocity%tests%keep_copy(problem, method, report%iterations)
       if (present(watch)) call watch%look(report)
     end do
     report%layered = state%trial%layered
