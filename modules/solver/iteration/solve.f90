@@ -14,7 +14,7 @@ module gravier_solve
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
   use gravier_waking, only: wake_is_due
-  use gravier_vain_impulses, only: normals_are_in_vain
+  use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, excess_of
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, solve_contacts
@@ -131,6 +131,8 @@ module gravier_solve
     logical :: grows = .false.
     !> the criterion is by_velocity; the first residual was within its tolerance
     logical :: by_estimate = .false., settled = .false.
+    !> on a residual within its tolerance, where that is the criterion
+    integer :: verdict = residual_ends
   end type solve_state_t
 
 contains
@@ -281,10 +283,13 @@ contains
     logical, intent(out) :: is_met
 
     is_met = .false.
+    state%verdict = residual_ends
     if (report%residual > control%tolerance .and. control%criterion /= by_error) return
     select case (control%criterion)
     case (by_residual)
-      is_met = .true.
+      if (report%residual > 0.0_dp) call find_residual_verdict(problem, method, state%velocity, report%iterations, &
+        & control%accuracy*problem%error_scale, state%verdict)
+      is_met = state%verdict == residual_ends
     case (by_error)
       is_met = report%error <= control%tolerance
     case default
@@ -365,6 +370,8 @@ contains
     select case (control%criterion)
     case (by_residual)
       report%figure = report%residual
+      if (state%verdict /= residual_ends) report%figure = max(report%residual, &
+        & control%tolerance*excess_of(state%velocity, control%accuracy*problem%error_scale))
     case (by_error)
       report%figure = report%error
     case default
@@ -398,10 +405,8 @@ contains
     call take_figure(state, problem, control, report)
     if (met) then
       report%status = solve_converged
-      ! a residual is relative to the impulses, and falls where they grow without bound
-      if (control%criterion == by_residual .and. .not. problem%rest_is_admissible .and. report%iterations > 0) then
-        if (normals_are_in_vain(problem)) report%status = solve_unbounded
-      end if
+    else if (state%verdict == residual_in_vain) then
+      report%status = solve_unbounded
     else if (defect > growth_limit*state%reference .and. &
         & .not. (method%guarded .and. report%iterations < control%max_iterations)) then
       report%status = solve_diverged

@@ -21,6 +21,7 @@ module gravier_test_impulses
   use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
+  use gravier_vain_impulses, only: kept_impulses_t
   implicit none
   private
   public :: test_impulses_t, projection_t
@@ -61,7 +62,9 @@ module gravier_test_impulses
     procedure :: start => test_impulses_start
     procedure :: keep_copy => test_impulses_keep_copy
     procedure :: begin_anew => test_impulses_begin_anew
+    procedure :: take_earlier => test_impulses_take_earlier
     procedure :: project => test_impulses_project
+    procedure, private :: has_copy => test_impulses_has_copy
   end type test_impulses_t
 
 contains
@@ -99,6 +102,36 @@ contains
     self%next_copy = iteration + first_copy
   end subroutine test_impulses_begin_anew
 
+  !> Copies of the impulses of an earlier iteration, if there are any.
+  subroutine test_impulses_take_earlier(self, problem, method, iteration, earlier, are_known)
+    class(test_impulses_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    class(method_t), intent(in) :: method
+    !> iterations made
+    integer, intent(in) :: iteration
+    !> of the subdomains of this rank
+    type(kept_impulses_t), intent(out) :: earlier(:)
+    logical, intent(out) :: are_known
+    integer :: s
+
+    are_known = iteration > 0 .and. (method%acceleration%on .or. self%has_copy(iteration))
+    if (.not. are_known) return
+    do s = 1, size(problem%sub)
+      if (method%acceleration%on) then
+        earlier(s)%value = method%acceleration%part(s)%impulse
+      else
+        earlier(s)%value = self%part(s)%previous
+      end if
+    end do
+  end subroutine test_impulses_take_earlier
+
+  !> Whether there is a copy of impulses from before an iteration.
+  pure logical function test_impulses_has_copy(self, iteration) result(has_copy)
+    class(test_impulses_t), intent(in) :: self
+    integer, intent(in) :: iteration
+    has_copy = self%taken_at > 0 .and. self%taken_at < iteration
+  end function test_impulses_has_copy
+
   !> Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over the contacts
   !> and one reduction. The powers r . w of the contacts are left to the levels. Collective.
   subroutine test_impulses_project(self, problem, method, iteration, levels, found)
@@ -123,7 +156,7 @@ contains
         ! without earlier impulses the third test impulse is 0, which tells nothing
         if (method%acceleration%on .and. iteration > 0) then
           call test(problem, s, part, method%acceleration%part(s)%impulse, levels(s)%power, parts(:, s), largest(1))
-        else if (self%taken_at > 0 .and. self%taken_at < iteration) then
+        else if (self%has_copy(iteration)) then
           call test(problem, s, part, part%previous, levels(s)%power, parts(:, s), largest(1))
         else
           call test(problem, s, part, sub%impulse, levels(s)%power, parts(:, s), largest(1))

@@ -61,8 +61,8 @@ module gravier_velocity_error
     real(dp) :: largest_violation = 0.0_dp
     !> whether few heavy bodies have most of the mass
     logical, private :: is_uneven = .false.
-    !> whether it is known how fast bodies sink
-    logical, private :: has_followed = .false.
+    !> whether L is known, and how fast bodies sink
+    logical, private :: has_levels = .false., has_followed = .false.
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
     !> what finds Y
@@ -94,7 +94,7 @@ contains
     !> mass of the grains, of all bodies that can move; squares of the grains' masses, number of grains
     real(dp) :: parts(4, size(problem%sub)), sums(4), heavy
     logical :: moves
-    integer :: s, b
+    integer :: s, b, d
 
     self%allowed = allowed
     self%most_at_rest = min(nearly_at_rest*allowed, slow*problem%error_scale)
@@ -114,7 +114,12 @@ contains
           parts(3, s) = parts(3, s) + heavy**2/sub%multiplicity(b)
           parts(4, s) = parts(4, s) + 1.0_dp/sub%multiplicity(b)
         end do
-        moves = moves .or. any(abs(sub%v_free(:, sub%n_bodies + 1:)) > 0.0_dp)
+        do b = sub%n_grains + 1, sub%n_columns
+          ! boundaries that forces move along some components move as prescribed along the others
+          do d = 1, problem%kernels%nv
+            moves = moves .or. (abs(sub%v_free(d, b)) > 0.0_dp .and. .not. sub%moves(d, b))
+          end do
+        end do
         if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
         if (problem%kernels%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
           & any(abs(sub%hot(:, problem%kernels%shift_row + 1:problem%kernels%shift_row + nd - 1, :)) > 0.0_dp)
@@ -135,6 +140,7 @@ contains
     self%bound_by_rest = unknown
     self%projection = unknown
     call self%levels%forget()
+    self%has_levels = .false.
     self%has_followed = .false.
     self%is_restless = .false.
     self%largest_violation = 0.0_dp
@@ -251,6 +257,7 @@ contains
     real(dp) :: limit
 
     call self%levels%add(problem, self%mass, self%largest_violation)
+    self%has_levels = .true.
     self%has_followed = .false.
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
@@ -274,7 +281,7 @@ contains
     real(dp) :: residual, defect
 
     if (.not. self%is_assessed) call self%assess(problem, method, iteration, residual, defect)
-    call self%add_levels(problem)
+    if (.not. self%has_levels) call self%add_levels(problem)
   end subroutine velocity_error_complete
 
   !> The iterations begin anew from other impulses.
