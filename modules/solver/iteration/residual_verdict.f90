@@ -15,7 +15,7 @@ module gravier_residual_verdict
   use gravier_velocity_error, only: velocity_error_t, violations_allowed
   implicit none
   private
-  public :: residual_ends, residual_waits, residual_in_vain, find_residual_verdict, excess_of
+  public :: residual_ends, residual_waits, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
 
   !> the residual ends the solve; iterations go on; they would do so for ever
   integer, parameter :: residual_ends = 0, residual_waits = 1, residual_in_vain = 2
@@ -35,8 +35,6 @@ contains
     !> velocity error that the accuracy allows [m/s]
     real(dp), intent(in) :: allowed
     integer, intent(out) :: verdict
-    type(kept_impulses_t) :: earlier(size(problem%sub))
-    logical :: are_known
 
     verdict = residual_ends
     if (problem%rest_is_admissible) return
@@ -44,10 +42,24 @@ contains
     if (excess_of(velocity, allowed) <= 1.0_dp) return
     if (speed_against(problem) <= allowed) return
     verdict = residual_waits
-    call velocity%tests%take_earlier(problem, method, iteration, earlier, are_known)
-    if (.not. are_known) return
-    if (are_in_vain(problem, earlier)) verdict = residual_in_vain
+    if (grow_in_vain(problem, method, velocity, iteration)) verdict = residual_in_vain
   end subroutine find_residual_verdict
+
+  !> Whether the impulses have grown in vain since those of an earlier iteration, where some are known. They cannot where rest obeys
+  !> all laws. Collective.
+  logical function grow_in_vain(problem, method, velocity, iteration) result(in_vain)
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(in) :: method
+    type(velocity_error_t), intent(in) :: velocity
+    !> iterations made
+    integer, intent(in) :: iteration
+    type(kept_impulses_t) :: earlier(size(problem%sub))
+
+    in_vain = .false.
+    if (problem%rest_is_admissible) return
+    call velocity%tests%take_earlier(problem, method, iteration, earlier, in_vain)
+    if (in_vain) in_vain = are_in_vain(problem, earlier)
+  end function grow_in_vain
 
   !> How far velocities are beyond what a small residual may leave, at most 1 where they are not; 0 where no velocity is there to
   !> compare with.

@@ -14,7 +14,7 @@ module gravier_solve
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
   use gravier_waking, only: wake_is_due
-  use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, excess_of
+  use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, solve_contacts
@@ -399,8 +399,7 @@ contains
       return
     end if
     if (report%iterations == 0) state%reference = max(defect, problem%force_scale)
-    report%velocity_error = 0.0_dp
-    if (report%residual > 0.0_dp) report%velocity_error = state%velocity%estimate()
+    report%velocity_error = merge(state%velocity%estimate(), 0.0_dp, report%residual > 0.0_dp)
     call find_whether_met(state, problem, method, control, report, met)
     call take_figure(state, problem, control, report)
     if (met) then
@@ -416,6 +415,8 @@ contains
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
+        if (control%criterion == by_residual) report%status = merge(solve_unbounded, solve_exhausted, &
+          & grow_in_vain(problem, method, state%velocity, report%iterations))
       else
         call judge_stagnation(state, problem, method, control, report, finished)
       end if

@@ -9,8 +9,6 @@
 !>
 !> A solution needs bodies as fast as max|V| >= A/sum|P|. Where that is far beyond the speeds of the problem, there is none. With
 !> friction in z this is a sign and no proof, as in gravier_unbounded, which looks at the matrix of a problem in the same way.
-!> A over the impulses on boundaries is the mean speed by which these work against z. Where it is within the accuracy of a solve, the
-!> contradiction is, too.
 !> For compliant contacts the law holds for v + s + a r, and A loses z a r for the impulses r: springs give way before impulses grow
 !> without bound. Their shifts are speeds of the problem, since springs drive bodies that are at rest; so are shifts in a periodic
 !> cell that moves.
@@ -27,12 +25,6 @@ module gravier_vain_impulses
     real(dp), allocatable :: value(:, :, :)
   end type kept_impulses_t
 
-  !> What impulses z do: A [J], sum |P| over what can move, sum |z| over the contacts of boundaries [N s]; the largest speed of the
-  !> problem [m/s].
-  type :: effect_t
-    real(dp) :: work = 0.0_dp, on_bodies = 0.0_dp, on_boundaries = 0.0_dp, fastest = 0.0_dp
-  end type effect_t
-
   !> speed that a solution would need, over the largest speed of the problem, from which on there is none
   real(dp), parameter :: beyond = 20.0_dp
 
@@ -45,7 +37,6 @@ contains
     !> of the subdomains of this rank
     type(kept_impulses_t), intent(in) :: earlier(:)
     type(kept_impulses_t) :: now(size(problem%sub))
-    type(effect_t) :: effect
     integer :: s
 
     do s = 1, size(problem%sub)
@@ -55,59 +46,80 @@ contains
         call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
       end associate
     end do
-    call find_effect(problem, now, effect)
-    in_vain = effect%work > 0.0_dp .and. effect%work > beyond*effect%fastest*effect%on_bodies
-    do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :, :) = now(s)%value
-    end do
-    call problem%evaluate()
+    in_vain = exceeds_bound(problem, now)
+    call put_back(problem, now)
   end function are_in_vain
 
-  !> The mean speed of boundaries that work against the impulses, which are the weights [m/s]; 0 where nothing works against them,
-  !> and beyond all speeds where something else than boundaries does. Collective.
+  !> The largest speed at which something prescribed works against the impulse of a contact, along that impulse: a boundary, or the
+  !> shift of the law [m/s]. Where that is within the accuracy of a solve, so is any contradiction of what is prescribed. Collective.
   real(dp) function speed_against(problem) result(speed)
-    type(contact_problem_t), intent(inout) :: problem
-    type(kept_impulses_t) :: now(size(problem%sub))
-    type(effect_t) :: effect
-    integer :: s
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), allocatable :: prescribed(:, :), v(:, :, :)
+    real(dp) :: impulse
+    integer :: s, b, c, d
 
+    speed = 0.0_dp
     do s = 1, size(problem%sub)
-      now(s)%value = problem%sub(s)%impulse
+      associate (sub => problem%sub(s), kernels => problem%kernels)
+        allocate (prescribed, mold=sub%v_free)
+        allocate (v, mold=sub%impulse)
+        prescribed(:, :) = 0.0_dp
+        do b = sub%n_grains + 1, sub%n_columns
+          do d = 1, kernels%nv
+            if (.not. sub%moves(d, b)) prescribed(d, b) = sub%v_free(d, b)
+          end do
+        end do
+        call kernels%contact_velocity(sub%pair, sub%hot, prescribed, v)
+        do c = 1, sub%n_contacts
+          associate (r => sub%impulse(lane_of(c), 1:kernels%nf, block_of(c)))
+            impulse = norm2(r)
+            if (impulse > 0.0_dp) speed = max(speed, -(dot_product(r, v(lane_of(c), 1:kernels%nf, block_of(c))) &
+              & + r(1)*sub%hot(lane_of(c), kernels%row%shift, block_of(c)))/impulse)
+          end associate
+        end do
+        deallocate (prescribed, v)
+      end associate
     end do
-    call find_effect(problem, now, effect)
-    speed = merge(huge(speed), 0.0_dp, effect%work > 0.0_dp)
-    if (effect%on_boundaries > 0.0_dp) speed = max(0.0_dp, effect%work/effect%on_boundaries)
-    call problem%evaluate()
+    speed = problem%comm%highest(speed)
   end function speed_against
 
-  !> The effect of z, which stands in the place of the impulses. Collective.
-  subroutine find_effect(problem, impulses, effect)
+  !> Whether z, which stands in the place of the impulses, asks for velocities far beyond those of the problem. Collective.
+  logical function exceeds_bound(problem, impulses) result(exceeds)
     type(contact_problem_t), intent(inout) :: problem
     !> r of the subdomains of this rank
     type(kept_impulses_t), intent(in) :: impulses(:)
-    type(effect_t), intent(out) :: effect
-    !> A, sum |z| on boundaries and sum |P| (3, subdomains)
-    real(dp) :: parts(3, size(problem%sub)), sums(3)
+    !> A and sum |P| (2, subdomains)
+    real(dp) :: parts(2, size(problem%sub)), sums(2), fastest
     integer :: s
 
     parts(:, :) = 0.0_dp
+    fastest = 0.0_dp
     do s = 1, size(problem%sub)
       call problem%own_reactions(s)
       call add_work(problem, problem%sub(s), impulses(s)%value, parts(1, s))
-      call add_boundaries(problem, problem%sub(s), parts(2, s))
       call problem%shared%load(s, problem%sub(s)%reaction)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
-      call add_reactions(problem, problem%sub(s), parts(3, s), effect%fastest)
+      call add_reactions(problem, problem%sub(s), parts(2, s), fastest)
     end do
     call problem%comm%sum_parts(parts, sums)
-    effect%work = sums(1)
-    effect%on_boundaries = sums(2)
-    effect%on_bodies = sums(3)
-    effect%fastest = problem%comm%highest(effect%fastest)
-  end subroutine find_effect
+    fastest = problem%comm%highest(fastest)
+    exceeds = sums(1) > 0.0_dp .and. sums(1) > beyond*fastest*sums(2)
+  end function exceeds_bound
+
+  !> The impulses as they were, and the velocities under them. Collective.
+  subroutine put_back(problem, now)
+    type(contact_problem_t), intent(inout) :: problem
+    type(kept_impulses_t), intent(in) :: now(:)
+    integer :: s
+
+    do s = 1, size(problem%sub)
+      problem%sub(s)%impulse(:, :, :) = now(s)%value
+    end do
+    call problem%evaluate()
+  end subroutine put_back
 
   !> A of a subdomain, whose `reaction` is H z of its own contacts [J].
   pure subroutine add_work(problem, sub, r, work)
@@ -118,7 +130,7 @@ contains
     real(dp), intent(inout) :: work
     integer :: b, c, d
 
-    ! boundaries that forces move along some components move as prescribed along the others
+    ! boundaries that forces move along some axes move as prescribed along the others
     do b = sub%n_grains + 1, sub%n_columns
       do d = 1, problem%kernels%nv
         if (.not. sub%moves(d, b)) work = work - sub%reaction(d, b)*sub%v_free(d, b)
@@ -138,19 +150,6 @@ contains
       end do
     end associate
   end subroutine add_work
-
-  !> |z| of the contacts of a subdomain that boundaries have.
-  pure subroutine add_boundaries(problem, sub, total)
-    type(contact_problem_t), intent(in) :: problem
-    type(subproblem_t), intent(in) :: sub
-    real(dp), intent(inout) :: total
-    integer :: c
-
-    do c = 1, sub%n_contacts
-      if (maxval(sub%pair(:, c)) > sub%n_grains) &
-        & total = total + norm2(sub%impulse(lane_of(c), 1:problem%kernels%nf, block_of(c)))
-    end do
-  end subroutine add_boundaries
 
   !> |P| of a subdomain, whose `reaction` is H z of all contacts, a copy of a shared body counting with its part; the moment of a
   !> grain counts as a force at its rim, and the speed of its rim as one [N s], [m/s].

@@ -115,7 +115,7 @@ contains
           parts(4, s) = parts(4, s) + 1.0_dp/sub%multiplicity(b)
         end do
         do b = sub%n_grains + 1, sub%n_columns
-          ! boundaries that forces move along some components move as prescribed along the others
+          ! boundaries that forces move along some axes move as prescribed along the others
           do d = 1, problem%kernels%nv
             moves = moves .or. (abs(sub%v_free(d, b)) > 0.0_dp .and. .not. sub%moves(d, b))
           end do
