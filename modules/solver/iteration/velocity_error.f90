@@ -153,10 +153,8 @@ contains
   logical function velocity_error_all_are_slow(self, problem) result(are_slow)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp) :: limit
 
-    limit = merge(bodies_allowed, min(violations_allowed, body_allowed), self%is_uneven)*self%allowed
-    are_slow = 2.0_dp*fastest_speed(problem) <= limit
+    are_slow = 2.0_dp*fastest_speed(problem) <= bodies_allowed*self%allowed
   end function velocity_error_all_are_slow
 
   !> The largest speed of a body, with that of its rim [m/s]. Collective.
