@@ -129,9 +129,8 @@ module gravier_solve
     !> iteration from which on the defect has been above the reference, -1 where it is not; whether that is too long
     integer :: exceeded_at = -1
     logical :: grows = .false.
-    !> the criterion is by_velocity; the first residual was within its tolerance
+    !> the criterion is by_velocity; the first residual was within its tolerance; where the residual is the criterion, the verdict on it
     logical :: by_estimate = .false., settled = .false.
-    !> on a residual within its tolerance, where that is the criterion
     integer :: verdict = residual_ends
   end type solve_state_t
 

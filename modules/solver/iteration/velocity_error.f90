@@ -65,6 +65,10 @@ module gravier_velocity_error
     logical, private :: has_levels = .false., has_followed = .false.
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
+    !> the same where contacts attract, and the wave along them cannot have gone through all bodies yet, so that E may be too small;
+    !> iterations made at the last `assess`
+    logical, private :: is_early = .false.
+    integer, private :: iterations = 0
     !> what finds Y
     type(test_impulses_t) :: tests
   contains
@@ -143,6 +147,7 @@ contains
     self%has_levels = .false.
     self%has_followed = .false.
     self%is_restless = .false.
+    self%is_early = .false.
     self%largest_violation = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
@@ -188,6 +193,7 @@ contains
       & self%levels%mean_of_bodies/bodies_allowed)
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
+    if (self%is_early) criterion = max(criterion, self%bound_by_rest/share_at_rest)
   end function velocity_error_criterion
 
   !> The share of the error allowed that E may have where nearly all bodies are at rest and some move: C is what moves there.
@@ -240,6 +246,7 @@ contains
     defect = found%defect
     call self%bound(problem)
     self%is_assessed = .true.
+    self%iterations = iteration
     self%largest_violation = found%largest_violation
     self%projection = 0.0_dp
     if (self%mass > 0.0_dp) self%projection = sqrt(found%square/self%mass)
@@ -260,8 +267,11 @@ contains
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then
-      if (max(self%wave(weight_of_sinking)/self%share_of_motion(), self%levels%fastest_body/speed_at_rest) > self%allowed) &
+      ! bodies that hold by traction sway in waves that few iterations do not show
+      if (problem%attracts .or. max(self%wave(weight_of_sinking)/self%share_of_motion(), &
+        & self%levels%fastest_body/speed_at_rest) > self%allowed) &
         & self%is_restless = fastest_speed(problem) > speed_at_rest*self%allowed
+      self%is_early = self%is_restless .and. problem%attracts .and. self%iterations < self%levels%most_depth
       if (self%criterion() > self%allowed) return
       if (self%is_restless) limit = speed_at_rest
     end if
