@@ -21,7 +21,7 @@ module gravier_solve
   public :: by_velocity, by_residual, by_error
   public :: solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
 
-  !> what ends a solve: the estimated velocity error and the residual; the residual alone; the error of known impulses
+  !> what ends a solve: the velocity error and the residual; the residual (gravier_residual_verdict); the error of known impulses
   integer, parameter :: by_velocity = 1, by_residual = 2, by_error = 3
 
   !> met; not met in max_iterations; grown beyond bounds; not met, and nothing gained any more; no solution seems to exist
@@ -129,7 +129,7 @@ module gravier_solve
     !> iteration from which on the defect has been above the reference, -1 where it is not; whether that is too long
     integer :: exceeded_at = -1
     logical :: grows = .false.
-    !> the criterion is by_velocity; the first residual was within its tolerance; where the residual is the criterion, the verdict on it
+    !> the criterion is by_velocity; the first residual was within its tolerance; by_residual: the verdict on one that is
     logical :: by_estimate = .false., settled = .false.
     integer :: verdict = residual_ends
   end type solve_state_t
