@@ -1,9 +1,8 @@
 !> Test impulses: the projection of the velocity error on the velocities that some impulses make.
 !>
 !> Let w = W (P(r - (v + s n)/W) - r) be the velocity by which a contact violates its law, and e = V - V* the error. With the set of
-!> pressing and sticking contacts known, H^T e = -w there, so that any impulse y gives y . w = -(M^-1 H y, e)_M. Several of them, with
-!> the velocities h_i = M^-1 H y_i, give the norm of the projection of e on the span of these velocities:
-!>
+!> pressing and sticking contacts known, H^T e = -w there, so that any impulse y gives y . w = -(M^-1 H y, e)_M. Several of them,
+!> with the velocities h_i = M^-1 H y_i, give the norm of the projection of e on the span of these velocities:
 !>     b_i = y_i . w,   G_ij = (h_i, h_j)_M,   Y^2 = b^T G^+ b.
 !>
 !> The test impulses are
@@ -207,8 +206,8 @@ contains
     part%load = sub%reaction + sub%attraction_load
   end subroutine take_attractions_off
 
-  !> Add what the contacts of subdomain `s` of this rank say: those that are awake, then those that sleep, whose part of the residual
-  !> goes into the next places.
+  !> Add what the contacts of subdomain `s` of this rank say: those that are awake, then those that sleep, whose part of the
+  !> residual goes into the next places.
   subroutine test(problem, s, part, previous, power, sums, largest)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s

@@ -51,7 +51,8 @@ contains
   end function are_in_vain
 
   !> The largest speed at which something prescribed works against the impulse of a contact, along that impulse: a boundary, or the
-  !> shift of the law [m/s]. Where that is within the accuracy of a solve, so is any contradiction of what is prescribed. Collective.
+  !> shift of the law [m/s]. Where that is within the accuracy of a solve, so is any contradiction of what is prescribed.
+  !> Collective.
   real(dp) function speed_against(problem) result(speed)
     type(contact_problem_t), intent(in) :: problem
     real(dp), allocatable :: prescribed(:, :), v(:, :, :)

@@ -101,8 +101,8 @@ module gravier_kernel_table
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :)
-      !> (lanes, nc, blocks); on_bodies: r without the attractions, which is `impulse` itself where there are none; previous: those of
-      !> an earlier iteration [N s]
+      !> (lanes, nc, blocks); on_bodies: r without the attractions, which is `impulse` itself where there are none; previous: those
+      !> of an earlier iteration [N s]
       real(dp), intent(in), contiguous :: impulse(:, :, :), on_bodies(:, :, :), previous(:, :, :)
       !> (lanes, blocks) [J]
       real(dp), intent(inout), contiguous :: power(:, :)
