@@ -140,7 +140,7 @@ contains
           call take_velocities(problem, states(:, n))
           n = n + 1
         end if
-        call velocity%keep_copy(problem, method, k)
+        call velocity%tests%keep_copy(problem, method, k)
       end do
     end associate
     call solve_tightly(plan, simulation, reference, error)

@@ -108,7 +108,7 @@ contains
             call take_velocities(problem, states(:, n))
           end if
         end if
-        call velocity%keep_copy(problem, method, k)
+        call velocity%tests%keep_copy(problem, method, k)
       end do
       method%acceleration%on = accelerated
       if (allocated(error)) return

@@ -62,9 +62,9 @@ def hexagonal(wide, high, jitter=0.0, seed=1):
     return centres + jitter * (np.random.default_rng(seed).random(centres.shape) - 0.5)
 
 
-def write_bodies(path, centres, radii, velocities=None, masses=None, walls=()):
-    """A bodies file, with velocities and masses where they are given."""
-    write_hdf5(path, centres, radii, walls=walls)
+def write_bodies(path, centres, radii, velocities=None, masses=None, walls=(), group=None):
+    """A bodies file, with velocities, masses and groups where they are given."""
+    write_hdf5(path, centres, radii, group, walls)
     with h5py.File(path, "a") as file:
         if velocities is not None:
             spins = np.zeros((len(radii), 1 if centres.shape[1] == 2 else 3))
@@ -182,17 +182,40 @@ def heavy_block(packing, ratio):
     return make
 
 
+def bonded(title, centres, boundaries, directory, held=None):
+    """Disks of rock, bonded where they touch; those of `held` stay where they are."""
+    group = None if held is None else np.where(held, 1, 0)
+    write_bodies(directory / "bodies.h5", centres, np.full(len(centres), 0.5 * DIAMETER), group=group)
+    # the weight of a disk is 1.9 N
+    bond = {"materials": "rock", "kind": "bonded", "friction": 0.5, "bond_strength": 2000.0, "bond_friction": 1.0,
+            "bond_distance": 1.0e-5}
+    if held is not None:
+        boundaries = [*boundaries, {"name": "held", "shape": "grains", "group": 1, "material": "rock"}]
+    return {**case(title), "material": [{"name": "rock"}], "law": [bond], "boundary": boundaries}
+
+
 def beam(wide, high):
     """Bonded disks on two supports, the ends of the floor."""
     def make(directory):
-        centres = hexagonal(wide, high)
-        write_bodies(directory / "bodies.h5", centres, np.full(len(centres), 0.5 * DIAMETER))
-        # the weight of a disk is 1.9 N
-        bond = {"materials": "rock", "kind": "bonded", "friction": 0.5, "bond_strength": 2000.0, "bond_friction": 1.0,
-                "bond_distance": 1.0e-5}
         supports = [{"name": name, "shape": "segment", "point": [x, 0.0], "end": [x + 2.0 * DIAMETER, 0.0]}
                     for name, x in (("left", 0.0), ("right", (wide - 2) * DIAMETER))]
-        return {**case("bonded beam on two supports"), "material": [{"name": "rock"}], "law": [bond], "boundary": supports}
+        return bonded("bonded beam on two supports", hexagonal(wide, high), supports, directory)
+    return make
+
+
+def cantilever(wide, high):
+    """Bonded disks that stand out from those of the first diameter and a half, which stay where they are."""
+    def make(directory):
+        centres = hexagonal(wide, high)
+        return bonded("bonded cantilever", centres, [], directory, centres[:, 0] < 1.25 * DIAMETER)
+    return make
+
+
+def hanging(wide, high):
+    """Bonded disks that hang from those of the highest row, which stay where they are."""
+    def make(directory):
+        centres = hexagonal(wide, high)
+        return bonded("bonded disks that hang", centres, [], directory, centres[:, 1] > centres[:, 1].max() - 0.25 * DIAMETER)
     return make
 
 
@@ -283,7 +306,16 @@ def scenes():
         Scene("mass 100 on 19 disks", heavy(20, 100.0), rest, "--situations", "cold,lost:0.05", quick=True),
         Scene("mass 1e4 on 19 disks", heavy(20, 1.0e4), rest, "--situations", "cold,lost:0.05"),
         Scene("600 disks under mass 50", heavy_block(DISKS, 50.0), *limited, "--situations", "cold,lost:0.05", share_of=DISKS, quick=True),
-        Scene("bonded beam", beam(20, 6), "--situations", "cold,lost:0.05", quick=True),
+        Scene("bonded beam 20 x 6", beam(20, 6), rest, "--situations", "cold,lost:0.05", quick=True),
+        Scene("bonded beam 40 x 4", beam(40, 4), rest, "--situations", "cold,lost:0.05"),
+        Scene("bonded beam 20 x 12", beam(20, 12), rest, "--situations", "cold,lost:0.05"),
+        Scene("bonded beam 60 x 10", beam(60, 10), rest, "--situations", "cold,lost:0.05"),
+        Scene("bonded cantilever 15 x 6", cantilever(15, 6), rest, "--situations", "cold,lost:0.05", quick=True),
+        Scene("bonded cantilever 24 x 8", cantilever(24, 8), rest, "--situations", "cold,lost:0.05"),
+        Scene("bonded disks that hang, 4 x 30", hanging(4, 30), rest, "--situations", "cold,lost:0.05", quick=True),
+        # a beam that bends and a strip that sways, a little more in each step
+        Scene("bonded beam 40 x 4, run", beam(40, 4), rest, "--situations", "none", "--steps", "60", "--every", "4", quick=True),
+        Scene("bonded disks that hang, run", hanging(4, 30), rest, "--situations", "none", "--steps", "60", "--every", "4", quick=True),
         Scene("600 disks, liquid bridges", wet(DISKS), *limited, "--situations", "cold,lost:0.05,turned:20", share_of=DISKS, quick=True),
         Scene("silo of 100 diameters", SILO.scene(), *limited, "--situations", f"program,cold,lost:0.05,{TURNED}", share_of=SILO),
         Scene("600 disks, NSCDD", DISKS.scene(solver={"solver": {"method": "nscdd"}, "decomposition": {"grid": [2, 2]}}), *limited,

@@ -219,8 +219,8 @@ module gravier_config_table
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &
      key_t("solver", "criterion", kind_choice, "'velocity_error'", "velocity_error residual error", &
-           "what ends a solve: the estimated velocity error, with the residual as a guard; the residual alone; "// &
-           "the known error on the impulses of `bodies = 'column'`"), &
+           "what ends a solve: the estimated velocity error, with the residual as a guard; the residual, with ten times "// &
+           "the other as a guard where boundaries move; the known error on the impulses of `bodies = 'column'`"), &
      key_t("solver", "accuracy", kind_real, "0.1", "> 0", &
            "estimated velocity error over the velocity scale at which a solve has converged; with another criterion the "// &
            "closing lines count the solves that miss it"), &

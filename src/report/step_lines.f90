@@ -105,7 +105,7 @@ contains
       text = "error "//to_text(solve%error, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solver%criterion == "residual" .and. solve%status == solve_unbounded .and. solve%residual <= solver%tolerance) then
       text = "impulses exceed what any loads can cause"
-    else if (solver%criterion == "residual" .or. solve%residual > solver%tolerance) then
+    else if (solve%residual > solver%tolerance) then
       text = "residual "//to_text(solve%residual, 3)//" above the tolerance "//to_text(solver%tolerance, 3)
     else if (solve%violation > solve%violation_allowed .and. (solve%status == solve_unbounded .or. &
         & solve%velocity_error <= solver%accuracy*solve%velocity_scale)) then

@@ -27,7 +27,7 @@ def row(count, dimension=2, gap=0.0, mass=None, height=RADIUS):
 def scene(grains, boundaries, dimension=2, friction=0.0, gravity=0.0, steps=20, subdomains=4, **more):
     """Grains and input groups. Small grains above those of the scene touch nothing: they make it large enough to be divided."""
     width = max(grain.place[0] for grain in grains) - min(grain.place[0] for grain in grains)
-    if dimension == 3 or len(boundaries) < 4:
+    if len(boundaries) < 2 * dimension:
         middle = [grains[0].place[0] + 0.5 * width] + [0.0] * (dimension - 2)
         grains = grains + [Grain([*middle, 0.5 + 0.2 * k], radius=0.1 * RADIUS) for k in range(4)]
     down = [0.0, -gravity, 0.0] if dimension == 2 else [0.0, 0.0, -gravity]
@@ -62,6 +62,26 @@ def block(rows, columns):
     return [Grain([RADIUS * (2 * i + 1), RADIUS * (2 * j + 1)]) for j in range(rows) for i in range(columns)]
 
 
+def shrinking(count, rate, **more):
+    """A row across a period that shrinks: nothing is prescribed but the motion of the cell."""
+    return scene(row(count), [], cell_strain_rate=[-rate, 0.0], period=[2 * RADIUS * count, 0.0], **more)
+
+
+def light_and_heavy(count, mass, heavy):
+    """A row of light grains between walls, on a floor that a heavy grain lies on, too: the residual is relative to what it weighs."""
+    far = plane([0.0, 0.0], [1.0, 0.0], velocity=[SPEED, 0.0])
+    near = {"shape": "grains", "group": 1, "velocity": [-SPEED, 0.0]}
+    grains = row(count, mass=[mass] * count) + [Grain([RADIUS * (2 * count + 1), RADIUS], group=1)]
+    return scene(grains + [Grain([2.0 + 3.0 * RADIUS * k, RADIUS], mass=heavy) for k in range(3)], [far, near, floor()],
+                 friction=0.3, gravity=G)
+
+
+def cube(count):
+    """Spheres on a cubic grid, from the corner of the planes x = 0, y = 0 and z = 0 on."""
+    places = RADIUS * (2 * np.stack(np.meshgrid(*[np.arange(count)] * 3), axis=-1).reshape(-1, 3) + 1)
+    return [Grain(place) for place in places]
+
+
 def impossible():
     """{name: (grains, groups)}."""
     d = 2 * RADIUS
@@ -94,6 +114,14 @@ def impossible():
         "disks in a box, all sides close": scene(block(3, 3), walls(3 * d) + walls(3 * d, axis=1), friction=0.5),
         "wedge of friction": scene([Grain([0.0, RADIUS / np.sin(wedge)])], lean, friction=1.0, gravity=G, subdomains=2),
         "restitution": scene(row(3), walls(3 * d), restitution=0.5, wall_restitution=0.5),
+        "spheres in a box, all sides close": scene(
+            cube(2), [wall for axis in range(3) for wall in walls(2 * d, 3, axis=axis)], 3, friction=0.5),
+        "light chain beside heavy disks": light_and_heavy(10, 1e-3, 1e3),
+        # the walls slide as they like, and move along their normals as prescribed
+        "walls that forces move along the other axis": scene(
+            row(3), [{**wall, "free": [False, True], "force": [0.0, 1.0], "mass": 1.0} for wall in walls(3 * d)], friction=0.3),
+        "one wall closes, the other one is at rest": scene(row(3), [walls(3 * d)[0], plane([3 * d, 0.0], [-1.0, 0.0])], friction=0.3),
+        "row across a period that shrinks": shrinking(10, 1.0, friction=0.3),
         "rolling friction": scene(row(3), [*walls(3 * d), floor()], friction=0.5, gravity=G, rolling_friction=0.1),
     }
     for name in ("one disk, others beside", "one sphere, others beside"):

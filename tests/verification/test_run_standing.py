@@ -1,4 +1,4 @@
-"""What stands still: columns side by side, a periodic tower and a bonded beam at default settings, made by drivers/studies/study_error.py.
+"""What stands still: columns side by side, a periodic tower, a bonded beam and a bonded strip that hangs, at default settings, made by drivers/studies/study_error.py.
 
 The velocity error is a mean by mass. One column of several, or a part that sways, could move by more than what is allowed; a body that
 is faster than nearly all others, which are at rest, therefore asks for a smaller error."""
@@ -19,7 +19,7 @@ GRAVITY, STEP = 9.81, 1e-3
 SPEED = 0.05
 #: steps, subdomains, ranks of each run
 RUNS = {"columns": (500, 1, 1), "columns in four subdomains": (100, 4, 1), "columns on two ranks": (100, 4, 2),
-        "tower": (100, 1, 1), "beam": (60, 1, 1)}
+        "tower": (100, 1, 1), "beam": (60, 1, 1), "strip": (60, 1, 1)}
 
 
 class Standing(RunTestCase):
@@ -28,7 +28,7 @@ class Standing(RunTestCase):
         import study_error
 
         make = {"columns": study_error.towers((10, 20, 40, 80, 160)), "tower": study_error.tower(10, 40),
-                "beam": study_error.beam(60, 10)}[name.split()[0]]
+                "beam": study_error.beam(60, 10), "strip": study_error.hanging(4, 30)}[name.split()[0]]
         directory = pathlib.Path(self.here(name))
         directory.mkdir()
         more = {"time": {"steps": steps}, "output": {"directory": "results", "every": 1, "contacts": False}}

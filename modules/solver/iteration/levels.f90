@@ -17,7 +17,7 @@ module gravier_levels
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   implicit none
   private
-  public :: levels_t
+  public :: levels_t, level_part_t
 
   !> mean cosine between normals and the way down
   real(dp), parameter :: cosine = 0.65_dp

@@ -14,14 +14,14 @@ module gravier_solve
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
   use gravier_waking, only: wake_is_due
-  use gravier_vain_impulses, only: normals_are_in_vain
+  use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, solve_contacts
   public :: by_velocity, by_residual, by_error
   public :: solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
 
-  !> what ends a solve: the estimated velocity error and the residual; the residual alone; the error of known impulses
+  !> what ends a solve: the velocity error and the residual; the residual (gravier_residual_verdict); the error of known impulses
   integer, parameter :: by_velocity = 1, by_residual = 2, by_error = 3
 
   !> met; not met in max_iterations; grown beyond bounds; not met, and nothing gained any more; no solution seems to exist
@@ -129,8 +129,9 @@ module gravier_solve
     !> iteration from which on the defect has been above the reference, -1 where it is not; whether that is too long
     integer :: exceeded_at = -1
     logical :: grows = .false.
-    !> the criterion is by_velocity; the first residual was within its tolerance
+    !> the criterion is by_velocity; the first residual was within its tolerance; by_residual: the verdict on one that is
     logical :: by_estimate = .false., settled = .false.
+    integer :: verdict = residual_ends
   end type solve_state_t
 
 contains
@@ -169,7 +170,7 @@ contains
         if (allocated(error)) return
         if (anew) call state%schedule%forget_ratio()
       end if
-      call state%velocity%keep_copy(problem, method, report%iterations)
+      call state%velocity%tests%keep_copy(problem, method, report%iterations)
       if (present(watch)) call watch%look(report)
     end do
     report%layered = state%trial%layered
@@ -282,10 +283,13 @@ contains
     logical, intent(out) :: is_met
 
     is_met = .false.
+    state%verdict = residual_ends
     if (report%residual > control%tolerance .and. control%criterion /= by_error) return
     select case (control%criterion)
     case (by_residual)
-      is_met = .true.
+      if (report%residual > 0.0_dp) call find_residual_verdict(problem, method, state%velocity, report%iterations, &
+        & control%accuracy*problem%error_scale, state%verdict)
+      is_met = state%verdict == residual_ends
     case (by_error)
       is_met = report%error <= control%tolerance
     case default
@@ -366,6 +370,8 @@ contains
     select case (control%criterion)
     case (by_residual)
       report%figure = report%residual
+      if (state%verdict /= residual_ends) report%figure = max(report%residual, &
+        & control%tolerance*excess_of(state%velocity, control%accuracy*problem%error_scale))
     case (by_error)
       report%figure = report%error
     case default
@@ -393,16 +399,13 @@ contains
       return
     end if
     if (report%iterations == 0) state%reference = max(defect, problem%force_scale)
-    report%velocity_error = 0.0_dp
-    if (report%residual > 0.0_dp) report%velocity_error = state%velocity%estimate()
+    report%velocity_error = merge(state%velocity%estimate(), 0.0_dp, report%residual > 0.0_dp)
     call find_whether_met(state, problem, method, control, report, met)
     call take_figure(state, problem, control, report)
     if (met) then
       report%status = solve_converged
-      ! a residual is relative to the impulses, and falls where they grow without bound
-      if (control%criterion == by_residual .and. .not. problem%rest_is_admissible .and. report%iterations > 0) then
-        if (normals_are_in_vain(problem)) report%status = solve_unbounded
-      end if
+    else if (state%verdict == residual_in_vain) then
+      report%status = solve_unbounded
     else if (defect > growth_limit*state%reference .and. &
         & .not. (method%guarded .and. report%iterations < control%max_iterations)) then
       report%status = solve_diverged
@@ -412,6 +415,8 @@ contains
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
+        if (control%criterion == by_residual) report%status = merge(solve_unbounded, solve_exhausted, &
+          & grow_in_vain(problem, method, state%velocity, report%iterations))
       else
         call judge_stagnation(state, problem, method, control, report, finished)
       end if

@@ -18,7 +18,7 @@ module gravier_vain_impulses
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: kept_impulses_t, are_in_vain, normals_are_in_vain
+  public :: kept_impulses_t, are_in_vain, speed_against
 
   !> Impulses of a subdomain (lanes, nc, blocks) [N s].
   type :: kept_impulses_t
@@ -50,20 +50,39 @@ contains
     call put_back(problem, now)
   end function are_in_vain
 
-  !> Whether the normal impulses themselves are larger than any loads can make: no velocities obey the law. Impulses and velocities
-  !> stay as they are. Collective.
-  logical function normals_are_in_vain(problem) result(in_vain)
-    type(contact_problem_t), intent(inout) :: problem
-    type(kept_impulses_t) :: now(size(problem%sub))
-    integer :: s
+  !> The largest speed at which something prescribed works against the impulse of a contact, along that impulse: a boundary, or the
+  !> shift of the law [m/s]. Where that is within the accuracy of a solve, so is any contradiction of what is prescribed.
+  !> Collective.
+  real(dp) function speed_against(problem) result(speed)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), allocatable :: prescribed(:, :), v(:, :, :)
+    real(dp) :: impulse
+    integer :: s, b, c, d
 
+    speed = 0.0_dp
     do s = 1, size(problem%sub)
-      now(s)%value = problem%sub(s)%impulse
-      problem%sub(s)%impulse(:, 2:, :) = 0.0_dp
+      associate (sub => problem%sub(s), kernels => problem%kernels)
+        allocate (prescribed, mold=sub%v_free)
+        allocate (v, mold=sub%impulse)
+        prescribed(:, :) = 0.0_dp
+        do b = sub%n_grains + 1, sub%n_columns
+          do d = 1, kernels%nv
+            if (.not. sub%moves(d, b)) prescribed(d, b) = sub%v_free(d, b)
+          end do
+        end do
+        call kernels%contact_velocity(sub%pair, sub%hot, prescribed, v)
+        do c = 1, sub%n_contacts
+          associate (r => sub%impulse(lane_of(c), 1:kernels%nf, block_of(c)))
+            impulse = norm2(r)
+            if (impulse > 0.0_dp) speed = max(speed, -(dot_product(r, v(lane_of(c), 1:kernels%nf, block_of(c))) &
+              & + r(1)*sub%hot(lane_of(c), kernels%row%shift, block_of(c)))/impulse)
+          end associate
+        end do
+        deallocate (prescribed, v)
+      end associate
     end do
-    in_vain = exceeds_bound(problem, now)
-    call put_back(problem, now)
-  end function normals_are_in_vain
+    speed = problem%comm%highest(speed)
+  end function speed_against
 
   !> Whether z, which stands in the place of the impulses, asks for velocities far beyond those of the problem. Collective.
   logical function exceeds_bound(problem, impulses) result(exceeds)
@@ -110,10 +129,13 @@ contains
     !> impulses (lanes, nc, blocks) [N s]
     real(dp), intent(in), contiguous :: r(:, :, :)
     real(dp), intent(inout) :: work
-    integer :: b, c
+    integer :: b, c, d
 
-    do b = sub%n_bodies + 1, sub%n_columns
-      work = work - dot_product(sub%reaction(:, b), sub%v_free(:, b))
+    ! boundaries that forces move along some axes move as prescribed along the others
+    do b = sub%n_grains + 1, sub%n_columns
+      do d = 1, problem%kernels%nv
+        if (.not. sub%moves(d, b)) work = work - sub%reaction(d, b)*sub%v_free(d, b)
+      end do
     end do
     do c = 1, sub%n_contacts
       work = work - sub%impulse(lane_of(c), 1, block_of(c))*sub%hot(lane_of(c), problem%kernels%nd + 1, block_of(c))

@@ -1,11 +1,7 @@
 !> The velocity error of a solve, estimated without knowing the solution: |V - V*|_M over the root of the mass of the grains in
 !> contact, a root mean square velocity. The natural-map residual does not see waves that are long against a grain; this does.
 !>
-!> What is looked at is the velocity by which a contact violates its law, w = W (P(r - (v + s n)/W) - r). With e = V - V* and
-!> the set of pressing and sticking contacts known, H^T e = -w there, so that any test impulse y gives y . w = -(M^-1 H y, e)_M.
-!>   Y  projection of e on what test impulses move: b_i = y_i . w, G_ij = (h_i, h_j)_M, h_i = M^-1 H y_i, Y^2 = b^T G^+ b.
-!>      The test impulses are w/W (local errors), r (a wrong total load), and r less earlier impulses (the wave under way): those
-!>      one iteration before where sweeps are accelerated, which keep them; else those of some iterations before.
+!>   Y  projection of the error on what test impulses move (gravier_test_impulses).
 !>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
 !>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
 !>      (gravier_layered_start) long waves are gone, and a = 1.7.
@@ -17,12 +13,11 @@
 !> roll or be in error: E has to be at most a third of what moves there. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
-  use gravier_timers, only: start_timer, stop_timer, phase_reduction
-  use gravier_contact_kernels, only: lanes
-  use gravier_body_mass, only: inverse_products, inverse_of_translation
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
+  use gravier_body_mass, only: inverse_of_translation
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_levels, only: levels_t
+  use gravier_test_impulses, only: test_impulses_t, projection_t
   implicit none
   private
   public :: velocity_error_t, copies_ready, violations_allowed
@@ -44,27 +39,10 @@ module gravier_velocity_error
   real(dp), parameter :: speed_at_rest = 0.3_dp, least_share = 0.2_dp
   !> fraction of the velocity scale that the bodies of a scene nearly at rest have at most, however large the error allowed is
   real(dp), parameter :: slow = 0.3_dp
-  !> fraction of the square of a test's velocity below which what the others have left of it counts as 0
-  real(dp), parameter :: rank_cut = 1.0e-10_dp
-  !> plain sweeps: ratio between the iterations at which impulses are copied, and the first of them
-  real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
-  integer, parameter :: first_copy = 2
-  !> test impulses; places of the sums of an assessment, the first of which make the residual: the powers y . w, the products of the
-  !> velocities that test impulses make
-  integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_products = at_powers + n_tests, &
-    & n_sums = at_products + n_tests*(n_tests + 1)/2
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
-
-  !> What the estimate holds for one subdomain.
-  type :: error_part_t
-    !> H y of the tests w/W and r less earlier impulses, summed over copies of bodies (nv, n_columns) [N s, N m s]
-    real(dp), allocatable :: local(:, :), recent(:, :)
-    !> earlier impulses where the method keeps none (lanes, nc, blocks) [N s]
-    real(dp), allocatable :: previous(:, :, :)
-  end type error_part_t
 
   type :: velocity_error_t
     !> mass of the grains in contact, or of all that can move where there are none [kg]
@@ -81,18 +59,20 @@ module gravier_velocity_error
     real(dp), private :: weight = weight_of_projection
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
-    !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
-    integer, private :: taken_at = 0, next_copy = first_copy
     !> whether few heavy bodies have most of the mass
     logical, private :: is_uneven = .false.
-    !> whether it is known how fast bodies sink
-    logical, private :: has_followed = .false.
+    !> whether L is known, and how fast bodies sink
+    logical, private :: has_levels = .false., has_followed = .false.
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
-    type(error_part_t), allocatable, private :: part(:)
+    !> the same where contacts attract, and the wave along them cannot have gone through all bodies yet, so that E may be too small;
+    !> iterations made at the last `assess`
+    logical, private :: is_early = .false.
+    integer, private :: iterations = 0
+    !> what finds Y
+    type(test_impulses_t) :: tests
   contains
     procedure :: start => velocity_error_start
-    procedure :: keep_copy => velocity_error_keep_copy
     procedure :: bound => velocity_error_bound
     procedure :: assess => velocity_error_assess
     procedure :: rests => velocity_error_rests
@@ -118,11 +98,11 @@ contains
     !> mass of the grains, of all bodies that can move; squares of the grains' masses, number of grains
     real(dp) :: parts(4, size(problem%sub)), sums(4), heavy
     logical :: moves
-    integer :: s, b
+    integer :: s, b, d
 
     self%allowed = allowed
     self%most_at_rest = min(nearly_at_rest*allowed, slow*problem%error_scale)
-    allocate (self%part(size(problem%sub)))
+    call self%tests%start(problem)
     call self%levels%start(problem)
     parts(:, :) = 0.0_dp
     moves = .false.
@@ -138,7 +118,12 @@ contains
           parts(3, s) = parts(3, s) + heavy**2/sub%multiplicity(b)
           parts(4, s) = parts(4, s) + 1.0_dp/sub%multiplicity(b)
         end do
-        moves = moves .or. any(abs(sub%v_free(:, sub%n_bodies + 1:)) > 0.0_dp)
+        do b = sub%n_grains + 1, sub%n_columns
+          ! boundaries that forces move along some axes move as prescribed along the others
+          do d = 1, problem%kernels%nv
+            moves = moves .or. (abs(sub%v_free(d, b)) > 0.0_dp .and. .not. sub%moves(d, b))
+          end do
+        end do
         if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
         if (problem%kernels%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
           & any(abs(sub%hot(:, problem%kernels%shift_row + 1:problem%kernels%shift_row + nd - 1, :)) > 0.0_dp)
@@ -150,22 +135,6 @@ contains
     problem%rest_is_admissible = .not. problem%comm%any_true(moves)
   end subroutine velocity_error_start
 
-  !> Keep a copy of the impulses after an iteration, where one is due and the method keeps none.
-  subroutine velocity_error_keep_copy(self, problem, method, iteration)
-    class(velocity_error_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
-    class(method_t), intent(in) :: method
-    integer, intent(in) :: iteration
-    integer :: s
-
-    if (method%acceleration%on .or. iteration < self%next_copy) return
-    self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
-    self%taken_at = iteration
-    do s = 1, size(self%part)
-      self%part(s)%previous = problem%sub(s)%impulse
-    end do
-  end subroutine velocity_error_keep_copy
-
   !> C, from what `residual` of the problem has summed; nothing else is known then [m/s].
   subroutine velocity_error_bound(self, problem)
     class(velocity_error_t), intent(inout) :: self
@@ -175,8 +144,10 @@ contains
     self%bound_by_rest = unknown
     self%projection = unknown
     call self%levels%forget()
+    self%has_levels = .false.
     self%has_followed = .false.
     self%is_restless = .false.
+    self%is_early = .false.
     self%largest_violation = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
@@ -187,21 +158,18 @@ contains
   logical function velocity_error_all_are_slow(self, problem) result(are_slow)
     class(velocity_error_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp) :: limit
 
-    limit = merge(bodies_allowed, min(violations_allowed, body_allowed), self%is_uneven)*self%allowed
-    are_slow = 2.0_dp*fastest_speed(self, problem) <= limit
+    are_slow = 2.0_dp*fastest_speed(problem) <= bodies_allowed*self%allowed
   end function velocity_error_all_are_slow
 
   !> The largest speed of a body, with that of its rim [m/s]. Collective.
-  real(dp) function fastest_speed(self, problem) result(fastest)
-    class(velocity_error_t), intent(in) :: self
+  real(dp) function fastest_speed(problem) result(fastest)
     type(contact_problem_t), intent(in) :: problem
     real(dp) :: rim
     integer :: s, b
 
     fastest = 0.0_dp
-    do s = 1, size(self%part)
+    do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), nd => problem%kernels%nd)
         do b = 1, sub%n_bodies
           rim = 0.0_dp
@@ -225,6 +193,7 @@ contains
       & self%levels%mean_of_bodies/bodies_allowed)
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
+    if (self%is_early) criterion = max(criterion, self%bound_by_rest/share_at_rest)
   end function velocity_error_criterion
 
   !> The share of the error allowed that E may have where nearly all bodies are at rest and some move: C is what moves there.
@@ -270,149 +239,18 @@ contains
     integer, intent(in) :: iteration
     !> as `residual` of the problem returns them
     real(dp), intent(out) :: residual, defect
-    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums), largest(1)
-    integer :: s
+    type(projection_t) :: found
 
-    parts(:, :) = 0.0_dp
-    largest(1) = 0.0_dp
-    do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), part => self%part(s))
-        call make_room(part, problem%kernels%nv, sub%n_columns, size(sub%hot, 3), self%levels%part(s)%power)
-        if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
-        if (sub%n_contacts == 0) cycle
-        ! without earlier impulses the third test impulse is 0, which tells nothing
-        if (method%acceleration%on .and. iteration > 0) then
-          call test(sub, part, method%acceleration%part(s)%impulse)
-        else if (self%taken_at > 0 .and. self%taken_at < iteration) then
-          call test(sub, part, part%previous)
-        else
-          call test(sub, part, sub%impulse)
-        end if
-      end associate
-    end do
-    if (problem%n_subdomains > 1) call sum_motions(problem, self%part)
-    do s = 1, size(problem%sub)
-      ! the products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j
-      associate (sub => problem%sub(s), part => self%part(s))
-        call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, sub%reaction, part%recent, &
-          & parts(at_products + 1:, s))
-      end associate
-    end do
-    call start_timer(phase_reduction)
-    call problem%comm%sum_parts(parts, sums)
-    call problem%comm%highest_of(largest)
-    call stop_timer(phase_reduction)
-    call problem%take_residual(sums(1:n_residual_sums), residual, defect)
+    call self%tests%project(problem, method, iteration, self%levels%part, found)
+    residual = found%residual
+    defect = found%defect
     call self%bound(problem)
     self%is_assessed = .true.
-    self%largest_violation = sqrt(largest(1))
+    self%iterations = iteration
+    self%largest_violation = found%largest_violation
     self%projection = 0.0_dp
-    if (self%mass > 0.0_dp) self%projection = &
-      & sqrt(projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:))/self%mass)
-
-  contains
-
-    !> The contacts that are awake, then those that sleep.
-    subroutine test(sub, part, previous)
-      type(subproblem_t), intent(in) :: sub
-      type(error_part_t), intent(inout) :: part
-      real(dp), intent(in), contiguous :: previous(:, :, :)
-      integer :: awake
-
-      awake = problem%awake_blocks(s)
-      call test_blocks(sub, part, previous, 1, awake, 0)
-      if (awake < size(sub%hot, 3)) call test_blocks(sub, part, previous, awake + 1, size(sub%hot, 3), 3)
-    end subroutine test
-
-    !> Blocks `a` to `z`, whose part of the residual goes into the places after `at`.
-    subroutine test_blocks(sub, part, previous, a, z, at)
-      type(subproblem_t), intent(in) :: sub
-      type(error_part_t), intent(inout) :: part
-      real(dp), intent(in), contiguous :: previous(:, :, :)
-      integer, intent(in) :: a, z, at
-      real(dp) :: found(3 + n_tests)
-
-      call problem%kernels%make_tests(sub%pair(:, (a - 1)*lanes + 1:z*lanes), sub%hot(:, :, a:z), sub%inverse_mass, &
-        & sub%v_global, sub%impulse(:, :, a:z), previous(:, :, a:z), self%levels%part(s)%power(:, a:z), part%local, part%recent, &
-        & found, largest(1))
-      parts(at + 1:at + 3, s) = found(1:3)
-      parts(at_powers + 1:at_products, s) = parts(at_powers + 1:at_products, s) + found(4:)
-    end subroutine test_blocks
-
+    if (self%mass > 0.0_dp) self%projection = sqrt(found%square/self%mass)
   end subroutine velocity_error_assess
-
-  !> H y of a subdomain's tests at 0; the first time room is made for them and for the powers at contacts.
-  subroutine make_room(part, nv, n_columns, n_blocks, power)
-    type(error_part_t), intent(inout) :: part
-    integer, intent(in) :: nv, n_columns, n_blocks
-    real(dp), allocatable, intent(inout) :: power(:, :)
-
-    if (.not. allocated(part%local)) then
-      allocate (part%local(nv, n_columns), part%recent(nv, n_columns))
-      allocate (power(lanes, n_blocks))
-    end if
-    part%local(:, :) = 0.0_dp
-    part%recent(:, :) = 0.0_dp
-  end subroutine make_room
-
-  !> Sum H y over the copies of bodies; that of the impulses themselves is the reaction, which is summed. Collective.
-  subroutine sum_motions(problem, part)
-    type(contact_problem_t), intent(inout) :: problem
-    type(error_part_t), intent(inout) :: part(:)
-    integer :: s
-
-    do s = 1, size(part)
-      call problem%shared%load(s, part(s)%local)
-    end do
-    call problem%shared%pass()
-    do s = 1, size(part)
-      call problem%shared%sum_copies(s, part(s)%local, mean=.false.)
-      call problem%shared%load(s, part(s)%recent)
-    end do
-    call problem%shared%pass()
-    do s = 1, size(part)
-      call problem%shared%sum_copies(s, part(s)%recent, mean=.false.)
-    end do
-  end subroutine sum_motions
-
-  !> b^T G^+ b [J]: the tests are taken one after the other, next the one of which those taken have left most, as in a Cholesky
-  !> factorisation with pivots. What little is left of a test that is nearly a sum of others counts as none.
-  pure real(dp) function projection_of(b, products) result(square)
-    !> (n_tests); columns of the upper triangle of G
-    real(dp), intent(in), contiguous :: b(:), products(:)
-    real(dp) :: left(n_tests, n_tests), power(n_tests), share(n_tests)
-    integer :: i, j, k, at
-
-    at = 0
-    do j = 1, n_tests
-      do i = 1, j
-        at = at + 1
-        left(i, j) = products(at)
-        left(j, i) = products(at)
-      end do
-    end do
-    power(:) = b
-    share(:) = 0.0_dp
-    do i = 1, n_tests
-      if (left(i, i) > 0.0_dp) share(i) = 1.0_dp/left(i, i)
-    end do
-    square = 0.0_dp
-    do k = 1, n_tests
-      i = 1
-      do j = 2, n_tests
-        if (left(j, j)*share(j) > left(i, i)*share(i)) i = j
-      end do
-      if (.not. left(i, i)*share(i) > rank_cut) return
-      square = square + power(i)**2/left(i, i)
-      power(:) = power - left(:, i)*(power(i)/left(i, i))
-      do j = 1, n_tests
-        if (j /= i) left(:, j) = left(:, j) - left(:, i)*(left(i, j)/left(i, i))
-      end do
-      share(i) = 0.0_dp
-      left(:, i) = 0.0_dp
-      left(i, :) = 0.0_dp
-    end do
-  end function projection_of
 
   !> L, after `assess`; and, where all else is within the error allowed, whether some body moves among bodies at rest, and how fast
   !> each body sinks if bounds do not tell enough. Where few heavy bodies have most of the mass, E says little of the others.
@@ -424,12 +262,16 @@ contains
     real(dp) :: limit
 
     call self%levels%add(problem, self%mass, self%largest_violation)
+    self%has_levels = .true.
     self%has_followed = .false.
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then
-      if (max(self%wave(weight_of_sinking)/self%share_of_motion(), self%levels%fastest_body/speed_at_rest) > self%allowed) &
-        & self%is_restless = fastest_speed(self, problem) > speed_at_rest*self%allowed
+      ! bodies that hold by traction sway in waves that few iterations do not show
+      if (problem%attracts .or. max(self%wave(weight_of_sinking)/self%share_of_motion(), &
+        & self%levels%fastest_body/speed_at_rest) > self%allowed) &
+        & self%is_restless = fastest_speed(problem) > speed_at_rest*self%allowed
+      self%is_early = self%is_restless .and. problem%attracts .and. self%iterations < self%levels%most_depth
       if (self%criterion() > self%allowed) return
       if (self%is_restless) limit = speed_at_rest
     end if
@@ -447,7 +289,7 @@ contains
     real(dp) :: residual, defect
 
     if (.not. self%is_assessed) call self%assess(problem, method, iteration, residual, defect)
-    call self%add_levels(problem)
+    if (.not. self%has_levels) call self%add_levels(problem)
   end subroutine velocity_error_complete
 
   !> The iterations begin anew from other impulses.
@@ -460,8 +302,7 @@ contains
 
     self%is_assessed = .false.
     self%weight = merge(weight_after_layers, weight_of_projection, layered)
-    self%taken_at = 0
-    self%next_copy = iteration + first_copy
+    call self%tests%begin_anew(iteration)
   end subroutine velocity_error_begin_anew
 
 end module gravier_velocity_error

@@ -96,17 +96,19 @@ module gravier_kernel_table
     !> What the estimate of the velocity error needs (gravier_velocity_error), w = W (P - r) being the velocity by which a contact
     !> misses its law and W its undivided local operator: r . w of each contact, H y of the test impulses P - r and r - previous,
     !> added to `local` and `recent`, and sums. `largest` is raised to the largest |w|^2.
-    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, previous, power, local, recent, sums, largest)
+    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, on_bodies, previous, power, local, recent, sums, largest)
       import :: dp
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
-      !> previous: impulses of an earlier iteration (lanes, nc, blocks) [N s]
-      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :), impulse(:, :, :), previous(:, :, :)
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :)
+      !> (lanes, nc, blocks); on_bodies: r without the attractions, which is `impulse` itself where there are none; previous: those
+      !> of an earlier iteration [N s]
+      real(dp), intent(in), contiguous :: impulse(:, :, :), on_bodies(:, :, :), previous(:, :, :)
       !> (lanes, blocks) [J]
       real(dp), intent(inout), contiguous :: power(:, :)
       !> (nv, n_columns) [N s, N m s]
       real(dp), intent(inout), contiguous :: local(:, :), recent(:, :)
-      !> the three of a residual; of y . w with the tests P - r, r and r - previous
+      !> the three of a residual; of y . w with the tests P - r, on_bodies and r - previous
       real(dp), intent(out) :: sums(6)
       real(dp), intent(inout) :: largest
     end subroutine tests_kernel

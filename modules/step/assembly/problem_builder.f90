@@ -55,7 +55,8 @@ contains
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
     call count_figures(decomposition, halo, problem, figures)
-    if (physics%laws%attracts) call problem%load_attraction()
+    problem%attracts = physics%laws%attracts
+    if (problem%attracts) call problem%load_attraction()
     call find_scales(problem)
     call stop_timer(phase_interface)
   end subroutine build_problem

@@ -17,10 +17,11 @@ program test_solver_parts
   use gravier_levels, only: levels_t
   use gravier_layered_start, only: carry_loads
   use gravier_layer_trial, only: layer_trial_t
-  use gravier_velocity_error, only: copies_ready
+  use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_residual_verdict, only: find_residual_verdict, excess_of, residual_ends, residual_waits, residual_in_vain
   use gravier_check_schedule, only: check_schedule_t
   use gravier_stagnation, only: stagnation_t
-  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, normals_are_in_vain
+  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, speed_against
   use gravier_creeping_groups, only: creep_t, find_creep
   use gravier_proximal_law, only: proximal_law_t
   use gravier_newton, only: newton_t
@@ -451,10 +452,12 @@ contains
   end subroutine check_stagnation
 
   !> A disk between two planes that close on it: equal impulses from both are in vain, and unequal ones, or those of planes that
-  !> open, or that do not come to touch it in the step, are not.
+  !> open, or that do not come to touch it in the step, are not. Planes that close work against impulses, however unequal, so that
+  !> no residual ends a solve.
   subroutine check_vain_impulses()
     type(simulation_t) :: sim
     type(kept_impulses_t), allocatable :: none(:), now(:)
+    type(error_t), allocatable :: error
     integer :: s, c, round
     logical :: expected
 
@@ -463,6 +466,8 @@ contains
       call make_column(1, 1, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0, velocity = "// &
         & trim(merge("-1", " 1", round == 2))//", 0 /"//newline//"&boundary shape = 'plane', point = 1, 0, normal = -1, 0, "// &
         & "velocity = "//trim(merge(" 1", "-1", round == 2))//", 0 /"//newline//"&solver method = 'nscdd' /", sim)
+      call sim%method%start(sim%problem, error)
+      call check(.not. allocated(error), "start")
       expected = round == 1
       if (allocated(none)) deallocate (none, now)
       allocate (none(size(sim%problem%sub)), now(size(sim%problem%sub)))
@@ -479,15 +484,39 @@ contains
           now(s)%value = sub%impulse
         end associate
       end do
-      call check(normals_are_in_vain(sim%problem) .eqv. expected, "impulses that walls press with: are they in vain?")
+      call check_close(speed_against(sim%problem), merge(1.0_dp, 0.0_dp, mod(round, 2) == 1), 1.0e-12_dp, &
+        & "speed of the walls against their impulses, less the gap over the step")
       call check(are_in_vain(sim%problem, none) .eqv. expected, "impulses that have grown: have they in vain?")
       call check(.not. are_in_vain(sim%problem, now), "impulses that have not grown are not in vain")
+      call check_verdict(sim, 0, merge(residual_waits, residual_ends, mod(round, 2) == 1))
+      ! the iteration before had none
+      call check_verdict(sim, 1, merge(residual_in_vain, merge(residual_waits, residual_ends, round == 3), round == 1))
       do s = 1, size(now)
         call check(all(abs(sim%problem%sub(s)%impulse - now(s)%value) <= 0.0_dp), "impulses stay as they are")
       end do
       call sim%free()
     end do
   end subroutine check_vain_impulses
+
+  !> The verdict on a residual within its tolerance after some iterations.
+  subroutine check_verdict(sim, iterations, expected)
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: iterations, expected
+    real(dp), parameter :: allowed = 1.0e-2_dp
+    type(velocity_error_t) :: velocity
+    integer :: verdict
+
+    call velocity%start(sim%problem, allowed)
+    call find_residual_verdict(sim%problem, sim%method, velocity, iterations, allowed, verdict)
+    ! planes that open have left the disk: nothing that moves is in contact
+    if (.not. sim%problem%rest_is_admissible) call check(excess_of(velocity, allowed) > 1.0_dp, "far beyond the accuracy")
+    call check_equal(verdict, expected, "verdict after "//to_text(iterations)//" iterations")
+    ! planes of 1 m/s work against the impulses
+    call find_residual_verdict(sim%problem, sim%method, velocity, iterations, 1.1_dp, verdict)
+    call check_equal(verdict, residual_ends, "planes that move within the accuracy are no contradiction")
+    call find_residual_verdict(sim%problem, sim%method, velocity, iterations, 1.0e9_dp, verdict)
+    call check_equal(verdict, residual_ends, "velocities within the accuracy")
+  end subroutine check_verdict
 
   !> F is 0 where impulses and velocities obey the law, whether contacts are open, stick or slip; near by, the step dr = c - L dv
   !> leaves of F what is of second order in its distance.

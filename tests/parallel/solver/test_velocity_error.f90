@@ -10,6 +10,8 @@ program test_velocity_error
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_vain_impulses, only: kept_impulses_t
+  use gravier_test_impulses, only: test_impulses_t
   use gravier_velocity_error, only: velocity_error_t
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   use gravier_layered_start, only: carry_loads
@@ -28,6 +30,7 @@ program test_velocity_error
   call test_share(1)
   call test_share(4)
   call test_exact()
+  call test_copies()
   call test_decomposition()
   call test_layers(1)
   call test_layers(4)
@@ -266,6 +269,44 @@ contains
     call check(velocity%criterion() <= 1e-6_dp*gravity*step, "criterion of the exact impulses")
     call sim%free()
   end subroutine test_exact
+
+  !> Earlier impulses: those that accelerated sweeps keep, or a copy from an iteration before.
+  subroutine test_copies()
+    type(simulation_t) :: sim
+    type(test_impulses_t) :: tests
+    type(kept_impulses_t), allocatable :: earlier(:)
+    logical :: are_known
+    integer :: s
+
+    call make(5, 4, sim)
+    allocate (earlier(size(sim%problem%sub)))
+    call tests%start(sim%problem)
+    call set_impulses(sim%problem, 5, 0.5_dp)
+    call tests%take_earlier(sim%problem, sim%method, 0, earlier, are_known)
+    call check(.not. are_known, "nothing is known before the first iteration")
+    call tests%take_earlier(sim%problem, sim%method, 1, earlier, are_known)
+    call check(are_known, "accelerated sweeps keep the impulses of the iteration before")
+    do s = 1, size(earlier)
+      call check(all(abs(earlier(s)%value - sim%method%acceleration%part(s)%impulse) <= 0.0_dp), "which are those")
+    end do
+    sim%method%acceleration%on = .false.
+    call tests%take_earlier(sim%problem, sim%method, 1, earlier, are_known)
+    call check(.not. are_known, "plain sweeps keep none")
+    call tests%keep_copy(sim%problem, sim%method, 1)
+    call tests%keep_copy(sim%problem, sim%method, 2)
+    call set_impulses(sim%problem, 5, 1.0_dp)
+    call tests%take_earlier(sim%problem, sim%method, 2, earlier, are_known)
+    call check(.not. are_known, "a copy of the same iteration is no earlier one")
+    call tests%take_earlier(sim%problem, sim%method, 3, earlier, are_known)
+    call check(are_known, "a copy of the iteration before is one")
+    do s = 1, size(earlier)
+      call check(all(abs(2.0_dp*earlier(s)%value - sim%problem%sub(s)%impulse) <= 1e-12_dp), "and has the impulses of then")
+    end do
+    call tests%begin_anew(3)
+    call tests%take_earlier(sim%problem, sim%method, 4, earlier, are_known)
+    call check(.not. are_known, "what begins anew has no earlier impulses")
+    call sim%free()
+  end subroutine test_copies
 
   !> A pass over layers leaves a column of 100 with less than a tenth of g h; a column of 20 is not deep enough for one.
   subroutine test_layers(n_subdomains)

@@ -161,8 +161,8 @@ contains
       local(:, :) = 0.0_dp
       recent(:, :) = 0.0_dp
       largest = 0.0_dp
-      call kernels%make_tests(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, previous, power, &
-        & local, recent, tests, largest)
+      call kernels%make_tests(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, problem%impulse, &
+        & previous, power, local, recent, tests, largest)
       call check_close(sqrt(largest), 0.0_dp, 100*rounding, "violation at the solution")
       call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
       do c = 1, n

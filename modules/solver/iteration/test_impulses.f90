@@ -1,0 +1,312 @@
+!> Test impulses: the projection of the velocity error on the velocities that some impulses make.
+!>
+!> Let w = W (P(r - (v + s n)/W) - r) be the velocity by which a contact violates its law, and e = V - V* the error. With the set of
+!> pressing and sticking contacts known, H^T e = -w there, so that any impulse y gives y . w = -(M^-1 H y, e)_M. Several of them,
+!> with the velocities h_i = M^-1 H y_i, give the norm of the projection of e on the span of these velocities:
+!>     b_i = y_i . w,   G_ij = (h_i, h_j)_M,   Y^2 = b^T G^+ b.
+!>
+!> The test impulses are
+!>   w/W  local errors;
+!>   r    a wrong total load: the impulses on the bodies, without the attractions of contacts. Attractions that hold bodies together
+!>        are many times the loads and balance each other, so that r with them would show what they do at surfaces, and no load;
+!>   r less earlier impulses, the wave under way: those one iteration before where sweeps are accelerated, which keep them; else
+!>        those of some iterations before.
+!> See doc/theory.md, section 24.
+module gravier_test_impulses
+  use gravier_kinds, only: dp
+  use gravier_timers, only: start_timer, stop_timer, phase_reduction
+  use gravier_contact_kernels, only: lanes
+  use gravier_body_mass, only: inverse_products
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
+  use gravier_method, only: method_t
+  use gravier_levels, only: level_part_t
+  use gravier_vain_impulses, only: kept_impulses_t
+  implicit none
+  private
+  public :: test_impulses_t, projection_t
+
+  !> fraction of the square of a test's velocity below which what the others have left of it counts as 0
+  real(dp), parameter :: rank_cut = 1.0e-10_dp
+  !> plain sweeps: ratio between the iterations at which impulses are copied, and the first of them
+  real(dp), parameter :: copy_ratio = 4.0_dp/3.0_dp
+  integer, parameter :: first_copy = 2
+  !> test impulses; places of the sums, the first of which make the residual: the powers y . w, the products of the velocities that
+  !> test impulses make
+  integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_products = at_powers + n_tests, &
+    & n_sums = at_products + n_tests*(n_tests + 1)/2
+
+  !> What is held for one subdomain.
+  type :: test_part_t
+    !> H y of the tests w/W and r less earlier impulses, summed over copies of bodies (nv, n_columns) [N s, N m s]
+    real(dp), allocatable :: local(:, :), recent(:, :)
+    !> earlier impulses where the method keeps none (lanes, nc, blocks) [N s]
+    real(dp), allocatable :: previous(:, :, :)
+    !> where contacts attract, the impulses on the bodies (lanes, nc, blocks) [N s], and H of them (nv, n_columns) [N s, N m s]
+    real(dp), allocatable :: on_bodies(:, :, :), load(:, :)
+  end type test_part_t
+
+  !> What test impulses find.
+  type :: projection_t
+    !> Y^2 [J]; the largest |w| of a contact [m/s]
+    real(dp) :: square = 0.0_dp, largest_violation = 0.0_dp
+    !> as `residual` of the problem returns them
+    real(dp) :: residual = 0.0_dp, defect = 0.0_dp
+  end type projection_t
+
+  type :: test_impulses_t
+    !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
+    integer, private :: taken_at = 0, next_copy = first_copy
+    type(test_part_t), allocatable, private :: part(:)
+  contains
+    procedure :: start => test_impulses_start
+    procedure :: keep_copy => test_impulses_keep_copy
+    procedure :: begin_anew => test_impulses_begin_anew
+    procedure :: take_earlier => test_impulses_take_earlier
+    procedure :: project => test_impulses_project
+    procedure, private :: has_copy => test_impulses_has_copy
+  end type test_impulses_t
+
+contains
+
+  !> Make ready for a solve.
+  subroutine test_impulses_start(self, problem)
+    class(test_impulses_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+
+    allocate (self%part(size(problem%sub)))
+  end subroutine test_impulses_start
+
+  !> Keep a copy of the impulses after an iteration, where one is due and the method keeps none.
+  subroutine test_impulses_keep_copy(self, problem, method, iteration)
+    class(test_impulses_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    class(method_t), intent(in) :: method
+    integer, intent(in) :: iteration
+    integer :: s
+
+    if (method%acceleration%on .or. iteration < self%next_copy) return
+    self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
+    self%taken_at = iteration
+    do s = 1, size(self%part)
+      self%part(s)%previous = problem%sub(s)%impulse
+    end do
+  end subroutine test_impulses_keep_copy
+
+  !> The iterations begin anew from other impulses, after `iteration` of them.
+  subroutine test_impulses_begin_anew(self, iteration)
+    class(test_impulses_t), intent(inout) :: self
+    integer, intent(in) :: iteration
+
+    self%taken_at = 0
+    self%next_copy = iteration + first_copy
+  end subroutine test_impulses_begin_anew
+
+  !> Copies of the impulses of an earlier iteration, if there are any.
+  subroutine test_impulses_take_earlier(self, problem, method, iteration, earlier, are_known)
+    class(test_impulses_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    class(method_t), intent(in) :: method
+    !> iterations made
+    integer, intent(in) :: iteration
+    !> of the subdomains of this rank
+    type(kept_impulses_t), intent(out) :: earlier(:)
+    logical, intent(out) :: are_known
+    integer :: s
+
+    are_known = iteration > 0 .and. (method%acceleration%on .or. self%has_copy(iteration))
+    if (.not. are_known) return
+    do s = 1, size(problem%sub)
+      if (method%acceleration%on) then
+        earlier(s)%value = method%acceleration%part(s)%impulse
+      else
+        earlier(s)%value = self%part(s)%previous
+      end if
+    end do
+  end subroutine test_impulses_take_earlier
+
+  !> Whether there is a copy of impulses from before an iteration.
+  pure logical function test_impulses_has_copy(self, iteration) result(has_copy)
+    class(test_impulses_t), intent(in) :: self
+    integer, intent(in) :: iteration
+    has_copy = self%taken_at > 0 .and. self%taken_at < iteration
+  end function test_impulses_has_copy
+
+  !> Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over the contacts
+  !> and one reduction. The powers r . w of the contacts are left to the levels. Collective.
+  subroutine test_impulses_project(self, problem, method, iteration, levels, found)
+    class(test_impulses_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(in) :: method
+    integer, intent(in) :: iteration
+    !> of the subdomains of this rank
+    type(level_part_t), intent(inout) :: levels(:)
+    type(projection_t), intent(out) :: found
+    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums), largest(1)
+    integer :: s
+
+    parts(:, :) = 0.0_dp
+    largest(1) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), part => self%part(s))
+        call make_room(part, problem%kernels%nv, sub%n_columns, size(sub%hot, 3), levels(s)%power)
+        if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
+        if (allocated(sub%attraction)) call take_attractions_off(sub, part)
+        if (sub%n_contacts == 0) cycle
+        ! without earlier impulses the third test impulse is 0, which tells nothing
+        if (method%acceleration%on .and. iteration > 0) then
+          call test(problem, s, part, method%acceleration%part(s)%impulse, levels(s)%power, parts(:, s), largest(1))
+        else if (self%has_copy(iteration)) then
+          call test(problem, s, part, part%previous, levels(s)%power, parts(:, s), largest(1))
+        else
+          call test(problem, s, part, sub%impulse, levels(s)%power, parts(:, s), largest(1))
+        end if
+      end associate
+    end do
+    if (problem%n_subdomains > 1) call sum_motions(problem, self%part)
+    do s = 1, size(problem%sub)
+      ! the products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j
+      associate (sub => problem%sub(s), part => self%part(s), products => parts(at_products + 1:, s))
+        if (allocated(part%load)) then
+          call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, part%load, part%recent, products)
+        else
+          call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, sub%reaction, part%recent, products)
+        end if
+      end associate
+    end do
+    call start_timer(phase_reduction)
+    call problem%comm%sum_parts(parts, sums)
+    call problem%comm%highest_of(largest)
+    call stop_timer(phase_reduction)
+    call problem%take_residual(sums(1:n_residual_sums), found%residual, found%defect)
+    found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:))
+    found%largest_violation = sqrt(largest(1))
+  end subroutine test_impulses_project
+
+  !> H y of a subdomain's tests at 0; the first time room is made for them and for the powers at contacts.
+  subroutine make_room(part, nv, n_columns, n_blocks, power)
+    type(test_part_t), intent(inout) :: part
+    integer, intent(in) :: nv, n_columns, n_blocks
+    real(dp), allocatable, intent(inout) :: power(:, :)
+
+    if (.not. allocated(part%local)) then
+      allocate (part%local(nv, n_columns), part%recent(nv, n_columns))
+      allocate (power(lanes, n_blocks))
+    end if
+    part%local(:, :) = 0.0_dp
+    part%recent(:, :) = 0.0_dp
+  end subroutine make_room
+
+  !> The impulses on the bodies of a subdomain whose contacts attract, and their reactions.
+  subroutine take_attractions_off(sub, part)
+    type(subproblem_t), intent(in) :: sub
+    type(test_part_t), intent(inout) :: part
+
+    part%on_bodies = sub%impulse
+    part%on_bodies(:, 1, :) = part%on_bodies(:, 1, :) - sub%attraction
+    part%load = sub%reaction + sub%attraction_load
+  end subroutine take_attractions_off
+
+  !> Add what the contacts of subdomain `s` of this rank say: those that are awake, then those that sleep, whose part of the
+  !> residual goes into the next places.
+  subroutine test(problem, s, part, previous, power, sums, largest)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    type(test_part_t), intent(inout) :: part
+    !> earlier impulses (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: previous(:, :, :)
+    !> r . w (lanes, blocks) [J]
+    real(dp), intent(inout), contiguous :: power(:, :)
+    !> (n_sums)
+    real(dp), intent(inout), contiguous :: sums(:)
+    real(dp), intent(inout) :: largest
+    integer :: awake, all_blocks
+
+    awake = problem%awake_blocks(s)
+    all_blocks = size(problem%sub(s)%hot, 3)
+    if (allocated(part%on_bodies)) then
+      call test_blocks(part%on_bodies, 1, awake, 0)
+      if (awake < all_blocks) call test_blocks(part%on_bodies, awake + 1, all_blocks, 3)
+    else
+      call test_blocks(problem%sub(s)%impulse, 1, awake, 0)
+      if (awake < all_blocks) call test_blocks(problem%sub(s)%impulse, awake + 1, all_blocks, 3)
+    end if
+
+  contains
+
+    !> Blocks `a` to `z`, whose part of the residual goes into the places after `at`.
+    subroutine test_blocks(on_bodies, a, z, at)
+      real(dp), intent(in), contiguous :: on_bodies(:, :, :)
+      integer, intent(in) :: a, z, at
+      real(dp) :: found(3 + n_tests)
+
+      associate (sub => problem%sub(s))
+        call problem%kernels%make_tests(sub%pair(:, (a - 1)*lanes + 1:z*lanes), sub%hot(:, :, a:z), sub%inverse_mass, &
+          & sub%v_global, sub%impulse(:, :, a:z), on_bodies(:, :, a:z), previous(:, :, a:z), power(:, a:z), part%local, &
+          & part%recent, found, largest)
+      end associate
+      sums(at + 1:at + 3) = found(1:3)
+      sums(at_powers + 1:at_products) = sums(at_powers + 1:at_products) + found(4:)
+    end subroutine test_blocks
+
+  end subroutine test
+
+  !> Sum H y over the copies of bodies; that of the impulses themselves is the reaction, which is summed. Collective.
+  subroutine sum_motions(problem, part)
+    type(contact_problem_t), intent(inout) :: problem
+    type(test_part_t), intent(inout) :: part(:)
+    integer :: s
+
+    do s = 1, size(part)
+      call problem%shared%load(s, part(s)%local)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(part)
+      call problem%shared%sum_copies(s, part(s)%local, mean=.false.)
+      call problem%shared%load(s, part(s)%recent)
+    end do
+    call problem%shared%pass()
+    do s = 1, size(part)
+      call problem%shared%sum_copies(s, part(s)%recent, mean=.false.)
+    end do
+  end subroutine sum_motions
+
+  !> b^T G^+ b [J]: the tests are taken one after the other, next the one of which those taken have left most, as in a Cholesky
+  !> factorisation with pivots. What little is left of a test that is nearly a sum of others counts as none.
+  pure real(dp) function projection_of(b, products) result(square)
+    !> (n_tests); columns of the upper triangle of G
+    real(dp), intent(in), contiguous :: b(:), products(:)
+    real(dp) :: left(n_tests, n_tests), power(n_tests), share(n_tests)
+    integer :: i, j, k, at
+
+    at = 0
+    do j = 1, n_tests
+      do i = 1, j
+        at = at + 1
+        left(i, j) = products(at)
+        left(j, i) = products(at)
+      end do
+    end do
+    power(:) = b
+    share(:) = 0.0_dp
+    do i = 1, n_tests
+      if (left(i, i) > 0.0_dp) share(i) = 1.0_dp/left(i, i)
+    end do
+    square = 0.0_dp
+    do k = 1, n_tests
+      i = 1
+      do j = 2, n_tests
+        if (left(j, j)*share(j) > left(i, i)*share(i)) i = j
+      end do
+      if (.not. left(i, i)*share(i) > rank_cut) return
+      square = square + power(i)**2/left(i, i)
+      power(:) = power - left(:, i)*(power(i)/left(i, i))
+      do j = 1, n_tests
+        if (j /= i) left(:, j) = left(:, j) - left(:, i)*(left(i, j)/left(i, i))
+      end do
+      share(i) = 0.0_dp
+      left(:, i) = 0.0_dp
+      left(i, :) = 0.0_dp
+    end do
+  end function projection_of
+
+end module gravier_test_impulses
