@@ -1,6 +1,6 @@
 """Input that must be refused: exit status 2, one line on the standard error that says where, what and what was expected, and
-no file touched. A hang of the ranks that know of no error shows as a timeout. An input file is read by one rank and refused by all: every
-fifth one runs on two ranks, and all of them do in `./gravier test long`."""
+no file touched. A hang of the ranks that know of no error shows as a timeout. Every fifth input
+file runs on two ranks too, and all of them do in `./gravier test long`."""
 import os
 import shutil
 import unittest
