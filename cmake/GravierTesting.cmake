@@ -36,14 +36,15 @@ add_custom_target(debug_tests)
 include(CheckLinkerFlag)
 check_linker_flag(Fortran -fuse-ld=gold GRAVIER_LINKER_GOLD)
 
-# gravier_test(NAME SOURCES ... [OPTIMISED] [RANKS 1 2 4] [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds] [EXPECT text])
-# One test for each number of ranks, NAME or NAME_npN when on several, each in a directory of its own.
+# gravier_test(NAME SOURCES ... [OPTIMISED] [RANKS 1 2 4] [DEBUG_RANKS 1 2] [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds] [EXPECT text])
+# One test for each number of ranks, NAME or NAME_npN when on several, each in a directory of its own. One rank runs without the launcher,
+# in half the time. Numbers of ranks that are not among DEBUG_RANKS have the label long in place of debug in a debug build.
 # LIBRARIES defaults to the application (the top layer while there is none). With EXPECT the program must fail
 # and print the text. Called again with the same NAME and SOURCES it adds tests of the same program. A program is compiled without
 # optimisation: it runs for moments, and to optimise it would take five times as long as to compile it. OPTIMISED is for one that computes
 # much, or compares with formulas that have to round as the library does.
 function(gravier_test name)
-  cmake_parse_arguments(TEST "OPTIMISED" "TIMEOUT;EXPECT" "SOURCES;RANKS;LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(TEST "OPTIMISED" "TIMEOUT;EXPECT" "SOURCES;RANKS;DEBUG_RANKS;LIBRARIES;LABELS" ${ARGN})
   if(NOT TEST_LIBRARIES)
     set(TEST_LIBRARIES $<IF:$<TARGET_EXISTS:gravier_app>,gravier_app,gravier_step>)
   endif()
@@ -80,22 +81,35 @@ function(gravier_test name)
     endif()
     set(command ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${MPIEXEC_PREFLAGS} $<TARGET_FILE:${target}>
       ${MPIEXEC_POSTFLAGS})
+    if(ranks EQUAL 1 AND NOT TEST_EXPECT)
+      set(command $<TARGET_FILE:${target}>)
+    endif()
     if(TEST_EXPECT)
       string(REPLACE ";" "|" command "${command}")
       set(command ${CMAKE_COMMAND} "-DCOMMAND=${command}" "-DEXPECT=${TEST_EXPECT}"
         -P ${PROJECT_SOURCE_DIR}/tests/support/expect_failure.cmake)
     endif()
-    gravier_add_test(${test} ${TEST_TIMEOUT} ${ranks} "${TEST_LABELS}" "${command}")
+    set(labels ${TEST_LABELS})
+    if(CMAKE_BUILD_TYPE STREQUAL Debug AND TEST_DEBUG_RANKS AND NOT ranks IN_LIST TEST_DEBUG_RANKS)
+      list(TRANSFORM labels REPLACE "^debug$" long)
+    endif()
+    gravier_add_test(${test} ${TEST_TIMEOUT} ${ranks} "${labels}" "${command}")
     if(ranks EQUAL 1)
-      # it has no rank to wait for, and would give up its processor at each message to itself
+      # it has no rank to wait for, and would give up its processor at each message to itself. Without a launcher Open MPI starts no daemon
+      # and only what one rank needs; tests that run at once each have a session directory of their own
       set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT OMPI_MCA_mpi_yield_when_idle=0)
+      if(NOT TEST_EXPECT)
+        set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT OMPI_MCA_ess_singleton_isolated=1 OMPI_MCA_btl=self
+          OMPI_MCA_coll=basic,libnbc,self OMPI_MCA_orte_tmpdir_base=${PROJECT_BINARY_DIR}/tests/work/${test})
+      endif()
     endif()
   endforeach()
 endfunction()
 
 # gravier_python_test(NAME FILE [APART] [LABELS ...] [TIMEOUT seconds])
 # A unittest script. Its environment names GRAVIER_BIN_DIR, GRAVIER_SOURCE_DIR and MPIEXEC; tests/support is on its path. With APART
-# each of its methods test_X is a test by itself, NAME_X.
+# each of its methods test_X is a test by itself, NAME_X. A script that imports LONG, SOME_RANKS or only_long of gravier_runs is also the test
+# long_NAME of the label long, where LONG is true: all variants of what the suite shows by a few.
 function(gravier_python_test name file)
   cmake_parse_arguments(TEST "APART" "TIMEOUT" "LABELS" ${ARGN})
   if(NOT GRAVIER_PYTHON)
@@ -108,8 +122,13 @@ function(gravier_python_test name file)
   get_filename_component(script ${file} NAME)
   set(command "${GRAVIER_PYTHON};-m;unittest;discover;-v;-s;${directory};-p;${script}")
   set(methods "")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(STRINGS ${file} long REGEX "^from gravier_runs import .*(LONG|SOME_RANKS|only_long)" LIMIT_COUNT 1)
+  if(long AND CMAKE_BUILD_TYPE STREQUAL Release)
+    gravier_add_test(long_${name} 7200 1 long "${command}")
+    set_property(TEST long_${name} APPEND PROPERTY ENVIRONMENT GRAVIER_LONG=1)
+  endif()
   if(TEST_APART)
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
     file(STRINGS ${file} lines REGEX "^    def test_[a-z0-9_]+\\(self")
     foreach(line ${lines})
       string(REGEX REPLACE "^    def test_([a-z0-9_]+).*" "\\1" method ${line})

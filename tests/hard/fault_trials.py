@@ -240,8 +240,9 @@ def used(directory):
     return sum(512 * os.stat(os.path.join(folder, name)).st_blocks for folder, _, names in os.walk(directory) for name in names)
 
 
-def full_disks(random_seed, trials, directory, kinds=KINDS):
-    """`trials` random sizes of the disk for each kind of output, on 1 or 2 ranks, some of them with files of an older run there."""
+def full_disks(random_seed, trials, directory, kinds=KINDS, first=0):
+    """`trials` random sizes of the disk for each kind of output, on 1 or 2 ranks, some of them with files of an older run there. Those of
+    an even number, of which `first` is the first, are small disks."""
     figure = Figure("full disks")
     for kind in kinds:
         draw = random.Random(f"{random_seed} {kind}")
@@ -256,7 +257,7 @@ def full_disks(random_seed, trials, directory, kinds=KINDS):
         os.rename(disk, pattern)
         os.makedirs(disk)
         most = 1.6 * used(pattern) + 300e3
-        for trial in range(trials):
+        for trial in range(first, first + trials):
             # small disks meet the beginnings of files, large ones their ends
             kilobytes = int(draw.uniform(8, most / 1024) if trial % 2 else 8 * (most / 8192) ** draw.random())
             ranks = draw.choice((1, 2)) if program.startswith("gravier") else 1

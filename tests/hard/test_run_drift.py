@@ -7,7 +7,7 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case
+from gravier_runs import SOME_RANKS, RunTestCase, differences, each, merged, run_case
 from packings import settled_disks
 
 RADIUS = 0.01
@@ -253,11 +253,11 @@ class Drift(RunTestCase):
         self.assertLess(abs(kept["position_y:lid"][-1] - without["position_y:lid"][-1]), RADIUS)
 
     def test_ranks_under_pistons(self):
-        """The same bits on 1, 2 and 4 ranks, of which some know the lid by hearsay; a plane, and glued grains."""
+        """The same bits on 1 and 2 ranks, and on 4 in `./gravier test long`, of which some know the lid by hearsay; a plane, and glued grains."""
         grid = {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 8, "grid": [2, 4]}, "time": {"steps": 30}}
         for build, more in ((self.glued_piston, {"solver": {"tolerance": 1e-3}, "time": {"steps": 15}}),
                             (self.pressed, {"scene": {"overlap_allowed": 1e-3 * RADIUS}, "output": {"every": 10}})):
-            runs = each(build, [(f"{build.__name__} {ranks}", merged(grid, more), ranks) for ranks in (1, 2, 4)])
+            runs = each(build, [(f"{build.__name__} {ranks}", merged(grid, more), ranks) for ranks in SOME_RANKS])
             self.assertGreater(runs[0].history()["projected"].sum(), 10)
             for run in runs[1:]:
                 self.assertEqual([name for name in differences(runs[0].results(), run.results()) if not name.startswith("/run")], [])

@@ -1,10 +1,10 @@
-"""A few trials of each fault, as the command fault_trials.py has them by the hundred."""
+"""A few trials of each fault, more of them in `./gravier test long`, as the command fault_trials.py has them by the hundred."""
 import os
 import subprocess
 import sys
 import unittest
 
-from gravier_runs import RunTestCase
+from gravier_runs import LONG, RunTestCase
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import fault_trials  # noqa: E402
@@ -18,7 +18,10 @@ class FaultTrials(RunTestCase):
         self.assertEqual(figure.wrong, [])
 
     def test_several_at_once(self):
-        self.assert_right(fault_trials.at_once(2, 2, self.here("at once")), 2)
+        """Two that come to their end, and in `./gravier test long` three that go on until their time is over (test_run_two_at_once.py has
+        such a run too)."""
+        trials = 2 if LONG else 1
+        self.assert_right(fault_trials.at_once(2, trials, self.here("at once")), trials)
 
     def test_full_disks(self):
         os.makedirs(self.here("mount"))
@@ -29,11 +32,17 @@ class FaultTrials(RunTestCase):
             print(reason, file=sys.stderr)
             self.skipTest(reason)
         subprocess.run(["umount", "-l", self.here("mount")], check=True)
-        # a size from all that a disk may have, and one of a small disk, for each kind
-        self.assert_right(fault_trials.full_disks(2, 2, self.here("disks")), 2 * len(fault_trials.KINDS))
+        # a size from all that a disk may have, or one of a small disk, by turns, for each kind; both in `./gravier test long`
+        for first in (0, 1):
+            kinds = fault_trials.KINDS[first::2]
+            self.assert_right(fault_trials.full_disks(2, 1, self.here(f"disks {first}"), kinds, first), len(kinds))
+            if LONG:
+                kinds = fault_trials.KINDS[1 - first::2]
+                self.assert_right(fault_trials.full_disks(2, 1, self.here(f"more disks {first}"), kinds, first), len(kinds))
 
     def test_kills(self):
-        self.assert_right(fault_trials.kills(6, 2, self.here("kills")), 6)
+        ranks = (1, 2, 4) if LONG else (1, 2)
+        self.assert_right(fault_trials.kills(6, 2, self.here("kills"), ranks), 2 * len(ranks))
 
 
 if __name__ == "__main__":

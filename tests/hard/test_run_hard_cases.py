@@ -1,11 +1,11 @@
-"""All hard cases by a selection of methods: NSCDD on two ranks, but on one where steps are many or solves slow (the bits are the same,
-test_run_rank_invariance.py), and one of the other methods in turn on one. Methods whose iterations are dear make a few steps, in which
-what is thrown meets. The table of all methods is drivers/studies/study_hard.py."""
+"""All hard cases by a selection of methods: NSCDD, every fourth case on two ranks (the bits are the same, test_run_rank_invariance.py), and
+one of the other methods in turn on one. In `./gravier test long` NSCDD is on two ranks but where steps are many or solves slow. Methods
+whose iterations are dear make a few steps, in which what is thrown meets. The table of all methods is drivers/studies/study_hard.py."""
 import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each
+from gravier_runs import LONG, RunTestCase, differences, each
 from hard_cases import BASE, METHODS, cases, disagreement, methods_of, play, units
 
 CASES = cases()
@@ -18,7 +18,7 @@ def selection(number, case):
     if case.methods:
         # some on two ranks, of each method
         return [(title, groups, 2 if k % 5 == 0 else 1) for k, (title, groups) in enumerate(case.methods.items())]
-    ranks = 1 if case.slow or case.steps >= 100 else 2
+    ranks = 1 if case.slow or case.steps >= 100 or not (LONG or number % 4 == 0) else 2
     return [(title, METHODS[title], ranks) for title, ranks in (("nscdd", ranks), (OTHERS[number % len(OTHERS)], 1))]
 
 

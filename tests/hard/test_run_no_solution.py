@@ -5,7 +5,7 @@ import re
 import unittest
 
 from closing_walls import impossible
-from gravier_runs import RunTestCase, each, gravier, merged, run_case, write
+from gravier_runs import LONG, RunTestCase, each, gravier, merged, run_case, write
 from small_scenes import bodies_csv
 
 #: methods that take their turns with the scenes, beside NLGS on one domain and NSCDD on two ranks
@@ -18,11 +18,13 @@ RESIDUAL = {"solver": {"criterion": "residual", "max_iterations": LIMIT}}
 
 
 def taking_turns():
-    """(name, method, ranks) of all scenes: NLGS on one domain, NSCDD on two ranks, and the other methods in turn."""
+    """(name, method, ranks) of all scenes: NLGS on one domain, NSCDD, and the other methods in turn. The bits are the same on one rank and on two
+    (test_run_rank_invariance.py): some are run on two, in `./gravier test long` more."""
     for number, (name, (_, groups)) in enumerate(impossible().items()):
         # the enriched methods and Newton's do not serve moments
         other = "schwarz" if "rolling_friction" in groups["scene"] else OTHERS[number % len(OTHERS)]
-        yield from ((name, "nlgs", 1), (name, "nscdd", 2), (name, other, 1 + number % 2))
+        yield from ((name, "nlgs", 1), (name, "nscdd", 2 if LONG or number % 4 == 0 else 1),
+                    (name, other, 2 if number % (2 if LONG else 8) == 1 else 1))
 
 
 class NoSolution(RunTestCase):

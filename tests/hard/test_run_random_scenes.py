@@ -6,7 +6,7 @@
 import os
 import unittest
 
-from gravier_runs import RunTestCase, each
+from gravier_runs import LONG, RunTestCase, each
 from hard_cases import METHODS, disagreement, play
 from random_scenes import methods, scene
 
@@ -18,7 +18,7 @@ class RandomScenes(RunTestCase):
 
     def play(self, number):
         case = scene(number)
-        runs = [play(case, title, METHODS[title], 1 + number % 2, self.here(f"{number} {title}")) for title in methods(number)]
+        runs = [play(case, title, METHODS[title], 1 + (number % (2 if LONG else 4) == 1), self.here(f"{number} {title}")) for title in methods(number)]
         wrong = [f"{run.method}: {words}" for run in runs for words in run.complaints()]
         return wrong + disagreement(*runs)
 

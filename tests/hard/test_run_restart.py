@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from busy_scene import DRUM, write_drum
-from gravier_runs import RunTestCase, contents, differences, each, gravier, merged, namelist, read_csv, run_case, steps_of, write
+from gravier_runs import LONG, RunTestCase, contents, differences, each, gravier, merged, namelist, read_csv, run_case, steps_of, write
 from killed_runs import Going, compile_shim
 
 BOX = {
@@ -105,7 +105,7 @@ class Restart(RunTestCase):
         self.assertTrue(np.any(images != 0))
         oldest = 1 + int(np.argmax(ages))
         stops = sorted({int(listed[len(listed) // 2]), oldest, int(divided[1]) - 1, 32, 33, 34})
-        ranks = [(1, 2), (2, 4), (4, 1), (2, 1), (1, 4), (4, 2)]
+        ranks = [(1, 2), (2, 4), (4, 1), (2, 1), (1, 4), (4, 2)] if LONG else [(1, 2), (2, 1), (2, 2), (2, 1), (1, 4), (1, 2)]
         each(lambda stop, number: self.one_restart(DRUM, stop, *number, straight, write_drum), list(zip(stops, ranks)))
 
     def test_piston(self):
@@ -118,7 +118,7 @@ class Restart(RunTestCase):
         straight = self.straight("piston", case)
         history = read_csv(os.path.join(straight, "results", "history.csv"))
         self.assertGreater(history["projected"][30:].sum(), 40)
-        for stop, before, after in ((45, 1, 2), (61, 2, 1), (62, 2, 4)):
+        for stop, before, after in ((45, 1, 2), (61, 2, 1), (62, 2, 4)) if LONG else ((45, 1, 2), (61, 2, 1)):
             self.one_restart(case, stop, before, after, straight)
 
     def test_methods(self):
@@ -279,17 +279,19 @@ class Restart(RunTestCase):
                 self.assertIn(f"/steps/{step}/{name}", found)
 
     def test_kills_at_random(self):
-        """Killed again and again while it writes a state and a checkpoint each step, on 1 and 2 ranks in turn."""
-        case = merged(BOX, {"time": {"steps": 300}, "output": {"trace": True}})
+        """Killed again and again while it writes a state and a checkpoint each step, on 1 and 2 ranks in turn; nine times in `./gravier test
+        long`, and five in a shorter run."""
+        steps, times, most = (300, 9, 45) if LONG else (120, 5, 30)
+        case = merged(BOX, {"time": {"steps": steps}, "output": {"trace": True}})
         straight = self.straight("not killed", case)
         directory = self.here("killed")
         draw = random.Random(3)
         reached = kills = 0
-        for kills in range(9):
+        for kills in range(times):
             run = Going(case, 1 + kills % 2, directory, ["--restart"])
             run.wait_for_rows(reached)
-            reached += draw.randrange(5, 45)
-            run.wait_for_rows(min(reached, 290))
+            reached += draw.randrange(5, most)
+            run.wait_for_rows(min(reached, steps - 10))
             time.sleep(draw.random() * 0.01)
             run.send(signal.SIGKILL)
             status, said = run.end()
@@ -300,7 +302,7 @@ class Restart(RunTestCase):
         with open(history, "rb+") as file:
             file.truncate(os.path.getsize(history) - 1)
             file.seek(0, os.SEEK_END)
-            file.write(b"\n299,0.2")
+            file.write(b"\n%d,0.2" % (steps - 1))
         run = restart(directory, 2)
         self.assert_status(run, 0)
         self.assertIn("from the checkpoint of step", run.stdout)
@@ -328,7 +330,8 @@ class Restart(RunTestCase):
             shutil.rmtree(directory)
 
         # a state takes 45 writes, of which the last three show it
-        each(killed, [(1 + count % 2, count) for count in [*range(10, 60, 16), *range(100, 150, 8), 230]])
+        counts = [*range(10, 60, 16), *range(100, 150, 8), 230] if LONG else [10, 42, 116, 132, 230]
+        each(killed, [(1 + k % 2, count) for k, count in enumerate(counts)])
 
     def test_refusals(self):
         """Another scene, a damaged checkpoint, results that are gone: one line, status 2, and all files as they were."""

@@ -8,7 +8,7 @@ import subprocess
 import unittest
 from pathlib import Path
 
-from gravier_runs import PROGRAMS, SOURCE, RunTestCase
+from gravier_runs import PROGRAMS, SOURCE, RunTestCase, only_long
 
 BUILD = Path(PROGRAMS).parent
 CPACK = shutil.which("cpack")
@@ -22,6 +22,7 @@ class Package(RunTestCase):
         self.assertEqual(done.returncode, 0, f"{command}\n{done.stdout}{done.stderr}")
         return done.stdout
 
+    @only_long
     def test_package(self):
         self.call(CPACK, "--config", str(BUILD / "CPackConfig.cmake"), "-B", self.scratch, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", cwd=self.scratch)
         packages = [name for name in os.listdir(self.scratch) if name.endswith(".deb")]

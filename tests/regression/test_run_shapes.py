@@ -174,7 +174,7 @@ class Shapes(RunTestCase):
         rows = [f"{k + 1},{0.12 * (k % 4) + 0.07 * (k // 4 % 2)},{0.12 + 0.13 * (k // 4)},0,0,{('brick', 'ell', 'pill', '')[k % 4]},"
                 f"{'' if k % 4 == 3 else 0.2 + 0.003 * k},{0.7 * k},{0.04 if k % 4 == 3 else ''},," for k in range(16)]
         bodies = "\n".join([BODIES.splitlines()[0], *rows, "99,0,0,,,plane,,,,0,1", ""])
-        case = merged(CASE, {"time": {"steps": 250}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2}})
+        case = merged(CASE, {"time": {"steps": 250}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2}, "output": {"every": 250}})
         runs = [run_case(case, ranks, self.prepare(f"fall {ranks}", bodies=bodies)) for ranks in (1, 2)]
         for run in runs:
             self.assert_status(run, 0)

@@ -30,6 +30,11 @@ MPIEXEC = os.environ.get("MPIEXEC", "mpiexec")
 MEMORY, ROOM = "/dev/shm", 2**32
 if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
     tempfile.tempdir = MEMORY
+#: whether all variants run, as in `./gravier test long`, where the suite runs a few of them
+LONG = os.environ.get("GRAVIER_LONG", "0") == "1"
+#: numbers of ranks on which runs have the same bits: on four where there are two cores a run takes ten times what it takes on one
+SOME_RANKS = (1, 2, 4) if LONG else (1, 2)
+only_long = unittest.skipUnless(LONG, "a part of ./gravier test long")
 #: numbers of the runs of this process
 RUNS = itertools.count()
 #: seconds after which a run that does not end is taken for one that hangs, on whatever machine, with whatever else to do

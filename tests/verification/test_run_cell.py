@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 
-from gravier_runs import RunTestCase, gravier, merged, run_case, write
+from gravier_runs import SOME_RANKS, RunTestCase, gravier, merged, run_case, write
 from small_scenes import Grain, bodies_csv
 
 import unittest
@@ -166,7 +166,7 @@ class Cell(RunTestCase):
             for name in ("bodies/position", "bodies/velocity", "cell/edge"):
                 np.testing.assert_allclose(parts["/steps/40/" + name], whole["/steps/40/" + name], rtol=0, atol=1e-6, err_msg=f"{count} {name}")
         several = {"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 8}}
-        runs = {ranks: self.lattice(f"ranks {ranks}", several, ranks).results() for ranks in (1, 2, 4)}
+        runs = {ranks: self.lattice(f"ranks {ranks}", several, ranks).results() for ranks in SOME_RANKS}
         here = self.here("restarted")
         os.makedirs(here)
         first = run_case(merged(LATTICE, several, {"time": {"steps": 33}, "output": {"checkpoint_every": 33}}), directory=here)

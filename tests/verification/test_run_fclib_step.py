@@ -6,7 +6,7 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, gravier, merged, run_case
+from gravier_runs import SOME_RANKS, RunTestCase, gravier, merged, run_case
 from shaped_scenes import box, lattice, prepare, shaped_case
 
 STEP = 60
@@ -129,12 +129,12 @@ class FclibStep(RunTestCase):
                 case, rows = case
             dimension = case["scene"]["dimension"]
             case = merged(case, {"decomposition": {"subdomains": 4}})
-            for number in (1, 2, 4):
+            for number in SOME_RANKS:
                 if rows:
                     prepare(self.here(f"{name}{number}"), dimension, rows)
             step = 180 if rows else STEP
             first = self.dump(case, f"{name}1", step=step)
-            for ranks in (2, 4):
+            for ranks in SOME_RANKS[1:]:
                 other = self.dump(case, f"{name}{ranks}", ranks=ranks, step=step)
                 for values in "m h f w mu v r u".split():
                     np.testing.assert_array_equal(getattr(other, values), getattr(first, values), err_msg=values)

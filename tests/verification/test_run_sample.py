@@ -8,7 +8,7 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, each, gravier, merged, namelist, write
+from gravier_runs import SOME_RANKS, RunTestCase, each, gravier, merged, namelist, write
 
 DENSITY = 2500.0
 BASE = {
@@ -42,8 +42,9 @@ UNPREPARED = [name for name, case in CASES.items() if "preparation" not in case[
 #: steps of preparations that are compared on four ranks: grains meet, and subdomains are cut anew at step 100
 BEGINNING = {"sample": {"max_steps": 120}}
 CASES.update({f"{name}, beginning": merged(CASES[name], BEGINNING) for name in ("settled", "compacted", "pressed")})
-#: numbers of ranks by case: a preparation to its end is compared on two, for one of each kind
-RANKS = {name: (1, 2, 4) for name in CASES} | {"settled": (1, 2), "compacted": (1, 2), "pressed": (1,)}
+#: numbers of ranks by case: a preparation to its end is compared on two, for one of each kind; what is loose and a beginning on four, and
+#: more in `./gravier test long`
+RANKS = {name: SOME_RANKS for name in CASES} | {name: (1, 2, 4) for name in ("loose", "compacted, beginning")} | {"settled": (1, 2), "compacted": (1, 2), "pressed": (1,)}
 WHOLE = [name for name in CASES if not name.endswith("beginning")]
 
 

@@ -8,7 +8,7 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, each, gravier, merged, namelist, write
+from gravier_runs import SOME_RANKS, RunTestCase, each, gravier, merged, namelist, write
 
 DENSITY = 2000.0
 SOLIDS = """shape die
@@ -52,7 +52,7 @@ CASES = {
 BEGINNING = {"sample": {"max_steps": 120}}
 CASES.update({f"{name}, beginning": (CASES[name][0], merged(CASES[name][1], BEGINNING)) for name in ("settled", "planar")})
 #: numbers of ranks by case: a preparation to its end is compared on two, and so is the one in a single subdomain
-RANKS = {name: (1, 2, 4) for name in CASES} | {name: (1, 2) for name in ("settled", "compacted", "planar")}
+RANKS = {name: SOME_RANKS for name in CASES} | {"planar, beginning": (1, 2, 4)} | {name: (1, 2) for name in ("settled", "compacted", "planar")}
 
 
 def make(shapes, case, directory, ranks=1):
