@@ -65,8 +65,8 @@ module gravier_velocity_error
     logical, private :: has_levels = .false., has_followed = .false.
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
-    !> the same where contacts attract, and the wave along them cannot have gone through all bodies yet, so that E may be too small;
-    !> iterations made at the last `assess`
+    !> whether nearly all bodies are at rest where contacts attract, and the wave along them cannot have crossed all bodies yet, so
+    !> that E may be too small; iterations made at the last `assess`
     logical, private :: is_early = .false.
     integer, private :: iterations = 0
     !> what finds Y
@@ -193,7 +193,7 @@ contains
       & self%levels%mean_of_bodies/bodies_allowed)
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
-    if (self%is_early) criterion = max(criterion, self%bound_by_rest/share_at_rest)
+    if (self%is_early .and. self%is_restless) criterion = max(criterion, self%bound_by_rest/share_at_rest)
   end function velocity_error_criterion
 
   !> The share of the error allowed that E may have where nearly all bodies are at rest and some move: C is what moves there.
@@ -224,10 +224,11 @@ contains
     rests = self%bound_by_rest <= share_at_rest*self%allowed
   end function velocity_error_rests
 
-  !> The smaller of E and C [m/s].
+  !> The smaller of E and C, or C where E may be too small [m/s].
   pure real(dp) function velocity_error_estimate(self) result(estimate)
     class(velocity_error_t), intent(in) :: self
-    estimate = min(self%bound_by_rest, self%wave(1.0_dp))
+    estimate = self%bound_by_rest
+    if (.not. self%is_early) estimate = min(estimate, self%wave(1.0_dp))
   end function velocity_error_estimate
 
   !> C, Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
@@ -264,6 +265,7 @@ contains
     call self%levels%add(problem, self%mass, self%largest_violation)
     self%has_levels = .true.
     self%has_followed = .false.
+    self%is_early = problem%attracts .and. self%bound_by_rest <= self%most_at_rest .and. self%iterations < self%levels%most_depth
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then
@@ -271,7 +273,6 @@ contains
       if (problem%attracts .or. max(self%wave(weight_of_sinking)/self%share_of_motion(), &
         & self%levels%fastest_body/speed_at_rest) > self%allowed) &
         & self%is_restless = fastest_speed(problem) > speed_at_rest*self%allowed
-      self%is_early = self%is_restless .and. problem%attracts .and. self%iterations < self%levels%most_depth
       if (self%criterion() > self%allowed) return
       if (self%is_restless) limit = speed_at_rest
     end if
