@@ -80,7 +80,8 @@ class Disks(RankInvariance):
             self.assertEqual(steps_of(run.results()), list(range(cases[title]["time"]["steps"] + 1)))
             history = run.history()
             self.assertGreater(history["contacts"].min(), 1100, title)
-            self.assertGreater(history["iterations"].min(), 0, title)
+            # later steps may start converged
+            self.assertGreater(history["iterations"][0], 0, title)
             self.assertGreater(history["iterations"].max() * cases[title]["solver"].get("sweeps", 1), 100, title)
             self.assertGreater(history["interface_bodies"].min(), 30, title)
 

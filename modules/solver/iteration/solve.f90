@@ -445,8 +445,7 @@ contains
     end if
   end subroutine note_growth
 
-  !> Whether nothing is to be expected of more iterations: because there is no solution, or because the method finds none.
-  !> Collective.
+  !> Whether more iterations promise nothing: because there is no solution, or because the method finds none. Collective.
   subroutine judge_stagnation(state, problem, method, control, report, has_stagnated)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
