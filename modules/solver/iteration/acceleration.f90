@@ -26,9 +26,9 @@ module gravier_acceleration
     integer :: window
   end type steering_t
 
-  !> Long waves cross a scene by what acceleration remembers. With friction changes grow by single per cent where contacts begin to
-  !> slide, so that little memory is given up at once. Where so few contacts are that a wave crosses them within a window, growth
-  !> tells that it comes back, and to begin anew ends a solve soonest.
+  !> Acceleration carries long waves across a scene as long as it keeps its memory. With friction, changes also grow by single per
+  !> cent when contacts begin to slide, and such growth must cost little memory. In a problem of few contacts a wave crosses all
+  !> of them within a window. Growth then means that the wave has passed the solution, and a shorter memory ends the solve sooner.
   type(steering_t), parameter :: of_many = steering_t(memory_kept=0.95_dp, first_margin=0.05_dp, least_margin=0.01_dp, window=20)
   type(steering_t), parameter :: of_few = steering_t(memory_kept=0.7_dp, first_margin=0.1_dp, least_margin=0.02_dp, window=10)
   integer, parameter :: few_contacts = 100
@@ -112,7 +112,7 @@ contains
     most = (1.0_dp - root)/(1.0_dp + root)
   end function most_extrapolation
 
-  !> Answer to growth as it suits a problem of so many contacts, before the first iteration.
+  !> Choose how strongly growth is answered, by the number of contacts. Called before the first iteration.
   pure subroutine acceleration_choose_steering(self, n_contacts)
     class(acceleration_t), intent(inout) :: self
     !> of all subdomains

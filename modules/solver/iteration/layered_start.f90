@@ -10,8 +10,8 @@
 !>   layer   `thickness` diameters of way; the first is the farthest. A contact belongs to the layer of its farther body.
 !>   halo    the bodies of the next `halo` diameters below a layer move with it; their impulses are thrown away afterwards.
 !>
-!> A layer that goes on moving is not held by what lies below: its error would be handed to all further layers, and would be more
-!> than sweeps over the whole have to mend without a pass. The pass is then given up.
+!> What lies below does not hold a layer that still moves when it is done. All further layers would then be loaded with its error,
+!> and sweeps over the whole scene would take longer to mend it than to carry the load without a pass. The pass is given up.
 !>
 !> Subdomains go through the layers together; a layer is solved by iterations of NSCDD. Results do not depend on ranks. See
 !> doc/theory.md, section 25.
@@ -81,7 +81,7 @@ contains
     type(work_t), intent(inout) :: work
     !> over all contacts, that relax as many as the pass did; 0 where there are no layers
     real(dp), intent(out) :: sweeps
-    !> all layers are done; otherwise there are none, or the pass was given up and the impulses are those of no use
+    !> all layers are done; otherwise there are none, or the pass was given up, and the caller has to restore the impulses
     logical, intent(out) :: carried
     type(layers_t) :: layers(size(problem%sub))
     real(dp) :: relaxed(1, size(problem%sub)), sums(1)
