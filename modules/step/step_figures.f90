@@ -29,8 +29,9 @@ module gravier_step_figures
     !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
     !> space was divided anew
     real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp
-    !> contacts that slept at the start of the solve; where they can
+    !> contacts that were left out, because their bodies sleep; how often the step was solved, anew where bodies woke
     integer(i8) :: asleep = 0
+    integer :: tries = 1
     !> of the first step, where a file gives contacts with forces: what the solve started from
     type(started_t) :: started
     !> places were projected, because some overlap exceeded what is allowed

@@ -28,7 +28,9 @@ module gravier_time_stepper
   use gravier_cell_drive, only: cell_drive_t, take_cell
   use gravier_cell_response, only: start_response
   use gravier_overlap_projection, only: project_overlaps
-  use gravier_sleeping, only: sleeping_rule_t, count_rest, wake_all
+  use gravier_sleeping, only: sleeping_rule_t, count_rest
+  use gravier_waking, only: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
+  use gravier_whole_problem, only: build_whole, take_whole
   use gravier_impulse_memory, only: keep_impulses, recall_impulses
   use gravier_memory_carrying, only: carry_memory
   use gravier_given_contacts, only: given_contacts_t
@@ -48,6 +50,9 @@ module gravier_time_stepper
   !> shifts of all grains by a projection, over the overlap allowed, that are rounding: grains that a projection has left at the
   !> overlap allowed are projected again where it is exceeded by rounding
   real(dp), parameter :: rounded_shift = 1.0e-6_dp
+
+  !> times that a step is solved anew with more bodies awake before all wake
+  integer, parameter :: most_tries = 4
 
   type :: time_stepper_t
     type(communicator_t), pointer :: comm => null()
@@ -78,7 +83,11 @@ module gravier_time_stepper
     !> where it is known
     class(exact_solution_t), allocatable :: exact
     ! ---- the present step
+    !> what is solved; once the step is over, where it is shown, the problem of all contacts
     type(contact_problem_t) :: problem
+    !> what sleeps, and is left out of the problem that is solved; whether the problem has all contacts
+    type(resting_t) :: resting
+    logical :: is_whole = .true.
     !> velocity against which errors of the solve of the present step are compared
     type(velocity_scale_t) :: velocity_scale
     !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
@@ -118,13 +127,14 @@ module gravier_time_stepper
     type(effort_t) :: effort
     !> how solves ended and what was mended, since this run began or went on from a checkpoint
     type(run_tally_t) :: tally
-    !> over all steps of this run: contacts that slept at the start of a solve, and solves that woke them
+    !> over all steps of this run: contacts that were left out, and solves that were made anew because bodies woke
     integer(i8) :: slept = 0, woken = 0
   contains
     procedure :: assemble => time_stepper_assemble
     procedure :: advance => time_stepper_advance
     procedure :: take_forces => time_stepper_take_forces
     procedure :: wake => time_stepper_wake
+    procedure :: make_whole => time_stepper_make_whole
     procedure :: free => time_stepper_free
   end type time_stepper_t
 
@@ -138,23 +148,22 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     !> is told how the solve goes on
     class(solve_watch_t), intent(inout), optional :: watch
+    type(contact_problem_t), target :: whole
     type(solved_step_t) :: solved
-    type(solve_control_t) :: control
     real(dp) :: shifts
 
     if (allocated(error)) return
     call self%assemble(figures)
-    control = self%control
-    ! a pass over layers would replace the impulses that were given
-    control%layered = control%layered .and. figures%started%matched == 0
-    call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
+    call solve(self, figures, error, watch)
     call note_solve(self, figures, error)
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
-    call take_solution(self, figures)
+    call take_solution(self, figures, whole)
+    if (allocated(whole%sub)) call sum_boundary_impulses(self%decomposition, whole, self%boundary_impulses)
     solved = solved_step_of(self, figures)
-    call self%diagnostics%take_step(solved)
     call self%balance%take_step(solved)
+    if (allocated(whole%sub)) solved%problem => whole
+    call self%diagnostics%take_step(solved)
     self%velocities_set = .false.
     call move_to_end(self%decomposition, self%physics, self%physics%theta, self%n_glued > 0)
     call stop_timer(phase_bodies)
@@ -164,7 +173,44 @@ contains
     call note_step(self, figures, shifts)
     call self%diagnostics%measure(solved, self%written_steps%due(self%step))
     call figures%check_numbers(self%decomposition, self%diagnostics, self%step, error)
+    if (allocated(whole%sub)) call take_whole(whole, self%problem, self%is_whole)
   end subroutine time_stepper_advance
+
+  !> Solve the contact problem, anew as long as it wakes bodies. Beside bodies that cannot move a problem may have no solution: all
+  !> wake where it is not found. Collective.
+  subroutine solve(self, figures, error, watch)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    type(error_t), allocatable, intent(inout) :: error
+    class(solve_watch_t), intent(inout), optional :: watch
+    type(solve_control_t) :: control
+    integer :: tries, iterations
+    logical :: woken, finds_none
+
+    control = self%control
+    ! a pass over layers would replace the impulses that were given
+    control%layered = control%layered .and. figures%started%matched == 0
+    iterations = 0
+    do tries = 1, most_tries + 1
+      call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
+      figures%solve%iterations = figures%solve%iterations + iterations
+      if (allocated(error) .or. self%resting%bodies == 0 .or. figures%solve%status == solve_diverged) return
+      finds_none = figures%solve%status /= solve_converged
+      if (.not. finds_none) then
+        call wake_disturbed(self%decomposition, self%halo, self%problem, 2**(tries - 1), woken)
+        if (.not. woken) return
+      end if
+      if (finds_none .or. tries == most_tries) then
+        call wake_all(self%decomposition)
+        call self%halo%refresh(self%decomposition)
+      end if
+      figures%tries = tries + 1
+      iterations = figures%solve%iterations
+      if (self%warm_start) call keep_impulses(self%problem, self%halo)
+      call watch_awake(self%decomposition, self%halo, self%resting)
+      call set_up(self, figures)
+    end do
+  end subroutine solve
 
   !> Move grains and boundaries to q_m, bring the neighbour lists up to date, find the contacts and start them from the
   !> impulses of the last step. Collective.
@@ -172,13 +218,12 @@ contains
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
     logical :: listed, changed
-    integer :: s
 
     call start_timer(phase_bodies)
     self%physics%first = self%step == 0
     call move_to_middle(self%decomposition, self%physics, self%physics%theta, self%time, self%n_glued > 0, listed)
     call drive(self%decomposition, self%physics, self%gravity_table, self%time, changed)
-    if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%halo)
+    if (self%sleeping%after > 0 .and. (listed .or. changed)) call wake_all(self%decomposition)
     if (self%inflow%is_due()) call let_in(self, figures, listed)
     figures%fast = count_fast(self%decomposition, self%physics)
     call stop_timer(phase_bodies)
@@ -187,7 +232,22 @@ contains
     figures%divided = repartition_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
     figures%listed = listed .or. figures%divided
     call list_neighbours(self, figures)
+    if (self%sleeping%after > 0) call watch_awake(self%decomposition, self%halo, self%resting)
     call stop_timer(phase_neighbourhood)
+    call set_up(self, figures)
+    if (figures%divided) then
+      self%reached_imbalance = self%imbalance
+      call self%method%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
+      call self%method%forget_times()
+    end if
+  end subroutine time_stepper_assemble
+
+  !> Find the contacts and start them from the impulses of the last step. Collective.
+  subroutine set_up(self, figures)
+    class(time_stepper_t), intent(inout) :: self
+    type(step_figures_t), intent(inout) :: figures
+    integer :: s
+
     call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, self%physics%cell)
     call build_problem(self%decomposition, self%halo, self%problem%kernels, self%physics, self%problem, &
       & figures%interface_statistics)
@@ -200,8 +260,10 @@ contains
     if (self%problem%cell%moves) call start_response(self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
-    figures%contacts = self%problem%n_contacts
-    figures%asleep = self%problem%n_asleep
+    figures%contacts = self%problem%n_contacts + self%resting%contacts
+    figures%asleep = self%resting%contacts
+    self%is_whole = self%resting%bodies == 0
+    figures%max_overlap = 0.0_dp
     do s = 1, size(self%problem%sub)
       figures%max_overlap = max(figures%max_overlap, self%problem%sub(s)%overlap(yielding=.false.))
     end do
@@ -211,13 +273,8 @@ contains
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
     if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
       & *self%decomposition%n_subdomains/real(figures%contacts, dp)
-    if (figures%divided) then
-      self%reached_imbalance = self%imbalance
-      call self%method%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
-      call self%method%forget_times()
-    end if
     call measure_velocity_scale(self)
-  end subroutine time_stepper_assemble
+  end subroutine set_up
 
   !> Give all grains an applied force, of 0. The same on every rank, between two steps.
   subroutine time_stepper_take_forces(self)
@@ -234,12 +291,23 @@ contains
     end do
   end subroutine time_stepper_take_forces
 
-  !> Wake the contacts that sleep: what acts on the scene has changed.
+  !> Wake the bodies that sleep: what acts on the scene has changed.
   subroutine time_stepper_wake(self)
     class(time_stepper_t), intent(inout) :: self
 
-    if (self%sleeping%after > 0 .and. allocated(self%halo%view)) call wake_all(self%halo)
+    if (self%sleeping%after > 0) call wake_all(self%decomposition)
   end subroutine time_stepper_wake
+
+  !> After a step, bring the contacts back into the problem that it has left out, for whoever looks at all of them. Collective.
+  subroutine time_stepper_make_whole(self)
+    class(time_stepper_t), intent(inout) :: self
+    type(contact_problem_t) :: whole
+
+    if (self%is_whole) return
+    call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
+    call sum_boundary_impulses(self%decomposition, whole, self%boundary_impulses)
+    call take_whole(whole, self%problem, self%is_whole)
+  end subroutine time_stepper_make_whole
 
   !> Let grains enter, for which lists are made anew. Collective.
   subroutine let_in(self, figures, listed)
@@ -273,17 +341,20 @@ contains
   end subroutine measure_springs
 
   !> From the impulses of a solve to velocities of grains and boundaries, and to what the next step starts from. Collective.
-  subroutine take_solution(self, figures)
+  subroutine take_solution(self, figures, whole)
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(in) :: figures
+    !> the problem of all contacts, where it is shown and differs from the one that was solved; empty otherwise
+    type(contact_problem_t), intent(inout) :: whole
 
     if (self%problem%cell%moves) then
       call take_cell(self%problem, self%decomposition%period)
       self%physics%cell = self%problem%cell
     end if
-    if (self%sleeping%after > 0) call count_rest(self%sleeping, self%decomposition%boundaries, figures%solve%woken, &
-      & self%halo, self%problem)
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, figures%tries == 1, self%halo, self%problem, self%decomposition)
     if (self%warm_start) call keep_impulses(self%problem, self%halo)
+    if (.not. self%is_whole .and. (self%diagnostics%in_each_step() .or. self%written_steps%due(self%step + 1))) &
+      & call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
     if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%halo)
@@ -348,7 +419,7 @@ contains
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
     self%slept = self%slept + figures%asleep
-    if (figures%solve%woken) self%woken = self%woken + 1
+    self%woken = self%woken + figures%tries - 1
   end subroutine note_step
 
   !> Find the velocity against which errors of the solve to come are compared. Collective.
@@ -373,6 +444,7 @@ contains
     logical :: remembered
 
     if (self%halo%builds > 0) call self%halo%refresh(self%decomposition)
+    if (self%halo%builds > 0 .and. self%sleeping%after > 0) call wake_left_behind(self%decomposition, self%halo)
     if (.not. figures%listed) then
       if (.not. some_leave(self%decomposition)) return
       call drop_grains(self%decomposition, self%halo)
@@ -413,6 +485,8 @@ contains
     self%fast = 0
     self%quiet = 0
     self%velocities_set = .false.
+    self%resting = resting_t()
+    self%is_whole = .true.
     self%slept = 0
     self%woken = 0
     self%worst_overlap = 0.0_dp

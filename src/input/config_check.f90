@@ -8,7 +8,7 @@ module gravier_config_check
   use gravier_config_key, only: key_t, kind_real, kind_logical
   use gravier_config_table, only: keys
   use gravier_method_options, only: method_features_t
-  use gravier_method_registry, only: features_of, quoted_names, that_decompose, with_sleeping
+  use gravier_method_registry, only: features_of, quoted_names, that_decompose
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
@@ -296,10 +296,8 @@ contains
       call expect(report, solver%velocity_scale > 0.0_dp .or. .not. solver%velocity_scale_given, "solver", "velocity_scale", &
                   error)
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
-      call expect(report, features%sleeping .or. .not. solver%sleeping, "solver", "sleeping", error, &
-                  ".false. with this method: sleeping serves "//quoted_names(with_sleeping, "'", "and"))
       call expect(report, solver%warm_start .or. .not. solver%sleeping, "solver", "sleeping", error, &
-                  ".false. where warm_start = .false.: contacts that sleep keep their impulses from step to step")
+                  ".false. where warm_start = .false.: bodies that sleep keep their impulses from step to step")
       call expect(report, solver%sleep_after >= 1, "solver", "sleep_after", error)
       call expect(report, solver%sleep_speed > 0.0_dp .or. .not. solver%sleep_speed_given, "solver", "sleep_speed", error)
     end associate

@@ -10,7 +10,7 @@ module gravier_config_table
   use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
-    & accelerated, accelerated_on_active, with_sleeping
+    & accelerated, accelerated_on_active
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   implicit none
   private
@@ -243,8 +243,8 @@ module gravier_config_table
      key_t("solver", "layered_start", kind_logical, ".true.", "", &
            "carry loads by layers to the supports if a solve starts far from the solution (with `velocity_error` and gravity)"), &
      key_t("solver", "sleeping", kind_logical, ".false.", "", &
-           "contacts of bodies at rest leave the sweeps until these are disturbed"), &
-     key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a contact sleeps"), &
+           "bodies at rest stand still and leave the contact problem until something disturbs them"), &
+     key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a body sleeps"), &
      key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
            "largest mass times velocity of a body at rest, relative to the root mean square of the impulses; and at most a "// &
            "tenth of the impulses on it", &
@@ -431,8 +431,6 @@ contains
       case ("acceleration")
         keys(k)%meaning = trim(keys(k)%meaning)//" "//quoted_names(accelerated, "`", "and")//" and, on active contacts, "// &
           & quoted_names(accelerated_on_active, "`", "and")
-      case ("sleeping")
-        keys(k)%meaning = trim(keys(k)%meaning)//" ("//quoted_names(with_sleeping, "`", "and")//" only)"
       end select
     end do
   end subroutine complete_solver_keys

@@ -117,7 +117,7 @@ contains
       call table%add(interface_statistics%ghosts)
       call table%add(solve%seconds)
       call table%add(figures%asleep)
-      call table%add(merge(1, 0, solve%woken))
+      call table%add(figures%tries - 1)
       if (simulation%inflow%exists()) then
         call table%add(figures%entered)
         call table%add(figures%entered_mass)

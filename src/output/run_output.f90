@@ -5,7 +5,7 @@ module gravier_run_output
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_output, only: of_states, of_end
+  use gravier_output, only: after_solve, of_states, of_end
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
   private
@@ -93,6 +93,8 @@ contains
       associate (item => self%output(k)%output)
         if (item%stage /= stage .or. item%last == simulation%step) cycle
         if (.not. (all_due .or. item%schedule%due(simulation%step))) cycle
+        ! contacts of bodies that sleep come back for whoever writes contacts
+        if (any(stage == [after_solve, of_states, of_end])) call simulation%make_whole()
         call item%write(simulation, figures, seconds, error)
         item%last = simulation%step
         wrote = .true.

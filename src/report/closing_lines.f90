@@ -64,8 +64,8 @@ contains
       & to_text(work%interface_iterations)//" iterations; subdomain matrices: "//to_text(counts(2))//" analyses, "// &
       & to_text(counts(3))//" factorisations"//newline
     if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
-      & " contacts slept at the start of solves, summed over all solves; "//to_text(simulation%woken)// &
-      & " solves woke them to reach the tolerance"//newline
+      & " contacts of bodies asleep were left out, summed over all steps; "// &
+      & counted(simulation%woken, "solve")//" were made anew with more bodies awake"//newline
     if (simulation%method%direction_text /= "") text = text//"direction   "//simulation%method%direction_text//"; "// &
       & counted(work%lowered, "reduction")//" of l"//newline
     if (work%restarted + work%suspended > 0) text = text//"nesterov    "// &

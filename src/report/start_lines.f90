@@ -42,8 +42,8 @@ contains
         & "off         "//effects_text(simulation%effects, .false.)//newline// &
         & "unknowns    "//cost_text(simulation)//newline
       text = text//mesh_lines(decomposition%boundaries)
-      if (config%solver%sleeping) text = text//"sleeping    contacts of bodies at rest for "//to_text(config%solver%sleep_after)// &
-        & " steps leave the sweeps; the residual is that of all contacts"//newline
+      if (config%solver%sleeping) text = text//"sleeping    bodies at rest for "//to_text(config%solver%sleep_after)// &
+        & " steps stand still and leave the contact problem until something disturbs them"//newline
     end associate
     text = text//"options in force"//newline
   end function start_lines

@@ -223,7 +223,6 @@ contains
       associate (solver => self%config%solver)
         self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
       end associate
-      self%physics%sleep_after = self%sleeping%after
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)
       self%halo%memory = memory_of(self%problem%kernels, self%config%solver%warm_start, scene%laws%remembers, &

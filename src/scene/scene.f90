@@ -397,6 +397,7 @@ contains
     layout%nv = merge(3*layout%nd - 3, layout%nd, scene%effects%rotation)
     layout%ni = merge(layout%nd, 0, scene%period%on())
     if (scene%effects%shapes) layout%no = size(data%orientation, 1)
+    layout%nr = merge(1, 0, config%solver%sleeping)
     call scene%grains%init(layout, data%n)
     scene%grains%glued(:) = 0
     scene%grains%image(:, :) = 0

@@ -41,9 +41,9 @@ METHODS = {
 }
 
 
-#: methods that serve moments and sleeping contacts, and words of the others' refusals
+#: methods that serve moments, and words of the others' refusals
 PLAIN = ("nlgs", "nscdd", "schwarz")
-MOMENTS, SLEEPING = "with rolling or pivoting friction", "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"
+MOMENTS = "with rolling or pivoting friction"
 
 
 def is_enriched(method):
@@ -496,9 +496,9 @@ def resistances():
              sticky(100 * 0.7 * G, rolling_friction=0.3), may_fail=("nscdd",), holds=overlaps_below(0.02, 0.5),
              refuses=MOMENTS),
         Case("sleeping lattice", "disks fall asleep under a tolerance of 1e-4", square(4), box(8 * 0.05), asleep, steps=60,
-             holds=together(at_rest(1e-2), overlaps_below(1e-3)), refuses=SLEEPING),
+             holds=together(at_rest(1e-2), overlaps_below(1e-3))),
         Case("sleepers that are struck", "a disk falls among disks at rest", struck, box(8 * 0.05), asleep, steps=100, may_fail=ALL,
-             holds=overlaps_below(0.02), refuses=SLEEPING),
+             holds=overlaps_below(0.02)),
     ]
 
 

@@ -9,8 +9,11 @@ module gravier_neighbour_list
   type :: pair_memory_t
     !> entries of an impulse, 0 where solves do not start from those of the last step
     integer :: n_impulse = 0
-    !> rows of the states that laws with a memory give pairs, and of the steps at rest, where contacts may sleep; 0 for none
-    integer :: law_row = 0, rest_row = 0
+    !> row of the states that laws with a memory give pairs, 0 for none
+    integer :: law_row = 0
+    !> where bodies may sleep: entries of an impulse that is kept for them, and the row of a mark of pairs that touch while one sleeps;
+    !> 0 where none may
+    integer :: n_reference = 0, touch_row = 0
     !> where bodies have shapes or boundaries facets: the first of two rows of the key that tells a point of a pair from its others,
     !> 0 for no point
     integer :: key_row = 0
@@ -39,6 +42,12 @@ module gravier_neighbour_list
     real(dp), allocatable :: impulse(:, :)
     !> (entries of an elongation, n) [m]
     real(dp), allocatable :: spring(:, :)
+    !> where bodies may sleep, the impulse on the candidate when the first of two bodies fell asleep, along the global axes; 0 while
+    !> both are awake (nd, n) [N s]
+    real(dp), allocatable :: reference(:, :)
+    !> where some body sleeps, the places of the pairs that are looked at, ascending: those with a grain that is awake (n_watched);
+    !> not allocated where all are
+    integer, allocatable :: watched(:)
     !> numbers that pairs keep, 0 at first (memory%n_states, n)
     integer, allocatable :: state(:, :)
   contains
@@ -49,6 +58,10 @@ module gravier_neighbour_list
     procedure :: begins => neighbour_list_begins
     procedure :: keeps => neighbour_list_keeps
     procedure :: drop => neighbour_list_drop
+    procedure :: n_watched => neighbour_list_n_watched
+    procedure :: watched_place => neighbour_list_watched_place
+    procedure :: forget_impulses => neighbour_list_forget_impulses
+    procedure :: forget_elongations => neighbour_list_forget_elongations
     procedure :: find_kept => neighbour_list_find_kept
   end type neighbour_list_t
 
@@ -56,14 +69,14 @@ contains
 
   pure integer function pair_memory_n_states(self) result(n)
     class(pair_memory_t), intent(in) :: self
-    n = max(self%law_row, self%rest_row)
+    n = max(self%law_row, self%touch_row)
     if (self%key_row > 0) n = max(n, self%key_row + 1)
   end function pair_memory_n_states
 
   !> Words of what is kept with a pair.
   pure integer function pair_memory_words(self) result(n)
     class(pair_memory_t), intent(in) :: self
-    n = self%n_impulse + self%n_spring + self%n_states()
+    n = self%n_impulse + self%n_spring + self%n_reference + self%n_states()
   end function pair_memory_words
 
   !> Whether pair `p` keeps something from the last step.
@@ -81,6 +94,9 @@ contains
     end do
     do e = 1, size(self%spring, 1)
       if (abs(self%spring(e, p)) > 0.0_dp) return
+    end do
+    do e = 1, size(self%reference, 1)
+      if (abs(self%reference(e, p)) > 0.0_dp) return
     end do
     keeps = .false.
   end function neighbour_list_keeps
@@ -111,7 +127,8 @@ contains
 
     self%n = 0
     if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
-    if (allocated(self%impulse)) deallocate (self%impulse, self%spring, self%state)
+    if (allocated(self%impulse)) deallocate (self%impulse, self%spring, self%reference, self%state)
+    if (allocated(self%watched)) deallocate (self%watched)
     allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
   end subroutine neighbour_list_init
 
@@ -167,7 +184,7 @@ contains
     if (size(self%shift) > 0 .and. .not. begins) begins = self%shift(p - 1) /= self%shift(p)
   end function neighbour_list_begins
 
-  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set impulses, elongations and states to zero.
+  !> Put the pairs in the order order(1), order(2), ..., give back spare room and set all that pairs keep to zero.
   subroutine neighbour_list_finish(self, order, memory)
     class(neighbour_list_t), intent(inout) :: self
     !> places of the pairs as they were added, each as often as the pair is to stand in the list
@@ -181,6 +198,7 @@ contains
     self%memory = memory
     allocate (self%impulse(memory%n_impulse, self%n), source=0.0_dp)
     allocate (self%spring(memory%n_spring, self%n), source=0.0_dp)
+    allocate (self%reference(memory%n_reference, self%n), source=0.0_dp)
     allocate (self%state(memory%n_states(), self%n), source=0)
   end subroutine neighbour_list_finish
 
@@ -204,10 +222,55 @@ contains
       if (size(self%shift) > 0) self%shift(n) = self%shift(p)
       self%impulse(:, n) = self%impulse(:, p)
       self%spring(:, n) = self%spring(:, p)
+      self%reference(:, n) = self%reference(:, p)
       self%state(:, n) = self%state(:, p)
     end do
     self%n = n
+    if (allocated(self%watched)) deallocate (self%watched)
   end subroutine neighbour_list_drop
+
+  !> Pairs that are looked at.
+  pure integer function neighbour_list_n_watched(self) result(n)
+    class(neighbour_list_t), intent(in) :: self
+    n = self%n
+    if (allocated(self%watched)) n = size(self%watched)
+  end function neighbour_list_n_watched
+
+  !> Place of pair `k` of those that are looked at.
+  pure integer function neighbour_list_watched_place(self, k) result(p)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: k
+    p = k
+    if (allocated(self%watched)) p = self%watched(k)
+  end function neighbour_list_watched_place
+
+  !> Set the impulses of the pairs that are looked at to zero.
+  pure subroutine neighbour_list_forget_impulses(self)
+    class(neighbour_list_t), intent(inout) :: self
+    integer :: k
+
+    if (allocated(self%watched)) then
+      do k = 1, size(self%watched)
+        self%impulse(:, self%watched(k)) = 0.0_dp
+      end do
+    else
+      self%impulse(:, :) = 0.0_dp
+    end if
+  end subroutine neighbour_list_forget_impulses
+
+  !> Set the elongations of the pairs that are looked at to zero.
+  pure subroutine neighbour_list_forget_elongations(self)
+    class(neighbour_list_t), intent(inout) :: self
+    integer :: k
+
+    if (allocated(self%watched)) then
+      do k = 1, size(self%watched)
+        self%spring(:, self%watched(k)) = 0.0_dp
+      end do
+    else
+      self%spring(:, :) = 0.0_dp
+    end if
+  end subroutine neighbour_list_forget_elongations
 
   subroutine permute(list, order)
     integer, allocatable, intent(inout) :: list(:)

@@ -23,8 +23,8 @@ module gravier_decomposition
     type(period_t) :: period
     type(neighbour_rule_t) :: rule
     integer :: n_subdomains = 1
-    !> space dimension, degrees of freedom of a body, entries of an image, of an orientation and of an applied force
-    integer :: nd = 2, nv = 3, ni = 0, no = 0, na = 0
+    !> space dimension, degrees of freedom of a body, entries of an image, of an orientation, of its rest and of an applied force
+    integer :: nd = 2, nv = 3, ni = 0, no = 0, nr = 0, na = 0
     !> first subdomain of this rank; owned(s) belongs to subdomain first + s - 1
     integer :: first = 1
     type(body_set_t), allocatable :: owned(:)
@@ -67,6 +67,7 @@ contains
     self%nv = layout%nv
     self%ni = layout%ni
     self%no = layout%no
+    self%nr = layout%nr
     self%na = layout%na
     self%period = period
     if (.not. allocated(self%boundaries)) allocate (self%boundaries(0))
@@ -90,7 +91,7 @@ contains
   pure type(body_layout_t) function decomposition_layout(self) result(layout)
     class(decomposition_t), intent(in) :: self
 
-    layout = body_layout_t(self%nd, self%nv, self%ni, self%no, self%na)
+    layout = body_layout_t(self%nd, self%nv, self%ni, self%no, self%nr, self%na)
   end function decomposition_layout
 
   !> Subdomain of this rank and place among its owned bodies of a grain.

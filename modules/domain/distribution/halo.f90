@@ -22,6 +22,10 @@ module gravier_halo
     !> subdomain that owns each, and for its own the place among the owned (n); 0 for ghosts
     integer, allocatable :: owner(:), origin(:)
     type(neighbour_list_t) :: list
+    !> where bodies may sleep: which of them slept when the pairs to look at were found, not allocated where these have to be found
+    !> anew (n); contacts among the pairs that are not looked at
+    logical, allocatable :: asleep(:)
+    integer :: n_resting = 0
     !> the cell as it is, for the velocities of images; set where it moves
     type(period_t) :: period
   end type local_bodies_t
@@ -335,6 +339,7 @@ contains
         call shorten(view%owner, view%bodies%n)
         call shorten(view%origin, view%bodies%n)
         call view%list%drop(seen(s)%of)
+        if (allocated(view%asleep)) deallocate (view%asleep)
       end associate
     end do
     n = 0

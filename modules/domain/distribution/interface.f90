@@ -352,7 +352,7 @@ contains
     type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(inout) :: problem
     type(interface_statistics_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 7)
+    integer(i8) :: counts(n_multiplicities + 6)
     real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
     integer :: s, b, c, k, m
@@ -384,8 +384,7 @@ contains
         counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(halo%view(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
-        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%n_contacts - sub%n_awake
-        counts(n_multiplicities + 7) = counts(n_multiplicities + 7) + sub%overlapping_cores
+        counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%overlapping_cores
         deallocate (counted_elsewhere)
       end associate
     end do
@@ -394,7 +393,7 @@ contains
     figures%multiplicity(:) = counts(1:n_multiplicities)
     figures%bodies = sum(counts(2:n_multiplicities))
     figures%interactions = counts(n_multiplicities + 1)
-    figures%overlapping_cores = counts(n_multiplicities + 7)
+    figures%overlapping_cores = counts(n_multiplicities + 6)
     figures%most_contacts = nint(extremes(1), i8)
     figures%least_contacts = nint(-extremes(2), i8)
     figures%neighbours = counts(n_multiplicities + 3)
@@ -403,7 +402,6 @@ contains
     figures%most_neighbours = nint(extremes(3), i8)
     figures%most_values = nint(extremes(4), i8)
     problem%n_contacts = counts(n_multiplicities + 2)
-    problem%n_asleep = counts(n_multiplicities + 6)
   end subroutine count_figures
 
 end module gravier_interface

@@ -7,7 +7,7 @@ module gravier_removal
   use gravier_halo, only: mask_t, halo_t
   implicit none
   private
-  public :: some_leave, remove_grains, drop_grains
+  public :: some_leave, remove_grains, drop_grains, find_staying
 
 contains
 

@@ -21,7 +21,7 @@ contains
 
   pure function nscdd_features() result(features)
     type(method_features_t) :: features
-    features = method_features_t(name="nscdd", meaning="NSCDD", moments=.true., sleeping=.true., &
+    features = method_features_t(name="nscdd", meaning="NSCDD", moments=.true., &
       & accelerated_by_default=default_always)
   end function nscdd_features
 

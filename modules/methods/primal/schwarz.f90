@@ -63,7 +63,7 @@ contains
 
   pure function schwarz_features() result(features)
     type(method_features_t) :: features
-    features = method_features_t(name="schwarz", meaning="Schwarz-NSCD", moments=.true., sleeping=.true., relaxes=.true.)
+    features = method_features_t(name="schwarz", meaning="Schwarz-NSCD", moments=.true., relaxes=.true.)
   end function schwarz_features
 
   subroutine schwarz_set(self, options)

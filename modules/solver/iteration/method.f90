@@ -282,56 +282,36 @@ contains
     end do
   end subroutine begin_sweeps
 
-  !> Sweep `k` of an iteration in subdomain `s` of this rank; contacts that have woken come after the others.
+  !> Sweep `k` of an iteration in subdomain `s` of this rank.
   subroutine sweep_once(method, problem, s, k, law_velocity)
     class(method_t), intent(inout) :: method
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s, k
     !> takes the velocity that solves the law at each contact (lanes, nc, blocks) [m/s]
     real(dp), intent(inout), contiguous, optional :: law_velocity(:, :, :)
-    real(dp) :: sums(2), more(2), start
+    real(dp) :: sums(2), start
 
     start = clock()
-    associate (sub => problem%sub(s))
-      call sweep_blocks(1, n_blocks(sub%n_awake), sub%n_grouped, sums)
-      method%work%relaxations = method%work%relaxations + sub%n_awake
-      if (problem%n_asleep == 0 .and. sub%n_awake < sub%n_contacts) then
-        call sweep_blocks(n_blocks(sub%n_awake) + 1, size(sub%hot, 3), sub%n_grouped_asleep, more)
-        sums(:) = sums + more
-        method%work%relaxations = method%work%relaxations + sub%n_contacts - sub%n_awake
+    associate (sub => problem%sub(s), kernels => problem%kernels)
+      if (method%acceleration%on .and. k == 1 .and. .not. method%acceleration%resting) then
+        associate (previous => method%acceleration%part(s)%impulse, beta => method%acceleration%beta)
+          if (present(law_velocity)) then
+            call kernels%sweep_momentum_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, &
+              & beta, previous, law_velocity)
+          else
+            call kernels%sweep_momentum(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, beta, &
+              & previous)
+          end if
+        end associate
+      else if (present(law_velocity)) then
+        call kernels%sweep_recording(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums, law_velocity)
+      else
+        call kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
       end if
+      method%work%relaxations = method%work%relaxations + sub%n_contacts
     end associate
     if (k == 1) problem%progress(:, s) = sums
     method%seconds(s) = method%seconds(s) + clock() - start
-
-  contains
-
-    !> Sweep blocks `a` to `z`, of which the first n_grouped contacts have no common bodies.
-    subroutine sweep_blocks(a, z, n_grouped, sums)
-      integer, intent(in) :: a, z, n_grouped
-      real(dp), intent(out) :: sums(2)
-
-      associate (sub => problem%sub(s), kernels => problem%kernels, first => (a - 1)*lanes + 1, last => z*lanes)
-        if (method%acceleration%on .and. k == 1 .and. .not. method%acceleration%resting) then
-          associate (previous => method%acceleration%part(s)%impulse, beta => method%acceleration%beta)
-            if (present(law_velocity)) then
-              call kernels%sweep_momentum_recording(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, &
-                & sub%velocity, sub%impulse(:, :, a:z), sums, beta, previous(:, :, a:z), law_velocity(:, :, a:z))
-            else
-              call kernels%sweep_momentum(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, sub%velocity, &
-                & sub%impulse(:, :, a:z), sums, beta, previous(:, :, a:z))
-            end if
-          end associate
-        else if (present(law_velocity)) then
-          call kernels%sweep_recording(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, sub%velocity, &
-            & sub%impulse(:, :, a:z), sums, law_velocity(:, :, a:z))
-        else
-          call kernels%sweep(n_grouped, sub%pair(:, first:last), sub%hot(:, :, a:z), sub%weight, sub%velocity, &
-            & sub%impulse(:, :, a:z), sums)
-        end if
-      end associate
-    end subroutine sweep_blocks
-
   end subroutine sweep_once
 
   !> Count the sweeps, and choose the extrapolation of the next iteration. Collective where they are accelerated.

@@ -17,8 +17,8 @@ module gravier_method_options
     character(len=meaning_length) :: meaning = ""
     !> it works on subdomains; without, on one domain only
     logical :: decomposes = .true.
-    !> contacts may have moments of rolling and pivoting friction; contacts may sleep
-    logical :: moments = .false., sleeping = .false.
+    !> contacts may have moments of rolling and pivoting friction
+    logical :: moments = .false.
     !> one of the constants above
     integer :: accelerated_by_default = default_never
     !> it takes a `relaxation` factor, which it adapts itself where none is given; acceleration needs that

@@ -21,7 +21,7 @@ contains
   pure function nlgs_features() result(features)
     type(method_features_t) :: features
     features = method_features_t(name="nlgs", meaning="nonlinear Gauss-Seidel on one domain", decomposes=.false., &
-      & moments=.true., sleeping=.true., accelerated_by_default=default_always)
+      & moments=.true., accelerated_by_default=default_always)
   end function nlgs_features
 
   subroutine nlgs_start(self, problem, error)

@@ -13,7 +13,6 @@ module gravier_solve
   use gravier_stagnation, only: stagnation_t
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
-  use gravier_waking, only: wake_is_due
   use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
   implicit none
   private
@@ -78,8 +77,6 @@ module gravier_solve
     !> whether the velocities are within the accuracy, whatever the criterion; whether that is known, as it is not after few
     !> iterations. Both hold of solves that have converged alone.
     logical :: accurate = .true., judged = .true.
-    !> the contacts that slept were woken
-    logical :: woken = .false.
     !> sweeps over all contacts that a pass over layers took, 0 where there was none; whether the solve went on from it
     real(dp) :: layered_sweeps = 0.0_dp
     logical :: layered = .false.
@@ -253,25 +250,9 @@ contains
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
     call state%schedule%note_check(report%iterations, report%figure, report%goal)
-    if (.not. finished .and. problem%n_asleep > 0) call wake_if_due(state, problem, control, report)
     state%checking = state%checking + clock() - start
     call stop_timer(phase_check)
   end subroutine check
-
-  !> Wake the contacts that sleep, where it is time. Collective.
-  subroutine wake_if_due(state, problem, control, report)
-    type(solve_state_t), intent(inout) :: state
-    type(contact_problem_t), intent(inout) :: problem
-    type(solve_control_t), intent(in) :: control
-    type(solve_report_t), intent(inout) :: report
-
-    if (.not. wake_is_due(problem%asleep_share, report%residual <= control%tolerance, &
-      & .not. state%by_estimate .or. report%iterations >= copies_ready, 2*problem%n_asleep > problem%n_contacts)) return
-    call problem%wake()
-    report%woken = .true.
-    ! changes of all contacts are other changes
-    call state%schedule%forget_ratio()
-  end subroutine wake_if_due
 
   !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
   subroutine find_whether_met(state, problem, method, control, report, is_met)
@@ -299,8 +280,7 @@ contains
 
   !> Whether the estimated velocity error is within its limit, and no contact violates its law by much: the error is a mean by mass,
   !> which says little of light bodies. The bound by rest tells at once, the projection alone where the error is larger, and from
-  !> zero impulses neither before some iterations. Where all contacts sleep, iterations change nothing, and none is waited for.
-  !> Collective.
+  !> zero impulses neither before some iterations. Collective.
   subroutine find_whether_velocity_met(state, problem, method, control, report, is_met)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
@@ -317,7 +297,7 @@ contains
       if (state%velocity%rests()) then
         is_met = state%velocity%all_are_slow(problem)
         if (is_met) return
-      else if (report%iterations < copies_ready .and. problem%n_asleep < problem%n_contacts) then
+      else if (report%iterations < copies_ready) then
         return
       end if
       call state%velocity%assess(problem, method, report%iterations, report%residual, defect)

@@ -56,7 +56,8 @@ contains
     do s = 1, size(supports)
       associate (sub => problem%sub(s))
         do b = sub%n_bodies + 1, sub%n_columns
-          supports(s)%column(b) = sums(sub%boundary(b)) > least_pressing*load*sums(n + sub%boundary(b))
+          supports(s)%column(b) = sub%boundary(b) == 0
+          if (sub%boundary(b) > 0) supports(s)%column(b) = sums(sub%boundary(b)) > least_pressing*load*sums(n + sub%boundary(b))
         end do
       end associate
     end do
@@ -69,6 +70,7 @@ contains
       real(dp), intent(in) :: pressing
 
       if (b <= problem%sub(s)%n_bodies) return
+      if (problem%sub(s)%boundary(b) == 0) return
       associate (k => problem%sub(s)%boundary(b))
         parts(k, s) = parts(k, s) + pressing
         parts(n + k, s) = parts(n + k, s) + 1.0_dp

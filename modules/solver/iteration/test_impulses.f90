@@ -206,8 +206,7 @@ contains
     part%load = sub%reaction + sub%attraction_load
   end subroutine take_attractions_off
 
-  !> Add what the contacts of subdomain `s` of this rank say: those that are awake, then those that sleep, whose part of the
-  !> residual goes into the next places.
+  !> Add what the contacts of subdomain `s` of this rank say.
   subroutine test(problem, s, part, previous, power, sums, largest)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
@@ -219,34 +218,27 @@ contains
     !> (n_sums)
     real(dp), intent(inout), contiguous :: sums(:)
     real(dp), intent(inout) :: largest
-    integer :: awake, all_blocks
 
-    awake = problem%awake_blocks(s)
-    all_blocks = size(problem%sub(s)%hot, 3)
     if (allocated(part%on_bodies)) then
-      call test_blocks(part%on_bodies, 1, awake, 0)
-      if (awake < all_blocks) call test_blocks(part%on_bodies, awake + 1, all_blocks, 3)
+      call test_with(part%on_bodies)
     else
-      call test_blocks(problem%sub(s)%impulse, 1, awake, 0)
-      if (awake < all_blocks) call test_blocks(problem%sub(s)%impulse, awake + 1, all_blocks, 3)
+      call test_with(problem%sub(s)%impulse)
     end if
 
   contains
 
-    !> Blocks `a` to `z`, whose part of the residual goes into the places after `at`.
-    subroutine test_blocks(on_bodies, a, z, at)
+    subroutine test_with(on_bodies)
+      !> impulses on the bodies
       real(dp), intent(in), contiguous :: on_bodies(:, :, :)
-      integer, intent(in) :: a, z, at
       real(dp) :: found(3 + n_tests)
 
       associate (sub => problem%sub(s))
-        call problem%kernels%make_tests(sub%pair(:, (a - 1)*lanes + 1:z*lanes), sub%hot(:, :, a:z), sub%inverse_mass, &
-          & sub%v_global, sub%impulse(:, :, a:z), on_bodies(:, :, a:z), previous(:, :, a:z), power(:, a:z), part%local, &
-          & part%recent, found, largest)
+        call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, on_bodies, previous, &
+          & power, part%local, part%recent, found, largest)
       end associate
-      sums(at + 1:at + 3) = found(1:3)
-      sums(at_powers + 1:at_products) = sums(at_powers + 1:at_products) + found(4:)
-    end subroutine test_blocks
+      sums(1:3) = found(1:3)
+      sums(at_powers + 1:at_products) = found(4:)
+    end subroutine test_with
 
   end subroutine test
 

@@ -8,19 +8,20 @@ module gravier_contact_problem
   use gravier_body_mass, only: add_inverse_mass, apply_inverse_mass, can_move, mass_product, multiply_mass, velocities_under
   use gravier_contact_spring, only: spring_step_t
   use gravier_moving_cell, only: cell_motion_t, cell_contacts_t
-  use gravier_contact_kernels, only: kernels_t, global_impulse, lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, global_impulse, lanes, lane_of, block_of
   implicit none
   private
   public :: subproblem_t, contact_problem_t, n_residual_sums
 
   !> sums that a residual is made of, see `take_residual`
-  integer, parameter :: n_residual_sums = 7
+  integer, parameter :: n_residual_sums = 4
 
   !> a defect of so many roundings of the largest term of R^d, a contact, is none
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
 
   !> The contacts of one subdomain and the bodies they touch, packed in sweep order. Bodies 1 to n_grains are free
-  !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed.
+  !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed. Grains that sleep are among
+  !> the last: they stand still.
   !>
   !> Attractions F of contacts are loads of the solve, and unilateral contact holds for r~_n = r_n + h F. `impulse`, `reaction` and
   !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what
@@ -31,8 +32,6 @@ module gravier_contact_problem
     integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
     !> contacts in whole blocks without common bodies: the first ones
     integer :: n_grouped = 0
-    !> contacts that do not sleep, the first ones: all, or whole blocks; of those that sleep, what n_grouped is of these
-    integer :: n_awake = 0, n_grouped_asleep = 0
     !> pairs of pieces of bodies with shapes whose cores overlap: by more than both roundings
     integer :: overlapping_cores = 0
     !> identifiers (n_columns)
@@ -43,7 +42,7 @@ module gravier_contact_problem
     integer, allocatable :: place(:)
     !> subdomains in which each body carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
-    !> number of the boundary behind a column (n_grains + 1 to n_columns)
+    !> number of the boundary behind a column, 0 for a grain that sleeps (n_grains + 1 to n_columns)
     integer, allocatable :: boundary(:)
     !> of grains (n_grains) [m]
     real(dp), allocatable :: radius(:)
@@ -113,12 +112,10 @@ module gravier_contact_problem
     !> their sums over all subdomains, once `sum_progress` was called; whoever changes `progress` clears the mark
     real(dp), private :: progress_sums(2) = 0.0_dp
     logical :: progress_is_summed = .false.
-    !> contacts of the scene, and those of them that sleep: no sweep takes them, their impulses stay
-    integer(i8) :: n_contacts = 0, n_asleep = 0
+    !> contacts of all subdomains
+    integer(i8) :: n_contacts = 0
     !> root mean square of the impulses, by the last `residual` [N s]
     real(dp) :: impulse_scale = 0.0_dp
-    !> fraction of the squared defect that lies in contacts that sleep, by the last `residual`
-    real(dp) :: asleep_share = 0.0_dp
     !> whether everything prescribed is at rest and no contact sends velocities back, so that rest obeys all laws; set by
     !> gravier_velocity_error
     logical :: rest_is_admissible = .false.
@@ -137,9 +134,7 @@ module gravier_contact_problem
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
-    procedure :: awake_blocks => contact_problem_awake_blocks
     procedure :: take_residual => contact_problem_take_residual
-    procedure :: wake => contact_problem_wake
     procedure :: rounded_defect => contact_problem_rounded_defect
     procedure :: sum_progress => contact_problem_sum_progress
     procedure :: jump => contact_problem_jump
@@ -361,12 +356,9 @@ contains
 
     parts(:, :) = 0.0_dp
     do s = 1, size(self%sub)
-      associate (sub => self%sub(s), g => self%awake_blocks(s))
-        call self%kernels%residual(sub%pair(:, 1:g*lanes), sub%hot(:, :, 1:g), sub%inverse_mass, sub%v_global, &
-          & sub%impulse(:, :, 1:g), parts(1:3, s))
-        if (g < size(sub%hot, 3)) call self%kernels%residual(sub%pair(:, g*lanes + 1:), sub%hot(:, :, g + 1:), &
-          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, g + 1:), parts(4:6, s))
-        if (self%rest_is_admissible) parts(7, s) = sub%product_of(sub%v_global, sub%v_global)
+      associate (sub => self%sub(s))
+        call self%kernels%residual(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, parts(1:3, s))
+        if (self%rest_is_admissible) parts(4, s) = sub%product_of(sub%v_global, sub%v_global)
       end associate
     end do
     call start_timer(phase_reduction)
@@ -375,32 +367,20 @@ contains
     call self%take_residual(sums, residual, defect)
   end subroutine contact_problem_residual
 
-  !> Blocks of contacts of subdomain `s` of this rank that do not sleep, the first ones.
-  pure integer function contact_problem_awake_blocks(self, s) result(blocks)
-    class(contact_problem_t), intent(in) :: self
-    integer, intent(in) :: s
-    blocks = n_blocks(merge(self%sub(s)%n_awake, self%sub(s)%n_contacts, self%n_asleep > 0))
-  end function contact_problem_awake_blocks
-
   !> The residual by its sums over all subdomains, as `residual` returns it.
-  subroutine contact_problem_take_residual(self, all_sums, residual, defect)
+  subroutine contact_problem_take_residual(self, sums, residual, defect)
     class(contact_problem_t), intent(inout) :: self
-    !> of the squared defect, of the squared impulses and of r_n times the shift, of contacts that are awake and of those that
-    !> sleep;
-    !> |V|_M^2 where rest is admissible
-    real(dp), intent(in) :: all_sums(n_residual_sums)
+    !> of the squared defect, of the squared impulses, of r_n times the shift; |V|_M^2 where rest is admissible
+    real(dp), intent(in) :: sums(n_residual_sums)
     real(dp), intent(out) :: residual, defect
-    real(dp) :: sums(3)
 
-    sums(:) = all_sums(1:3) + all_sums(4:6)
     self%shift_power = sums(3)
-    self%kinetic = all_sums(7)
+    self%kinetic = sums(4)
     if (.not. all(ieee_is_finite(sums(1:2)))) then
       residual = ieee_value(residual, ieee_quiet_nan)
       defect = residual
       return
     end if
-    if (self%n_asleep > 0) self%asleep_share = all_sums(4)/max(sums(1), tiny(1.0_dp))
     defect = sqrt(sums(1))
     self%impulse_scale = sqrt(sums(2)/max(1_i8, self%n_contacts))
     if (defect <= self%rounded_defect()) then
@@ -421,13 +401,6 @@ contains
     class(contact_problem_t), intent(in) :: self
     defect = rounding*self%rounded_scale*sqrt(real(self%n_contacts, dp))
   end function contact_problem_rounded_defect
-
-  !> Let sweeps take all contacts for the rest of the solve.
-  subroutine contact_problem_wake(self)
-    class(contact_problem_t), intent(inout) :: self
-    self%n_asleep = 0
-    self%asleep_share = 0.0_dp
-  end subroutine contact_problem_wake
 
   !> Sums of `progress` over all subdomains of the scene, for acceleration, checks and safeguards: one reduction an iteration at
   !> most. Collective.

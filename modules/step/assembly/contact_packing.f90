@@ -47,10 +47,7 @@ contains
 
     allocate (pair(2, found%n), order(found%n))
     call find_pairs(view, found, boundaries, numbers, sub, pair)
-    sub%n_awake = found%n_awake
-    call group_contacts(pair(:, 1:sub%n_awake), sub%n_bodies, order(1:sub%n_awake), sub%n_grouped)
-    call group_contacts(pair(:, sub%n_awake + 1:), sub%n_bodies, order(sub%n_awake + 1:), sub%n_grouped_asleep)
-    order(sub%n_awake + 1:) = sub%n_awake + order(sub%n_awake + 1:)
+    call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))

@@ -91,7 +91,7 @@ contains
     nd = problem%kernels%nd
     do k = 1, size(problem%sub)
       associate (sub => problem%sub(k), list => halo%view(k)%list)
-        list%spring(:, :) = 0.0_dp
+        call list%forget_elongations()
         allocate (v, mold=sub%impulse)
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
         if (problem%cell%moves) call subtract_images(problem, k, v)

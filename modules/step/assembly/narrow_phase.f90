@@ -19,8 +19,6 @@ module gravier_narrow_phase
   !> Gaps and normals of the pairs of a list that are contacts.
   type :: contact_list_t
     integer :: n = 0
-    !> those that do not sleep: the first ones, in whole blocks where others follow
-    integer :: n_awake = 0
     !> place in the list (n)
     integer, allocatable :: source(:)
     !> the boundary that takes part, by itself or by a grain glued to it; 0 between free grains (n)
@@ -39,22 +37,23 @@ module gravier_narrow_phase
 
 contains
 
-  !> Narrow phase: gaps and normals of the near pairs, of which those within the alert distance are contacts. A law with
-  !> restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
+  !> Narrow phase: gaps and normals of the near pairs that are looked at, of which those within the alert distance are contacts. A
+  !> law with restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
   subroutine find_contacts(view, decomposition, physics, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
-    integer :: nd
+    integer :: nd, room
 
     nd = decomposition%nd
+    room = view%list%n_watched()
     if (allocated(found%source)) deallocate (found%source, found%boundary, found%gap, found%normal, found%terms, &
       & found%spring, found%place)
-    allocate (found%source(view%list%n), found%boundary(view%list%n), found%gap(view%list%n), found%normal(nd, view%list%n))
-    allocate (found%terms(merge(view%list%n, 0, physics%laws%varies)))
-    allocate (found%spring(merge(view%list%n, 0, physics%laws%yields)))
-    allocate (found%place(merge(view%list%n, 0, decomposition%no > 0)))
+    allocate (found%source(room), found%boundary(room), found%gap(room), found%normal(nd, room))
+    allocate (found%terms(merge(room, 0, physics%laws%varies)))
+    allocate (found%spring(merge(room, 0, physics%laws%yields)))
+    allocate (found%place(merge(room, 0, decomposition%no > 0)))
     found%n = 0
     found%overlapping_cores = 0
     if (decomposition%no > 0) then
@@ -62,7 +61,6 @@ contains
     else
       call find_round_contacts(view, decomposition, physics, found)
     end if
-    found%n_awake = found%n
   end subroutine find_contacts
 
   !> The contacts of disks or spheres: one a pair, but for boundaries of facets, of which a grain may touch several.
@@ -72,13 +70,14 @@ contains
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
     type(shape_work_t) :: work
-    integer :: p, i, j, nd
+    integer :: w, p, i, j, nd
     real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
     call work%init(nd)
-    do p = 1, view%list%n
+    do w = 1, view%list%n_watched()
+      p = view%list%watched_place(w)
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
       if (j > 0) then
@@ -139,11 +138,12 @@ contains
     type(shape_work_t) :: work
     type(contact_place_t) :: place
     real(dp) :: normal(decomposition%nd)
-    integer :: p, k
+    integer :: w, p, k
 
     call work%init(decomposition%nd)
-    p = 1
-    do while (p <= view%list%n)
+    w = 1
+    do while (w <= view%list%n_watched())
+      p = view%list%watched_place(w)
       call find_points(view, decomposition, p, work, points)
       call carry_memory(points, p, view%list)
       do k = 1, points%n
@@ -151,7 +151,7 @@ contains
         place = place_of_point(view, decomposition%nd, p, points, k)
         call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found, place)
       end do
-      p = p + view%list%points_of(p)
+      w = w + view%list%points_of(p)
     end do
     found%overlapping_cores = points%overlapping_cores
   end subroutine find_contacts_of_shapes

@@ -23,8 +23,6 @@ module gravier_physics
     logical :: rotation = .true.
     !> step [s]; weight of the new velocity in the places
     real(dp) :: h = 1.0_dp, theta = 0.5_dp
-    !> steps at rest after which a contact sleeps, see gravier_sleeping; 0: none does
-    integer :: sleep_after = 0
     !> motion of the periodic cell in this step, without contacts until it is solved
     type(cell_motion_t) :: cell
   contains

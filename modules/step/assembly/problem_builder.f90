@@ -12,7 +12,6 @@ module gravier_problem_builder
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_contact_packing, only: numbers_t, pack_contacts
-  use gravier_sleeping, only: put_sleepers_last
   use gravier_interface, only: interface_statistics_t, find_interface, count_figures
   implicit none
   private
@@ -44,7 +43,6 @@ contains
       associate (view => halo%view(s))
         call start_timer(phase_detection)
         call find_contacts(view, decomposition, physics, found)
-        if (physics%sleep_after > 0) call put_sleepers_last(view, decomposition%boundaries, physics%sleep_after, found)
         call stop_timer(phase_detection)
         call start_timer(phase_setup)
         problem%sub(s)%subdomain = decomposition%subdomain_of(s)
@@ -63,8 +61,8 @@ contains
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
   !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
-  !> boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, or one a contact where
-  !> the boundary turns.
+  !> boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, one a grain that sleeps, and one
+  !> a contact where the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
@@ -73,11 +71,12 @@ contains
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     type(numbers_t) :: numbers
-    integer :: c, p, b, n
+    integer :: c, p, b, n, n_asleep
 
     associate (list => view%list, boundaries => decomposition%boundaries)
       allocate (numbers%of_grain(view%bodies%n), numbers%of_boundary(size(boundaries)), source=0)
       n = 0
+      n_asleep = 0
       sub%n_grains = 0
       do c = 1, found%n
         p = found%source(c)
@@ -102,6 +101,9 @@ contains
         sub%n_columns = sub%n_columns + 1
         numbers%of_boundary(b) = sub%n_columns
       end do
+      ! the last column of a boundary is known now
+      if (n_asleep > 0) where (numbers%of_grain < 0) numbers%of_grain = sub%n_columns - numbers%of_grain
+      sub%n_columns = sub%n_columns + n_asleep
       call allocate_bodies(kernels, sub%n_columns + n, sub)
       if (any(abs(physics%body_force) > 0.0_dp)) allocate (sub%volume(sub%n_grains))
       if (decomposition%na > 0) allocate (sub%applied(decomposition%na, sub%n_grains))
@@ -116,13 +118,18 @@ contains
 
   contains
 
-    !> Give grain `k` the next number, unless it has one or is part of a boundary.
+    !> Give grain `k` the next number, unless it has one or is part of a boundary; of those that sleep, the next one below 0.
     subroutine number(k)
       integer, intent(in) :: k
 
-      if (numbers%of_grain(k) > 0 .or. view%bodies%glued(k) > 0) return
-      sub%n_grains = sub%n_grains + 1
-      numbers%of_grain(k) = sub%n_grains
+      if (numbers%of_grain(k) /= 0 .or. view%bodies%glued(k) > 0) return
+      if (view%bodies%sleeps(k)) then
+        n_asleep = n_asleep + 1
+        numbers%of_grain(k) = -n_asleep
+      else
+        sub%n_grains = sub%n_grains + 1
+        numbers%of_grain(k) = sub%n_grains
+      end if
     end subroutine number
 
   end subroutine pack_subproblem
@@ -154,6 +161,7 @@ contains
       b = number_of(k)
       if (b == 0) cycle
       sub%id(b) = view%bodies%id(k)
+      if (b > sub%n_grains) cycle
       sub%owner(b) = view%owner(k)
       sub%place(b) = view%origin(k)
       sub%radius(b) = view%bodies%radius(k)

@@ -32,6 +32,7 @@ module gravier_diagnostics
     procedure :: take => diagnostics_take
     procedure :: take_step => diagnostics_take_step
     procedure :: measure => diagnostics_measure
+    procedure :: in_each_step => diagnostics_in_each_step
     procedure :: place => diagnostics_place
     procedure :: in_history => diagnostics_in_history
     procedure :: in_results => diagnostics_in_results
@@ -102,6 +103,18 @@ contains
       call self%asked(k)%diagnostic%take_step(step)
     end do
   end subroutine diagnostics_take_step
+
+  !> Whether some diagnostic looks at each step.
+  pure logical function diagnostics_in_each_step(self) result(are)
+    class(diagnostics_t), intent(in) :: self
+    integer :: k
+
+    are = .false.
+    if (.not. allocated(self%asked)) return
+    do k = 1, size(self%asked)
+      are = are .or. self%asked(k)%features%measures == in_each_step
+    end do
+  end function diagnostics_in_each_step
 
   !> Measure the step at its end, those of written steps only where it is one, and fill the columns. Collective.
   subroutine diagnostics_measure(self, step, written)

@@ -36,6 +36,7 @@ contains
           else
             b = sub%boundary(sub%pair(1, c))
           end if
+          if (b == 0) cycle
           first = (b - 1)*nd
           parts(first + 1:first + nd, s) = parts(first + 1:first + nd, s) + p
         end do

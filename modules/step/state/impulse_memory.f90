@@ -14,20 +14,22 @@ module gravier_impulse_memory
   public :: memory_of, impulse_entries, keep_impulses, recall_impulses, list_impulses, match_impulses, pair_record
 
   !> the words of a record of list_impulses, in their order: the version of checkpoints, which changes with them
-  character(len=*), parameter :: pair_record = "candidate antagonist impulse elongation states"
+  character(len=*), parameter :: pair_record = "candidate antagonist impulse elongation reference states"
 
 contains
 
   !> What pairs have to keep.
-  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, counts_rest, has_points) result(memory)
+  pure type(pair_memory_t) function memory_of(kernels, warm_start, remembers, may_sleep, has_points) result(memory)
     type(kernels_t), intent(in) :: kernels
-    !> solves start from the impulses of the last step; some law remembers; steps at rest are counted; pairs may touch in several
-    !> points
-    logical, intent(in) :: warm_start, remembers, counts_rest, has_points
+    !> solves start from the impulses of the last step; some law remembers; bodies may sleep; pairs may touch in several points
+    logical, intent(in) :: warm_start, remembers, may_sleep, has_points
 
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
     memory%law_row = merge(1, 0, remembers)
-    if (counts_rest) memory%rest_row = memory%law_row + 1
+    if (may_sleep) then
+      memory%n_reference = kernels%nd
+      memory%touch_row = memory%law_row + 1
+    end if
     if (has_points) memory%key_row = memory%n_states() + 1
     if (kernels%row%compliance_t > 0) memory%n_spring = merge(1, 3, kernels%nd == 2)
   end function memory_of
@@ -41,7 +43,7 @@ contains
     if (kernels%nf == 3) n = merge(7, 4, kernels%rolling_row > 0)
   end function impulse_entries
 
-  !> Keep the impulses of a solved problem with the pairs of the lists, whose memory has them.
+  !> Keep the impulses of a solved problem with the pairs of the lists, whose memory has them. Between bodies that sleep they stay.
   subroutine keep_impulses(problem, halo)
     type(contact_problem_t), intent(in) :: problem
     type(halo_t), intent(inout) :: halo
@@ -52,7 +54,7 @@ contains
     rolls = problem%kernels%rolling_row > 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => halo%view(s)%list)
-        list%impulse(:, :) = 0.0_dp
+        call list%forget_impulses()
         do g = 1, n_blocks(sub%n_contacts)
           if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
           if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
@@ -108,8 +110,8 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for pairs of a list; the
-  !> antagonist of a boundary is minus its number.
+  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring, the reference of bodies that sleep and the
+  !> states, for pairs of a list; the antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, pairs, records)
     type(local_bodies_t), intent(in) :: view
     !> words left free before those of a record
@@ -132,7 +134,10 @@ contains
         do e = 1, size(list%spring, 1)
           records(lead + 2 + size(list%impulse, 1) + e, n) = transfer(list%spring(e, p), 0_i8)
         end do
-        records(lead + 3 + size(list%impulse, 1) + size(list%spring, 1):, n) = list%state(:, p)
+        do e = 1, size(list%reference, 1)
+          records(lead + 2 + size(list%impulse, 1) + size(list%spring, 1) + e, n) = transfer(list%reference(e, p), 0_i8)
+        end do
+        records(lead + 3 + list%memory%words() - list%memory%n_states():, n) = list%state(:, p)
       end do
     end associate
   end subroutine list_impulses
@@ -147,7 +152,7 @@ contains
 
   !> Give impulses and states to the pairs of a list that have the same bodies; what the records do not have stays.
   subroutine match_impulses(records, kept, view)
-    !> (2 + words of `kept`, n): candidate, antagonist, impulse, elongation, states
+    !> (2 + words of `kept`, n): candidate, antagonist, impulse, elongation, reference, states
     integer(i8), intent(in), contiguous :: records(:, :)
     type(pair_memory_t), intent(in) :: kept
     type(local_bodies_t), intent(inout) :: view
@@ -172,8 +177,11 @@ contains
         do e = 1, min(list%memory%n_spring, kept%n_spring)
           list%spring(e, p) = transfer(records(2 + kept%n_impulse + e, k), 0.0_dp)
         end do
+        do e = 1, min(list%memory%n_reference, kept%n_reference)
+          list%reference(e, p) = transfer(records(2 + kept%n_impulse + kept%n_spring + e, k), 0.0_dp)
+        end do
         call take_state(list%memory%law_row, kept%law_row)
-        call take_state(list%memory%rest_row, kept%rest_row)
+        call take_state(list%memory%touch_row, kept%touch_row)
         call take_state(list%memory%key_row, kept%key_row)
         if (list%memory%key_row > 0) call take_state(list%memory%key_row + 1, kept%key_row + 1)
       end do
@@ -184,7 +192,7 @@ contains
     subroutine take_state(row, row_kept)
       integer, intent(in) :: row, row_kept
 
-      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = narrow(records(2 + kept%n_impulse + kept%n_spring + row_kept, k))
+      if (row > 0 .and. row_kept > 0) view%list%state(row, p) = narrow(records(2 + kept%words() - kept%n_states() + row_kept, k))
     end subroutine take_state
 
   end subroutine match_impulses

@@ -125,6 +125,7 @@ contains
 
     to%impulse(:, p) = from%impulse(:, q)
     to%spring(:, p) = from%spring(:, q)
+    to%reference(:, p) = from%reference(:, q)
     to%state(:, p) = from%state(:, q)
   end subroutine copy_memory
 
@@ -134,7 +135,7 @@ contains
     !> of the memory
     integer, intent(in) :: words
     type(local_bodies_t), intent(in) :: before(:)
-    !> (1 + nd + 2 + words, n): subdomain (to be set), point, candidate, antagonist, impulse, elongation, states
+    !> (1 + nd + 2 + words, n): subdomain (to be set), point, candidate, antagonist, impulse, elongation, reference, states
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer(i8), allocatable :: own(:, :), more(:, :)
     integer, allocatable :: moved(:)

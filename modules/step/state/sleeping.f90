@@ -1,39 +1,50 @@
-!> Contacts that leave the sweeps while their bodies are at rest, and return when these are disturbed.
+!> Bodies that sleep: they stand still, and leave the contact problem, until something disturbs them.
 !>
-!> A body is at rest where the momentum left to it, and the change of the impulses on it, are small: m (|v| + R |w|) <= limit and
-!> sum |r_n - r_n of the step before| <= settled limit, limit being the lesser of `speed` times the root mean square of all
-!> impulses, which the residual is relative to, and of a `share` of the normal impulses on the body, so that no grain hangs in
-!> the air whatever lies next to it; where some law attracts, the momentum is at most that share of the sum H r of the contacts'
-!> impulses on it too, which is all that holds a body up: those that cling to each other press each other with more. Each contact
-!> counts the steps for which both of its bodies have been at rest; a contact that
-!> comes, goes or changes lets them start anew, and so does a boundary that moves. A grain all of whose contacts have counted
-!> half of `after` stands still: what the impulses of solves do not balance would else add up, step by step, and sweeps now find
-!> impulses that hold a grain without motion. A contact that has counted them all sleeps: no sweep takes it, its impulse stays,
-!> and its reaction is part of the velocities from the start of a solve. A solve that misses its tolerance for contacts that
-!> sleep wakes them; what moves then moves by the laws of all contacts, and nothing is stopped.
+!> Let l be the lesser of `speed` times the root mean square of all impulses and of a `share` of the sum S of the normal impulses
+!> on a grain. The grain is at rest in a step where the momentum left to it, m (|v| + R |w|), is at most l/2, and the changes of the
+!> normal impulses on it since the last step at most a `settled` share of S. Where some law attracts, the momentum is at most
+!> `share` times the sum H r of the contacts' impulses on it too, which is all that holds a body up: those that cling to each other
+!> press each other with more. Impulses of a boundary that moves count as changed. A step counts where the grains that it touches
+!> are at rest too. A grain that has counted half of `after` steps stands still: what the impulses of solves do not balance would
+!> else add up, step by step. After `after` steps it sleeps.
+!>
+!> Contacts between grains that sleep, or with boundaries at rest, leave the problem with the impulses that they have. Contacts with
+!> grains that are awake stay: there the sleeper is a body that cannot move. The impulses that they had when it fell asleep are its
+!> reference. Where those of a solve differ from them, summed over the contacts of a sleeper, by more than the l/2 of that time, it
+!> wakes with those around it, and the step is solved anew. See doc/theory.md, section 12.
 module gravier_sleeping
-  use gravier_kinds, only: dp
-  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
+  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
-  use gravier_narrow_phase, only: contact_list_t
+  use gravier_velocity_return, only: find_senders
   implicit none
   private
-  public :: sleeping_rule_t, count_rest, put_sleepers_last, wake_all
+  public :: sleeping_rule_t, count_rest, may_push
 
-  !> change of the impulses on a body at rest over what momentum it may have; either over the impulses on it at most
-  real(dp), parameter :: settled = 10.0_dp, share = 0.1_dp
+  !> momentum of a body at rest with what may change while it sleeps, and changes of the impulses on it in a step, over the normal
+  !> impulses on it
+  real(dp), parameter :: share = 0.1_dp, settled = 0.05_dp
 
-  !> Sums over the contacts of each body of a subdomain (nv, n_columns).
-  type :: sums_t
-    real(dp), allocatable :: of(:, :)
-  end type sums_t
+  !> What the contacts of the bodies of a subdomain say.
+  type :: rest_t
+    !> sums over contacts: normal impulses, and by how much they have changed [N s]; contacts with bodies that are not at rest
+    !> (nv, n_columns)
+    real(dp), allocatable :: sums(:, :), restless(:, :)
+    !> whether each column is at rest (n_columns)
+    logical, allocatable :: rests(:)
+    !> steps at rest, with this one (n_grains); place in the view (n_grains)
+    integer, allocatable :: steps(:), seen(:)
+  end type rest_t
 
   type :: sleeping_rule_t
-    !> steps at rest after which a contact sleeps; 0: none does
+    !> steps at rest after which a body sleeps; 0: none does
     integer :: after = 0
     !> momentum of a body at rest over the root mean square of the impulses
     real(dp) :: speed = 0.0_dp
@@ -41,195 +52,249 @@ module gravier_sleeping
 
 contains
 
-  !> Count the steps at rest of the contacts of a solved problem, before its impulses are kept. Collective.
-  subroutine count_rest(rule, boundaries, woken, halo, problem)
+  !> Whether a boundary moves or forces may move it, so that nothing near it sleeps.
+  pure elemental logical function may_push(boundary)
+    type(boundary_t), intent(in) :: boundary
+    may_push = boundary%is_moved() .or. boundary%is_driven()
+  end function may_push
+
+  !> Count the steps at rest of the grains of a solved problem, before its impulses are kept; those that fall asleep get the change
+  !> that wakes them, and their contacts a reference. Grains that are in no contact start anew. Collective.
+  subroutine count_rest(rule, stops, halo, problem, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
-    type(boundary_t), intent(in) :: boundaries(:)
-    !> contacts that slept were woken: nothing is stopped. Else grains at rest stand still: their v_global becomes zero
-    logical, intent(in) :: woken
+    !> grains may come to stand still: v_global of those at rest becomes zero
+    logical, intent(in) :: stops
     type(halo_t), intent(inout) :: halo
     !> v_global is evaluated, and `reaction` what it is evaluated with
     type(contact_problem_t), intent(inout) :: problem
-    type(sums_t) :: sums(size(problem%sub))
+    type(decomposition_t), intent(inout) :: decomposition
+    type(rest_t) :: rest(size(problem%sub))
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call sum_impulses(boundaries, halo%view(s)%list, problem%sub(s), problem%kernels%nv, sums(s))
-    end do
-    call sum_over_copies(problem, sums)
-    do s = 1, size(problem%sub)
-      call count_steps(rule%after, rule%speed*problem%impulse_scale, boundaries, halo%view(s)%list, problem%sub(s), &
-        & problem%kernels%nd, sums(s))
-    end do
-    if (woken) return
-    call sum_over_copies(problem, sums)
-    do s = 1, size(problem%sub)
-      do b = 1, problem%sub(s)%n_grains
-        if (.not. sums(s)%of(1, b) > 0.0_dp) problem%sub(s)%v_global(:, b) = 0.0_dp
-      end do
-    end do
-  end subroutine count_rest
-
-  !> Put the contacts that have been at rest for `after` steps behind the others; so many of them stay before that these fill
-  !> whole blocks. A contact with a boundary that moves as prescribed does not sleep.
-  subroutine put_sleepers_last(view, boundaries, after, found)
-    type(local_bodies_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    integer, intent(in) :: after
-    type(contact_list_t), intent(inout) :: found
-    type(contact_list_t) :: old
-    logical, allocatable :: asleep(:)
-    integer :: c, b, n, round
-
-    allocate (asleep(found%n))
-    do c = 1, found%n
-      asleep(c) = view%list%state(view%list%memory%rest_row, found%source(c)) >= after
-      b = found%boundary(c)
-      if (b > 0) asleep(c) = asleep(c) .and. .not. boundaries(b)%is_moved()
-    end do
-    found%n_awake = min(found%n, lanes*n_blocks(count(.not. asleep)))
-    n = found%n_awake - count(.not. asleep)
-    do c = 1, found%n
-      if (n == 0) exit
-      if (.not. asleep(c)) cycle
-      asleep(c) = .false.
-      n = n - 1
-    end do
-    if (found%n_awake == found%n) return
-    old = found
-    n = 0
-    do round = 1, 2
-      do c = 1, found%n
-        if (asleep(c) .neqv. round == 2) cycle
-        n = n + 1
-        found%source(n) = old%source(c)
-        found%boundary(n) = old%boundary(c)
-        found%gap(n) = old%gap(c)
-        found%normal(:, n) = old%normal(:, c)
-        if (size(old%terms) > 0) found%terms(n) = old%terms(c)
-        if (size(old%spring) > 0) found%spring(n) = old%spring(c)
-        if (size(old%place) > 0) found%place(n) = old%place(c)
-      end do
-    end do
-  end subroutine put_sleepers_last
-
-  !> No contact is at rest any more.
-  pure subroutine wake_all(halo)
-    type(halo_t), intent(inout) :: halo
-    integer :: s
-
-    if (.not. allocated(halo%view)) return
-    do s = 1, size(halo%view)
-      associate (list => halo%view(s)%list)
-        list%state(list%memory%rest_row, :) = 0
-      end associate
-    end do
-  end subroutine wake_all
-
-  !> Sum over the copies of each body. Collective.
-  subroutine sum_over_copies(problem, sums)
-    type(contact_problem_t), intent(inout) :: problem
-    type(sums_t), intent(inout) :: sums(:)
-    integer :: s
-
-    do s = 1, size(problem%sub)
-      call problem%shared%load(s, sums(s)%of)
+      call sum_impulses(decomposition%boundaries, halo%view(s)%list, problem%sub(s), problem%kernels%nv, rest(s)%sums)
+      call problem%shared%load(s, rest(s)%sums)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
-      call problem%shared%sum_copies(s, sums(s)%of, mean=.false.)
+      call problem%shared%sum_copies(s, rest(s)%sums, mean=.false.)
+      call find_rest(rule, decomposition%boundaries, problem, s, rest(s))
+      call problem%shared%load(s, rest(s)%restless)
     end do
-  end subroutine sum_over_copies
+    call problem%shared%pass()
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), view => halo%view(s), own => rest(s))
+        call problem%shared%sum_copies(s, own%restless, mean=.false.)
+        call find_seen(view%list, sub, own%seen)
+        allocate (own%steps(sub%n_grains), source=0)
+        do b = 1, sub%n_grains
+          if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
+          own%steps(b) = min(view%bodies%rest(own%seen(b)) + 1, merge(rule%after, rule%after - 1, stops))
+          if (stops .and. 2*own%steps(b) >= rule%after) sub%v_global(:, b) = 0.0_dp
+        end do
+        call set_references(problem, s, rule%after, own%steps, view%list)
+      end associate
+    end do
+    call bring_home(rule, problem, rest, decomposition)
+  end subroutine count_rest
 
-  !> Into the first two rows: normal impulses on each body, and by how much they have changed since the step before. Under a
-  !> boundary that moves they count as changed.
+  !> l/2 [N s]: the momentum that a body at rest may have, and the change of impulses that it does not wake from.
+  pure real(dp) function allowed(rule, impulse_scale, pressing)
+    type(sleeping_rule_t), intent(in) :: rule
+    !> root mean square of all impulses; normal impulses on the body [N s]
+    real(dp), intent(in) :: impulse_scale, pressing
+    allowed = 0.5_dp*min(rule%speed*impulse_scale, share*pressing)
+  end function allowed
+
+  !> Sums over the contacts of each body of a subdomain: normal impulses, and by how much they have changed since the step before.
   subroutine sum_impulses(boundaries, list, sub, nv, sums)
     type(boundary_t), intent(in) :: boundaries(:)
     type(neighbour_list_t), intent(in) :: list
     type(subproblem_t), intent(in) :: sub
     !> degrees of freedom of a body, those of an exchange
     integer, intent(in) :: nv
-    type(sums_t), intent(out) :: sums
+    !> (nv, n_columns)
+    real(dp), allocatable, intent(out) :: sums(:, :)
     real(dp) :: r, change
     integer :: c, k
 
-    allocate (sums%of(nv, sub%n_columns), source=0.0_dp)
+    allocate (sums(nv, sub%n_columns), source=0.0_dp)
     do c = 1, sub%n_contacts
       r = sub%impulse(lane_of(c), 1, block_of(c))
       change = abs(r - list%impulse(1, sub%source(c)))
-      if (is_moved(boundaries, sub, sub%pair(1, c)) .or. is_moved(boundaries, sub, sub%pair(2, c))) change = r
       do k = 1, 2
-        sums%of(1, sub%pair(k, c)) = sums%of(1, sub%pair(k, c)) + r
-        sums%of(2, sub%pair(k, c)) = sums%of(2, sub%pair(k, c)) + change
+        if (sub%pair(k, c) <= sub%n_grains) cycle
+        if (sub%boundary(sub%pair(k, c)) == 0) cycle
+        if (may_push(boundaries(sub%boundary(sub%pair(k, c))))) change = r
+      end do
+      do k = 1, 2
+        sums(1, sub%pair(k, c)) = sums(1, sub%pair(k, c)) + r
+        sums(2, sub%pair(k, c)) = sums(2, sub%pair(k, c)) + change
       end do
     end do
   end subroutine sum_impulses
 
-  !> Whether column `b` is a boundary that moves as prescribed.
-  pure logical function is_moved(boundaries, sub, b)
+  !> Which bodies of subdomain `s` of this rank are at rest, and the contacts of each with others that are not.
+  subroutine find_rest(rule, boundaries, problem, s, rest)
+    type(sleeping_rule_t), intent(in) :: rule
     type(boundary_t), intent(in) :: boundaries(:)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> with the sums over all copies
+    type(rest_t), intent(inout) :: rest
+    integer :: b, c, k
+
+    associate (sub => problem%sub(s))
+      allocate (rest%rests(sub%n_columns), source=.true.)
+      allocate (rest%restless, mold=rest%sums)
+      rest%restless(:, :) = 0.0_dp
+      do b = 1, sub%n_columns
+        if (b <= sub%n_grains) then
+          rest%rests(b) = rest%sums(2, b) <= settled*rest%sums(1, b) .and. &
+            & is_slow(sub, problem%kernels%nd, allowed(rule, problem%impulse_scale, rest%sums(1, b)), b)
+        else if (sub%boundary(b) > 0) then
+          rest%rests(b) = .not. may_push(boundaries(sub%boundary(b)))
+        end if
+      end do
+      do c = 1, sub%n_contacts
+        do k = 1, 2
+          if (.not. rest%rests(sub%pair(k, c))) rest%restless(1, sub%pair(3 - k, c)) = rest%restless(1, sub%pair(3 - k, c)) + 1.0_dp
+        end do
+      end do
+    end associate
+  end subroutine find_rest
+
+  !> Places in the view of the grains of a subdomain.
+  subroutine find_seen(list, sub, seen)
+    type(neighbour_list_t), intent(in) :: list
     type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: b
+    !> (n_grains)
+    integer, allocatable, intent(out) :: seen(:)
+    integer :: c
 
-    is_moved = .false.
-    if (b > sub%n_grains) is_moved = boundaries(sub%boundary(b))%is_moved()
-  end function is_moved
+    allocate (seen(sub%n_grains), source=0)
+    do c = 1, sub%n_contacts
+      if (sub%pair(1, c) <= sub%n_grains) seen(sub%pair(1, c)) = list%candidate(sub%source(c))
+      if (sub%pair(2, c) <= sub%n_grains) seen(sub%pair(2, c)) = list%antagonist(sub%source(c))
+    end do
+  end subroutine find_seen
 
-  !> Count the steps at rest, and put the number of the contacts of each body that have not counted half of `after` into the
-  !> first row of the sums, which comes as sum_impulses and sum_over_copies leave it.
-  subroutine count_steps(after, limit, boundaries, list, sub, nd, sums)
-    integer, intent(in) :: after
-    !> momentum of a body at rest [N s]
-    real(dp), intent(in) :: limit
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(neighbour_list_t), intent(inout) :: list
+  !> Whether the momentum of grain `b` is small, beside what acts on it.
+  pure logical function is_slow(sub, nd, limit, b)
     type(subproblem_t), intent(in) :: sub
     !> space dimension
     integer, intent(in) :: nd
-    type(sums_t), intent(inout) :: sums
-    logical, allocatable :: rests(:)
-    integer, allocatable :: steps(:)
-    real(dp) :: reaction(nd)
-    integer :: c, b, d, row
+    !> of the momentum [N s]
+    real(dp), intent(in) :: limit
+    integer, intent(in) :: b
+    real(dp) :: momentum, reaction(nd)
+    integer :: d
 
-    allocate (rests(sub%n_columns), steps(sub%n_contacts))
-    do b = 1, sub%n_columns
-      rests(b) = .not. is_moved(boundaries, sub, b)
-      if (b > sub%n_bodies) cycle
-      rests(b) = max(momentum(b), sums%of(2, b)/settled) <= min(limit, share*sums%of(1, b))
-      if (.not. allocated(sub%attraction_load)) cycle
-      do d = 1, nd
-        reaction(d) = sub%contact_reaction(d, b)
+    momentum = (norm2(sub%v_global(1:nd, b)) + sub%radius(b)*norm2(sub%v_global(nd + 1:, b))) &
+      & /inverse_of_translation(sub%inverse_mass(:, b), nd)
+    is_slow = limit > 0.0_dp .and. momentum <= limit
+    if (.not. allocated(sub%attraction_load)) return
+    do d = 1, nd
+      reaction(d) = sub%contact_reaction(d, b)
+    end do
+    is_slow = is_slow .and. momentum <= share*norm2(reaction)
+  end function is_slow
+
+  !> The contacts of grains that fall asleep are marked, and the impulses of now become the reference of those with grains that are
+  !> awake.
+  subroutine set_references(problem, s, after, steps, list)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> steps at rest after which a body sleeps; steps at rest (n_grains)
+    integer, intent(in) :: after
+    integer, intent(in), contiguous :: steps(:)
+    type(neighbour_list_t), intent(inout) :: list
+    real(dp) :: p(problem%kernels%nd)
+    integer :: c, k, b
+    logical :: starts, goes_on
+
+    if (.not. any(steps >= after)) return
+    associate (sub => problem%sub(s))
+      do c = 1, sub%n_contacts
+        starts = .false.
+        goes_on = .false.
+        do k = 1, 2
+          b = sub%pair(k, c)
+          if (b <= sub%n_grains) then
+            starts = starts .or. steps(b) >= after
+          else
+            goes_on = goes_on .or. sub%boundary(b) == 0
+          end if
+        end do
+        if (starts) list%state(list%memory%touch_row, sub%source(c)) = 1
+        if (goes_on .or. .not. starts) cycle
+        call problem%impulse_on_candidate(s, c, p)
+        list%reference(:, sub%source(c)) = p
       end do
-      rests(b) = rests(b) .and. momentum(b) <= share*norm2(reaction)
+    end associate
+  end subroutine set_references
+
+  !> Bring steps at rest, and the changes that wake, to the owners of the grains, in this subdomain by their places, in others by
+  !> records (owner, grain, steps, change). Collective.
+  subroutine bring_home(rule, problem, rest, decomposition)
+    type(sleeping_rule_t), intent(in) :: rule
+    type(contact_problem_t), intent(in) :: problem
+    type(rest_t), intent(in) :: rest(:)
+    type(decomposition_t), intent(inout) :: decomposition
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer, allocatable :: destination(:)
+    logical, allocatable :: sends(:)
+    integer :: s, b, k, h, place, n, round
+
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        where (.not. owned%wakes_at > 0.0_dp) owned%rest = 0
+      end associate
     end do
-    row = list%memory%rest_row
-    do c = 1, sub%n_contacts
-      steps(c) = 0
-      if (rests(sub%pair(1, c)) .and. rests(sub%pair(2, c))) steps(c) = min(after, list%state(row, sub%source(c)) + 1)
+    do round = 1, 2
+      n = 0
+      do s = 1, size(problem%sub)
+        associate (sub => problem%sub(s))
+          call find_senders(problem, s, sends)
+          do b = 1, sub%n_grains
+            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), change_of(s, b))
+            if (.not. sends(b)) cycle
+            n = n + 1
+            if (round == 1) cycle
+            destination(n) = decomposition%comm%rank_of(sub%owner(b), decomposition%n_subdomains)
+            records(1, n) = sub%owner(b)
+            records(2, n) = sub%id(b)
+            records(3, n) = rest(s)%steps(b)
+            records(4, n) = transfer(change_of(s, b), 0_i8)
+          end do
+        end associate
+      end do
+      if (round == 1) allocate (records(4, n), destination(n))
     end do
-    list%state(row, :) = 0
-    sums%of(:, :) = 0.0_dp
-    do c = 1, sub%n_contacts
-      list%state(row, sub%source(c)) = steps(c)
-      if (2*steps(c) >= after) cycle
-      sums%of(1, sub%pair(1, c)) = sums%of(1, sub%pair(1, c)) + 1.0_dp
-      sums%of(1, sub%pair(2, c)) = sums%of(1, sub%pair(2, c)) + 1.0_dp
+    call sparse_exchange(decomposition%comm, records, destination, received)
+    do k = 1, size(received, 2)
+      call decomposition%find_owned(received(1:2, k), h, place)
+      call put(h, place, narrow(received(3, k)), transfer(received(4, k), 0.0_dp))
     end do
 
   contains
 
-    !> m (|v| + R |w|) of body `b` [N s].
-    pure real(dp) function momentum(b)
-      integer, intent(in) :: b
-      real(dp) :: speed
+    !> The change that wakes grain `b` of subdomain `s` of this rank [N s].
+    pure real(dp) function change_of(s, b)
+      integer, intent(in) :: s, b
+      change_of = allowed(rule, problem%impulse_scale, rest(s)%sums(1, b))
+    end function change_of
 
-      speed = norm2(sub%v_global(1:nd, b))
-      if (b <= sub%n_grains) speed = speed + sub%radius(b)*norm2(sub%v_global(nd + 1:, b))
-      momentum = inverse_of_translation(sub%inverse_mass(:, b), nd)
-      if (momentum > 0.0_dp) momentum = speed/momentum
-    end function momentum
+    !> Set what is known of grain `place` of subdomain `h` of this rank.
+    subroutine put(h, place, steps, change)
+      integer, intent(in) :: h, place, steps
+      !> [N s]
+      real(dp), intent(in) :: change
 
-  end subroutine count_steps
+      decomposition%owned(h)%rest(place) = steps
+      if (steps >= rule%after) decomposition%owned(h)%wakes_at(place) = change
+    end subroutine put
+
+  end subroutine bring_home
 
 end module gravier_sleeping

@@ -10,12 +10,13 @@ module gravier_velocity_return
   use gravier_cell_drive, only: carry_grains
   implicit none
   private
-  public :: take_velocities, take_displacements
+  public :: take_velocities, take_displacements, find_senders
 
 contains
 
   !> Velocities at the end of the step: those of the solved problem (v_global) for grains in contact, free ones for
-  !> the others. A shared grain whose owner has no contact on it gets its velocity from its first sharer. Grains glued to
+  !> the others. What sleeps stands still.
+  !> A shared grain whose owner has no contact on it gets its velocity from its first sharer. Grains glued to
   !> a boundary are left. In a cell that moves grains are carried along, and v_global is that of grains carried along. Collective.
   subroutine take_velocities(decomposition, physics, problem)
     type(decomposition_t), intent(inout) :: decomposition
@@ -26,7 +27,8 @@ contains
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (owned%glued(k) == 0) call physics%accelerate(decomposition%figures, owned, k, owned%velocity(:, k))
+          if (owned%glued(k) == 0 .and. .not. owned%sleeps(k)) call physics%accelerate(decomposition%figures, owned, k, &
+            & owned%velocity(:, k))
         end do
       end associate
     end do
@@ -124,21 +126,13 @@ contains
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer, allocatable, intent(out) :: destination(:)
     logical, allocatable :: sends(:)
-    integer :: s, b, k, d, n, round
+    integer :: s, b, d, n, round
 
     do round = 1, 2
       n = 0
       do s = 1, size(problem%sub)
-        associate (sub => problem%sub(s), part => problem%shared%part(s))
-          allocate (sends(sub%n_bodies), source=.false.)
-          do b = 1, sub%n_grains
-            sends(b) = sub%place(b) == 0
-          end do
-          do k = 1, part%n_shared
-            b = part%body(k)
-            if (b > sub%n_grains) cycle
-            sends(b) = part%copy_rank(k) == 1 .and. .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%owner(b))
-          end do
+        associate (sub => problem%sub(s))
+          call find_senders(problem, s, sends)
           do b = 1, sub%n_grains
             if (.not. sends(b)) cycle
             n = n + 1
@@ -150,11 +144,32 @@ contains
               records(2 + d, n) = transfer(sub%v_global(d, b), 0_i8)
             end do
           end do
-          deallocate (sends)
         end associate
       end do
       if (round == 1) allocate (records(2 + problem%kernels%nv, n), destination(n))
     end do
   end subroutine list_returns
+
+  !> Which grains of subdomain `s` of this rank are owned by none of their sharers, so that this one, the first of them, tells the
+  !> owner what becomes of them.
+  subroutine find_senders(problem, s, sends)
+    type(contact_problem_t), intent(in) :: problem
+    integer, intent(in) :: s
+    !> (n_bodies)
+    logical, allocatable, intent(out) :: sends(:)
+    integer :: b, k
+
+    associate (sub => problem%sub(s), part => problem%shared%part(s))
+      allocate (sends(sub%n_bodies), source=.false.)
+      do b = 1, sub%n_grains
+        sends(b) = sub%place(b) == 0
+      end do
+      do k = 1, part%n_shared
+        b = part%body(k)
+        if (b > sub%n_grains) cycle
+        sends(b) = part%copy_rank(k) == 1 .and. .not. any(part%sharer(part%first(k):part%first(k + 1) - 1) == sub%owner(b))
+      end do
+    end associate
+  end subroutine find_senders
 
 end module gravier_velocity_return

@@ -86,7 +86,6 @@ contains
     sub%n_bodies = sum(number_of)
     sub%n_columns = sub%n_bodies
     sub%n_contacts = n
-    sub%n_awake = n
     allocate (sub%id(sub%n_bodies), sub%owner(sub%n_bodies), sub%multiplicity(sub%n_bodies))
     allocate (sub%v_free(problem%kernels%nv, sub%n_bodies), source=0.0_dp)
     allocate (sub%velocity, sub%v_global, sub%reaction, mold=sub%v_free)

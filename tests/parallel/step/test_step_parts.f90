@@ -12,9 +12,7 @@ program test_step_parts
   use gravier_contact_structure, only: contact_structure_t, bin_width, n_bins
   use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
-  use gravier_sleeping, only: wake_all, put_sleepers_last, count_rest
-  use gravier_narrow_phase, only: contact_list_t, find_contacts
-  use gravier_contact_kernels, only: lanes
+  use gravier_sleeping, only: count_rest
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -61,7 +59,9 @@ program test_step_parts
   call check_sleeping()
   call check_moving_plane("0")
   call check_moving_plane("0.5")
-  call check_sleepers_last()
+  call check_chain_asleep()
+  call check_chain_disturbed()
+  call check_left_behind()
   call check_starting_boundary()
   call check_projection()
   call check_shared_lid()
@@ -669,25 +669,41 @@ contains
       & newline)
   end subroutine make_resting
 
-  !> Steps at rest of the contact of grain `id` with the plane, or with grains of higher identifiers: the same on all ranks.
-  integer function counted(sim, id, with_grains)
+  !> Steps at rest of grain `id`: the same on all ranks.
+  integer function counted(sim, id)
     type(simulation_t), intent(in) :: sim
     integer, intent(in) :: id
-    logical, intent(in), optional :: with_grains
-    integer :: s, p
+    integer :: s, k
     real(dp) :: most
 
     most = -1.0_dp
-    do s = 1, size(sim%halo%view)
-      associate (view => sim%halo%view(s))
-        do p = 1, view%list%n
-          if (view%bodies%id(view%list%candidate(p)) == id .and. (view%list%antagonist(p) > 0 .eqv. present(with_grains))) &
-            & most = max(most, real(view%list%state(view%list%memory%rest_row, p), dp))
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%id(k) == id) most = owned%rest(k)
         end do
       end associate
     end do
     counted = nint(comm%highest(most))
   end function counted
+
+  !> Wake grain `id`, and add to its vertical velocity.
+  subroutine push(sim, id, velocity)
+    type(simulation_t), intent(inout) :: sim
+    integer, intent(in) :: id
+    real(dp), intent(in) :: velocity
+    integer :: s, k
+
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%id(k) /= id) cycle
+          call owned%wake(k)
+          owned%velocity(2, k) = owned%velocity(2, k) + velocity
+        end do
+      end associate
+    end do
+  end subroutine push
 
   !> Multiply the impulse that the list keeps of the contact of grain `id` with the plane.
   subroutine disturb(sim, id, factor)
@@ -706,8 +722,8 @@ contains
     end do
   end subroutine disturb
 
-  !> Contacts count steps at rest, one a step; a change of an impulse by more than ten times the momentum allowed, 1e-3 of the
-  !> impulses, begins anew; so do all where they are woken.
+  !> Grains count steps at rest, one a step; a change of the impulses on one by more than a twentieth begins anew; so do all where they
+  !> are woken.
   subroutine check_sleeping()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
@@ -716,38 +732,40 @@ contains
     call make_resting(sim, "", "6")
     ! the first step finds impulses that were not there before
     call advance(sim, figures)
-    call check_equal(counted(sim, 1), 0, "a contact that is new is not at rest")
+    call check_equal(counted(sim, 1), 0, "a grain whose contact is new is not at rest")
     do k = 1, 3
       call advance(sim, figures)
       call check_equal(counted(sim, 1), k, "a step at rest counts")
     end do
-    call disturb(sim, 1, 1.005_dp)
+    call disturb(sim, 1, 1.04_dp)
     call advance(sim, figures)
-    call check_equal(counted(sim, 1), 4, "a change of half a percent is rest")
-    call disturb(sim, 1, 1.02_dp)
+    call check_equal(counted(sim, 1), 4, "a change of four percent is rest")
+    call disturb(sim, 1, 1.06_dp)
     call advance(sim, figures)
-    call check_equal(counted(sim, 1), 0, "a change of two percent is not")
-    call check_equal(counted(sim, 2), 5, "the other contact goes on")
+    call check_equal(counted(sim, 1), 0, "a change of six percent is not")
+    call check_equal(counted(sim, 2), 5, "the other grain goes on")
+    call advance(sim, figures)
+    do k = 1, size(sim%problem%sub)
+      sim%problem%sub(k)%v_global(3, 1:sim%problem%sub(k)%n_grains) = 1.0_dp
+    end do
+    call count_rest(sim%sleeping, .true., sim%halo, sim%problem, sim%decomposition)
+    call check_equal(counted(sim, 1), 0, "a disk that spins is not at rest")
     do k = 1, 7
       call advance(sim, figures)
     end do
     call check_equal(counted(sim, 1), 6, "steps are counted as far as it takes to sleep")
-    call check_equal(figures%asleep, 2_i8, "both contacts sleep")
+    call check_equal(figures%asleep, 2_i8, "both contacts are left out")
+    call check_equal(figures%contacts, 2_i8, "and are contacts still")
     call check_close(grain(sim, 1, 2), 0.0_dp, 0.0_dp, "what sleeps does not move")
-    do k = 1, size(sim%problem%sub)
-      sim%problem%sub(k)%v_global(3, 1:sim%problem%sub(k)%n_grains) = 1.0_dp
-    end do
-    call count_rest(sim%sleeping, sim%decomposition%boundaries, .true., sim%halo, sim%problem)
-    call check_equal(counted(sim, 1), 0, "a disk that spins is not at rest")
-    call wake_all(sim%halo)
-    call check_equal(counted(sim, 1), 0, "woken contacts count from the start")
+    call sim%wake()
+    call check_equal(counted(sim, 1), 0, "grains that are woken count from the start")
     call advance(sim, figures)
-    call check_equal(figures%asleep, 0_i8, "and are awake")
+    call check_equal(figures%asleep, 0_i8, "and none is left out")
     call sim%free()
   end subroutine check_sleeping
 
-  !> On a plane that moves, without friction, nothing changes, and yet the disks are not taken to rest on it: the contact of two
-  !> disks, one upon the other, counts no step while the plane moves, and counts them when it is at rest.
+  !> On a plane that moves, without friction, nothing changes, and yet disks are not taken to rest on it: of two, one upon the other,
+  !> none counts a step while the plane moves, and both count them when it is at rest.
   subroutine check_moving_plane(speed)
     character(len=*), intent(in) :: speed
     type(simulation_t) :: sim
@@ -763,60 +781,80 @@ contains
     do k = 1, 5
       call advance(sim, figures)
     end do
-    call check_equal(counted(sim, 1, .true.), merge(4, 0, speed == "0"), "steps at rest of two disks on a plane")
-    call check_equal(counted(sim, 1), merge(4, 0, speed == "0"), "steps at rest of the lower one and the plane")
+    call check_equal(counted(sim, 1), merge(4, 0, speed == "0"), "steps at rest of the lower disk")
+    call check_equal(counted(sim, 2), merge(4, 0, speed == "0"), "and of the one upon it")
     call sim%free()
   end subroutine check_moving_plane
 
-  !> Of contacts found, those asleep come last, and those before them fill whole blocks.
-  subroutine check_sleepers_last()
+  !> Three disks of 1 kg, one upon the other on a plane, that sleep.
+  subroutine make_chain(sim)
+    type(simulation_t), intent(inout) :: sim
+    type(step_figures_t) :: figures
+    integer :: k
+
+    do k = 1, 3
+      call add_grain(k, 1.0_dp, 0, 0.0_dp, 0.2_dp*k - 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    end do
+    call make(sim, "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
+      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1, friction = 0.5 /"//newline// &
+      & "&time step = 0.01, steps = 99 /"//newline//exact//", sleeping = T, sleep_after = 4, sleep_speed = 1 /"//newline// &
+      & "&output every = 0 /"//newline)
+    do k = 1, 7
+      call advance(sim, figures)
+    end do
+    call check_equal(figures%asleep, 3_i8, "a chain sleeps")
+    call check_equal(sim%problem%n_contacts, 0_i8, "and leaves an empty problem")
+  end subroutine make_chain
+
+  !> What is left out comes back for whoever looks at all contacts. A small change of the impulses on a sleeper wakes nothing.
+  subroutine check_chain_asleep()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
-    type(contact_list_t) :: found
-    integer :: k, s, c, awake, n_asleep
 
-    do k = 1, 40
-      call add_grain(k, 1.0_dp, 0, 0.3_dp*k, 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
-    end do
-    call make(sim, "gravity = 0, -9.81, overlap_projection = F /"//newline// &
-      & "&boundary shape = 'plane', point = 0, 0, normal = 0, 1 /"//newline//"&time step = 0.01, steps = 99 /"//newline// &
-      & exact//", sleeping = T, sleep_after = 3 /"//newline)
+    call make_chain(sim)
+    call check_close(sim%boundary_impulses(2, 1), 0.0_dp, 0.0_dp, "the plane feels what is solved alone")
+    call sim%make_whole()
+    call check_equal(sim%problem%n_contacts, 3_i8, "the whole problem has all contacts")
+    call check_close(sim%boundary_impulses(2, 1), -3*g*h, solved, "and the plane bears all three")
+    ! of the impulses on the disk below, 3 m g h, a twentieth is 0.0147 N s
+    call push(sim, 3, -0.014_dp)
     call advance(sim, figures)
-    do s = 1, size(sim%halo%view)
-      associate (view => sim%halo%view(s))
-        ! every contact but those of each third grain sleeps
-        do k = 1, view%list%n
-          view%list%state(view%list%memory%rest_row, k) = merge(0, 3, mod(view%bodies%id(view%list%candidate(k)), 3_i8) == 0)
-        end do
-        call find_contacts(view, sim%decomposition, sim%physics, found)
-        awake = 0
-        do k = 1, found%n
-          if (view%list%state(view%list%memory%rest_row, found%source(k)) == 0) awake = awake + 1
-        end do
-        call put_sleepers_last(view, sim%decomposition%boundaries, 3, found)
-        call check_equal(found%n_awake, min(found%n, lanes*((awake + lanes - 1)/lanes)), "awake contacts fill whole blocks")
-        n_asleep = 0
-        do c = 1, found%n
-          if (view%list%state(view%list%memory%rest_row, found%source(c)) == 0) then
-            call check(c <= found%n_awake, "a contact that is awake is among the first")
-          else if (c > found%n_awake) then
-            n_asleep = n_asleep + 1
-          end if
-          ! gaps and normals go with their contacts
-          k = view%list%candidate(found%source(c))
-          call check_close(found%gap(c), view%bodies%position(2, k) - view%bodies%radius(k), 0.0_dp, "gaps stay with their pairs")
-        end do
-        call check_equal(n_asleep, found%n - found%n_awake, "the others sleep")
-        if (found%n == 0) cycle
-        sim%decomposition%boundaries(1)%velocity(1) = 1.0_dp
-        call find_contacts(view, sim%decomposition, sim%physics, found)
-        call put_sleepers_last(view, sim%decomposition%boundaries, 3, found)
-        call check_equal(found%n_awake, found%n, "no contact with a boundary that moves sleeps")
-        sim%decomposition%boundaries(1)%velocity(1) = 0.0_dp
-      end associate
-    end do
+    call check_equal(figures%tries, 1, "a small change is not noticed")
+    call check_equal(figures%asleep, 2_i8, "the two others sleep on")
+    call check_equal(sim%problem%n_contacts, 1_i8, "the problem is that of the upper contact")
+    call check_close(grain(sim, 3, 2), 0.0_dp, solved, "beside a sleeper that cannot move")
     call sim%free()
-  end subroutine check_sleepers_last
+  end subroutine check_chain_asleep
+
+  !> A blow wakes what it reaches, and the step is solved with it: the plane takes its momentum up, and the weights.
+  subroutine check_chain_disturbed()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+
+    call make_chain(sim)
+    call push(sim, 3, -1.0_dp)
+    call advance(sim, figures)
+    call check_equal(figures%tries, 2, "a blow is noticed, and the step solved anew")
+    call check_equal(figures%asleep, 0_i8, "with all awake that it reaches")
+    call check_equal(sim%problem%n_contacts, 3_i8, "in the problem of all contacts")
+    call check_close(sim%boundary_impulses(2, 1), -3*g*h - 1.0_dp, solved, "whose impulses carry its momentum through")
+    call check_equal(counted(sim, 1), 0, "what is woken counts anew")
+    call sim%free()
+  end subroutine check_chain_disturbed
+
+  !> What sleeps on a grain that leaves the scene wakes in that step, and falls.
+  subroutine check_left_behind()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+
+    call make_chain(sim)
+    sim%decomposition%dismissed = [2_i8]
+    call advance(sim, figures)
+    call check_equal(figures%left, 1_i8, "a grain leaves")
+    call check_close(grain(sim, 3, 2), -g*h, solved, "the one above it falls")
+    call check_close(grain(sim, 1, 2), 0.0_dp, solved, "and the one below it rests")
+    call sim%free()
+  end subroutine check_left_behind
 
   !> A plane on which disks sleep starts to move: they wake in that step and, with enough friction, roll with a third of its speed.
   subroutine check_starting_boundary()

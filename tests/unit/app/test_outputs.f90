@@ -331,7 +331,7 @@ contains
         figures%listed = .false.
         figures%divided = k == 2
         figures%projected = k > 2
-        figures%solve%woken = k > 2
+        figures%tries = merge(2, 1, k > 2)
       end if
       call output%write(simulation, figures, 3.5_dp, error)
     end do

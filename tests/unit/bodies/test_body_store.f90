@@ -3,7 +3,7 @@ program test_body_store
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, collect_fields, place_word, body_record
+  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, collect_fields, place_word, rest_words, body_record
   use gravier_field_list, only: field_list_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -22,6 +22,7 @@ program test_body_store
     call test_described(kinds(:, k))
     call test_invalid(kinds(:, k))
     call test_forces(kinds(:, k))
+    call test_rest(kinds(:, k))
   end do
   call finish_checks()
   call MPI_Finalize()
@@ -272,6 +273,47 @@ contains
     end associate
   end subroutine test_written
 
+  !> Bodies that may sleep: what is known of their rest travels, and is the last that a checkpoint has; the others have none of it.
+  subroutine test_rest(sizes)
+    !> space dimension, degrees of freedom, entries of an image
+    integer, intent(in) :: sizes(3)
+    type(body_layout_t) :: layout
+    type(body_set_t) :: bodies, others
+    integer(i8), allocatable :: record(:), renewed(:)
+
+    layout = body_layout_t(sizes(1), sizes(2), sizes(3))
+    call others%init(layout, 2)
+    call check(.not. others%sleeps(1), "where none may sleep none does")
+    call check_equal(size(others%rest) + size(others%wakes_at), 0, "and nothing is kept for it")
+    layout%nr = 1
+    call bodies%init(layout, 2)
+    call check_equal(layout%saved_words(), others%saved_words() + rest_words, "words of the rest in a checkpoint")
+    call check(bodies%rest(2) == 0 .and. .not. bodies%sleeps(2), "a new body is awake")
+    bodies%id(:) = [3_i8, 5_i8]
+    bodies%radius(:) = 1.0_dp
+    bodies%mass(:) = 1.0_dp
+    bodies%glued(:) = 0
+    bodies%position(:, :) = 0.0_dp
+    bodies%velocity(:, :) = 0.0_dp
+    bodies%inertia(:) = 1.0_dp
+    bodies%image(:, :) = 0
+    bodies%rest(2) = 7
+    bodies%wakes_at(2) = 0.25_dp
+    allocate (record(bodies%record_words()), renewed(bodies%renewed_words()))
+    call bodies%get_record(2, record)
+    call check_equal(record(layout%saved_words() - 1), 7_i8, "steps at rest come last but one")
+    call others%init(layout, 2)
+    call others%set_record(1, record)
+    call check(others%sleeps(1) .and. others%rest(1) == 7, "a body that travels sleeps on")
+    call bodies%get_renewed(2, renewed)
+    call others%set_renewed(2, renewed)
+    call check(others%sleeps(2), "its copies know of it")
+    call others%wake(2)
+    call check(.not. others%sleeps(2) .and. others%rest(2) == 0, "a body that wakes counts from the start")
+    record(layout%saved_words() - 1) = -1
+    call check(layout%invalid_field(record, 0, 0, 0) == "rest", "no body has rested for less than no step")
+  end subroutine test_rest
+
   !> Names and bytes of the fields add up to the record that travels.
   subroutine test_described(sizes)
     !> space dimension, degrees of freedom, entries of an image
@@ -289,7 +331,8 @@ contains
       f = f + 1
       call bodies%describe_field(f, name, bytes, entries)
       if (len(name) == 0) exit
-      call check_equal(bytes, merge(4, 8, name == "glued" .or. name == "material" .or. name == "image" .or. name == "shape"), &
+      call check_equal(bytes, merge(4, 8, name == "glued" .or. name == "material" .or. name == "image" .or. name == "shape" .or. &
+        & name == "rest"), &
         & "bytes of "//name)
       names = names//name//" "
       words = words + entries

@@ -5,7 +5,7 @@ program test_method_registry
   use gravier_method, only: method_t
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t, default_always, default_on_active
   use gravier_method_registry, only: method_holder_t, registered_methods, make_method, features_of, method_words, quoted_names, &
-    & all_methods, that_decompose, with_moments, with_sleeping, that_relax, accelerated, accelerated_on_active
+    & all_methods, that_decompose, with_moments, that_relax, accelerated, accelerated_on_active
   implicit none
 
   call test_names()
@@ -43,7 +43,6 @@ contains
     call check_equal(quoted_names(that_decompose, "'", "or"), "'schwarz', 'schwarz_ec', 'nscdd', 'nscdd_ep' or 'newton'", &
       & "those on subdomains")
     call check_equal(quoted_names(with_moments, "'", "or"), "'nlgs', 'schwarz' or 'nscdd'", "those with moments")
-    call check_equal(quoted_names(with_sleeping, "'", "and"), "'nlgs', 'schwarz' and 'nscdd'", "those with sleeping contacts")
     call check_equal(quoted_names(accelerated, "`", "and"), "`nlgs` and `nscdd`", "those with momentum by default")
     call check_equal(quoted_names(accelerated_on_active, "`", "and"), "`nscdd_ep`", "one name alone")
   end subroutine test_names

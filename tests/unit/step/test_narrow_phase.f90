@@ -114,7 +114,6 @@ contains
     call list(view, reshape([1, 2, 1, 3, 1, 4, 5, -1, 1, -1, 5, 6, 5, -2], [2, 7]), pair_memory_t())
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 4, "contacts: those within the alert distance")
-    call check_equal(found%n_awake, 4, "all are awake")
     call check(all(found%source(1:4) == [1, 2, 4, 6]), "they are found at their places in the list")
     call check_close(found%gap(1), 0.009_dp, rounding, "an open gap")
     call check_close(found%gap(2), -0.01_dp, rounding, "an overlap")
@@ -125,6 +124,11 @@ contains
     call check_close(maxval(abs(found%normal(:, 3) - up)), 0.0_dp, rounding, "normal of a plane")
     call check_close(maxval(abs(found%normal(:, 4) - up)), 0.0_dp, 0.0_dp, "coincident centres are parted along the vertical")
     call check_equal(size(found%terms), 0, "no laws, no terms")
+    view%list%watched = [2, 3, 6]
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 2, "of some pairs alone, those that are contacts")
+    call check(all(found%source(1:2) == [2, 6]), "at their places in the whole list")
+    deallocate (view%list%watched)
     decomposition%boundaries(1)%present = .false.
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 3, "a boundary that is removed has no contacts")

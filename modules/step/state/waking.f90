@@ -1,0 +1,337 @@
+!> Which pairs are looked at while some bodies sleep, and what wakes these: a neighbour whose impulses change, a boundary that
+!> begins to move, a load that changes (gravier_sleeping has the rule).
+module gravier_waking
+  use gravier_kinds, only: dp, i8
+  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_boundary, only: boundary_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_removal, only: some_leave, find_staying
+  use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_pair_laws, only: boundary_of
+  use gravier_sleeping, only: may_push
+  implicit none
+  private
+  public :: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
+
+  !> What is left out of a problem.
+  type :: resting_t
+    !> bodies that sleep; contacts between them, or between them and boundaries
+    integer(i8) :: bodies = 0, contacts = 0
+  end type resting_t
+
+  !> One of each body of a view.
+  type :: marks_t
+    logical, allocatable :: of(:)
+  end type marks_t
+
+contains
+
+  !> Find the pairs to look at, in views that are up to date. What sleeps near boundaries that move wakes. Collective.
+  subroutine watch_awake(decomposition, halo, resting)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    type(resting_t), intent(out) :: resting
+    type(marks_t) :: exposed(size(halo%view))
+    integer(i8) :: counts(2)
+    integer :: s
+    logical :: some
+
+    some = .false.
+    do s = 1, size(halo%view)
+      if (allocated(halo%view(s)%asleep) .and. any(begins(decomposition%boundaries))) deallocate (halo%view(s)%asleep)
+      call watch(decomposition%boundaries, halo%view(s), exposed(s)%of)
+      some = some .or. any(exposed(s)%of)
+    end do
+    if (decomposition%comm%any_true(some)) then
+      call wake_marked(decomposition, halo, exposed)
+      do s = 1, size(halo%view)
+        call watch(decomposition%boundaries, halo%view(s), exposed(s)%of)
+      end do
+    end if
+    counts(:) = 0
+    do s = 1, size(halo%view)
+      counts(1) = counts(1) + count(decomposition%owned(s)%wakes_at > 0.0_dp)
+      counts(2) = counts(2) + halo%view(s)%n_resting
+    end do
+    call decomposition%comm%sum_counts(counts)
+    resting%bodies = counts(1)
+    resting%contacts = counts(2)
+  end subroutine watch_awake
+
+  !> Whether a boundary that was at rest begins to move, but for what forces make of it.
+  pure elemental logical function begins(boundary)
+    type(boundary_t), intent(in) :: boundary
+    begins = boundary%is_moved() .and. .not. (any(abs(boundary%last_velocity) > 0.0_dp .and. .not. boundary%free) .or. &
+      & any(abs(boundary%last_spin) > 0.0_dp))
+  end function begins
+
+  !> The pairs of a view to look at, where others sleep now than before: those with a grain that is awake. A grain that sleeps is
+  !> not looked at beside boundaries, which are at rest or expose it.
+  subroutine watch(boundaries, view, exposed)
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(local_bodies_t), intent(inout) :: view
+    !> (bodies) sleeping grains near boundaries that move
+    logical, allocatable, intent(out) :: exposed(:)
+    integer, allocatable :: watched(:)
+    logical :: asleep(view%bodies%n), sleeps_i, sleeps_j
+    integer :: p, n, b
+
+    allocate (exposed(view%bodies%n), source=.false.)
+    asleep(:) = view%bodies%wakes_at > 0.0_dp
+    if (allocated(view%asleep)) then
+      if (all(asleep .eqv. view%asleep)) return
+    end if
+    view%asleep = asleep
+    view%n_resting = 0
+    associate (list => view%list)
+      if (allocated(list%watched)) deallocate (list%watched)
+      if (.not. any(asleep)) then
+        list%reference(:, :) = 0.0_dp
+        list%state(list%memory%touch_row, :) = 0
+        return
+      end if
+      allocate (watched(list%n))
+      n = 0
+      do p = 1, list%n
+        sleeps_i = asleep(list%candidate(p))
+        sleeps_j = .false.
+        if (list%antagonist(p) > 0) sleeps_j = asleep(list%antagonist(p))
+        b = boundary_of(view, p)
+        if (.not. (sleeps_i .or. sleeps_j)) then
+          list%reference(:, p) = 0.0_dp
+          list%state(list%memory%touch_row, p) = 0
+        end if
+        if ((sleeps_i .and. sleeps_j) .or. ((sleeps_i .or. sleeps_j) .and. b > 0)) then
+          view%n_resting = view%n_resting + list%state(list%memory%touch_row, p)
+          if (b == 0) cycle
+          if (.not. may_push(boundaries(b))) cycle
+          if (sleeps_i) exposed(list%candidate(p)) = .true.
+          if (sleeps_j) exposed(list%antagonist(p)) = .true.
+        else
+          n = n + 1
+          watched(n) = p
+        end if
+      end do
+      allocate (list%watched(n))
+      list%watched(:) = watched(1:n)
+    end associate
+  end subroutine watch
+
+  !> Wake the bodies on which the impulses of a solve differ by much from those under which they fell asleep, and those around them.
+  !> Collective.
+  subroutine wake_disturbed(decomposition, halo, problem, rings, woken)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    !> solved
+    type(contact_problem_t), intent(in) :: problem
+    !> how many neighbours away
+    integer, intent(in) :: rings
+    !> whether some body was woken; views and pairs to look at are those of before where none was
+    logical, intent(out) :: woken
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer, allocatable :: destination(:)
+    type(marks_t) :: around(size(halo%view))
+    integer :: s, ring
+
+    call list_changes(decomposition, halo, problem, records, destination)
+    call sparse_exchange(decomposition%comm, records, destination, received)
+    call wake_changed(decomposition, received, woken)
+    woken = decomposition%comm%any_true(woken)
+    if (.not. woken) return
+    call halo%refresh(decomposition)
+    do ring = 1, rings
+      do s = 1, size(halo%view)
+        call mark_neighbours(halo%view(s), around(s)%of)
+      end do
+      call wake_marked(decomposition, halo, around)
+    end do
+  end subroutine wake_disturbed
+
+  !> Records (owner, grain, change) of the grains that sleep beside grains that are awake: how much the impulses on them differ from
+  !> their reference, summed over contacts [N s]. A contact that has ended counts as one without an impulse.
+  subroutine list_changes(decomposition, halo, problem, records, destination)
+    type(decomposition_t), intent(in) :: decomposition
+    type(halo_t), intent(in) :: halo
+    type(contact_problem_t), intent(in) :: problem
+    integer(i8), allocatable, intent(out) :: records(:, :)
+    integer, allocatable, intent(out) :: destination(:)
+    type :: change_t
+      real(dp), allocatable :: of(:)
+    end type change_t
+    type(change_t) :: change(size(halo%view))
+    real(dp) :: p(problem%kernels%nd)
+    integer :: s, k, w, c, n, round
+
+    do s = 1, size(halo%view)
+      associate (view => halo%view(s), list => halo%view(s)%list)
+        allocate (change(s)%of(view%bodies%n), source=0.0_dp)
+        if (.not. allocated(list%watched)) cycle
+        do w = 1, size(list%watched)
+          k = sleeper_of(view, list%watched(w))
+          if (k > 0) change(s)%of(k) = change(s)%of(k) + norm2(list%reference(:, list%watched(w)))
+        end do
+        do c = 1, problem%sub(s)%n_contacts
+          associate (source => problem%sub(s)%source(c))
+            k = sleeper_of(view, source)
+            if (k == 0) cycle
+            call problem%impulse_on_candidate(s, c, p)
+            change(s)%of(k) = change(s)%of(k) + norm2(p - list%reference(:, source)) - norm2(list%reference(:, source))
+          end associate
+        end do
+      end associate
+    end do
+    do round = 1, 2
+      n = 0
+      do s = 1, size(halo%view)
+        associate (view => halo%view(s))
+          do k = 1, view%bodies%n
+            if (.not. change(s)%of(k) > 0.0_dp) cycle
+            n = n + 1
+            if (round == 1) cycle
+            destination(n) = decomposition%comm%rank_of(view%owner(k), decomposition%n_subdomains)
+            records(1, n) = view%owner(k)
+            records(2, n) = view%bodies%id(k)
+            records(3, n) = transfer(change(s)%of(k), 0_i8)
+          end do
+        end associate
+      end do
+      if (round == 1) allocate (records(3, n), destination(n))
+    end do
+  end subroutine list_changes
+
+  !> Place in the view of the grain of pair `p` that sleeps, 0 for none.
+  pure integer function sleeper_of(view, p) result(k)
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in) :: p
+
+    k = view%list%candidate(p)
+    if (view%asleep(k)) return
+    k = max(view%list%antagonist(p), 0)
+    if (k == 0) return
+    if (.not. view%asleep(k)) k = 0
+  end function sleeper_of
+
+  !> Wake the grains of this rank on which impulses have changed by too much; the changes of several subdomains add up.
+  subroutine wake_changed(decomposition, received, woken)
+    type(decomposition_t), intent(inout) :: decomposition
+    !> (owner, grain, change), by the subdomain that sends them
+    integer(i8), intent(in), contiguous :: received(:, :)
+    logical, intent(out) :: woken
+    type :: change_t
+      real(dp), allocatable :: of(:)
+    end type change_t
+    type(change_t) :: change(size(decomposition%owned))
+    integer :: s, k, h, place
+
+    do s = 1, size(change)
+      allocate (change(s)%of(decomposition%owned(s)%n), source=0.0_dp)
+    end do
+    do k = 1, size(received, 2)
+      call decomposition%find_owned(received(1:2, k), h, place)
+      change(h)%of(place) = change(h)%of(place) + transfer(received(3, k), 0.0_dp)
+    end do
+    woken = .false.
+    do s = 1, size(change)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (.not. change(s)%of(k) > owned%wakes_at(k)) cycle
+          call owned%wake(k)
+          woken = .true.
+        end do
+      end associate
+    end do
+  end subroutine wake_changed
+
+  !> Wake what sleeps beside grains that are about to leave the scene, if some are, in views that are up to date. Collective.
+  subroutine wake_left_behind(decomposition, halo)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    type(marks_t) :: around(size(halo%view))
+    logical, allocatable :: stays(:)
+    integer :: s, p
+
+    if (.not. some_leave(decomposition)) return
+    do s = 1, size(halo%view)
+      associate (view => halo%view(s), list => halo%view(s)%list)
+        call find_staying(decomposition, view%bodies, stays)
+        allocate (around(s)%of(view%bodies%n), source=.false.)
+        do p = 1, list%n
+          if (list%antagonist(p) < 0) cycle
+          associate (i => list%candidate(p), j => list%antagonist(p))
+            if (stays(i) .eqv. stays(j)) cycle
+            if (view%bodies%sleeps(i)) around(s)%of(i) = .true.
+            if (view%bodies%sleeps(j)) around(s)%of(j) = .true.
+          end associate
+        end do
+      end associate
+    end do
+    call wake_marked(decomposition, halo, around)
+  end subroutine wake_left_behind
+
+  !> Mark what sleeps beside a body that has just woken.
+  subroutine mark_neighbours(view, around)
+    type(local_bodies_t), intent(in) :: view
+    !> (bodies)
+    logical, allocatable, intent(out) :: around(:)
+    logical :: woken(view%bodies%n)
+    integer :: p, i, j
+
+    allocate (around(view%bodies%n), source=.false.)
+    woken(:) = view%asleep .and. .not. view%bodies%wakes_at > 0.0_dp
+    if (.not. any(woken)) return
+    do p = 1, view%list%n
+      i = view%list%candidate(p)
+      j = view%list%antagonist(p)
+      if (j < 0) cycle
+      if (woken(i) .and. view%bodies%sleeps(j)) around(j) = .true.
+      if (woken(j) .and. view%bodies%sleeps(i)) around(i) = .true.
+    end do
+  end subroutine mark_neighbours
+
+  !> Wake bodies that subdomains see, and bring the views up to date. Collective.
+  subroutine wake_marked(decomposition, halo, marked)
+    type(decomposition_t), intent(inout) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    type(marks_t), intent(in) :: marked(:)
+    integer(i8), allocatable :: records(:, :), received(:, :)
+    integer, allocatable :: destination(:)
+    integer :: s, k, n, h, place
+
+    n = 0
+    do s = 1, size(marked)
+      n = n + count(marked(s)%of)
+    end do
+    allocate (records(2, n), destination(n))
+    n = 0
+    do s = 1, size(marked)
+      associate (view => halo%view(s))
+        do k = 1, view%bodies%n
+          if (.not. marked(s)%of(k)) cycle
+          n = n + 1
+          destination(n) = decomposition%comm%rank_of(view%owner(k), decomposition%n_subdomains)
+          records(1, n) = view%owner(k)
+          records(2, n) = view%bodies%id(k)
+        end do
+      end associate
+    end do
+    call sparse_exchange(decomposition%comm, records, destination, received)
+    do k = 1, size(received, 2)
+      call decomposition%find_owned(received(1:2, k), h, place)
+      call decomposition%owned(h)%wake(place)
+    end do
+    call halo%refresh(decomposition)
+  end subroutine wake_marked
+
+  !> Wake all bodies of this rank; views are to be brought up to date.
+  pure subroutine wake_all(decomposition)
+    type(decomposition_t), intent(inout) :: decomposition
+    integer :: s
+
+    do s = 1, size(decomposition%owned)
+      decomposition%owned(s)%rest(:) = 0
+      decomposition%owned(s)%wakes_at(:) = 0.0_dp
+    end do
+  end subroutine wake_all
+
+end module gravier_waking

@@ -1,0 +1,69 @@
+!> The contact problem of all bodies after a step that was solved without those that sleep: for diagnostics and files.
+module gravier_whole_problem
+  use gravier_kinds, only: dp
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_decomposition, only: decomposition_t
+  use gravier_halo, only: halo_t
+  use gravier_interface, only: interface_statistics_t
+  use gravier_physics, only: physics_t
+  use gravier_problem_builder, only: build_problem
+  use gravier_impulse_memory, only: recall_impulses
+  implicit none
+  private
+  public :: build_whole, take_whole
+
+  !> What is put aside of a view while its bodies count as awake.
+  type :: asleep_t
+    real(dp), allocatable :: wakes_at(:)
+    integer, allocatable :: watched(:)
+  end type asleep_t
+
+contains
+
+  !> Build it from the views of the step, with the impulses that their pairs keep, and the velocities under these. Collective.
+  subroutine build_whole(decomposition, halo, physics, solved, whole)
+    type(decomposition_t), intent(in) :: decomposition
+    !> comes back as it was
+    type(halo_t), intent(inout) :: halo
+    type(physics_t), intent(in) :: physics
+    type(contact_problem_t), intent(in) :: solved
+    type(contact_problem_t), intent(inout) :: whole
+    type(interface_statistics_t) :: ignored
+    type(asleep_t) :: aside(size(halo%view))
+    integer :: s
+
+    do s = 1, size(halo%view)
+      associate (view => halo%view(s))
+        call move_alloc(view%bodies%wakes_at, aside(s)%wakes_at)
+        allocate (view%bodies%wakes_at(view%bodies%n), source=0.0_dp)
+        call move_alloc(view%list%watched, aside(s)%watched)
+      end associate
+    end do
+    call build_problem(decomposition, halo, solved%kernels, physics, whole, ignored)
+    call recall_impulses(halo, whole)
+    whole%load(:) = solved%load
+    whole%error_scale = solved%error_scale
+    call whole%evaluate()
+    do s = 1, size(halo%view)
+      associate (view => halo%view(s))
+        call move_alloc(aside(s)%wakes_at, view%bodies%wakes_at)
+        call move_alloc(aside(s)%watched, view%list%watched)
+      end associate
+    end do
+  end subroutine build_whole
+
+  !> Let the problem of all bodies take the place of the one that was solved.
+  subroutine take_whole(whole, problem, is_whole)
+    !> is left empty
+    type(contact_problem_t), intent(inout) :: whole
+    type(contact_problem_t), intent(inout) :: problem
+    logical, intent(out) :: is_whole
+    type(subproblem_t), allocatable :: sub(:)
+
+    call move_alloc(whole%sub, sub)
+    problem = whole
+    call move_alloc(sub, problem%sub)
+    is_whole = .true.
+  end subroutine take_whole
+
+end module gravier_whole_problem
