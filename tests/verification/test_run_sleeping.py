@@ -1,5 +1,5 @@
-"""Sleeping: contacts of bodies at rest leave the sweeps and return where something disturbs them, while the residual over all
-contacts stays below the tolerance. Two heaps of disks stand side by side, a wall between them; a disk falls on the left one."""
+"""Sleeping: bodies at rest stand still and leave the contact problem until something disturbs them. Two heaps of disks stand side by side,
+a wall between them; a disk falls on the left one. Spheres roll down a bed of many others, and wake those near them alone."""
 import re
 import unittest
 
@@ -70,23 +70,20 @@ class Sleeping(RunTestCase):
         self.assertEqual(speed[-1].max(), 0.0)
         # the right heap knows nothing of it
         self.assertEqual(speed[before:, right].max(), 0.0)
-        # in solves that wake all contacts, grains at rest may take up what the tolerance leaves: less than 0.01 g h in a step, so 0.01 g h^2
-        # of way (measured: 0.0058)
-        woken = history["woken"][IMPACT - 20:].sum()
-        self.assertLess(np.ptp(record.position[before:, right], axis=0).max(), woken * 0.01 * 9.81 * 1e-3**2)
-        # measured: 5e-5 of a radius
+        self.assertEqual(np.ptp(record.position[before:, right], axis=0).max(), 0.0)
+        # measured: 7e-4 of a radius, between friction and walls that leave more than one place to rest
         plain = Record(self.plain, self.grains, 2)
-        self.assertLess(np.abs(record.position[-1] - plain.position[-1]).max(), 1e-3 * RADIUS)
+        self.assertLess(np.abs(record.position[-1] - plain.position[-1]).max(), 2e-3 * RADIUS)
 
     def test_work(self):
-        """Sleep saves relaxations of contacts: from the step on in which both heaps rest all but an eighth (measured: 3616 of 33 919), in all,
-        the fall of the heaps included, what the log tells; and the log says how many contacts slept."""
+        """Sleep saves relaxations of contacts: from the step on in which both heaps rest all but an eighth (measured: 3584 of 33 087), in all,
+        the fall of the heaps included, what the log tells; and the log says how many contacts were left out."""
         relaxed = [int(re.search(r"sweeps, (\d+) contact relaxations", run.stdout).group(1)) for run in (self.plain, self.sleeping)]
         self.assertLess(relaxed[1], relaxed[0])
         plain, sleeping = self.plain.history(), self.sleeping.history()
         self.assertLess(8 * (sleeping["iterations"] * (sleeping["contacts"] - sleeping["sleeping"]))[REST:].sum(),
                         (plain["iterations"] * plain["contacts"])[REST:].sum())
-        slept = int(re.search(r"sleeping +(\d+) contacts slept", self.sleeping.stdout).group(1))
+        slept = int(re.search(r"sleeping +(\d+) contacts of bodies asleep were left out", self.sleeping.stdout).group(1))
         self.assertEqual(slept, self.sleeping.history()["sleeping"].sum())
         self.assertEqual(sum(self.plain.history()["sleeping"]) + sum(self.plain.history()["woken"]), 0, "nobody sleeps unless asked to")
 
@@ -104,9 +101,9 @@ class Sleeping(RunTestCase):
             self.assertEqual(self.sleeping.history()[column].tolist(), run.history()[column].tolist(), column)
 
     def test_velocity_error(self):
-        """Solves that end by the velocity error let contacts sleep as well. A residual that meets its tolerance before the error is known wakes
-        nothing: of the 170 solves after the impact a few do, until the heap rests again (measured: 8). Of the relaxations after the first fall
-        sleep saves all but a fifth (measured: 2512 of 41 460)."""
+        """Solves that end by the velocity error let bodies sleep as well. Of the 170 steps after the impact a few are solved anew because
+        bodies wake, until the heap rests again (measured: 3). Of the relaxations after the first fall sleep saves all but a fifth (measured:
+        2528 of 45 527)."""
         case = merged(self.case, {"solver": {"criterion": "velocity_error", "tolerance": None}, "output": {"checkpoint_every": 0}})
         plain, sleeping = each(lambda name, more: run_case(merged(case, more), 1, f"{self.scratch}/error {name}"),
                                [("plain", {}), ("sleeping", SLEEPING)])
@@ -143,12 +140,44 @@ class Sleeping(RunTestCase):
         self.assertGreater(asleep[-1], 0)
         self.assertEqual(runs[1].history()["sleeping"][202:].tolist(), [0] * 8)
 
+    def test_all_methods(self):
+        """The enriched methods and Newton's have sleepers as well."""
+        short = merged(self.case, SLEEPING, {"time": {"steps": IMPACT + 30}, "output": {"checkpoint_every": 0, "every": 0}})
+        runs = each(lambda name, more: run_case(merged(short, more), 1, f"{self.scratch}/{name}"),
+                    [(method, {"solver": {"method": method}}) for method in ("nscdd_ep", "schwarz_ec", "newton")])
+        for run in runs:
+            self.assert_status(run, 0)
+            history = run.history()
+            asleep = history["sleeping"] / history["contacts"]
+            self.assertGreater(asleep[IMPACT - 20], 0.95)
+            self.assertLess(asleep[IMPACT:].min(), 0.9)
+            self.assertLessEqual(history["residual"].max(), TOLERANCE)
+
+    def test_what_is_shown(self):
+        """Diagnostics and files have all contacts, those that are left out too: the floor bears the weight of what sleeps, and a state has as
+        many contacts as without sleep. What is shown changes no bit of the motion."""
+        weight = 9.81 * sum(grain.mass for grain in self.grains[:2 * HEAP])
+        steps = {"time": {"steps": IMPACT + 10}}
+        shown = merged(self.case, SLEEPING, steps, {"output": {"every": 3, "boundary_forces": True, "stress": True, "checkpoint_every": 0}})
+        hidden = merged(self.case, SLEEPING, steps, {"output": {"every": 0, "checkpoint_every": 0}})
+        runs = each(lambda name, case: run_case(case, 2, f"{self.scratch}/{name}"), [("shown", shown), ("hidden", hidden)])
+        for run in runs:
+            self.assert_status(run, 0)
+        history, results = runs[0].history(), runs[0].results()
+        last = IMPACT - 10
+        self.assertGreater(history["sleeping"][last - 1], 0.95 * history["contacts"][last - 1])
+        self.assertLess(abs(history["force_y:boundary 1"][last - 1] + weight), 0.01 * weight)
+        forces = results[f"/steps/{last}/boundaries/force"]
+        self.assertLess(abs(forces[0, 1] + weight), 0.01 * weight)
+        self.assertEqual(len(results[f"/steps/{last}/contacts/gap"]), history["contacts"][last - 1])
+        final = f"/steps/{IMPACT + 10}/bodies/"
+        for name in ("position", "velocity", "rest"):
+            self.assertEqual(results[final + name].tolist(), runs[1].results()[final + name].tolist(), name)
+        self.assertEqual(history["iterations"].tolist(), runs[1].history()["iterations"].tolist())
+
     def test_refusals(self):
         """One line, status 2."""
-        for more, expected in [({"method": "newton"}, "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"),
-                               ({"method": "nscdd_ep"}, "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"),
-                               ({"method": "schwarz_ec"}, "sleeping serves 'nlgs', 'schwarz' and 'nscdd'"),
-                               ({"warm_start": False}, "contacts that sleep keep their impulses"),
+        for more, expected in [({"warm_start": False}, "bodies that sleep keep their impulses"),
                                ({"sleep_after": 0}, "sleep_after = 0: expected an integer >= 1"),
                                ({"sleep_speed": 0.0}, "sleep_speed = 0.0: expected a finite real number > 0")]:
             with self.subTest(more):
@@ -157,7 +186,7 @@ class Sleeping(RunTestCase):
                 self.assertEqual(len(run.stderr.splitlines()), 1, run)
                 self.assertIn(expected, run.stderr)
         checked = run_case(merged(self.case, SLEEPING), 1, self.here("checked"), options=["--check"])
-        self.assertIn("contacts of bodies at rest for 20 steps leave the sweeps", checked.stdout)
+        self.assertIn("bodies at rest for 20 steps stand still and leave the contact problem", checked.stdout)
 
 
 if __name__ == "__main__":
