@@ -64,8 +64,9 @@ function(gravier_test name)
       gravier_compile_options(${target})
     else()
       gravier_compile_options(${target} OPTIMISE 0)
-      # without optimisation the compiler warns falsely of descriptors that an allocation sets; the debug build warns of those that are never set
-      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Wno-maybe-uninitialized>)
+      # without optimisation the compiler warns falsely of descriptors that an allocation sets; checks of the debug build find those that are never
+      # set when they are used
+      target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Sanitize>>:-Wno-maybe-uninitialized>)
     endif()
     if(GRAVIER_LINKER_GOLD)
       target_link_options(${target} PRIVATE $<$<NOT:$<CONFIG:Sanitize>>:-fuse-ld=gold>)
