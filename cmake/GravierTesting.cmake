@@ -25,7 +25,8 @@ set(gravier_test_environment
   # MPI says on stderr where a chroot has no /sys; tests count the lines there
   HWLOC_HIDE_ERRORS=2
   OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-  MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support
+  # what Python compiles is kept here, for the next start of the same script, and nothing in the sources
+  MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX=${PROJECT_BINARY_DIR}/tests/pycache PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support
   ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1
   GRAVIER_PYTHON=${GRAVIER_PYTHON} GRAVIER_BIN_DIR=${PROJECT_BINARY_DIR}/bin GRAVIER_SOURCE_DIR=${PROJECT_SOURCE_DIR}
   MPIEXEC=${MPIEXEC_EXECUTABLE})

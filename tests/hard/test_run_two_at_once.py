@@ -72,6 +72,8 @@ class TwoAtOnce(RunTestCase):
         """Begun anew or as a restart, on one and on two ranks, and under another spelling of the directory."""
         run = self.going("second")
         results = os.path.join(run.directory, "results")
+        # it keeps its locks while it is stopped, and takes no processor from those that wait for them
+        run.send(signal.SIGSTOP)
         before = files(results)
         for ranks, directory, options in ((1, "results", []), (2, "./results/../results", []), (1, "results", ["--restart"])):
             write(os.path.join(run.directory, "other.nml"), namelist(merged(CASE, {"output": {"directory": directory}})))
@@ -82,6 +84,7 @@ class TwoAtOnce(RunTestCase):
                 self.assertEqual(after[name][0], inode, name)
                 self.assertTrue(after[name][1].startswith(content), name)
             self.assertEqual(set(before), set(after))
+        run.send(signal.SIGCONT)
         run.send(signal.SIGTERM)
         status, said = run.end()
         self.assertEqual(status, 4, said)
