@@ -209,8 +209,10 @@ contains
     if (self%physics%laws%yields) call measure_springs(self)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
-    if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
-      & *self%decomposition%n_subdomains/real(figures%contacts, dp)
+    if (figures%contacts > 0) then
+      self%imbalance = real(figures%interface_statistics%most_contacts, dp)*self%decomposition%n_subdomains &
+        & /real(figures%contacts, dp)
+    end if
     if (figures%divided) then
       self%reached_imbalance = self%imbalance
       call self%method%measure_balance(self%comm, self%decomposition%n_subdomains, figures%rank_balance, figures%subdomain_balance)
