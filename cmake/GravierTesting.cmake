@@ -25,7 +25,8 @@ set(gravier_test_environment
   # MPI says on stderr where a chroot has no /sys; tests count the lines there
   HWLOC_HIDE_ERRORS=2
   OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-  MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support
+  # what Python compiles is kept here, for the next start of the same script, and nothing in the sources
+  MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX=${PROJECT_BINARY_DIR}/tests/pycache PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support
   ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1
   GRAVIER_PYTHON=${GRAVIER_PYTHON} GRAVIER_BIN_DIR=${PROJECT_BINARY_DIR}/bin GRAVIER_SOURCE_DIR=${PROJECT_SOURCE_DIR}
   MPIEXEC=${MPIEXEC_EXECUTABLE})
@@ -36,15 +37,17 @@ add_custom_target(debug_tests)
 include(CheckLinkerFlag)
 check_linker_flag(Fortran -fuse-ld=gold GRAVIER_LINKER_GOLD)
 
-# gravier_test(NAME SOURCES ... [OPTIMISED] [RANKS 1 2 4] [DEBUG_RANKS 1 2] [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds] [EXPECT text])
+# gravier_test(NAME SOURCES ... [OPTIMISED] [RANKS 1 2 4] [DEBUG_RANKS 1 2] [RELEASE_RANKS 1 2] [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds]
+#              [EXPECT text])
 # One test for each number of ranks, NAME or NAME_npN when on several, each in a directory of its own. One rank runs without the launcher,
-# in half the time. Numbers of ranks that are not among DEBUG_RANKS have the label long in place of debug in a debug build.
+# in half the time. Numbers of ranks that are not among DEBUG_RANKS have the label long in place of debug in a debug build, and those that are not
+# among RELEASE_RANKS have it in place of quick in a release build.
 # LIBRARIES defaults to the application (the top layer while there is none). With EXPECT the program must fail
 # and print the text. Called again with the same NAME and SOURCES it adds tests of the same program. A program is compiled without
 # optimisation: it runs for moments, and to optimise it would take five times as long as to compile it. OPTIMISED is for one that computes
 # much, or compares with formulas that have to round as the library does.
 function(gravier_test name)
-  cmake_parse_arguments(TEST "OPTIMISED" "TIMEOUT;EXPECT" "SOURCES;RANKS;DEBUG_RANKS;LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(TEST "OPTIMISED" "TIMEOUT;EXPECT" "SOURCES;RANKS;DEBUG_RANKS;RELEASE_RANKS;LIBRARIES;LABELS" ${ARGN})
   if(NOT TEST_LIBRARIES)
     set(TEST_LIBRARIES $<IF:$<TARGET_EXISTS:gravier_app>,gravier_app,gravier_step>)
   endif()
@@ -64,8 +67,9 @@ function(gravier_test name)
       gravier_compile_options(${target})
     else()
       gravier_compile_options(${target} OPTIMISE 0)
-      # without optimisation the compiler warns falsely of descriptors that an allocation sets; the debug build warns of those that are never set
-      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Wno-maybe-uninitialized>)
+      # without optimisation the compiler warns falsely of descriptors that an allocation sets; checks of the debug build find those that are never
+      # set when they are used
+      target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Sanitize>>:-Wno-maybe-uninitialized>)
     endif()
     if(GRAVIER_LINKER_GOLD)
       target_link_options(${target} PRIVATE $<$<NOT:$<CONFIG:Sanitize>>:-fuse-ld=gold>)
@@ -92,6 +96,10 @@ function(gravier_test name)
     set(labels ${TEST_LABELS})
     if(CMAKE_BUILD_TYPE STREQUAL Debug AND TEST_DEBUG_RANKS AND NOT ranks IN_LIST TEST_DEBUG_RANKS)
       list(TRANSFORM labels REPLACE "^debug$" long)
+    endif()
+    if(CMAKE_BUILD_TYPE STREQUAL Release AND TEST_RELEASE_RANKS AND NOT ranks IN_LIST TEST_RELEASE_RANKS)
+      list(REMOVE_ITEM labels quick)
+      list(APPEND labels long)
     endif()
     gravier_add_test(${test} ${TEST_TIMEOUT} ${ranks} "${labels}" "${command}")
     if(ranks EQUAL 1)

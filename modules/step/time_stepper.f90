@@ -83,7 +83,7 @@ module gravier_time_stepper
     !> where it is known
     class(exact_solution_t), allocatable :: exact
     ! ---- the present step
-    !> what is solved; once the step is over, where it is shown, the problem of all contacts
+    !> what is solved; where it is shown, after the step, of all contacts
     type(contact_problem_t) :: problem
     !> what sleeps, and is left out of the problem that is solved; whether the problem has all contacts
     type(resting_t) :: resting
@@ -93,8 +93,7 @@ module gravier_time_stepper
     !> impulse of the contacts of the last step on each boundary (nd, boundaries) [N s]
     real(dp), allocatable :: boundary_impulses(:, :)
     integer :: step = 0
-    !> [s]
-    real(dp) :: time = 0.0_dp
+    real(dp) :: time = 0.0_dp ! [s]
     !> grains of the scene now, and those of them that are glued to boundaries
     integer(i8) :: n_grains = 0, n_glued = 0
     !> mass of the free grains of the scene now, and of those that have left [kg]
@@ -271,8 +270,10 @@ contains
     if (self%physics%laws%yields) call measure_springs(self)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
-    if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
-      & *self%decomposition%n_subdomains/real(figures%contacts, dp)
+    if (figures%contacts > 0) then
+      self%imbalance = real(figures%interface_statistics%most_contacts, dp)*self%decomposition%n_subdomains &
+        & /real(figures%contacts, dp)
+    end if
     call measure_velocity_scale(self)
   end subroutine set_up
 
@@ -363,7 +364,7 @@ contains
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
   end subroutine take_solution
 
-  !> What diagnostics see of a step: it lives as long as the stepper that is shown.
+  !> What diagnostics see of a step: it lives as long as the stepper.
   type(solved_step_t) function solved_step_of(self, figures) result(solved)
     class(time_stepper_t), target, intent(in) :: self
     type(step_figures_t), intent(in) :: figures

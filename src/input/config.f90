@@ -313,8 +313,10 @@ contains
       if (.not. is_given(report, "enriched", "contacts")) config%enriched%contacts = "active"
     end if
     if (.not. is_given(report, "solver", "acceleration")) then
-      if (features%accelerated_by_default == default_always .or. (features%accelerated_by_default == default_on_active .and. &
-          config%enriched%contacts == "active")) config%solver%acceleration = "momentum"
+      if (features%accelerated_by_default == default_always .or. &
+          (features%accelerated_by_default == default_on_active .and. config%enriched%contacts == "active")) then
+        config%solver%acceleration = "momentum"
+      end if
     end if
     if (.not. config%solver%tolerance_given .and. config%solver%criterion == "velocity_error") config%solver%tolerance = 1.0e-2_dp
     if (.not. config%solver%sleep_speed_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)

@@ -21,8 +21,10 @@ contains
     character(len=text_length), allocatable :: names(:)
     integer :: i
 
-    if (config%scene%bodies == "none" .and. size(config%insertions) == 0) call raise(error, status_input, report%file// &
-      ": group &insertion is missing: expected &insertion ... /, required by bodies = 'none'")
+    if (config%scene%bodies == "none" .and. size(config%insertions) == 0) then
+      call raise(error, status_input, report%file// &
+        & ": group &insertion is missing: expected &insertion ... /, required by bodies = 'none'")
+    end if
     call expect(report, config%scene%bodies /= "none" .or. config%decomposition%partition == "grid" .or. &
                 config%decomposition%subdomains == 1, "decomposition", "partition", error, &
                 "'grid' where bodies = 'none': METIS finds no grains to distribute")

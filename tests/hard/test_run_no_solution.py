@@ -66,7 +66,9 @@ class NoSolution(RunTestCase):
     def test_residual(self):
         """A residual is relative to the impulses: it falls where they grow without bound, and does not see light bodies beside heavy
         ones. It must not end a solve there."""
-        jobs = [(*job, RESIDUAL, "residual") for job in taking_turns()]
+        # NSCDD in every fourth scene and on two ranks, the others on one: the criterion is the same in all methods
+        jobs = [(name, method, ranks if LONG or method == "nscdd" else 1, RESIDUAL, "residual") for name, method, ranks in taking_turns()
+                if LONG or method != "nscdd" or ranks == 2]
         for (name, method, ranks, *_), run in zip(jobs, each(self.play, jobs)):
             with self.subTest(name, method=method, ranks=ranks):
                 self.assert_refused(run, name, LIMIT + 1)

@@ -35,6 +35,9 @@ ENVIRONMENT = {
     "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
 }
+#: of programs without a launcher, as in gravier_runs: Open MPI starts no daemon for them
+ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1", "OMPI_MCA_coll": "basic,libnbc,self",
+         "OMPI_MCA_mpi_yield_when_idle": "0"}
 
 
 class Block:
@@ -96,9 +99,9 @@ def anchors(page):
     return found
 
 
-def run(command, directory, path=None):
+def run(command, directory, path=None, more=None):
     """Status and output of a command; a command that is not over in time is ended, with all that it started."""
-    environment = {**ENVIRONMENT, **os.environ, "LC_ALL": "C.UTF-8",
+    environment = {**ENVIRONMENT, **os.environ, **(more or {}), "LC_ALL": "C.UTF-8",
                    "PYTHONPATH": f"{SOURCE / 'drivers/python'}:{os.environ.get('PYTHONPATH', '')}"}
     if path:
         environment["PATH"] = f"{path}:{environment['PATH']}"
@@ -311,12 +314,16 @@ class Blocks(unittest.TestCase):
         self.work, self.bin = self.directory / "work", self.directory / "bin"
         self.work.mkdir()
         self.bin.mkdir()
+        # programs run without a launcher but where a block has one, which starts its ranks in the environment of the tests
+        self.more = {**ALONE, "OMPI_MCA_orte_tmpdir_base": str(self.directory), "MPIEXEC": str(self.bin / "mpirun")}
+        launched = "env " + " ".join(f'-u {name}' for name in self.more if name not in os.environ)
+        launched += "".join(f" {name}='{os.environ[name]}'" for name in self.more if name in os.environ)
         for name in ("data", "drivers"):
             (self.work / name).symlink_to(SOURCE / name)
         # `python3` is the one that has h5py
-        for name, program in (("mpirun", MPIEXEC), ("python3", sys.executable)):
+        for name, program in (("mpirun", f'{launched} "{MPIEXEC}"'), ("python3", f'"{sys.executable}"')):
             launcher = self.bin / name
-            launcher.write_text(f'#!/bin/sh\nexec "{program}" "$@"\n', encoding="utf-8")
+            launcher.write_text(f'#!/bin/sh\nexec {program} "$@"\n', encoding="utf-8")
             launcher.chmod(0o755)
 
     def run_page(self, page):
@@ -333,7 +340,7 @@ class Blocks(unittest.TestCase):
             else:
                 continue
             count += 1
-            status, output = run(command, self.work, path=f"{self.bin}:{PROGRAMS}")
+            status, output = run(command, self.work, path=f"{self.bin}:{PROGRAMS}", more=self.more)
             if status != 0:
                 how = "did not end" if status is None else f"status {status}"
                 self.fail(f"{block.place}: {how}:\n{block.text}\n{output[-3000:]}")

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, PATIENCE, PROGRAMS, SOURCE, RunTestCase, merged, namelist, write
+from gravier_runs import PATIENCE, PROGRAMS, SOURCE, RunTestCase, alone_environment, merged, namelist, write
 
 CASE = {
     "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [4, 3], "radius_min": 0.01, "radius_max": 0.01},
@@ -88,8 +88,9 @@ class Messages(RunTestCase):
 
     def run_program(self, *arguments, program="gravier", status=2, directory=None):
         """What a program says on its standard error; it ends with the status."""
-        done = subprocess.run([os.path.join(PROGRAMS, program), *arguments], cwd=directory or self.scratch, capture_output=True, text=True,
-                              env={**ENVIRONMENT, **os.environ}, timeout=PATIENCE, check=False)
+        with alone_environment() as environment:
+            done = subprocess.run([os.path.join(PROGRAMS, program), *arguments], cwd=directory or self.scratch, capture_output=True, text=True,
+                                  env=environment, timeout=PATIENCE, check=False)
         with self.subTest(program, arguments=arguments):
             self.assertEqual(done.returncode, status, f"{done.stdout[-500:]}{done.stderr}")
         type(self).said += done.stderr

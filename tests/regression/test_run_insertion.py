@@ -39,9 +39,13 @@ def changed(**keys):
 def states(run):
     """Bodies by step: (identifiers, fields)."""
     found = run.results()
+    fields = {}
+    for name, value in found.items():
+        parts = name.split("/", 4)
+        if parts[1] == "steps" and parts[3:4] == ["bodies"] and len(parts) == 5 and "@" not in name:
+            fields.setdefault(int(parts[2]), {})[parts[4]] = value
     for step in steps_of(found):
-        place = f"/steps/{step}/bodies/"
-        yield step, found[place + "id"], {name[len(place):]: value for name, value in found.items() if name.startswith(place) and "@" not in name}
+        yield step, fields[step]["id"], fields[step]
 
 
 def middles(fields):

@@ -43,7 +43,7 @@ class Rebound(SmallScene):
     def test_apex(self):
         """The n-th apex is e^(2n) h0 but for an error of order 1: the impact is found up to a step late. Where in the step it
         falls is a matter of chance, so that the error of one ball jumps with h; balls of many heights show the order."""
-        restitution, rates = 0.7, np.array([128, 256, 512])
+        restitution, rates = 0.7, np.array([64, 128, 256])
         heights, rms = self.heights(rates[0]), []
         for rate in rates:
             record = self.drops(rate, restitution, 1.75, heights)
@@ -66,7 +66,7 @@ class Rebound(SmallScene):
     def test_rest(self):
         """At rest after t0 (1 + e) / (1 - e), t0 = sqrt(2 h0 / g), and for good. An impact found the share d of a step late
         shifts the end by h (1 - d (1 + e) / e): by at most h / e for e <= 1/2."""
-        restitution, rates = 0.5, np.array([128, 256, 512])
+        restitution, rates = 0.5, np.array([64, 128, 256])
         heights, errors = self.heights(rates[0]), []
         for rate in rates:
             record = self.drops(rate, restitution, 2.0, heights)

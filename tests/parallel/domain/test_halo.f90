@@ -225,7 +225,9 @@ contains
     type(near_pair_t), allocatable :: pairs(:)
     type(near_pair_t) :: pair
     !> times that a pair was found, 27 owner + code of its shift
-    integer(i8), allocatable :: times(:, :), owner(:, :), expected(:, :), right(:, :)
+    integer(i8), allocatable, target :: times(:, :), owner(:, :)
+    integer(i8), allocatable :: expected(:, :), right(:, :)
+    integer(i8), pointer, contiguous :: counted(:)
     real(dp) :: place(cloud%nd)
     integer :: s, p, code, shift(3)
 
@@ -247,10 +249,10 @@ contains
         end do
       end associate
     end do
-    do p = 1, n_grains
-      call comm%sum_counts(times(:, p))
-      call comm%sum_counts(owner(:, p))
-    end do
+    counted(1:n_grains**2) => times
+    call comm%sum_counts(counted)
+    counted(1:n_grains**2) => owner
+    call comm%sum_counts(counted)
     call cloud%near_pairs(range, pairs)
     do p = 1, size(pairs)
       call cloud%find_antagonist(pairs(p), place)

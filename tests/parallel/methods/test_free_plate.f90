@@ -349,8 +349,9 @@ program test_free_plate
   do dimension = 2, 3
     call test_matrix(dimension, 0.0_dp)
     call test_matrix(dimension, 0.2_dp)
-    call test_methods(dimension, 0.0_dp)
-    call test_methods(dimension, 0.2_dp)
+    ! what is sent depends on the number of components of a velocity: two ranks send the fewest and the most, four ranks the most
+    if (comm%size == 1 .or. (comm%size == 2 .and. dimension == 2)) call test_methods(dimension, 0.0_dp)
+    if (comm%size == 1 .or. dimension == 3) call test_methods(dimension, 0.2_dp)
   end do
   call finish_checks()
   call alone%free()

@@ -103,7 +103,7 @@ contains
     integer, intent(in) :: nd
     real(dp), parameter :: a = 0.5_dp, b = 10.0_dp
     type(radius_distribution_t) :: distribution
-    real(dp) :: r, below, volume
+    real(dp) :: r, below(3), volume
     integer :: k, part
 
     distribution = between("uniform_volume", nd, a, b)
@@ -118,15 +118,17 @@ contains
     call check_close(distribution%quantile(1.0_dp), b, 1e-12_dp, "uniform_volume: upper bound")
     call check_sample(distribution, "uniform_volume")
     ! shares of volume by quantiles at the middles of equal shares by number: second-order quadrature over u
-    do part = 1, 3
-      below = 0.0_dp
-      volume = 0.0_dp
-      do k = 1, 100*n
-        r = distribution%quantile((k - 0.5_dp)/(100*n))
-        volume = volume + r**nd
-        if (r < a + part*(b - a)/4) below = below + r**nd
+    below(:) = 0.0_dp
+    volume = 0.0_dp
+    do k = 1, 100*n
+      r = distribution%quantile((k - 0.5_dp)/(100*n))
+      volume = volume + r**nd
+      do part = 1, 3
+        if (r < a + part*(b - a)/4) below(part) = below(part) + r**nd
       end do
-      call check_close(below/volume, part/4.0_dp, 1e-4_dp, "uniform_volume: volume below a radius")
+    end do
+    do part = 1, 3
+      call check_close(below(part)/volume, part/4.0_dp, 1e-4_dp, "uniform_volume: volume below a radius")
     end do
   end subroutine test_uniform_volume
 
