@@ -13,6 +13,9 @@ program test_step_parts
   use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: count_rest
+  use gravier_waking, only: resting_t, watch_awake, wake_all
+  use gravier_whole_problem, only: build_whole
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -810,8 +813,16 @@ contains
   subroutine check_chain_asleep()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
+    type(resting_t) :: resting
+    type(contact_problem_t) :: whole
 
     call make_chain(sim)
+    call watch_awake(sim%decomposition, sim%halo, resting)
+    call check_equal(resting%bodies, 3_i8, "bodies that sleep")
+    call check_equal(resting%contacts, 3_i8, "and contacts that are left out")
+    call build_whole(sim%decomposition, sim%halo, sim%physics, sim%problem, whole)
+    call check_equal(whole%n_contacts, 3_i8, "another problem has them")
+    call check_equal(sim%problem%n_contacts, 0_i8, "beside the one that was solved")
     call check_close(sim%boundary_impulses(2, 1), 0.0_dp, 0.0_dp, "the plane feels what is solved alone")
     call sim%make_whole()
     call check_equal(sim%problem%n_contacts, 3_i8, "the whole problem has all contacts")
@@ -823,6 +834,11 @@ contains
     call check_equal(figures%asleep, 2_i8, "the two others sleep on")
     call check_equal(sim%problem%n_contacts, 1_i8, "the problem is that of the upper contact")
     call check_close(grain(sim, 3, 2), 0.0_dp, solved, "beside a sleeper that cannot move")
+    call wake_all(sim%decomposition)
+    call check_equal(counted(sim, 1), 0, "all are woken")
+    call sim%halo%refresh(sim%decomposition)
+    call watch_awake(sim%decomposition, sim%halo, resting)
+    call check_equal(resting%bodies, 0_i8, "and none sleeps")
     call sim%free()
   end subroutine check_chain_asleep
 
