@@ -815,6 +815,7 @@ contains
     type(step_figures_t) :: figures
     type(resting_t) :: resting
     type(contact_problem_t) :: whole
+    integer :: s
 
     call make_chain(sim)
     call watch_awake(sim%decomposition, sim%halo, resting)
@@ -822,6 +823,9 @@ contains
     call check_equal(resting%contacts, 3_i8, "and contacts that are left out")
     call build_whole(sim%decomposition, sim%halo, sim%physics, sim%problem, whole)
     call check_equal(whole%n_contacts, 3_i8, "another problem has them")
+    do s = 1, size(whole%sub)
+      call check(all(whole%sub(s)%boundary > 0), "in which no grain counts as one that cannot move")
+    end do
     call check_equal(sim%problem%n_contacts, 0_i8, "beside the one that was solved")
     call check_close(sim%boundary_impulses(2, 1), 0.0_dp, 0.0_dp, "the plane feels what is solved alone")
     call sim%make_whole()
@@ -855,6 +859,12 @@ contains
     call check_equal(sim%problem%n_contacts, 3_i8, "in the problem of all contacts")
     call check_close(sim%boundary_impulses(2, 1), -3*g*h - 1.0_dp, solved, "whose impulses carry its momentum through")
     call check_equal(counted(sim, 1), 0, "what is woken counts anew")
+    call sim%free()
+    call make_chain(sim)
+    call push(sim, 3, 1.0_dp)
+    call advance(sim, figures)
+    call check_equal(figures%tries, 2, "a load that goes away is noticed")
+    call check_close(sim%boundary_impulses(2, 1), -2*g*h, solved, "and the plane bears the two that stay")
     call sim%free()
   end subroutine check_chain_disturbed
 
