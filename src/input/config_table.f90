@@ -246,8 +246,8 @@ module gravier_config_table
            "bodies at rest stand still and leave the contact problem until something disturbs them"), &
      key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a body sleeps"), &
      key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
-           "largest mass times velocity of a body at rest, relative to the root mean square of the impulses; and at most a "// &
-           "tenth of the impulses on it", &
+           "twice the largest mass times velocity of a body at rest, relative to the root mean square of the impulses; "// &
+           "it is at most a tenth of the impulses on it, too", &
            note="100 times `tolerance`"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
            "after a solve that gave up: go on; write the step and stop; stop without it. "// &

@@ -65,7 +65,7 @@ contains
       & to_text(counts(3))//" factorisations"//newline
     if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
       & " contacts of bodies asleep were left out, summed over all steps; "// &
-      & counted(simulation%woken, "solve")//" were made anew with more bodies awake"//newline
+      & counted(simulation%woken, "further solve")//" because bodies woke"//newline
     if (simulation%method%direction_text /= "") text = text//"direction   "//simulation%method%direction_text//"; "// &
       & counted(work%lowered, "reduction")//" of l"//newline
     if (work%restarted + work%suspended > 0) text = text//"nesterov    "// &

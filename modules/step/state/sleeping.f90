@@ -22,7 +22,7 @@ module gravier_sleeping
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_halo, only: halo_t
   use gravier_velocity_return, only: find_senders
   implicit none
   private
@@ -46,7 +46,7 @@ module gravier_sleeping
   type :: sleeping_rule_t
     !> steps at rest after which a body sleeps; 0: none does
     integer :: after = 0
-    !> momentum of a body at rest over the root mean square of the impulses
+    !> twice the largest momentum of a body at rest over the root mean square of the impulses
     real(dp) :: speed = 0.0_dp
   end type sleeping_rule_t
 

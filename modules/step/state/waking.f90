@@ -25,6 +25,11 @@ module gravier_waking
     logical, allocatable :: of(:)
   end type marks_t
 
+  !> How much the impulses on each body have changed [N s].
+  type :: change_t
+    real(dp), allocatable :: of(:)
+  end type change_t
+
 contains
 
   !> Find the pairs to look at, in views that are up to date. What sleeps near boundaries that move wakes. Collective.
@@ -156,9 +161,6 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer(i8), allocatable, intent(out) :: records(:, :)
     integer, allocatable, intent(out) :: destination(:)
-    type :: change_t
-      real(dp), allocatable :: of(:)
-    end type change_t
     type(change_t) :: change(size(halo%view))
     real(dp) :: p(problem%kernels%nd)
     integer :: s, k, w, c, n, round
@@ -218,9 +220,6 @@ contains
     !> (owner, grain, change), by the subdomain that sends them
     integer(i8), intent(in), contiguous :: received(:, :)
     logical, intent(out) :: woken
-    type :: change_t
-      real(dp), allocatable :: of(:)
-    end type change_t
     type(change_t) :: change(size(decomposition%owned))
     integer :: s, k, h, place
 
