@@ -181,7 +181,7 @@ contains
 
     call method%start(problem, error)
     method%work%solves = method%work%solves - 1
-    call velocity%begin_anew(iteration, self%layered)
+    call velocity%begin_anew(iteration)
     self%anew = .true.
   end subroutine begin_anew
 

@@ -10,8 +10,8 @@
 !>   layer   `thickness` diameters of way; the first is the farthest. A contact belongs to the layer of its farther body.
 !>   halo    the bodies of the next `halo` diameters below a layer move with it; their impulses are thrown away afterwards.
 !>
-!> What lies below does not hold a layer that still moves when it is done. All further layers would then be loaded with its error,
-!> and sweeps over the whole scene would take longer to mend it than to carry the load without a pass. The pass is given up.
+!> A layer whose sweeps converge slowly does not stand still when it is done. All further layers would then be loaded with its
+!> error, and sweeps over the whole scene would take longer to mend it than to carry the load without a pass. The pass is given up.
 !>
 !> Subdomains go through the layers together; a layer is solved by iterations of NSCDD. Results do not depend on ranks. See
 !> doc/theory.md, section 25.
@@ -33,11 +33,12 @@ module gravier_layered_start
   !> of a layer and of the halo below it, in mean diameters
   real(dp), parameter :: thickness = 6.0_dp, halo = 3.0_dp
   !> relative change of the impulses of a layer by a sweep at which the layer is done; layers above whose number it falls with the
-  !> cube, because each hands its error on; sweeps of a layer at least and at most
+  !> cube, because each hands its error on; sweeps of a layer at least
   real(dp), parameter :: change_allowed = 9.0e-4_dp, few_layers = 12.0_dp
-  integer, parameter :: least_sweeps = 20, most_sweeps = 200
-  !> root mean square velocity of the bodies of a layer, over the velocity scale, at which the pass is given up
-  real(dp), parameter :: motion_allowed = 0.3_dp
+  integer, parameter :: least_sweeps = 20
+  !> sweeps of a layer after which the pass is given up: over the logarithm of the change that it ends at, or over the longest way
+  !> where that allows more
+  real(dp), parameter :: slow_fall = 10.0_dp, worth_of_way = 0.5_dp
 
   !> What one subdomain holds while the layers are gone through.
   type :: layers_t
@@ -85,7 +86,7 @@ contains
     logical, intent(out) :: carried
     type(layers_t) :: layers(size(problem%sub))
     real(dp) :: relaxed(1, size(problem%sub)), sums(1)
-    integer :: n_layers, l, s, inner
+    integer :: n_layers, l, s, inner, most_sweeps
     real(dp) :: change
 
     sweeps = 0.0_dp
@@ -96,18 +97,18 @@ contains
     call start_timer(phase_sweep)
     call start_velocities(problem, layers)
     change = change_allowed*min(1.0_dp, few_layers/n_layers)**3
+    most_sweeps = nint(max(-slow_fall*log(change), worth_of_way*thickness*n_layers))
     relaxed(:, :) = 0.0_dp
     do l = 0, n_layers - 1
       do s = 1, size(layers)
         call take_layer(problem, l, s, layers(s))
       end do
-      call solve_layer(problem, change, layers, inner)
+      call solve_layer(problem, change, most_sweeps, layers, inner, carried)
       do s = 1, size(layers)
         relaxed(1, s) = relaxed(1, s) + real(inner, dp)*size(layers(s)%taken)
       end do
-      call hand_on(problem, layers)
-      carried = motion_of(problem, l, layers) <= motion_allowed*problem%error_scale
       if (.not. carried) exit
+      call hand_on(problem, layers)
     end do
     call stop_timer(phase_sweep)
     work%relaxations = work%relaxations + nint(sum(relaxed), kind(work%relaxations))
@@ -359,13 +360,15 @@ contains
   end subroutine set_operators
 
   !> Accelerated sweeps over the contacts taken, and the exchange of NSCDD after each. Collective.
-  subroutine solve_layer(problem, change, layers, inner)
+  subroutine solve_layer(problem, change, most_sweeps, layers, inner, done)
     type(contact_problem_t), intent(inout) :: problem
     !> of the impulses by a sweep, relative, at which the layer is done
     real(dp), intent(in) :: change
+    integer, intent(in) :: most_sweeps
     type(layers_t), intent(inout) :: layers(:)
     !> sweeps made
     integer, intent(out) :: inner
+    logical, intent(out) :: done
     type(acceleration_t) :: acceleration
     real(dp) :: parts(2, size(layers)), sums(2), v
     integer :: s, i, d
@@ -393,7 +396,8 @@ contains
         end do
       end if
       call problem%comm%sum_parts(parts, sums)
-      if (inner >= least_sweeps .and. sums(1) <= change**2*sums(2)) return
+      done = inner >= least_sweeps .and. sums(1) <= change**2*sums(2)
+      if (done) return
       call acceleration%steer(sums(1))
     end do
     inner = most_sweeps
@@ -438,29 +442,5 @@ contains
       end associate
     end do
   end subroutine hand_on
-
-  !> Root mean square velocity of the bodies of layer `l`, on which no further layer acts [m/s]. Collective.
-  real(dp) function motion_of(problem, l, layers) result(motion)
-    type(contact_problem_t), intent(in) :: problem
-    integer, intent(in) :: l
-    type(layers_t), intent(in) :: layers(:)
-    !> m v^2 [J] and m [kg]; a body that subdomains share counts with a part in each of them
-    real(dp) :: parts(2, size(layers)), sums(2)
-    integer :: s, b
-
-    parts(:, :) = 0.0_dp
-    do s = 1, size(layers)
-      associate (this => layers(s), sub => problem%sub(s), nd => problem%kernels%nd)
-        do b = 1, sub%n_bodies
-          if (this%layer(b) /= l .or. .not. all(sub%inverse_mass(1:nd, b) > 0.0_dp)) cycle
-          parts(1, s) = parts(1, s) + sum(this%loaded(1:nd, b)**2)/(sub%inverse_mass(1, b)*sub%multiplicity(b))
-          parts(2, s) = parts(2, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
-        end do
-      end associate
-    end do
-    call problem%comm%sum_parts(parts, sums)
-    motion = 0.0_dp
-    if (sums(2) > 0.0_dp) motion = sqrt(sums(1)/sums(2))
-  end function motion_of
 
 end module gravier_layered_start

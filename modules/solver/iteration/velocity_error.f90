@@ -3,11 +3,10 @@
 !>
 !>   Y  projection of the error on what test impulses move (gravier_test_impulses).
 !>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
-!>   E  = sqrt((a Y)^2 + L^2), a = 2.4, because test impulses see but a part of long waves. After a pass over layers
-!>      (gravier_layered_start) long waves are gone, and a = 1.7.
+!>   E  = sqrt((a Y)^2 + L^2), a = 2.8, because test impulses see but a part of long waves.
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
-!>      at rest. The estimate is the smaller of E and C.
+!>      at rest. The estimate is the smaller of E and C, and C where that is below a tenth of the error allowed.
 !> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
 !> law by much, and no body sink by much onto what is below it. Where nearly all bodies are at rest and some are faster, these may
 !> roll or be in error: E has to be at most a third of what moves there. See doc/theory.md, section 24.
@@ -23,7 +22,7 @@ module gravier_velocity_error
   public :: velocity_error_t, copies_ready, violations_allowed
 
   !> weight of Y in the estimate
-  real(dp), parameter :: weight_of_projection = 2.4_dp, weight_after_layers = 1.7_dp
+  real(dp), parameter :: weight_of_projection = 2.8_dp
   !> fraction of the error allowed that bodies may move with where all could rest; factor of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
@@ -36,7 +35,7 @@ module gravier_velocity_error
   real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
   !> times the error allowed above which a body counts as moving among bodies that are nearly at rest; least share of the error
   !> allowed that is asked for then
-  real(dp), parameter :: speed_at_rest = 0.3_dp, least_share = 0.2_dp
+  real(dp), parameter :: speed_at_rest = 0.2_dp, least_share = 0.2_dp
   !> fraction of the velocity scale that the bodies of a scene nearly at rest have at most, however large the error allowed is
   real(dp), parameter :: slow = 0.3_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
@@ -55,8 +54,6 @@ module gravier_velocity_error
     real(dp) :: bound_by_rest = unknown, projection = unknown
     !> L and how fast bodies sink, by the last `add_levels`; 0 since `bound`
     type(levels_t) :: levels
-    !> weight of Y
-    real(dp), private :: weight = weight_of_projection
     !> largest |w| of a contact, by the last `assess`; 0 since `bound` [m/s]
     real(dp) :: largest_violation = 0.0_dp
     !> whether few heavy bodies have most of the mass
@@ -65,10 +62,11 @@ module gravier_velocity_error
     logical, private :: has_levels = .false., has_followed = .false.
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
-    !> whether nearly all bodies are at rest where contacts attract, and the wave along them cannot have crossed all bodies yet, so
-    !> that E may be too small; iterations made at the last `assess`
+    !> whether nearly all bodies are at rest where contacts attract or impulses came from a pass over layers, and the wave along them
+    !> cannot have crossed all bodies yet, so that E may be too small; iterations made at the last `assess`, and before the last
+    !> `begin_anew`
     logical, private :: is_early = .false.
-    integer, private :: iterations = 0
+    integer, private :: iterations = 0, begun_at = 0
     !> what finds Y
     type(test_impulses_t) :: tests
   contains
@@ -101,6 +99,7 @@ contains
     integer :: s, b, d
 
     self%allowed = allowed
+    self%begun_at = 0
     self%most_at_rest = min(nearly_at_rest*allowed, slow*problem%error_scale)
     call self%tests%start(problem)
     call self%levels%start(problem)
@@ -215,7 +214,7 @@ contains
     class(velocity_error_t), intent(in) :: self
     real(dp), intent(in) :: weight_of_levels
 
-    wave = hypot(self%weight*self%projection, weight_of_levels*self%levels%error)
+    wave = hypot(weight_of_projection*self%projection, weight_of_levels*self%levels%error)
   end function velocity_error_wave
 
   !> Whether C alone says that what moves is no more than what may where all could rest.
@@ -224,11 +223,11 @@ contains
     rests = self%bound_by_rest <= share_at_rest*self%allowed
   end function velocity_error_rests
 
-  !> The smaller of E and C, or C where E may be too small [m/s].
+  !> The smaller of E and C [m/s]; C where E may be too small, and where C alone ends a solve.
   pure real(dp) function velocity_error_estimate(self) result(estimate)
     class(velocity_error_t), intent(in) :: self
     estimate = self%bound_by_rest
-    if (.not. self%is_early) estimate = min(estimate, self%wave(1.0_dp))
+    if (.not. (self%is_early .or. self%rests())) estimate = min(estimate, self%wave(1.0_dp))
   end function velocity_error_estimate
 
   !> C, Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
@@ -261,11 +260,16 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     !> times the error allowed that no body may sink by
     real(dp) :: limit
+    !> iterations before which E is not believed: waves go down once after a pass, and down and up where bodies hold by traction
+    integer :: early
 
     call self%levels%add(problem, self%mass, self%largest_violation)
     self%has_levels = .true.
     self%has_followed = .false.
-    self%is_early = problem%attracts .and. self%bound_by_rest <= self%most_at_rest .and. self%iterations < self%levels%most_depth
+    early = 0
+    if (self%begun_at > 0) early = self%begun_at + self%levels%most_depth
+    if (problem%attracts) early = self%begun_at + 2*self%levels%most_depth
+    self%is_early = self%iterations < early .and. self%bound_by_rest <= slow*problem%error_scale
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then
@@ -294,15 +298,13 @@ contains
   end subroutine velocity_error_complete
 
   !> The iterations begin anew from other impulses.
-  subroutine velocity_error_begin_anew(self, iteration, layered)
+  subroutine velocity_error_begin_anew(self, iteration)
     class(velocity_error_t), intent(inout) :: self
     !> made so far
     integer, intent(in) :: iteration
-    !> those of a pass over layers
-    logical, intent(in) :: layered
 
     self%is_assessed = .false.
-    self%weight = merge(weight_after_layers, weight_of_projection, layered)
+    self%begun_at = iteration
     call self%tests%begin_anew(iteration)
   end subroutine velocity_error_begin_anew
 

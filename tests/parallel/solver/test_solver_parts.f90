@@ -214,30 +214,22 @@ contains
     call sim%free()
   end subroutine check_levels
 
-  !> A pass over layers brings a cold column near its impulses; it does nothing where the way is too short, and is given up after a
-  !> layer that moves by more than a part of the velocity scale.
+  !> A pass over layers brings a cold column near its impulses; it does nothing where the way is too short, and is given up in a
+  !> layer that converges slowly.
   subroutine check_layers()
     integer, parameter :: n = 40
     type(simulation_t) :: sim
     type(work_t) :: work
     real(dp) :: sweeps, of_one_layer, worst
     logical :: carried
-    integer :: s, c, l
+    integer :: s, b, c, l
 
     call make_column(n, 3, "&solver method = 'nscdd' /", sim)
     call carry_loads(sim%problem, 60.0_dp, work, sweeps, carried)
     call check_close(sweeps, 0.0_dp, 0.0_dp, "a way that is too short")
     call check(.not. (carried .or. sim%problem%any_impulse()), "leaves impulses as they are")
-    ! the bodies of a layer move by some thousandths of the velocity that the load gives in a step
-    sim%problem%error_scale = 1.0e-6_dp*norm2(sim%problem%load)
-    call carry_loads(sim%problem, 10.0_dp, work, of_one_layer, carried)
-    call check(of_one_layer > 0.0_dp .and. .not. carried, "a pass that is given up")
-    do s = 1, size(sim%problem%sub)
-      sim%problem%sub(s)%impulse(:, :, :) = 0.0_dp
-    end do
-    sim%problem%error_scale = norm2(sim%problem%load)
     call carry_loads(sim%problem, 10.0_dp, work, sweeps, carried)
-    call check(sweeps > 3.0_dp*of_one_layer .and. carried, "a pass")
+    call check(sweeps > 0.0_dp .and. carried, "a pass")
     worst = 0.0_dp
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
@@ -250,6 +242,18 @@ contains
     worst = comm%highest(worst)
     ! each of seven layers ends at changes of 9e-4 a sweep, of which some tens are still to come
     call check(worst < 0.15_dp, "brings loads down to the floor")
+    call sim%free()
+    ! a heavy disk on light ones, whose impulses sweeps find slowly
+    call make_column(n, 3, "&solver method = 'nscdd' /", sim)
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do b = 1, sub%n_grains
+          if (int(sub%id(b)) == n) sub%inverse_mass(:, b) = 1.0e-3_dp*sub%inverse_mass(:, b)
+        end do
+      end associate
+    end do
+    call carry_loads(sim%problem, 10.0_dp, work, of_one_layer, carried)
+    call check(of_one_layer > 0.0_dp .and. of_one_layer < sweeps .and. .not. carried, "a pass that is given up")
     call sim%free()
   end subroutine check_layers
 
