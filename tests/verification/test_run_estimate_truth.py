@@ -110,7 +110,7 @@ class Bounds(RunTestCase):
         counted = [row for row in rows if study_error.State(row).counts()]
         self.assertGreater(len(counted), 70)
         for row in counted:
-            estimate = math.hypot(2.4 * float(row["projection"]), float(row["levels"])) if float(row["projection"]) >= 0.0 else \
+            estimate = math.hypot(2.8 * float(row["projection"]), float(row["levels"])) if float(row["projection"]) >= 0.0 else \
                 float(row["estimate"])
             self.assertGreater(estimate, 0.6 * float(row["true_error"]), row)
 

@@ -30,6 +30,12 @@ program test_velocity_error
   call test_share(1)
   call test_share(4)
   call test_exact()
+  call test_attraction(1)
+  call test_attraction(4)
+  call test_start(is_uneven=.false.)
+  call test_start(is_uneven=.true.)
+  call test_slow(1)
+  call test_slow(4)
   call test_copies()
   call test_decomposition()
   call test_layers(1)
@@ -269,6 +275,97 @@ contains
     call check(velocity%criterion() <= 1e-6_dp*gravity*step, "criterion of the exact impulses")
     call sim%free()
   end subroutine test_exact
+
+  !> Nine tenths of the exact impulses in contacts that attract each other with up to a hundred times the weight of a disk. Test
+  !> impulses are those on the bodies, so that the estimate is that without attractions. Before waves have gone down the column and
+  !> up it is C.
+  subroutine test_attraction(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    integer, parameter :: count = 40
+    real(dp), parameter :: expected = 0.1_dp*gravity*step
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    real(dp) :: residual, defect
+    integer :: s
+
+    call make(count, n_subdomains, sim)
+    call set_impulses(sim%problem, count, 0.9_dp)
+    sim%problem%attracts = .true.
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        ! larger and smaller from contact to contact
+        sub%attraction = 50.0_dp*mass*gravity*step*(1.0_dp + sin(sub%impulse(:, 1, :)/(mass*gravity*step)))
+        where (sub%impulse(:, 1, :) <= 0.0_dp) sub%attraction = 0.0_dp
+      end associate
+    end do
+    call sim%problem%load_attraction()
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        sub%impulse(:, 1, :) = sub%impulse(:, 1, :) + sub%attraction
+      end associate
+    end do
+    call sim%problem%evaluate()
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
+    call check_close(velocity%projection, expected, 1e-9_dp*expected, "Y where contacts attract")
+    ! a small Y and no levels: E is below C
+    velocity%projection = 0.1_dp*expected
+    call velocity%add_levels(sim%problem)
+    velocity%levels%error = 0.0_dp
+    call check_close(velocity%estimate(), expected, 1e-9_dp*expected, "the estimate is C before waves have come back")
+    call velocity%assess(sim%problem, sim%method, 2*count, residual, defect)
+    velocity%projection = 0.1_dp*expected
+    call velocity%add_levels(sim%problem)
+    velocity%levels%error = 0.0_dp
+    call check_close(velocity%estimate(), 0.28_dp*expected, 1e-9_dp*expected, "and E afterwards")
+    call sim%free()
+  end subroutine test_attraction
+
+  !> Starts are compared by the estimate, and by the criterion where few heavy bodies have most of the mass.
+  subroutine test_start(is_uneven)
+    logical, intent(in) :: is_uneven
+    integer, parameter :: count = 40
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    real(dp) :: residual, defect
+    integer :: s
+
+    call make(count, 1, sim)
+    do s = 1, size(sim%problem%sub)
+      if (is_uneven) sim%problem%sub(s)%inverse_mass(:, 1) = 1.0e-3_dp*sim%problem%sub(s)%inverse_mass(:, 1)
+    end do
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    call set_impulses(sim%problem, count, 0.9_dp)
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
+    call velocity%add_levels(sim%problem)
+    call check(velocity%criterion() > 1.5_dp*velocity%estimate(), "the criterion is more than the estimate")
+    call check_close(velocity%measure_of_start(), merge(velocity%criterion(), velocity%estimate(), is_uneven), 0.0_dp, &
+      & "what a start is judged by")
+    call sim%free()
+  end subroutine test_start
+
+  !> One disk of many that moves: C ends a solve only where the fastest is below half of the error allowed.
+  subroutine test_slow(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    integer :: s, b, k
+
+    call make(40, n_subdomains, sim)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    do k = 1, 2
+      do s = 1, size(sim%problem%sub)
+        associate (sub => sim%problem%sub(s))
+          sub%v_global(:, :) = 0.0_dp
+          do b = 1, sub%n_grains
+            if (int(sub%id(b)) == 17) sub%v_global(2, b) = -merge(0.049_dp, 0.051_dp, k == 1)*sim%problem%error_scale
+          end do
+        end associate
+      end do
+      call check(velocity%all_are_slow(sim%problem) .eqv. k == 1, "one disk of many, case "//to_text(k))
+    end do
+    call sim%free()
+  end subroutine test_slow
 
   !> Earlier impulses: those that accelerated sweeps keep, or a copy from an iteration before.
   subroutine test_copies()
