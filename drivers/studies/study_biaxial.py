@@ -2,9 +2,9 @@
 """Biaxial compression of 5000 disks, Rmax/Rmin = 3 (CEGEO benchmark, 2012): isotropic compaction without friction between
 smooth walls, then compression at constant lateral pressure with friction 0.5.
 
-    python3 drivers/studies/study_biaxial.py OUT        about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study biaxial [--out DIR]        about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/study_biaxial.csv (the stress-strain curve), OUT/study_biaxial_summary.csv and OUT/study_biaxial.png."""
+leaves in DIR study_biaxial.csv (the stress-strain curve), study_biaxial_summary.csv and study_biaxial.png."""
 import argparse
 from pathlib import Path
 
@@ -96,7 +96,7 @@ def coordination(state, n, layer):
 
 
 def compact(options, size, mass):
-    """Press the loose disks of OUT/loose.h5 together, then let them come to rest with exact solves."""
+    """Press the loose disks of DIR/loose.h5 together, then let them come to rest with exact solves."""
     free_lid = {"free": [False, True], "pressure": PRESSURE, "mass": mass}
     run(options.out / "compaction", {
         "scene": scene("../loose.h5", 0.0, 0.4 * SMALLEST),
@@ -127,11 +127,11 @@ def compress(options, centres, radii, size, mass):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/biaxial"), help="default: out/biaxial")
     parser.add_argument("--grains", type=int, default=5000)
     parser.add_argument("--compaction-steps", type=int, default=1500)
-    parser.add_argument("--compacted", action="store_true", help="start from the disks that an earlier run left in OUT/rest")
-    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    parser.add_argument("--compacted", action="store_true", help="start from the disks that an earlier run left in DIR/rest")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     parser.add_argument("--rate", type=float, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
     parser.add_argument("--tolerance", type=float, default=3.0e-5, help="of the solves while the lid comes down")
     parser.add_argument("--max-iterations", type=int, default=1000)

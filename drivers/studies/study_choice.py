@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Step and accuracy of five small scenes: what a user would publish, its error, and what it costs.
 
-    python3 drivers/studies/study_choice.py OUT                     some 15 minutes on two busy cores; GRAVIER_BIN_DIR says where gravier is
-    python3 drivers/studies/study_choice.py OUT --only shear drum   these alone
+    ./gravier study choice [--out DIR]                     some 15 minutes on two busy cores; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study choice [--out DIR] --only shear drum   these alone
 
-leaves OUT/study_choice.csv, a row for each quantity of each run, and prints the tables of doc/choosing.md. Each scene is one of data/ with a shorter
+leaves in DIR study_choice.csv, a row for each quantity of each run, and prints the tables of doc/choosing.md. Each scene is one of data/ with a shorter
 time or with fewer grains. Further runs with the second step and 0.1, and with the smallest step and 0.03, begin from places of the grains that
 differ by a millionth of a diameter (the lattice of the settling: from other radii). The mean of those with the smallest step is the reference;
 twice the standard deviation in either group, the root mean square of both, is the scatter. A value is right where it deviates by no more than 2 %, or than the scatter where that is larger. Seconds are processor seconds of a run on
@@ -178,11 +178,11 @@ def print_table(rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/choice"), help="default: out/choice")
     parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES), metavar="SCENE", help="scenes to run")
     parser.add_argument("--realisations", type=int, default=3, help="further runs of each scene, for the scatter")
     parser.add_argument("--jobs", type=int, default=2, help="runs at the same time")
-    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(options.jobs) as pool:

@@ -3,10 +3,10 @@
 radius.
 (r - r0)/r0 goes like a for flat columns, and for tall ones like a^(2/3) in 2D and a^(1/2) in 3D.
 
-    python3 drivers/studies/study_collapse.py OUT                   about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    python3 drivers/studies/study_collapse.py OUT --dimension 3     about 7 minutes
+    ./gravier study collapse [--out DIR]                   about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study collapse [--out DIR] --dimension 3     about 7 minutes
 
-leaves OUT/study_collapse.csv, OUT/study_collapse_summary.csv and OUT/study_collapse.png, or the same with _3d."""
+leaves in DIR study_collapse.csv, study_collapse_summary.csv and study_collapse.png, or the same with _3d."""
 import argparse
 from pathlib import Path
 from types import SimpleNamespace
@@ -107,10 +107,10 @@ def length_of(centres, radii, wide):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/collapse"), help="default: out/collapse")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
     parser.add_argument("--grains", type=int, help="in each column: 1000 disks or 6000 spheres, about")
-    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
     case, make = {2: (PLANE, column_2d), 3: (SPACE, column_3d)}[options.dimension]
     rng = np.random.default_rng(2005)

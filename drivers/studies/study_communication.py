@@ -56,7 +56,7 @@ LARGE = (1e9, 1e5)
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bodies", help="bodies file of a dense packing")
-    parser.add_argument("--out", default="communication", help="directory of the results")
+    parser.add_argument("--out", default="out/communication", help="directory of the results; default: out/communication")
     parser.add_argument("--gravier", default="build/release/bin/gravier", help="the program")
     parser.add_argument("--subdomains", default="2,4,8,16,32,64,128,256,512", help="numbers of subdomains")
     return parser.parse_args()

@@ -2,7 +2,7 @@
 """Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
 tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius, disks under a piston.
 
-    python3 drivers/studies/study_drift.py --out DIR [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
+    python3 drivers/studies/study_drift.py [--out DIR] [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
 
 leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png."""
 import argparse
@@ -94,7 +94,7 @@ def figures(folder, name, tolerance, projection, seconds, first, width):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/drift"), help="default: out/drift")
     parser.add_argument("--gravier", metavar="PROGRAM", type=Path, default=BINARIES / "gravier")
     parser.add_argument("--steps", type=int, default=20000)
     options = parser.parse_args()

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Angle of the surface in the rotating drum of data/scenes/drum.nml against time: it keeps its mean.
 
-    python3 drivers/studies/study_drum.py OUT           about 2 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study drum [--out DIR]           about 2 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/study_drum.csv, OUT/study_drum_summary.csv and OUT/study_drum.png."""
+leaves in DIR study_drum.csv, study_drum_summary.csv and study_drum.png."""
 import argparse
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def surface_angle(centres):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/drum"), help="default: out/drum")
     options = parser.parse_args()
     run(options.out / "drum", {
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/drum.csv"), "density": 2500.0,

@@ -2,14 +2,14 @@
 """The distribution of forces between disks in biaxial compression, rigid and with springs, against published simulations: Radjai, Jean, Moreau
 and Roux, Physical Review Letters 77 (1996) 274.
 
-    python3 drivers/studies/study_forces.py OUT [--quick]
+    ./gravier study forces [--out DIR] [--quick]
 
 The shipped scene data/scenes/biaxial.nml is run with rigid contacts and with springs of kappa = 10 000. Of the normal forces f between disks
 over their mean in each state while the sample yields, the study takes the distribution P: above the mean it falls as exp(-beta f), with
 beta = 1.4 in the publication; well below the mean it goes as f^alpha, with alpha = -0.3; some two fifths of the forces are above the mean.
 Rigid forces are one of many possible sets, and those of springs are unique: their distributions should not differ.
 
-Leaves OUT/study_forces.csv, OUT/study_forces.png and the runs. Exit status: 0 all rows are within their bounds; 1 one is not."""
+Leaves in DIR study_forces.csv, study_forces.png and the runs. Exit status: 0 all rows are within their bounds; 1 one is not."""
 import sys
 from pathlib import Path
 
@@ -87,7 +87,7 @@ def draw(path, found):
 
 def main():
     parser = OneLineParser(description=__doc__)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/forces"), help="default: out/forces")
     parser.add_argument("--quick", action="store_true", help="half of the strain")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)

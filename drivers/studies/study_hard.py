@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The hard cases of tests/hard by every method, on 1 and 2 ranks: what converges, in how many iterations, and what does not.
 
-    python3 drivers/studies/study_hard.py --out DIR [--cases REGEX] [--methods TITLE...] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
+    python3 drivers/studies/study_hard.py [--out DIR] [--cases REGEX] [--methods TITLE...] [--ranks 1 2] [--several METHOD] [--short]     30 minutes on two cores
 
 leaves DIR/hard_cases.csv, a row a run, and DIR/hard_cases.md, the page with an overview of it. --short leaves out the long runs. With
 --cases and --methods the rows of others that DIR/hard_cases.csv has already stay."""
@@ -103,7 +103,7 @@ def page(rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/hard"), help="default: out/hard")
     parser.add_argument("--cases", default="", help="names of cases that match")
     parser.add_argument("--methods", nargs="+", help="titles of the methods; all")
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])

@@ -2,10 +2,10 @@
 """Discharge through openings of many widths D in a flat floor: Beverloo's law, Q ~ (D - k d)^(3/2) for disks through a slot and
 (D - k d)^(5/2) for spheres through a square.
 
-    python3 drivers/studies/study_hopper.py OUT                     about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    python3 drivers/studies/study_hopper.py OUT --dimension 3       about 5 minutes
+    ./gravier study hopper [--out DIR]                     about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study hopper [--out DIR] --dimension 3       about 5 minutes
 
-leaves OUT/study_hopper.csv, OUT/study_hopper_summary.csv and OUT/study_hopper.png, or the same with _3d."""
+leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, or the same with _3d."""
 import argparse
 from pathlib import Path
 from types import SimpleNamespace
@@ -55,10 +55,10 @@ def groups(case, d, path, steps, every, final):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/hopper"), help="default: out/hopper")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
     parser.add_argument("--height", type=float, help="of the loose fill [m]")
-    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in OUT")
+    parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
     d, case = options.dimension, {2: PLANE, 3: SPACE}[options.dimension]
     diameter = case.smallest + case.largest

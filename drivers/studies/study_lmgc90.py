@@ -2,7 +2,7 @@
 """Which of a directory of examples of LMGC90 import and run: each DATBOX below it by gravier_import, with the step, the number of steps and
 the periods of the command script beside it.
 
-    python3 drivers/studies/study_lmgc90.py EXAMPLES --out DIR [--steps N] [--seconds S] [--pylmgc90 PATH] [--only NAME...]
+    python3 drivers/studies/study_lmgc90.py EXAMPLES [--out DIR] [--steps N] [--seconds S] [--pylmgc90 PATH] [--only NAME...]
 
 EXAMPLES is a directory such as examples/RIGID_2D of the sources of LMGC90. Each run makes at most N steps (200) in at most S seconds (120). Where an
 example has a script gen_sample.py in the place of a DATBOX, the pre-processor of LMGC90 makes one in DIR: PATH is the directory that holds
@@ -131,7 +131,7 @@ def judge(folder, root, options):
 def main():
     parser = OneLineParser(prog="study_lmgc90", description=__doc__.splitlines()[0])
     parser.add_argument("examples", type=Path, nargs="+", help="directories of examples of LMGC90")
-    parser.add_argument("--out", type=Path, required=True, help="directory of the tables and runs")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/lmgc90"), help="directory of the tables and runs; default: out/lmgc90")
     parser.add_argument("--steps", type=int, default=200, help="most steps of a run (200)")
     parser.add_argument("--seconds", type=float, default=120.0, help="most seconds of a run (120)")
     parser.add_argument("--pylmgc90", type=Path, help="directory that holds the Python package pylmgc90")

@@ -319,7 +319,7 @@ def study(directory, listed, path):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", default="methods", help="directory of the results")
+    parser.add_argument("--out", default="out/methods", help="directory of the results; default: out/methods")
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--quick", action="store_true", help="few iterations")
     size.add_argument("--large", action="store_true", help="packings of 10^4 and 10^5 grains")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How dense the five Platonic solids pack when they are poured, against experiments: Baker and Kudrolli, Physical Review E 82 (2010) 061304.
 
-    python3 drivers/studies/study_platonic.py --out DIR [--quick] [--count N] [--solids NAME...]
+    python3 drivers/studies/study_platonic.py [--out DIR] [--quick] [--count N] [--solids NAME...]
 
 Solids of one size rain at a constant speed into a box that is periodic on its sides, with a floor, and come to rest under gravity. The solid
 fraction is measured in the middle of the height: the share of random points there that lie in a solid. It has to lie between what the experiments
@@ -84,7 +84,7 @@ def solid_fraction(made, width, rng):
 
 def main():
     parser = OneLineParser(prog="study_platonic", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/platonic"), help="default: out/platonic")
     parser.add_argument("--quick", action="store_true", help="200 of each in the place of 600")
     parser.add_argument("--count", type=int, metavar="N", help="solids of each kind")
     parser.add_argument("--solids", nargs="+", choices=list(SOLIDS), default=list(SOLIDS), metavar="NAME", help=", ".join(SOLIDS))

@@ -3,7 +3,7 @@
 (F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Physical Review E 72 (2005) 021309) and of spheres (S. Chialvo, J. Sun and
 S. Sundaresan, Physical Review E 85 (2012) 021305; T. Hatano, Physical Review E 75 (2007) 060301).
 
-    python3 drivers/studies/study_rheology.py OUT [--quick | --least I [I]]
+    ./gravier study rheology [--out DIR] [--quick | --least I [I]]
 
 The cell is sheared at the rate g along x over y, and its length along y is driven by a pressure P. With the mean diameter d, the mean mass m
 and the inertial number I = g sqrt(m/P) of disks, g d sqrt(rho/P) of spheres, the flow has a friction mu = -sigma_xy/sigma_yy and a solid
@@ -11,7 +11,7 @@ fraction phi, means over the strain after the start. For disks with friction 0.4
 phi = 0.81 - 0.3 I. For spheres with friction 0.3 slow flow has mu = 0.357 and phi = 0.596, and mu rises as a power of I, with the exponent
 0.28 +- 0.05 in the third publication.
 
-Leaves OUT/study_rheology.csv, OUT/study_rheology_flow.csv, OUT/study_rheology.png and the runs. Exit status: 0 all rows are within their
+Leaves in DIR study_rheology.csv, study_rheology_flow.csv, study_rheology.png and the runs. Exit status: 0 all rows are within their
 bounds; 1 one is not."""
 import sys
 from pathlib import Path
@@ -124,7 +124,7 @@ def compare(table, found):
 
 def main():
     parser = OneLineParser(description=__doc__)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/rheology"), help="default: out/rheology")
     parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and a quarter of the strain")
     parser.add_argument("--least", type=float, nargs="+", metavar="I", help="smallest inertial number of disks and of spheres, one or two "
                         "numbers (1e-3 of disks, 3e-3 of spheres); the least there are is 1e-4")

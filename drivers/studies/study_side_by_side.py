@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Examples of LMGC90 by LMGC90 itself and by Gravier, side by side: the same DATBOX, step, number of steps and law.
 
-    python3 drivers/studies/study_side_by_side.py EXAMPLE... --out DIR --pylmgc90 PATH [--steps N] [--settle M]
+    python3 drivers/studies/study_side_by_side.py EXAMPLE... [--out DIR] --pylmgc90 PATH [--steps N] [--settle M]
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
 LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. With --settle
@@ -240,7 +240,7 @@ def main():
         play_lmgc90(int(sys.argv[2]))
     parser = OneLineParser(prog="study_side_by_side", description=__doc__.splitlines()[0])
     parser.add_argument("examples", type=Path, nargs="+", help="directories with a DATBOX and a command script")
-    parser.add_argument("--out", type=Path, required=True, help="directory of the tables, the picture and the runs")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/side_by_side"), help="directory of the tables, the picture and the runs; default: out/side_by_side")
     parser.add_argument("--pylmgc90", type=Path, required=True, help="directory that holds the Python package pylmgc90")
     parser.add_argument("--steps", type=int, default=100, help="steps (100)")
     parser.add_argument("--settle", type=int, default=0, help="steps that LMGC90 makes before (0)")

@@ -2,9 +2,9 @@
 """Janssen's law in 2D: the vertical stress in a silo whose floor goes down slowly saturates with the depth,
 sigma = rho g lambda (1 - exp(-z/lambda)), lambda = width / (2 mu K).
 
-    python3 drivers/studies/study_silo.py OUT           about 3 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study silo [--out DIR]           about 3 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves OUT/study_silo.csv, OUT/study_silo_summary.csv and OUT/study_silo.png."""
+leaves in DIR study_silo.csv, study_silo_summary.csv and study_silo.png."""
 import argparse
 from pathlib import Path
 
@@ -23,7 +23,7 @@ SETTLING, WARMING, SAMPLING = 700, 500, 1000  # steps
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/silo"), help="default: out/silo")
     parser.add_argument("--layers", type=int, default=120)
     options = parser.parse_args()
     rng = np.random.default_rng(1895)

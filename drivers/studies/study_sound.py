@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The speed of sound through disks with springs, against exact linear theory and against effective medium theory.
 
-    python3 drivers/studies/study_sound.py OUT [--quick]
+    ./gravier study sound [--out DIR] [--quick]
 
 Periodic cells of disks that press on each other get the velocities of one mode of vibration, and the frequency with which it swings is
 measured: a chain, the triangular lattice, and a packing of unequal disks that came to rest, without friction and with tangential springs
@@ -9,7 +9,7 @@ that stick. Expected are the frequencies of the springs between the same disks, 
 the speeds of long waves, c = sqrt(9/8) d sqrt(k/m) of pressure and sqrt(3/8) d sqrt(k/m) of shear. Effective medium theory lets all disks
 of the packing follow the plane wave, which is stiffer than what they do.
 
-Leaves OUT/study_sound.csv and the runs. Exit status: 0 all rows are within their bounds; 1 one is not."""
+Leaves in DIR study_sound.csv and the runs. Exit status: 0 all rows are within their bounds; 1 one is not."""
 import argparse
 import sys
 from pathlib import Path
@@ -165,7 +165,7 @@ def packing(count, folder):
 
 def main():
     parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", metavar="OUT", type=Path)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/sound"), help="default: out/sound")
     parser.add_argument("--quick", action="store_true", help="smaller cells")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)

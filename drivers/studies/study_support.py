@@ -79,7 +79,8 @@ def lattice(lower, upper, smallest, largest, rng, inside=None):
 
 
 def write_hdf5(path, centres, radii, group=None, walls=()):
-    """A bodies file of grains at rest; walls: (point, normal) of each plane."""
+    """A bodies file of grains at rest; walls: (point, normal) of each plane. The directory is made if there is none."""
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part, hdf5_file(part) as file:
         file["bodies/id"] = np.arange(1, len(radii) + 1)
         file["bodies/position"] = np.asarray(centres, float)

@@ -29,7 +29,7 @@ class Forces(StudyTestCase):
 
     def test_quick(self):
         """The strong forces are those of the publication; the status says what the table does."""
-        done = self.run_study("out", "--quick")
+        done = self.run_study("--out", "out", "--quick")
         with open(self.here("out", "study_forces.csv"), encoding="ascii", newline="") as file:
             rows = {(row["oracle"], row["quantity"].split(",")[0]): row for row in csv.DictReader(file)}
         self.assertEqual(done.returncode, int(any(row["within"] == "NO" for row in rows.values())), done.stderr)
@@ -40,7 +40,7 @@ class Forces(StudyTestCase):
         self.assertTrue(os.path.exists(self.here("out", "study_forces.png")))
 
     def test_refused(self):
-        done = self.run_study()
+        done = self.run_study("--slow")
         self.assertEqual(done.returncode, 2)
         self.assertEqual(done.stderr.count("\n"), 1)
 

@@ -62,7 +62,7 @@ class Platonic(RunTestCase):
 
     def test_refused(self):
         for arguments, text in ((("--out", "out", "--count", "3"), "--count 3: expected 20 or more"),
-                                (("--out", "out", "--solids", "ball"), "invalid choice: 'ball'"), ((), "--out")):
+                                (("--out", "out", "--solids", "ball"), "invalid choice: 'ball'"), (("--slow",), "--slow")):
             done = self.run_study(*arguments)
             self.assertEqual(done.returncode, 2)
             self.assertIn(text, done.stderr)

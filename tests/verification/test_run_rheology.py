@@ -33,7 +33,7 @@ class Rheology(StudyTestCase):
 
     def test_quick(self):
         """Friction and solid fraction of disks are those of the publication; the status says what the table does."""
-        done = self.run_study("out", "--quick")
+        done = self.run_study("--out", "out", "--quick")
         with open(self.here("out", "study_rheology.csv"), encoding="ascii", newline="") as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(done.returncode, int(any(row["within"] == "NO" for row in rows)), done.stderr)
@@ -47,7 +47,7 @@ class Rheology(StudyTestCase):
             self.assertAlmostEqual(study_rheology.step_of(number), step, places=6)
 
     def test_refused(self):
-        for arguments in ((), ("out", "--least", "1e-3", "1e-3", "1e-3"), ("out", "--least", "slow")):
+        for arguments in (("--slow",), ("--least", "1e-3", "1e-3", "1e-3"), ("--least", "slow")):
             done = self.run_study(*arguments)
             self.assertEqual(done.returncode, 2)
             self.assertEqual(done.stderr.count("\n"), 1)

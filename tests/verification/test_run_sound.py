@@ -32,7 +32,7 @@ class Sound(StudyTestCase):
             self.assertAlmostEqual(motion @ k @ motion, energy, delta=1e-9 * study_sound.STIFFNESS)
 
     def test_quick(self):
-        done = self.run_study("out", "--quick")
+        done = self.run_study("--out", "out", "--quick")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         with open(self.here("out", "study_sound.csv"), encoding="ascii", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -54,7 +54,7 @@ class Sound(StudyTestCase):
         self.assertAlmostEqual(found / expected, np.sqrt(1.1), delta=2e-3)
 
     def test_refused(self):
-        done = self.run_study()
+        done = self.run_study("--slow")
         self.assertEqual(done.returncode, 2)
         self.assertEqual(done.stderr.count("\n"), 1)
 
