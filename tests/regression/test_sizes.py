@@ -10,7 +10,7 @@ FILE, PROCEDURE, ARGUMENTS = 500, 80, 7
 #: kernels take packed arrays and numbers one by one, so that the compiler sees that these do not overlap
 KERNELS = ("modules/solver/kernels/", "modules/contact/local/find_frame.fypi")
 #: procedures with more arguments, which are to become fewer
-MORE = {"partition_init_graph", "add_contact", "add_with_terms", "evaluate_pair"}
+MORE = {"add_contact", "add_with_terms", "evaluate_pair"}
 BEGIN = re.compile(r"^\s*(?!end\b)(?:[\w()=, ]+\s)?(?:subroutine|function)\s+([\w${}]+)\s*(\([^)]*\)?)?")
 END = re.compile(r"^\s*end (?:subroutine|function)\b")
 
