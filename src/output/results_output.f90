@@ -6,7 +6,7 @@ module gravier_results_output
   use gravier_diagnostic, only: histogram_t
   use gravier_diagnostics, only: diagnostics_t
   use gravier_field_list, only: field_list_t
-  use gravier_results_file, only: results_file_t, results_step_t, figures_t, accuracy_t
+  use gravier_results_file, only: results_file_t, provenance_t, results_step_t, figures_t, accuracy_t
   use gravier_build_info, only: version
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -47,6 +47,7 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: directory, command
     type(error_t), allocatable, intent(inout) :: error
+    type(provenance_t) :: run
     type(field_list_t) :: boundaries, facets
     type(field_list_t), allocatable :: shapes(:)
 
@@ -57,8 +58,11 @@ contains
       call self%file%reopen(simulation%comm, directory//"results.h5", simulation%step, "bodies/radius", error)
       return
     end if
-    call self%file%open(simulation%comm, directory//"results.h5", version, command, simulation%config%text, &
-      & simulation%config%scene%dimension, error)
+    run%version = version
+    run%command = command
+    run%input_text = simulation%config%text
+    run%dimension = simulation%config%scene%dimension
+    call self%file%open(simulation%comm, directory//"results.h5", run, error)
     call describe_boundaries(simulation, boundaries)
     call self%file%write_table(boundaries, error)
     if (has_facets(simulation%decomposition%boundaries)) then

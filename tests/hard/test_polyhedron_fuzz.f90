@@ -92,8 +92,8 @@ contains
     ! some are just within reach
     if (modulo(k, 4) == 1 .and. .not. core%overlap) alert = core%distance - pair%radius_a*a%piece(1)%rounding - &
       & pair%radius_b*b%piece(1)%rounding + 1.0e-6_dp
-    call find_polyhedron_manifold(a%piece(1), b%piece(1), pair%radius_a, pair%radius_b, pair%rotation, pair%way, alert, &
-      & merge(most_points, 4, modulo(k, 2) == 0), manifold)
+    call find_polyhedron_manifold(a%piece(1), b%piece(1), pair, alert, merge(most_points, 4, modulo(k, 2) == 0), &
+      & manifold)
     found%points = found%points + manifold%n
     if (manifold%n > 0) found%contacts = found%contacts + 1
     call examine(a%piece(1), b%piece(1), pair, core, alert, manifold, name)
@@ -233,8 +233,7 @@ contains
 
     ! the nearest points are in the faces across the third axis
     if (abs(abs(core%normal(3)) - 1.0_dp) > exact) return
-    call find_polyhedron_manifold(a%piece(1), b%piece(1), pair%radius_a, pair%radius_b, pair%rotation, pair%way, &
-      & core%distance + 1.0_dp, most_points, manifold)
+    call find_polyhedron_manifold(a%piece(1), b%piece(1), pair, core%distance + 1.0_dp, most_points, manifold)
     n = 0
     call add_lines(a%piece(1), pair%radius_a, .false., pair, line, n)
     call add_lines(b%piece(1), pair%radius_b, .true., pair, line, n)
@@ -302,8 +301,7 @@ contains
     do k = 1, steps
       before = pair
       call advance(pair, way, step, spin)
-      call find_polyhedron_manifold(a%piece(1), b%piece(1), pair%radius_a, pair%radius_b, pair%rotation, pair%way, alert, &
-        & most_points, manifold)
+      call find_polyhedron_manifold(a%piece(1), b%piece(1), pair, alert, most_points, manifold)
       if (manifold%n == 0 .or. manifold%cores_overlap) then
         met = 0
         cycle

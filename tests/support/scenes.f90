@@ -210,12 +210,13 @@ contains
     call decomposition%init(comm, n_subdomains, newcomers(1), cloud%period)
     call decomposition%bounding_box(newcomers, lower, upper)
     decomposition%partition%period(:) = cloud%period%length
+    call decomposition%partition%set_box(lower, upper)
     if (by_cells) then
       allocate (weights(newcomers(1)%n), source=1)
-      call decomposition%partition%init_graph(comm, lower, upper, 0.15_dp, newcomers(1)%position, weights, n_subdomains, error)
+      call decomposition%partition%init_graph(comm, 0.15_dp, newcomers(1)%position, weights, n_subdomains, error)
     else
       boxes(:) = choose_boxes(lower, upper, n_subdomains, cloud%period%length)
-      call decomposition%partition%init_grid(lower, upper, boxes, 0.1_dp, error)
+      call decomposition%partition%init_grid(boxes, 0.1_dp, error)
     end if
     call check(.not. allocated(error), "partition")
     call decomposition%migrate(newcomers(1))

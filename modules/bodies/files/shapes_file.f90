@@ -11,6 +11,7 @@ module gravier_shapes_file
   use gravier_convex_piece, only: convex_piece_t
   use gravier_mass_properties, only: mass_t, mass_of_sum, find_principal_axes
   use gravier_polyhedron, only: make_piece, make_piece_of_faces, make_capsule_piece, make_shape
+  use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_stl_file, only: read_stl
   use gravier_obj_file, only: read_obj
   use gravier_quaternion, only: find_quaternion
@@ -298,17 +299,16 @@ contains
     type(convex_piece_t), intent(out) :: piece
     type(mass_t), intent(out) :: mass
     type(error_t), allocatable, intent(inout) :: error
-    real(dp), allocatable :: point(:, :)
-    integer, allocatable :: first(:), corner(:)
+    type(sharp_polyhedron_t) :: surface
     integer :: n
 
     associate (path => statement%text)
       n = len(path)
       select case (lower(path(max(1, n - 3):)))
       case (".stl")
-        call read_stl(path, point, first, corner, error)
+        call read_stl(path, surface%vertex, surface%face_first, surface%face_vertex, error)
       case (".obj")
-        call read_obj(path, point, first, corner, error)
+        call read_obj(path, surface%vertex, surface%face_first, surface%face_vertex, error)
       case default
         call raise(error, status_input, what//": file "//path//": expected a path that ends with .stl or .obj")
       end select
@@ -317,10 +317,10 @@ contains
         if (index(error%message, what) /= 1) error%message = what//": "//error%message
         return
       end if
-      if (.not. all(is_bounded(point))) call raise(error, status_input, what//": "//path//": a coordinate of "// &
-        & to_text(maxval(abs(point)))//" in size: expected "//bounded_text)
+      if (.not. all(is_bounded(surface%vertex))) call raise(error, status_input, what//": "//path//": a coordinate of "// &
+        & to_text(maxval(abs(surface%vertex)))//" in size: expected "//bounded_text)
       if (.not. allocated(error)) &
-        & call make_piece_of_faces(what//": "//path, point, first, corner, rounding_of(rounding, point), piece, mass, error)
+        & call make_piece_of_faces(what//": "//path, surface, rounding_of(rounding, surface%vertex), piece, mass, error)
     end associate
   end subroutine make_piece_of_file
 

@@ -46,19 +46,17 @@ contains
 
   !> A body with the faces of a closed surface. Failures (status_input) beside those above: the surface is not closed, has no
   !> volume, is inside out or not convex, or has a face without area.
-  subroutine make_polyhedron_of_faces(name, points, first, corner, rounding, shape, error)
+  subroutine make_polyhedron_of_faces(name, surface, rounding, shape, error)
     character(len=*), intent(in) :: name
-    !> (3, n); points at one place become one
-    real(dp), intent(in) :: points(:, :)
-    !> face f has the corners corner(first(f):first(f + 1) - 1), anticlockwise seen from outside
-    integer, intent(in) :: first(:), corner(:)
+    !> its corners and faces; corners at one place become one, and planes are not read
+    type(sharp_polyhedron_t), intent(in) :: surface
     real(dp), intent(in) :: rounding
     type(body_shape_t), intent(out) :: shape
     type(error_t), allocatable, intent(inout) :: error
     type(convex_piece_t) :: piece(1)
     type(mass_t) :: mass
 
-    call make_piece_of_faces(name, points, first, corner, rounding, piece(1), mass, error)
+    call make_piece_of_faces(name, surface, rounding, piece(1), mass, error)
     call make_shape(name, piece, mass, shape, error)
   end subroutine make_polyhedron_of_faces
 
@@ -156,48 +154,47 @@ contains
   end subroutine make_piece
 
   !> The same of a closed surface. Failures as of make_polyhedron_of_faces.
-  subroutine make_piece_of_faces(name, points, first, corner, rounding, piece, mass, error)
+  subroutine make_piece_of_faces(name, surface, rounding, piece, mass, error)
     character(len=*), intent(in) :: name
-    real(dp), intent(in) :: points(:, :)
-    integer, intent(in) :: first(:), corner(:)
+    type(sharp_polyhedron_t), intent(in) :: surface
     real(dp), intent(in) :: rounding
     type(convex_piece_t), intent(out) :: piece
     type(mass_t), intent(out) :: mass
     type(error_t), allocatable, intent(inout) :: error
-    type(sharp_polyhedron_t) :: surface
+    type(sharp_polyhedron_t) :: merged
     character(len=:), allocatable :: message
-    integer :: same(size(points, 2)), k
-    logical :: used(size(points, 2))
+    integer :: same(size(surface%vertex, 2)), k
+    logical :: used(size(surface%vertex, 2))
 
     if (allocated(error)) return
-    if (size(corner) == 0) then
+    if (size(surface%face_vertex) == 0) then
       call raise(error, status_input, name//": no faces")
       return
     else
-      if (minval(corner) < 1 .or. maxval(corner) > size(points, 2)) then
+      if (minval(surface%face_vertex) < 1 .or. maxval(surface%face_vertex) > size(surface%vertex, 2)) then
         call raise(error, status_input, name//": a face names a corner that there is not")
         return
       end if
     end if
-    call merge_points(points, 0.1_dp*flat*extent_of(points), same)
-    allocate (surface%vertex(3, size(points, 2)), surface%face_vertex(size(corner)))
-    surface%vertex(:, :) = points
-    surface%face_first = first
+    call merge_points(surface%vertex, 0.1_dp*flat*extent_of(surface%vertex), same)
+    merged%vertex = surface%vertex
+    merged%face_first = surface%face_first
+    allocate (merged%face_vertex(size(surface%face_vertex)))
     used(:) = .false.
-    do k = 1, size(corner)
-      surface%face_vertex(k) = same(corner(k))
-      used(same(corner(k))) = .true.
+    do k = 1, size(surface%face_vertex)
+      merged%face_vertex(k) = same(surface%face_vertex(k))
+      used(same(surface%face_vertex(k))) = .true.
     end do
     ! points that no face names do not count
     do k = 1, size(same)
-      if (.not. used(k)) surface%vertex(:, k) = points(:, surface%face_vertex(1))
+      if (.not. used(k)) merged%vertex(:, k) = surface%vertex(:, merged%face_vertex(1))
     end do
-    call check_closed_convex(surface, flat*extent_of(points), message)
+    call check_closed_convex(merged, flat*extent_of(surface%vertex), message)
     if (len(message) > 0) then
       call raise(error, status_input, name//": "//message)
       return
     end if
-    call make_piece(name, surface%vertex, rounding, piece, mass, error)
+    call make_piece(name, merged%vertex, rounding, piece, mass, error)
   end subroutine make_piece_of_faces
 
   !> A capsule between two points, or a sphere where they are one. Failures: a radius that is not above 0.

@@ -31,6 +31,14 @@ module gravier_contact_feature
     real(dp) :: alert = 0.0_dp
   end type frame_t
 
+  !> A side of a face or an edge, seen from the plane of contact.
+  type :: side_t
+    !> from one corner to the next, in the axes and the unit of length of the piece
+    real(dp) :: way(3)
+    !> of the angle between the side and the plane of contact
+    real(dp) :: sine
+  end type side_t
+
   !> a face or edge within this angle of the plane of contact is one that the other piece touches as a whole: its sine and cosine
   real(dp), parameter :: most_sine = 0.2_dp
   real(dp), parameter :: least_cosine = sqrt(1.0_dp - most_sine**2)
@@ -131,7 +139,8 @@ contains
     integer, intent(out) :: vertex(:)
     !> along both axes of the frame and its normal (3, m or more) [m]
     real(dp), intent(out) :: place(:, :)
-    real(dp) :: along(3), x(3), y(3), side(3, feature%n), sine(feature%n)
+    type(side_t) :: side(feature%n)
+    real(dp) :: along(3), x(3), y(3)
     integer :: k, last
 
     m = feature%n
@@ -143,17 +152,17 @@ contains
     end if
     call turn_back(feature%at, frame%normal, along)
     do k = 1, m
-      side(:, k) = piece%vertex(:, vertex(mod(k, m) + 1)) - piece%vertex(:, vertex(k))
-      sine(k) = sine_of(side(:, k), along)
+      side(k)%way(:) = piece%vertex(:, vertex(mod(k, m) + 1)) - piece%vertex(:, vertex(k))
+      side(k)%sine = sine_of(side(k)%way, along)
     end do
     do k = 1, m
       x(:) = piece%vertex(:, vertex(k))
       last = mod(k + m - 2, m) + 1
-      if (min(sine(last), sine(k)) < blend_angle) then
+      if (min(side(last)%sine, side(k)%sine) < blend_angle) then
         if (feature%face > 0) then
-          call blend_in_face(piece, feature%face, vertex(k), along, side(:, last), side(:, k), sine(last), sine(k), x)
+          call blend_in_face(piece, feature%face, vertex(k), along, side(last), side(k), x)
         else
-          call blend_along(piece, vertex(k), side(:, k), sine(k), x)
+          call blend_along(piece, vertex(k), side(k), x)
         end if
       end if
       call place_point(feature%at, x, y)
@@ -196,41 +205,43 @@ contains
 
   !> Move a corner of a face towards its sharp place: within the face where both of its sides lie in the plane of contact, along a
   !> side where only that one does.
-  pure subroutine blend_in_face(piece, f, v, along, before, behind, sine_before, sine_behind, x)
+  pure subroutine blend_in_face(piece, f, v, along, before, behind, x)
     type(convex_piece_t), intent(in) :: piece
     !> face, corner
     integer, intent(in) :: f, v
-    !> normal of the plane of contact; sides of the face at the corner, and their sines
-    real(dp), intent(in) :: along(3), before(3), behind(3), sine_before, sine_behind
+    !> normal of the plane of contact
+    real(dp), intent(in) :: along(3)
+    !> sides of the face that end and begin at the corner
+    type(side_t), intent(in) :: before, behind
     real(dp), intent(inout) :: x(3)
     real(dp) :: way(3), long_before, long_behind, part_before, part_behind, share_before, share_behind, share
 
     way(:) = piece%corner(:, v) - piece%vertex(:, v)
     way(:) = way - dot_product(way, piece%face_normal(:, f))*piece%face_normal(:, f)
-    long_before = sqrt(dot_product(before, before))
-    long_behind = sqrt(dot_product(behind, behind))
+    long_before = sqrt(dot_product(before%way, before%way))
+    long_behind = sqrt(dot_product(behind%way, behind%way))
     if (.not. min(long_before, long_behind) > 0.0_dp) return
-    part_before = dot_product(way, before)/long_before
-    part_behind = dot_product(way, behind)/long_behind
-    share_before = share_of(sine_before, abs(part_before), piece%rounding)
-    share_behind = share_of(sine_behind, abs(part_behind), piece%rounding)
+    part_before = dot_product(way, before%way)/long_before
+    part_behind = dot_product(way, behind%way)/long_behind
+    share_before = share_of(before%sine, abs(part_before), piece%rounding)
+    share_behind = share_of(behind%sine, abs(part_behind), piece%rounding)
     share = min(share_before*share_behind, share_of(sine_of(way, along), sqrt(dot_product(way, way)), piece%rounding))
-    x(:) = x + share*way + share_before*(1.0_dp - share_behind)*part_before/long_before*before + &
-      & (1.0_dp - share_before)*share_behind*part_behind/long_behind*behind
+    x(:) = x + share*way + share_before*(1.0_dp - share_behind)*part_before/long_before*before%way + &
+      & (1.0_dp - share_before)*share_behind*part_behind/long_behind*behind%way
   end subroutine blend_in_face
 
   !> Move an end of an edge towards its sharp place.
-  pure subroutine blend_along(piece, v, side, sine, x)
+  pure subroutine blend_along(piece, v, side, x)
     type(convex_piece_t), intent(in) :: piece
     integer, intent(in) :: v
-    real(dp), intent(in) :: side(3), sine
+    type(side_t), intent(in) :: side
     real(dp), intent(inout) :: x(3)
     real(dp) :: way(3), squared
 
     way(:) = piece%corner(:, v) - piece%vertex(:, v)
-    squared = dot_product(side, side)
-    if (squared > 0.0_dp) way(:) = dot_product(way, side)/squared*side
-    x(:) = x + share_of(sine, sqrt(dot_product(way, way)), piece%rounding)*way
+    squared = dot_product(side%way, side%way)
+    if (squared > 0.0_dp) way(:) = dot_product(way, side%way)/squared*side%way
+    x(:) = x + share_of(side%sine, sqrt(dot_product(way, way)), piece%rounding)*way
   end subroutine blend_along
 
   !> Share of a way to a sharp corner, by the sine of the angle out of the plane of contact. Long ways, of thin corners, get theirs

@@ -30,30 +30,23 @@ module gravier_polyhedron_pair
 contains
 
   !> The contacts of two pieces, in the axes of the first.
-  pure subroutine find_polyhedron_manifold(a, b, radius_a, radius_b, rotation, way, alert, most, manifold)
+  pure subroutine find_polyhedron_manifold(a, b, pair, alert, most, manifold)
     type(convex_piece_t), intent(in) :: a, b
-    !> what the lengths of the pieces are multiplied by [m]
-    real(dp), intent(in) :: radius_a, radius_b
-    !> axes of b, one a column, and its centre seen from that of a, in the axes of a [m]
-    real(dp), intent(in) :: rotation(3, 3), way(3)
+    !> where they are, with the radii that their lengths are multiplied by
+    type(placed_pair_t), intent(in) :: pair
     !> points whose gap is this or more are no contacts [m]
     real(dp), intent(in) :: alert
     !> points wanted at most: 4, or up to most_points
     integer, intent(in) :: most
     !> from the centre of a, in its axes; what it held is lost
     type(manifold_t), intent(inout) :: manifold
-    type(placed_pair_t) :: pair
     type(core_distance_t) :: found
     real(dp) :: reach
 
     manifold%n = 0
     manifold%cores_overlap = .false.
-    if (dot_product(way, way) >= (radius_a + radius_b + max(alert, 0.0_dp))**2) return
-    reach = radius_a*a%rounding + radius_b*b%rounding
-    pair%radius_a = radius_a
-    pair%radius_b = radius_b
-    pair%rotation(:, :) = rotation
-    pair%way(:) = way
+    if (dot_product(pair%way, pair%way) >= (pair%radius_a + pair%radius_b + max(alert, 0.0_dp))**2) return
+    reach = pair%radius_a*a%rounding + pair%radius_b*b%rounding
     call find_core_distance(a, b, pair, max(0.0_dp, reach + alert), found)
     if (found%beyond) return
     if (found%overlap) call find_least_separation(a, b, pair, found)

@@ -74,13 +74,14 @@ contains
         partition%period(:) = decomposition%period%length
         ! a cell that moves is cut as the box that it is, and its images are found by the decomposition
         if (decomposition%period%moves) partition%period(:) = 0.0_dp
+        call partition%set_box(lower, upper)
         if (rule%by_graph) then
           call collect_weights(decomposition%nd, halo, bodies, points, weights)
-          call partition%init_graph(decomposition%comm, lower, upper, edge, points, weights, rule%subdomains, error)
+          call partition%init_graph(decomposition%comm, edge, points, weights, rule%subdomains, error)
         else
           boxes(:) = rule%grid
           if (any(boxes < 1)) boxes(:) = choose_boxes(lower, upper, rule%subdomains, decomposition%period%length)
-          call partition%init_grid(lower, upper, boxes, edge, error)
+          call partition%init_grid(boxes, edge, error)
         end if
       end associate
     end subroutine cut

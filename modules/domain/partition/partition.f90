@@ -27,7 +27,7 @@ module gravier_partition
   type, extends(region_t) :: partition_t
     integer :: nd = 2
     integer :: n_subdomains = 1
-    !> bounding box at the time of the partition [m]
+    !> the box that is divided, see `set_box` [m]
     real(dp) :: lower(3) = 0.0_dp, upper(3) = 1.0_dp
     !> set by the caller before init: period along each axis, 0 where there is none [m]; along a periodic axis the box is
     !> [lower, lower + period)
@@ -48,6 +48,7 @@ module gravier_partition
     procedure :: relay => partition_relay
     procedure :: near => partition_near
     procedure :: n_cells => partition_n_cells
+    procedure :: set_box => partition_set_box
     procedure :: init_grid => partition_init_grid
     procedure :: init_graph => partition_init_graph
     procedure :: get_head => partition_get_head
@@ -57,28 +58,10 @@ module gravier_partition
 
 contains
 
-  !> Equal boxes over the bounding box of the scene.
-  subroutine partition_init_grid(self, lower, upper, boxes, edge, error)
+  !> Set the box that is to be divided, the bounding box of the scene: before `init_grid` or `init_graph`.
+  pure subroutine partition_set_box(self, lower, upper)
     class(partition_t), intent(inout) :: self
     !> (nd) [m]
-    real(dp), intent(in) :: lower(:), upper(:)
-    integer, intent(in) :: boxes(3)
-    !> edge of a detection cell [m]: no more boxes than cells
-    real(dp), intent(in) :: edge
-    type(error_t), allocatable, intent(inout) :: error
-    type(cell_groups_t) :: none
-
-    call set_box(self, lower, upper)
-    self%kind = kind_boxes
-    self%groups = none
-    self%boxes(:) = boxes
-    self%n_subdomains = int(min(product(real(boxes, dp)), real(huge(1), dp)), i4)
-    call self%cells%set_boxes(lower, upper, self%period(1:self%nd), boxes)
-    call check_subdomains(lower, upper, edge, self%n_subdomains, error)
-  end subroutine partition_init_grid
-
-  subroutine set_box(self, lower, upper)
-    class(partition_t), intent(inout) :: self
     real(dp), intent(in) :: lower(:), upper(:)
 
     self%nd = size(lower)
@@ -86,17 +69,34 @@ contains
     self%upper(:) = 1.0_dp
     self%lower(1:self%nd) = lower
     self%upper(1:self%nd) = upper
-  end subroutine set_box
+  end subroutine partition_set_box
 
-  !> Cells distributed so that each subdomain holds about as much weight and few neighbours are cut. Each rank gives points of
-  !> its own. The graph that a rank cuts and what it keeps of the cells are bounded: where one graph of cell_limit cells gives
-  !> each subdomain too few, its cells make groups of subdomains, and the group of a cell is cut by itself, more finely.
-  !> Errors are the same on all ranks, and so is the partition on any number of ranks. Collective.
-  subroutine partition_init_graph(self, comm, lower, upper, edge, points, weights, n_subdomains, error)
+  !> Equal boxes over the box that was set.
+  subroutine partition_init_grid(self, boxes, edge, error)
+    class(partition_t), intent(inout) :: self
+    integer, intent(in) :: boxes(3)
+    !> edge of a detection cell [m]: no more boxes than cells
+    real(dp), intent(in) :: edge
+    type(error_t), allocatable, intent(inout) :: error
+    type(cell_groups_t) :: none
+
+    self%kind = kind_boxes
+    self%groups = none
+    self%boxes(:) = boxes
+    self%n_subdomains = int(min(product(real(boxes, dp)), real(huge(1), dp)), i4)
+    associate (lower => self%lower(1:self%nd), upper => self%upper(1:self%nd))
+      call self%cells%set_boxes(lower, upper, self%period(1:self%nd), boxes)
+      call check_subdomains(lower, upper, edge, self%n_subdomains, error)
+    end associate
+  end subroutine partition_init_grid
+
+  !> Cells of the box that was set, distributed so that each subdomain holds about as much weight and few neighbours are cut. Each
+  !> rank gives points of its own. The graph that a rank cuts and what it keeps of the cells are bounded: where one graph of
+  !> cell_limit cells gives each subdomain too few, its cells make groups of subdomains, and the group of a cell is cut by itself,
+  !> more finely. Errors are the same on all ranks, and so is the partition on any number of ranks. Collective.
+  subroutine partition_init_graph(self, comm, edge, points, weights, n_subdomains, error)
     class(partition_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
-    !> (nd) [m]
-    real(dp), intent(in) :: lower(:), upper(:)
     !> smallest edge of a cell [m]
     real(dp), intent(in) :: edge
     !> (nd, points of this rank) [m]
@@ -110,10 +110,9 @@ contains
     real(dp) :: cell_edge
     integer :: k, cell, place(3)
 
-    call set_box(self, lower, upper)
     self%n_subdomains = n_subdomains
     cell_edge = edge
-    call self%cells%set_cells(lower, upper, self%period(1:self%nd), cell_edge, self%cell_limit)
+    call self%cells%set_cells(self%lower(1:self%nd), self%upper(1:self%nd), self%period(1:self%nd), cell_edge, self%cell_limit)
     allocate (weight(self%cells%cells()), source=0_i8)
     do k = 1, size(weights)
       call self%cells%locate(points(:, k), place)

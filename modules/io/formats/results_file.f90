@@ -11,7 +11,19 @@ module gravier_results_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: results_file_t, results_step_t, figures_t, histogram_rows_t, accuracy_t
+  public :: results_file_t, provenance_t, results_step_t, figures_t, histogram_rows_t, accuracy_t
+
+  !> What was run: enough to run it again.
+  type :: provenance_t
+    !> of the program
+    character(len=:), allocatable :: version
+    !> the command line, without the number of ranks
+    character(len=:), allocatable :: command
+    !> the input file, whole
+    character(len=:), allocatable :: input_text
+    !> 2 or 3
+    integer :: dimension = 2
+  end type provenance_t
 
   !> Counts of equal bins that begin at 0.
   type :: histogram_rows_t
@@ -79,30 +91,24 @@ contains
 
   !> Create the file with /run (what was run) and an empty /steps. It takes its name, and the place of an older file, when
   !> it is complete. Collective.
-  subroutine results_open(self, comm, path, version, command, input_text, dimension, error)
+  subroutine results_open(self, comm, path, run, error)
     class(results_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
-    !> of the program
-    character(len=*), intent(in) :: version
-    !> the command line, without the number of ranks
-    character(len=*), intent(in) :: command
-    !> the input file, whole
-    character(len=*), intent(in) :: input_text
-    !> 2 or 3
-    integer, intent(in) :: dimension
+    !> the same on all ranks
+    type(provenance_t), intent(in) :: run
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(error)) return
     self%comm = comm
     self%path = path
     call self%file%create(comm, path, error)
-    call self%file%reserve(bytes_of_headers + len(version) + len(command) + len(input_text), error)
+    call self%file%reserve(bytes_of_headers + len(run%version) + len(run%command) + len(run%input_text), error)
     call self%file%make_group("/run", error)
-    call self%file%write_attribute("/run", "version", version, error)
-    call self%file%write_attribute("/run", "command", command, error)
-    call self%file%write_attribute("/run", "input_text", input_text, error)
-    call self%file%write_attribute("/run", "dimension", dimension, error)
+    call self%file%write_attribute("/run", "version", run%version, error)
+    call self%file%write_attribute("/run", "command", run%command, error)
+    call self%file%write_attribute("/run", "input_text", run%input_text, error)
+    call self%file%write_attribute("/run", "dimension", run%dimension, error)
     call self%file%make_group("/steps", error, members=steps_in_block)
     call self%file%show(error)
   end subroutine results_open

@@ -70,8 +70,8 @@ contains
     type(physics_t), intent(in) :: physics
     type(contact_list_t), intent(inout) :: found
     type(shape_work_t) :: work
-    integer :: w, p, i, j, nd
-    real(dp) :: branch(decomposition%nd), normal(decomposition%nd), distance, gap, alert
+    integer :: w, p, i, j, c, nd
+    real(dp) :: branch(decomposition%nd), distance, gap, alert
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
@@ -80,6 +80,8 @@ contains
       p = view%list%watched_place(w)
       i = view%list%candidate(p)
       j = view%list%antagonist(p)
+      ! a contact is written behind the last one of the list, which then takes it or not
+      c = found%n + 1
       if (j > 0) then
         branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
         if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
@@ -87,11 +89,11 @@ contains
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
         if (is_far(view%list, p, gap, alert)) cycle
         if (distance > 0.0_dp) then
-          normal(:) = branch/distance
+          found%normal(:, c) = branch/distance
         else
           ! coincident centres have no normal: take the vertical, so that the law can part them
-          normal(:) = 0.0_dp
-          normal(nd) = 1.0_dp
+          found%normal(:, c) = 0.0_dp
+          found%normal(nd, c) = 1.0_dp
         end if
       else
         if (.not. decomposition%boundaries(-j)%present) cycle
@@ -99,11 +101,13 @@ contains
           if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, work, found)
           cycle
         end if
-        call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, normal)
+        call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, found%normal(:, c))
         gap = distance - view%bodies%radius(i)
         if (is_far(view%list, p, gap, alert)) cycle
       end if
-      call add_contact(view, decomposition, physics, p, gap, normal, found)
+      found%source(c) = p
+      found%gap(c) = gap
+      call add_contact(view, decomposition, physics, found)
     end do
   end subroutine find_round_contacts
 
@@ -116,14 +120,13 @@ contains
     type(shape_work_t), intent(inout) :: work
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
-    real(dp) :: normal(decomposition%nd)
     integer :: k
 
     call find_points(view, decomposition, p, work, points)
     call carry_memory(points, p, view%list)
     do k = 1, points%n
-      normal(:) = points%normal(1:size(normal), k)
-      call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found)
+      call write_point(points, k, p, found)
+      call add_contact(view, decomposition, physics, found)
     end do
     found%overlapping_cores = found%overlapping_cores + points%overlapping_cores
   end subroutine find_facet_contacts
@@ -136,8 +139,6 @@ contains
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
     type(shape_work_t) :: work
-    type(contact_place_t) :: place
-    real(dp) :: normal(decomposition%nd)
     integer :: w, p, k
 
     call work%init(decomposition%nd)
@@ -147,14 +148,27 @@ contains
       call find_points(view, decomposition, p, work, points)
       call carry_memory(points, p, view%list)
       do k = 1, points%n
-        normal(:) = points%normal(1:size(normal), k)
-        place = place_of_point(view, decomposition%nd, p, points, k)
-        call add_contact(view, decomposition, physics, p + k - 1, points%gap(k), normal, found, place)
+        call write_point(points, k, p, found)
+        found%place(found%n + 1) = place_of_point(view, decomposition%nd, p, points, k)
+        call add_contact(view, decomposition, physics, found)
       end do
       w = w + view%list%points_of(p)
     end do
     found%overlapping_cores = points%overlapping_cores
   end subroutine find_contacts_of_shapes
+
+  !> Write point `k` of pair `p` behind the last contact of the list.
+  pure subroutine write_point(points, k, p, found)
+    type(pair_points_t), intent(in) :: points
+    integer, intent(in) :: k, p
+    type(contact_list_t), intent(inout) :: found
+
+    associate (c => found%n + 1, nd => size(found%normal, 1))
+      found%source(c) = p + k - 1
+      found%gap(c) = points%gap(k)
+      found%normal(:, c) = points%normal(1:nd, k)
+    end associate
+  end subroutine write_point
 
   !> Where point `k` of pair `p` is.
   pure type(contact_place_t) function place_of_point(view, nd, p, points, k) result(place)
@@ -183,46 +197,42 @@ contains
     if (is_far .and. list%memory%law_row > 0) is_far = list%state(list%memory%law_row, p) == 0
   end function is_far
 
-  !> Add the contact at place `p` of the list, within the alert distance or with something to remember, if it is one under its law.
-  subroutine add_contact(view, decomposition, physics, p, gap, normal, found, place)
+  !> Add the contact that was written behind the last one of the list, within the alert distance or with something to remember,
+  !> if it is one under its law.
+  subroutine add_contact(view, decomposition, physics, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    !> [m], (nd)
-    real(dp), intent(in) :: gap
-    real(dp), intent(in), contiguous :: normal(:)
+    !> contact n + 1 has its source, gap and normal, and its place where bodies have shapes
     type(contact_list_t), intent(inout) :: found
-    !> of bodies with shapes
-    type(contact_place_t), intent(in), optional :: place
 
     if (physics%laws%varies) then
-      call add_with_terms(view, decomposition, physics, p, gap, normal, found, place)
+      call add_with_terms(view, decomposition, physics, found)
     else
-      ! where some law has restitution; the law of a contact that is closed is looked up where its terms are packed
-      if (physics%laws%returns .and. gap > 0.0_dp) then
-        if (is_closed_under(terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, p), gap))) return
-      end if
-      call keep_contact(view, p, gap, normal, found, place)
+      associate (p => found%source(found%n + 1), gap => found%gap(found%n + 1))
+        ! where some law has restitution; the law of a contact that is closed is looked up where its terms are packed
+        if (physics%laws%returns .and. gap > 0.0_dp) then
+          if (is_closed_under(terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, p), gap))) return
+        end if
+      end associate
+      call keep_contact(view, found)
     end if
   end subroutine add_contact
 
   !> The same in a scene where some law has other terms for each pair. Such a law asks for more than the gap: it gives the contact
   !> its terms and springs, and the pair its state.
-  subroutine add_with_terms(view, decomposition, physics, p, gap, normal, found, place)
+  subroutine add_with_terms(view, decomposition, physics, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    integer, intent(in) :: p
-    !> [m], (nd)
-    real(dp), intent(in) :: gap
-    real(dp), intent(in), contiguous :: normal(:)
     type(contact_list_t), intent(inout) :: found
-    !> of bodies with shapes
-    type(contact_place_t), intent(in), optional :: place
     type(contact_pair_t) :: pair
-    integer :: l, row
+    real(dp) :: gap
+    integer :: c, p, l, row
 
+    c = found%n + 1
+    p = found%source(c)
+    gap = found%gap(c)
     l = law_of(view, decomposition%boundaries, physics%laws, p)
     if (physics%laws%varies_at(l)) then
       row = view%list%memory%law_row
@@ -230,20 +240,17 @@ contains
       pair%h = physics%h
       pair%gap = gap
       if (row > 0) pair%state = view%list%state(row, p)
-      if (present(place)) then
-        call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, place, normal, pair)
-      else
-        call evaluate_pair(view, decomposition%boundaries, physics%laws, l, p, round_place(view, p, gap, normal), normal, pair)
-      end if
+      call evaluate_pair(view, decomposition%boundaries, physics%laws%of(l)%law, p, place_of(view, found, c), found%normal(:, c), &
+        & pair)
       if (row > 0) view%list%state(row, p) = pair%state
     else
       pair%terms = terms_of(physics%laws, l, gap)
     end if
     if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
     if (gap > 0.0_dp .and. is_closed_under(pair%terms)) return
-    call keep_contact(view, p, gap, normal, found, place)
-    found%terms(found%n) = pair%terms
-    if (size(found%spring) > 0) found%spring(found%n) = pair%spring
+    call keep_contact(view, found)
+    found%terms(c) = pair%terms
+    if (size(found%spring) > 0) found%spring(c) = pair%spring
   end subroutine add_with_terms
 
   !> Whether what is open is no contact under these terms: what has restitution acts from the moment of touching on.
@@ -253,21 +260,13 @@ contains
     is_closed_under = terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp
   end function is_closed_under
 
-  !> Put a contact into the list.
-  pure subroutine keep_contact(view, p, gap, normal, found, place)
+  !> Take the contact that was written behind the last one into the list.
+  pure subroutine keep_contact(view, found)
     type(local_bodies_t), intent(in) :: view
-    integer, intent(in) :: p
-    real(dp), intent(in) :: gap
-    real(dp), intent(in), contiguous :: normal(:)
     type(contact_list_t), intent(inout) :: found
-    type(contact_place_t), intent(in), optional :: place
 
     found%n = found%n + 1
-    found%source(found%n) = p
-    found%boundary(found%n) = boundary_of(view, p)
-    found%gap(found%n) = gap
-    found%normal(:, found%n) = normal
-    if (present(place)) found%place(found%n) = place
+    found%boundary(found%n) = boundary_of(view, found%source(found%n))
   end subroutine keep_contact
 
   !> Where contact `f` of those found is.

@@ -3,7 +3,7 @@ module gravier_pair_laws
   use gravier_kinds, only: dp
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_boundary, only: boundary_t
-  use gravier_contact_law, only: contact_pair_t, contact_terms_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, contact_terms_t
   use gravier_law_set, only: law_set_t
   use gravier_material_filter, only: material_of
   use gravier_contact_kernels, only: lane_of, block_of
@@ -67,12 +67,12 @@ contains
     terms%free_gap = max(gap, 0.0_dp)
   end function terms_of
 
-  !> The terms of pair `p` over a step under law `l`, and its state.
-  pure subroutine evaluate_pair(view, boundaries, laws, l, p, place, normal, pair)
+  !> The terms of pair `p` over a step under a law, and its state.
+  pure subroutine evaluate_pair(view, boundaries, law, p, place, normal, pair)
     type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
-    type(law_set_t), intent(in) :: laws
-    integer, intent(in) :: l, p
+    class(contact_law_t), intent(in) :: law
+    integer, intent(in) :: p
     type(contact_place_t), intent(in) :: place
     !> (nd) from the antagonist to the candidate
     real(dp), intent(in) :: normal(:)
@@ -97,12 +97,10 @@ contains
     pair%normal_velocity = sum(v*normal)
     pair%slip = norm2(v - pair%normal_velocity*normal)
     pair%terms%free_gap = max(pair%gap, 0.0_dp)
-    associate (law => laws%of(l)%law)
-      if (law%yields) call find_reduced(view, i, j, nd, pair)
-      pair%terms%rolling_friction = law%largest%rolling_friction
-      pair%terms%pivoting_friction = law%largest%pivoting_friction
-      call law%evaluate(pair)
-    end associate
+    if (law%yields) call find_reduced(view, i, j, nd, pair)
+    pair%terms%rolling_friction = law%largest%rolling_friction
+    pair%terms%pivoting_friction = law%largest%pivoting_friction
+    call law%evaluate(pair)
   end subroutine evaluate_pair
 
   !> What springs ask of a pair: radius and mass of one sphere that meets a plane as the two bodies meet each other, and the breadth

@@ -2,6 +2,7 @@
 module gravier_shape_contacts
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_distance, only: placed_pair_t
   use gravier_shape_library, only: shape_library_t, of_face
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
@@ -133,16 +134,18 @@ contains
     type(seen_body_t), intent(in) :: a, b
     real(dp), intent(in) :: alert
     type(manifold_t), intent(inout) :: manifold
-    real(dp) :: rotation(3, 3), way(3)
+    type(placed_pair_t) :: pair
     integer :: k, l
 
+    pair%radius_a = a%radius
+    pair%radius_b = b%radius
     do k = 1, 3
-      way(k) = sum(a%axes(:, k)*b%centre)
+      pair%way(k) = sum(a%axes(:, k)*b%centre)
       do l = 1, 3
-        rotation(k, l) = sum(a%axes(:, k)*b%axes(:, l))
+        pair%rotation(k, l) = sum(a%axes(:, k)*b%axes(:, l))
       end do
     end do
-    call find_polyhedron_manifold(piece_a, piece_b, a%radius, b%radius, rotation, way, alert, of_face, manifold)
+    call find_polyhedron_manifold(piece_a, piece_b, pair, alert, of_face, manifold)
     call turn_manifold(a%axes, manifold)
   end subroutine meet_in_space
 

@@ -58,7 +58,8 @@ contains
     upper(:) = 1.0_dp
     decomposition%partition%period(:) = period%length
     boxes(:) = choose_boxes(lower, upper, n_subdomains, period%length)
-    call decomposition%partition%init_grid(lower, upper, boxes, 0.01_dp, error)
+    call decomposition%partition%set_box(lower, upper)
+    call decomposition%partition%init_grid(boxes, 0.01_dp, error)
     call check(.not. allocated(error), "a partition")
     call body%init(decomposition%layout(), merge(1, 0, comm%rank == 0))
     if (body%n == 1) then

@@ -76,7 +76,8 @@ contains
     boxes(1) = a
     boxes(2) = b
     boxes(3) = c
-    call partition%init_grid(lower(1:nd), upper(1:nd), boxes, 0.05_dp, error)
+    call partition%set_box(lower(1:nd), upper(1:nd))
+    call partition%init_grid(boxes, 0.05_dp, error)
     call check(.not. allocated(error), "boxes")
     call check_equal(partition%n_subdomains, a*b*c, "number of boxes")
     call check_owners(partition, lower(1:nd), upper(1:nd), boxes)
@@ -166,7 +167,8 @@ contains
     integer :: n
 
     allocate (list(0))
-    call partition%init_grid([0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp], [4, 2, 1], 0.25_dp, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp])
+    call partition%init_grid([4, 2, 1], 0.25_dp, error)
     call check_equal(partition%owner([1.0_dp, 1.0_dp]), 6, "a corner")
     call check_equal(partition%owner([4.0_dp, 2.0_dp]), 8, "the upper corner")
     call check_equal(partition%owner([0.0_dp, 0.0_dp]), 1, "the lower corner")
@@ -242,9 +244,10 @@ contains
     type(partition_t) :: partition
     type(error_t), allocatable :: error
 
-    call partition%init_grid([0.0_dp, 0.0_dp], [3.5_dp, 1.5_dp], [4, 2, 1], 1.0_dp, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [3.5_dp, 1.5_dp])
+    call partition%init_grid([4, 2, 1], 1.0_dp, error)
     call check(.not. allocated(error), "as many boxes as cells")
-    call partition%init_grid([0.0_dp, 0.0_dp], [3.5_dp, 1.5_dp], [3, 3, 1], 1.0_dp, error)
+    call partition%init_grid([3, 3, 1], 1.0_dp, error)
     call check_refused(error, 9, 8)
   end subroutine test_too_many_boxes
 
@@ -285,7 +288,8 @@ contains
     upper(:) = 1.0_dp
     edge = merge(0.04_dp, 0.12_dp, nd == 2)
     call make_grains(nd, comm%rank, comm%size, points, weights)
-    call partition%init_graph(comm, lower, upper, edge, points, weights, n, error)
+    call partition%set_box(lower, upper)
+    call partition%init_graph(comm, edge, points, weights, n, error)
     call check(.not. allocated(error), "cells shared out")
     call check_equal(partition%n_subdomains, n, "number of subdomains")
     associate (owner => partition%groups%maps(1)%subdomain)
@@ -307,7 +311,8 @@ contains
     call check_saved(partition, nd)
     ! one rank alone, with all grains, finds the same
     call make_grains(nd, 0, 1, points, weights)
-    call serial%init_graph(alone, lower, upper, edge, points, weights, n, error)
+    call serial%set_box(lower, upper)
+    call serial%init_graph(alone, edge, points, weights, n, error)
     call check(all(serial%groups%maps(1)%subdomain == partition%groups%maps(1)%subdomain), "the same on any number of ranks")
   end subroutine test_shared_cells
 
@@ -370,8 +375,9 @@ contains
     integer, allocatable :: met(:)
 
     call make_row(points, weights)
+    call partition%set_box([0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp])
     do n = 6, 12, 6
-      call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, n, error)
+      call partition%init_graph(comm, 1.0_dp, points, weights, n, error)
       call check(.not. allocated(error), "cells of a row")
       allocate (met(n), source=0)
       do k = 1, 12
@@ -402,7 +408,8 @@ contains
     integer, allocatable :: weights(:)
 
     call make_row(points, weights)
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, 13, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp])
+    call partition%init_graph(comm, 1.0_dp, points, weights, 13, error)
     call check_refused(error, 13, 12)
   end subroutine test_too_many_parts
 
@@ -414,10 +421,13 @@ contains
     integer, allocatable :: weights(:)
 
     call make_row(points, weights)
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, 12, error)
-    call partition%init_grid([0.0_dp, 0.0_dp], [12.0_dp, 4.0_dp], [3, 1, 1], 1.0_dp, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp])
+    call partition%init_graph(comm, 1.0_dp, points, weights, 12, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [12.0_dp, 4.0_dp])
+    call partition%init_grid([3, 1, 1], 1.0_dp, error)
     call check_equal(partition%owner([11.0_dp, 1.0_dp]), 3, "boxes after cells")
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp], 1.0_dp, points, weights, 6, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [11.9_dp, 3.9_dp])
+    call partition%init_graph(comm, 1.0_dp, points, weights, 6, error)
     call check_equal(partition%owner([11.5_dp, 0.5_dp]), 6, "cells after boxes")
     call check_equal(partition%n_subdomains, 6, "subdomains of cells after boxes")
   end subroutine test_change_of_kind
@@ -431,7 +441,8 @@ contains
 
     allocate (list(0))
     partition%period(1) = 4.0_dp
-    call partition%init_grid([0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp], [4, 2, 1], 0.25_dp, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp])
+    call partition%init_grid([4, 2, 1], 0.25_dp, error)
     call check_equal(partition%owner([4.0_dp, 2.0_dp]), 5, "the upper end is the lower end")
     call check_equal(partition%owner([-0.5_dp, 0.5_dp]), 4, "left of the box")
     call check_equal(partition%owner([9.5_dp, 5.0_dp]), 6, "two periods right, above")
@@ -443,7 +454,8 @@ contains
     call check_near(partition, [0.0_dp, 0.0_dp], [4.0_dp, 2.0_dp])
     call check_saved(partition, 2)
     partition%period(:) = 1.7_dp
-    call partition%init_grid([0.3_dp, -1.0_dp, 0.1_dp], [2.0_dp, 0.7_dp, 1.8_dp], [3, 1, 2], 0.05_dp, error)
+    call partition%set_box([0.3_dp, -1.0_dp, 0.1_dp], [2.0_dp, 0.7_dp, 1.8_dp])
+    call partition%init_grid([3, 1, 2], 0.05_dp, error)
     call check_near(partition, [0.3_dp, -1.0_dp, 0.1_dp], [2.0_dp, 0.7_dp, 1.8_dp])
     call check_images(partition, 3)
   end subroutine test_periodic_boxes
@@ -498,12 +510,14 @@ contains
     call check(.not. allocated(error), "cells without number")
     call check_subdomains([0.0_dp, 0.0_dp, 0.0_dp], [2.0e3_dp, 2.0e3_dp, 2.0e3_dp], 1.0_dp, huge(1), error)
     call check(.not. allocated(error), "more cells than integers")
-    call partition%init_grid([0.0_dp, 0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp, 1.0_dp], [100000, 100000, 100000], 0.1_dp, error)
+    call partition%set_box([0.0_dp, 0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp, 1.0_dp])
+    call partition%init_grid([100000, 100000, 100000], 0.1_dp, error)
     call check(allocated(error), "a product of boxes without number")
     deallocate (error)
     points(:, 1) = -far
     points(:, 2) = far
-    call partition%init_graph(comm, -far, far, 1.0e-3_dp, points, [1, 1], 2, error)
+    call partition%set_box(-far, far)
+    call partition%init_graph(comm, 1.0e-3_dp, points, [1, 1], 2, error)
     call check(.not. allocated(error), "a graph of cells without number")
     call check(partition%owner(points(:, 1)) /= partition%owner(points(:, 2)), "parts of a scene without number")
   end subroutine test_extremes
@@ -529,7 +543,8 @@ contains
       weights(k) = merge(30, 0, k <= 70)
     end do
     if (n > 0) points(2, 71) = 3.5_dp
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [59.9_dp, 3.9_dp], 1.0_dp, points, weights, 4, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [59.9_dp, 3.9_dp])
+    call partition%init_graph(comm, 1.0_dp, points, weights, 4, error)
     call check(.not. allocated(error), "weighted points")
     held(:) = 0
     do k = 1, 60
@@ -583,7 +598,8 @@ contains
     if (is_periodic) partition%period(1) = 1.0_dp
     if (is_periodic) partition%period(nd) = 1.0_dp
     call make_grains(nd, comm%rank, comm%size, points, weights)
-    call partition%init_graph(comm, lower, upper, edge, points, weights, n, error)
+    call partition%set_box(lower, upper)
+    call partition%init_graph(comm, edge, points, weights, n, error)
     call check(.not. allocated(error), "cells shared out on two levels")
     if (allocated(error)) return
     call check(partition%groups%n > 1 .and. partition%cells%split > 1, "there are two levels")
@@ -591,7 +607,8 @@ contains
     call make_grains(nd, 0, 1, points, weights)
     serial%cell_limit = partition%cell_limit
     serial%period(:) = partition%period
-    call serial%init_graph(alone, lower, upper, edge, points, weights, n, error)
+    call serial%set_box(lower, upper)
+    call serial%init_graph(alone, edge, points, weights, n, error)
     call check_levels(partition, serial, points)
     call check_loads(serial, points, n)
     call check_near(serial, lower, upper)
@@ -623,7 +640,8 @@ contains
     end do
     weights(:) = 1
     partition%cell_limit = 128
-    call partition%init_graph(alone, [0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp], 1.0_dp/side, points, weights, 12, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [1.0_dp, 1.0_dp])
+    call partition%init_graph(alone, 1.0_dp/side, points, weights, 12, error)
     call check(.not. allocated(error), "piles shared out on two levels")
     if (allocated(error)) return
     call check(partition%groups%n > 1 .and. partition%cells%split > 1, "there are two levels of piles")
@@ -810,7 +828,8 @@ contains
     call make_row(points, weights)
     if (size(weights) > 0) weights(:) = [30, 10, 10, 1, 10, 10, 10, 10, 1, 10, 10, 30]
     partition%period(1) = 12.0_dp
-    call partition%init_graph(comm, [0.0_dp, 0.0_dp], [12.0_dp, 0.9_dp], 1.0_dp, points, weights, 2, error)
+    call partition%set_box([0.0_dp, 0.0_dp], [12.0_dp, 0.9_dp])
+    call partition%init_graph(comm, 1.0_dp, points, weights, 2, error)
     call check(.not. allocated(error), "cells of a ring")
     call check_equal(partition%cells%n(1), 12, "whole cells fill the period")
     call check_equal(partition%owner([0.5_dp, 0.5_dp]), partition%owner([11.5_dp, 0.5_dp]), "a ring is not cut where it is heavy")

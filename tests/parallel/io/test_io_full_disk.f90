@@ -8,7 +8,7 @@ program test_io_full_disk
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory, remove_file
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t
+  use gravier_results_file, only: results_file_t, provenance_t
   use gravier_test_results_rows, only: body_rows_t, write_rows
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls
   use gravier_bodies_file, only: read_bodies, write_bodies
@@ -159,6 +159,17 @@ contains
     bodies%velocity = -1
   end subroutine make_bodies
 
+  !> What was run, by its input file and its dimension.
+  type(provenance_t) function run_of(input_text, dimension) result(run)
+    character(len=*), intent(in) :: input_text
+    integer, intent(in) :: dimension
+
+    run%version = "0.1.0"
+    run%command = "gravier case.nml"
+    run%input_text = input_text
+    run%dimension = dimension
+  end function run_of
+
   !> Steps until the disk is full: the error comes before anything is written, earlier steps stay, and once there is
   !> room again the run can go on.
   subroutine test_results()
@@ -168,7 +179,7 @@ contains
     integer :: step
 
     call make_bodies(1000, bodies)
-    call results%open(comm, disk//"/results.h5", "0.1.0", "gravier case.nml", "&scene /", 3, error)
+    call results%open(comm, disk//"/results.h5", run_of("&scene /", 3), error)
     call expect_none(error, "a results file on a disk with room")
     do step = 1, 100
       call write_rows(results, step, 0.01_dp*step, bodies, error)
@@ -184,7 +195,7 @@ contains
     call check_steps(step - 1)
 
     call fill(-1)
-    call results%open(comm, disk//"/results.h5", "0.1.0", "gravier case.nml", "&scene /", 3, error)
+    call results%open(comm, disk//"/results.h5", run_of("&scene /", 3), error)
     call write_rows(results, 1, 0.01_dp, bodies, error)
     call fill(4096)
     call write_rows(results, 2, 0.02_dp, bodies, error)
@@ -277,7 +288,7 @@ contains
     call expect(error, "no space left on device: ", "a new file on a full disk")
     call check(.not. file%is_open(), "not open")
     call fill(100000)
-    call results%open(comm, disk//"/new.h5", "0.1.0", "gravier case.nml", repeat("x", 200000), 2, error)
+    call results%open(comm, disk//"/new.h5", run_of(repeat("x", 200000), 2), error)
     call expect(error, "no space left on device: ", "results on a full disk")
     call results%close(error)
     call expect_none(error, "closing results never begun")

@@ -7,7 +7,7 @@ program test_io_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, accuracy_t
+  use gravier_results_file, only: results_file_t, provenance_t, accuracy_t
   use gravier_test_results_rows, only: body_rows_t, contact_rows_t, boundary_rows_t, write_rows, write_boundaries
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -135,6 +135,17 @@ contains
     if (comm%size > 1) owner = 1 + mod(5*g + g/4, comm%size - 1)
   end function owner
 
+  !> What was run, by its input file and its dimension.
+  type(provenance_t) function run_of(input_text, dimension) result(run)
+    character(len=*), intent(in) :: input_text
+    integer, intent(in) :: dimension
+
+    run%version = "0.1.0"
+    run%command = "gravier case.nml"
+    run%input_text = input_text
+    run%dimension = dimension
+  end function run_of
+
   subroutine write_all(comm, name, dimension, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: name
@@ -148,7 +159,7 @@ contains
     call make_bodies(comm, dimension, bodies)
     call make_contacts(comm, dimension, contacts)
     call make_boundaries(dimension, boundaries)
-    call results%open(comm, name, "0.1.0", "gravier case.nml", input_text, dimension, error)
+    call results%open(comm, name, run_of(input_text, dimension), error)
     call write_boundaries(results, boundaries%id, names, shapes, boundaries%normal, error)
     call write_rows(results, 0, 0.0_dp, bodies, error)
     call write_rows(results, 10, 0.01_dp, bodies, error, contacts, boundaries)
@@ -412,7 +423,7 @@ contains
     real(dp) :: nan
 
     nan = ieee_value(1.0_dp, ieee_quiet_nan)
-    call results%open(world, path, "0.1.0", "gravier case.nml", input_text, 2, error)
+    call results%open(world, path, run_of(input_text, 2), error)
     call make_bodies(world, 2, bodies)
     call make_contacts(world, 2, contacts)
     where (bodies%id == 103 .or. bodies%id == 109) bodies%velocity(3, :) = nan
@@ -446,7 +457,7 @@ contains
     call check(.not. file%exists("/steps/1/contacts"), "the step that was good")
     call file%close(error)
     call expect_none(error, "reading after refusals")
-    call results%open(world, path//"/none.h5", "", "", "", 2, error)
+    call results%open(world, path//"/none.h5", run_of("", 2), error)
     call expect(error, path//"/none.h5.part: cannot create this file: Not a directory", "no such directory")
   end subroutine test_refused
 

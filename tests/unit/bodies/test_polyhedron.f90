@@ -9,6 +9,7 @@ program test_polyhedron
     & about, random_turn
   use gravier_polyhedron, only: make_polyhedron, make_polyhedron_of_faces, make_box, make_capsule, make_union, &
     & make_overlapping_union, make_piece, make_capsule_piece
+  use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_shape_library, only: body_shape_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -292,7 +293,7 @@ contains
     integer :: corner(24), k
 
     points(:, :) = cube()
-    call make_polyhedron_of_faces("x", points, four, squares, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four, squares), 0.01_dp, shape, error)
     call check(.not. allocated(error), "a cube of squares")
     call check_close(shape%volume*shape%size**3, 8.0_dp, tight, "a cube of squares: volume")
     ! each face with points of its own, off by what single precision leaves
@@ -300,35 +301,35 @@ contains
       apart(:, k) = points(:, squares(k)) + 3.0e-8_dp*mod(k, 3)
       corner(k) = k
     end do
-    call make_polyhedron_of_faces("x", apart, four, corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(apart, four, corner), 0.01_dp, shape, error)
     call check(.not. allocated(error), "points merged by place")
     if (allocated(error)) print "(a)", error%message
     call check_equal(size(shape%piece(1)%vertex, 2), 8, "points merged by place: corners")
-    call make_polyhedron_of_faces("x", points, four(1:6), squares(1:20), 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four(1:6), squares(1:20)), 0.01_dp, shape, error)
     call check_refused(error, "x: the surface is not closed: beyond one side of face ")
     corner(:) = squares
     corner(5:8) = [7, 8, 6, 5]
-    call make_polyhedron_of_faces("x", points, four, corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four, corner), 0.01_dp, shape, error)
     call check_refused(error, "x: the surface is not closed: beyond one side of face 2 there is no face, or one with its")
     do k = 1, 24
       corner(k) = squares(25 - k)
     end do
-    call make_polyhedron_of_faces("x", points, four, corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four, corner), 0.01_dp, shape, error)
     call check_refused(error, "x: the surface is inside out")
     corner(:) = squares
     corner(4) = 4
-    call make_polyhedron_of_faces("x", points, four, corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four, corner), 0.01_dp, shape, error)
     call check_refused(error, "x: face 1 has two corners at one place")
     corner(4) = 9
-    call make_polyhedron_of_faces("x", points, four, corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four, corner), 0.01_dp, shape, error)
     call check_refused(error, "x: a face names a corner that there is not")
     points(3, :) = 0.0_dp
-    call make_polyhedron_of_faces("x", points, four, squares, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(points, four, squares), 0.01_dp, shape, error)
     call check_refused(error, "x: ")
     ! a pyramid dented into the face of x = 1
     dent(:, 1:8) = cube()
     dent(:, 9) = 0.0_dp
-    call make_polyhedron_of_faces("x", dent, dent_first, dent_corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces("x", sharp_polyhedron_t(dent, dent_first, dent_corner), 0.01_dp, shape, error)
     call check_refused(error, "x: the body is not convex: a point lies in front of face ")
   end subroutine test_faces
 

@@ -6,6 +6,7 @@ program test_shape_files
   use gravier_errors, only: error_t, status_input
   use gravier_obj_file, only: read_obj
   use gravier_polyhedron, only: make_polyhedron_of_faces
+  use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_shape_library, only: body_shape_t
   use gravier_stl_file, only: read_stl
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -47,7 +48,7 @@ contains
     if (allocated(error)) print "(a)", error%message
     call check(.not. allocated(error), name)
     if (allocated(error)) return
-    call make_polyhedron_of_faces(name, found, first, corner, 0.01_dp, shape, error)
+    call make_polyhedron_of_faces(name, sharp_polyhedron_t(found, first, corner), 0.01_dp, shape, error)
     call check(.not. allocated(error), name//": a body")
     if (allocated(error)) return
     call check_close(shape%volume*shape%size**3, 1/6.0_dp, 1.0e-14_dp, name//": volume")

@@ -3,6 +3,7 @@ program test_shapes_file
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
+  use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_shape_library, only: body_shape_t, shape_library_t
   use gravier_polyhedron, only: make_polyhedron_of_faces
   use gravier_shape_names, only: find_shape, shape_names, library_digest
@@ -453,7 +454,7 @@ contains
     real(dp), parameter :: point(3, 1) = 0.0_dp
     integer, parameter :: none(0) = 0
 
-    call make_polyhedron_of_faces("a", point, [1], none, 0.1_dp, shape, error)
+    call make_polyhedron_of_faces("a", sharp_polyhedron_t(point, [1], none), 0.1_dp, shape, error)
     call check(allocated(error), "a surface without faces")
     if (allocated(error)) call check(index(error%message, ": no faces") > 0, "a surface without faces: "//error%message)
   end subroutine test_no_faces

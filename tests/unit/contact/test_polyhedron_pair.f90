@@ -4,6 +4,7 @@ program test_polyhedron_pair
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_distance, only: placed_pair_t
   use gravier_manifold, only: manifold_t, most_points, feature_base
   use gravier_polyhedron, only: make_polyhedron, make_box, make_capsule
   use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
@@ -67,11 +68,16 @@ contains
     type(vector_t), intent(in) :: way
     type(manifold_t), intent(out) :: manifold
     integer, intent(in), optional :: most
+    type(placed_pair_t) :: pair
     integer :: n
 
     n = 4
     if (present(most)) n = most
-    call find_polyhedron_manifold(a%piece(1), b%piece(1), a%size, b%size, turn%m, way%x, alert, n, manifold)
+    pair%radius_a = a%size
+    pair%radius_b = b%size
+    pair%rotation(:, :) = turn%m
+    pair%way(:) = way%x
+    call find_polyhedron_manifold(a%piece(1), b%piece(1), pair, alert, n, manifold)
     call check(all(manifold%key(2:manifold%n) > manifold%key(1:manifold%n - 1)), "ascending keys")
   end subroutine meet
 

@@ -268,8 +268,8 @@ contains
     view%bodies%velocity(:, 1) = [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp, 5.0_dp, 6.0_dp]
     view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
     call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
-    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, n), &
-      & n, pair)
+    call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, round_place(view, 1, pair%gap, n), n, &
+        & pair)
     ! V + w x (-0.1 n) of the first grain, less V + w x (0.1 n) of the second
     v = cross([4.0_dp, 5.0_dp, 6.0_dp], n)
     w = cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
@@ -283,13 +283,13 @@ contains
     call make(2, reshape([0.0_dp, 0.1_dp], [2, 1]), view, decomposition)
     view%bodies%velocity(:, 1) = [0.3_dp, -0.2_dp, 5.0_dp]
     call list(view, reshape([1, -1], [2, 1]), pair_memory_t())
-    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
-      & [0.0_dp, 1.0_dp], pair)
+    call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, &
+      & round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), [0.0_dp, 1.0_dp], pair)
     call check_close(pair%normal_velocity, -0.2_dp, rounding, "a disk approaches a plane")
     call check_close(pair%slip, 0.8_dp, rounding, "and slips: 0.3 + 5 0.1")
     decomposition%boundaries(1)%last_velocity(1) = 0.8_dp
-    call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
-      & [0.0_dp, 1.0_dp], pair)
+    call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, &
+      & round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), [0.0_dp, 1.0_dp], pair)
     call check_close(pair%slip, 0.0_dp, rounding, "a plane that moves with it")
   end subroutine check_velocities
 
@@ -328,8 +328,8 @@ contains
       call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
       n(1) = 0.0_dp
       n(2) = merge(-1.0_dp, 1.0_dp, order == 1)
-      call evaluate_pair(view, decomposition%boundaries, physics%laws, 1, 1, round_place(view, 1, pair%gap, n), &
-      & n, pair)
+      call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, round_place(view, 1, pair%gap, n), n, &
+        & pair)
       ! at (1, 0.1) the boundary has the velocity (-0.3, 3)
       call check_close(pair%slip, 0.8_dp, 10*rounding, "slip against a glued grain, in either order")
       call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")
