@@ -47,6 +47,8 @@ contains
     end do
     call find_runs(target_rank, first, last)
     call deliver(comm, outgoing, target_rank, first, last, messages, n_messages)
+    ! what was sent makes room for what has come
+    deallocate (outgoing)
     call merge_messages(size(records, 1), messages(1:n_messages), received)
   end subroutine sparse_exchange
 
@@ -85,6 +87,7 @@ contains
 
     type(MPI_Request), allocatable :: requests(:)
     type(MPI_Request) :: barrier
+    integer(i8), allocatable :: own(:, :)
     integer :: i, n_sends
     logical :: arrived, sent, in_barrier, done
 
@@ -93,7 +96,8 @@ contains
     n_sends = 0
     do i = 1, size(first)
       if (target_rank(first(i)) == comm%rank) then
-        call keep(comm%rank, outgoing(:, first(i):last(i)))
+        allocate (own, source=outgoing(:, first(i):last(i)))
+        call keep(comm%rank, own)
       else
         n_sends = n_sends + 1
         call MPI_Issend(outgoing(:, first(i):last(i)), size(outgoing, 1)*(last(i) - first(i) + 1), MPI_INTEGER8, &
@@ -134,25 +138,30 @@ contains
 
     subroutine keep(source, words)
       integer, intent(in) :: source
-      integer(i8), intent(in), contiguous :: words(:, :)
+      !> taken away
+      integer(i8), allocatable, intent(inout) :: words(:, :)
       type(message_t), allocatable :: more(:)
+      integer :: k
 
       if (n_messages == size(messages)) then
         allocate (more(2*n_messages))
-        more(1:n_messages) = messages
+        do k = 1, n_messages
+          more(k)%source = messages(k)%source
+          call move_alloc(messages(k)%words, more(k)%words)
+        end do
         call move_alloc(more, messages)
       end if
       n_messages = n_messages + 1
       messages(n_messages)%source = source
-      messages(n_messages)%words = words
+      call move_alloc(words, messages(n_messages)%words)
     end subroutine keep
 
   end subroutine deliver
 
-  !> Put the messages one after the other by source rank.
+  !> Put the messages one after the other by source rank. Each is given back once it is there.
   pure subroutine merge_messages(n_words, messages, received)
     integer, intent(in) :: n_words
-    type(message_t), intent(in) :: messages(:)
+    type(message_t), intent(inout) :: messages(:)
     integer(i8), allocatable, intent(out) :: received(:, :)
     integer, allocatable :: order(:)
     integer :: i, j, k, n, next
@@ -178,6 +187,7 @@ contains
         next = next + 1
         received(:, next) = messages(order(i))%words(:, j)
       end do
+      deallocate (messages(order(i))%words)
     end do
   end subroutine merge_messages
 

@@ -270,10 +270,8 @@ contains
     if (self%physics%laws%yields) call measure_springs(self)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
-    if (figures%contacts > 0) then
-      self%imbalance = real(figures%interface_statistics%most_contacts, dp)*self%decomposition%n_subdomains &
-        & /real(figures%contacts, dp)
-    end if
+    if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
+      & *self%decomposition%n_subdomains/real(figures%contacts, dp)
     call measure_velocity_scale(self)
   end subroutine set_up
 
@@ -457,6 +455,8 @@ contains
     self%n_glued = self%n_glued - n_glued
     if (.not. figures%listed) return
     remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
+    ! the problem of the last step makes room
+    if (allocated(self%problem%sub)) deallocate (self%problem%sub)
     if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refused)
     call self%decomposition%migrate()
     if (remembered) call move_alloc(self%halo%view, before)

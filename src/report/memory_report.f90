@@ -27,9 +27,10 @@ module gravier_memory_report
     real(dp) :: peak = 0.0_dp
   end type memory_report_t
 
-  !> copies of the words of a row while it is written: as they are collected, as a record, sorted, and as they are written; on
-  !> several ranks with those that are sent and received. Rows of grains are down to two when those of contacts are at their most
-  integer, parameter :: copies(2) = [4, 6], grain_copies = 2
+  !> copies of the words of a row while it is written: as they are collected, as a record, and sorted or as they are written; on
+  !> several ranks as they are collected, sorted, sent and received. Rows of grains are down to two when those of contacts are at
+  !> their most
+  integer, parameter :: copies(2) = [3, 4], grain_copies = 2
   !> words of a row of a picture: of a grain and of a contact
   integer, parameter :: picture_words(2) = [13, 12]
   !> holes in the heap, over what is held

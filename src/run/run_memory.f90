@@ -13,8 +13,8 @@ module gravier_run_memory
   public :: check_planned_grains, check_read_grains, check_entering_grains
 
   !> bytes of a grain that touches no other, with its copies on the way from the scene to the first step, in 2D and 3D, without spin
-  !> and with it. The peaks of runs grow by 611, 739, 739 and 995 a grain (test_run_memory.py)
-  integer, parameter :: run_bytes(2:3, 0:1) = reshape([605, 730, 730, 985], [2, 2])
+  !> and with it. The peaks of runs grow by 545, 702, 661 and 870 a grain (test_run_memory.py)
+  integer, parameter :: run_bytes(2:3, 0:1) = reshape([540, 695, 655, 865], [2, 2])
 
 contains
 

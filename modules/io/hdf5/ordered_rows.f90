@@ -49,8 +49,8 @@ contains
     type(communicator_t), intent(in) :: comm
     !> the order is that of words 1 to n_keys, the first one counting most; word 1 must be >= 0
     integer, intent(in) :: n_keys
-    !> (words of a record, number of records)
-    integer(i8), intent(in), contiguous :: records(:, :)
+    !> (words of a record, number of records); given back
+    integer(i8), allocatable, intent(inout) :: records(:, :)
     integer(i8), allocatable, intent(out) :: ordered(:, :)
 
     integer(i8), allocatable :: sorted(:, :), first_keys(:), splitters(:), received(:, :)
@@ -78,21 +78,24 @@ contains
     call sort_rows(n_keys, received, ordered)
   end subroutine order_rows
 
-  !> Sort the local records.
+  !> Sort the local records, which are given back.
   subroutine sort_rows(n_keys, records, sorted)
     integer, intent(in) :: n_keys
-    integer(i8), intent(in), contiguous :: records(:, :)
+    integer(i8), allocatable, intent(inout) :: records(:, :)
     integer(i8), allocatable, intent(out) :: sorted(:, :)
     integer(i8), allocatable :: keys(:, :)
     integer, allocatable :: order(:)
     integer :: i
 
-    allocate (keys(n_keys, size(records, 2)), order(size(records, 2)), sorted(size(records, 1), size(records, 2)))
+    allocate (keys(n_keys, size(records, 2)), order(size(records, 2)))
     keys(:, :) = records(1:n_keys, :)
     call argsort_rows(keys, order)
+    deallocate (keys)
+    allocate (sorted(size(records, 1), size(records, 2)))
     do i = 1, size(order)
       sorted(:, i) = records(:, order(i))
     end do
+    deallocate (records)
   end subroutine sort_rows
 
   !> Last key of each block but that of the last rank, by bisection on the value of all of them together: the least
