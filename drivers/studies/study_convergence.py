@@ -12,7 +12,7 @@ the run goes. The estimate is that of doc/theory.md, section 24, over the veloci
 the solution of the same step. The solves of warm starts, of Newton's method and of 16 000 grains end by their
 own criterion each. `large` takes an hour and is made only where --parts names it.
 
-leaves in DIR a table a part, convergence_PART.csv, and prints them."""
+leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them."""
 import argparse
 import csv
 import re

@@ -11,7 +11,7 @@ velocities over the mass of the grains in contact, in units of g h, or of the ve
 Other parts: columns and a stack that stay at rest, beside an older program if one is given; what cold starts of packings of several
 heights cost; strength and change of volume of three tests beside runs that are ten times as tight.
 
-leaves in DIR a table a part, and error_states.csv (a row a state, with machine and version). The status
+leaves in out/error or the directory of --out a table a part, and error_states.csv (a row a state, with machine and version). The status
 is 0 where all bounds hold, 1 where one does not."""
 import argparse
 import concurrent.futures

@@ -47,7 +47,7 @@ contains
     end do
     call find_runs(target_rank, first, last)
     call deliver(comm, outgoing, target_rank, first, last, messages, n_messages)
-    ! what was sent makes room for what has come
+    ! everything is delivered: the memory of what was sent is free for what has come
     deallocate (outgoing)
     call merge_messages(size(records, 1), messages(1:n_messages), received)
   end subroutine sparse_exchange
@@ -138,7 +138,7 @@ contains
 
     subroutine keep(source, words)
       integer, intent(in) :: source
-      !> taken away
+      !> not allocated afterwards
       integer(i8), allocatable, intent(inout) :: words(:, :)
       type(message_t), allocatable :: more(:)
       integer :: k
@@ -158,7 +158,7 @@ contains
 
   end subroutine deliver
 
-  !> Put the messages one after the other by source rank. Each is given back once it is there.
+  !> Put the messages one after the other by source rank. Each is deallocated once it has been copied.
   pure subroutine merge_messages(n_words, messages, received)
     integer, intent(in) :: n_words
     type(message_t), intent(inout) :: messages(:)

@@ -455,7 +455,7 @@ contains
     self%n_glued = self%n_glued - n_glued
     if (.not. figures%listed) return
     remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
-    ! the problem of the last step makes room
+    ! the problem of the last step is built anew below: its memory is free for the lists
     if (allocated(self%problem%sub)) deallocate (self%problem%sub)
     if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refused)
     call self%decomposition%migrate()

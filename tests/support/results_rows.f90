@@ -3,10 +3,10 @@ module gravier_test_results_rows
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_field_list, only: field_list_t
-  use gravier_results_file, only: results_file_t, results_step_t, accuracy_t
+  use gravier_results_file, only: results_file_t, provenance_t, results_step_t, accuracy_t
   implicit none
   private
-  public :: body_rows_t, contact_rows_t, boundary_rows_t, write_rows, write_boundaries
+  public :: body_rows_t, contact_rows_t, boundary_rows_t, run_of, write_rows, write_boundaries
 
   !> Bodies of this rank.
   type :: body_rows_t
@@ -35,6 +35,17 @@ module gravier_test_results_rows
   end type contact_rows_t
 
 contains
+
+  !> What was run, by its input file and its dimension.
+  type(provenance_t) function run_of(input_text, dimension) result(run)
+    character(len=*), intent(in) :: input_text
+    integer, intent(in) :: dimension
+
+    run%version = "0.1.0"
+    run%command = "gravier case.nml"
+    run%input_text = input_text
+    run%dimension = dimension
+  end function run_of
 
   !> Write a step with these bodies and with what else is present.
   subroutine write_rows(results, step, time, bodies, error, contacts, boundaries, accuracy)

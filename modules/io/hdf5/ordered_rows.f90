@@ -49,7 +49,7 @@ contains
     type(communicator_t), intent(in) :: comm
     !> the order is that of words 1 to n_keys, the first one counting most; word 1 must be >= 0
     integer, intent(in) :: n_keys
-    !> (words of a record, number of records); given back
+    !> (words of a record, number of records); deallocated at the end
     integer(i8), allocatable, intent(inout) :: records(:, :)
     integer(i8), allocatable, intent(out) :: ordered(:, :)
 
@@ -78,7 +78,7 @@ contains
     call sort_rows(n_keys, received, ordered)
   end subroutine order_rows
 
-  !> Sort the local records, which are given back.
+  !> Sort the local records, which are deallocated.
   subroutine sort_rows(n_keys, records, sorted)
     integer, intent(in) :: n_keys
     integer(i8), allocatable, intent(inout) :: records(:, :)

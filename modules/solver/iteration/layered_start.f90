@@ -36,8 +36,8 @@ module gravier_layered_start
   !> cube, because each hands its error on; sweeps of a layer at least
   real(dp), parameter :: change_allowed = 9.0e-4_dp, few_layers = 12.0_dp
   integer, parameter :: least_sweeps = 20
-  !> sweeps of a layer after which the pass is given up: over the logarithm of the change that it ends at, or over the longest way
-  !> where that allows more
+  !> A layer that is not done after so many sweeps ends the pass: the first number times the logarithm of one over the change above,
+  !> or the second one times the longest way in mean diameters, whichever is more.
   real(dp), parameter :: slow_fall = 10.0_dp, worth_of_way = 0.5_dp
 
   !> What one subdomain holds while the layers are gone through.
@@ -364,10 +364,12 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     !> of the impulses by a sweep, relative, at which the layer is done
     real(dp), intent(in) :: change
+    !> sweeps after which the layer is left as it is
     integer, intent(in) :: most_sweeps
     type(layers_t), intent(inout) :: layers(:)
     !> sweeps made
     integer, intent(out) :: inner
+    !> the change is reached
     logical, intent(out) :: done
     type(acceleration_t) :: acceleration
     real(dp) :: parts(2, size(layers)), sums(2), v

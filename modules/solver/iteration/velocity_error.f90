@@ -62,9 +62,8 @@ module gravier_velocity_error
     logical, private :: has_levels = .false., has_followed = .false.
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
-    !> whether nearly all bodies are at rest where contacts attract or impulses came from a pass over layers, and the wave along them
-    !> cannot have crossed all bodies yet, so that E may be too small; iterations made at the last `assess`, and before the last
-    !> `begin_anew`
+    !> whether E may be too small: nearly all bodies are at rest, contacts attract or impulses came from a pass over layers, and
+    !> waves cannot have crossed all bodies yet. Iterations made at the last `assess`, and before the last `begin_anew`.
     logical, private :: is_early = .false.
     integer, private :: iterations = 0, begun_at = 0
     !> what finds Y

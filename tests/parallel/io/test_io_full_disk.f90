@@ -8,8 +8,8 @@ program test_io_full_disk
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_file_system, only: make_directory, remove_file
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, provenance_t
-  use gravier_test_results_rows, only: body_rows_t, write_rows
+  use gravier_results_file, only: results_file_t
+  use gravier_test_results_rows, only: body_rows_t, run_of, write_rows
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls
   use gravier_bodies_file, only: read_bodies, write_bodies
   use gravier_checkpoint_file, only: checkpoint_file_t
@@ -158,17 +158,6 @@ contains
     bodies%position = 0.25_dp
     bodies%velocity = -1
   end subroutine make_bodies
-
-  !> What was run, by its input file and its dimension.
-  type(provenance_t) function run_of(input_text, dimension) result(run)
-    character(len=*), intent(in) :: input_text
-    integer, intent(in) :: dimension
-
-    run%version = "0.1.0"
-    run%command = "gravier case.nml"
-    run%input_text = input_text
-    run%dimension = dimension
-  end function run_of
 
   !> Steps until the disk is full: the error comes before anything is written, earlier steps stay, and once there is
   !> room again the run can go on.

@@ -7,8 +7,8 @@ program test_io_results_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_results_file, only: results_file_t, provenance_t, accuracy_t
-  use gravier_test_results_rows, only: body_rows_t, contact_rows_t, boundary_rows_t, write_rows, write_boundaries
+  use gravier_results_file, only: results_file_t, accuracy_t
+  use gravier_test_results_rows, only: body_rows_t, contact_rows_t, boundary_rows_t, run_of, write_rows, write_boundaries
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   integer, parameter :: n_bodies = 23, n_contacts = 41
@@ -134,17 +134,6 @@ contains
     owner = 0
     if (comm%size > 1) owner = 1 + mod(5*g + g/4, comm%size - 1)
   end function owner
-
-  !> What was run, by its input file and its dimension.
-  type(provenance_t) function run_of(input_text, dimension) result(run)
-    character(len=*), intent(in) :: input_text
-    integer, intent(in) :: dimension
-
-    run%version = "0.1.0"
-    run%command = "gravier case.nml"
-    run%input_text = input_text
-    run%dimension = dimension
-  end function run_of
 
   subroutine write_all(comm, name, dimension, error)
     type(communicator_t), intent(in) :: comm
