@@ -14,7 +14,7 @@ function(gravier_compile_options target)
   target_compile_options(${target} PRIVATE
     -std=f2008 -Wall -Wextra -Wimplicit-interface -Warray-temporaries
     $<$<BOOL:${GRAVIER_WERROR}>:-Werror>
-    $<$<CONFIG:Release>:-O${OPTIONS_OPTIMISE} -fno-backtrace> ${arch}
+    $<$<CONFIG:Release>:-O${OPTIONS_OPTIMISE} -fno-backtrace -fno-semantic-interposition> ${arch}
     $<$<CONFIG:Debug>:-O${debug_level} -g${GRAVIER_DEBUG_LEVEL} -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow>
     $<$<CONFIG:Sanitize>:-O1 -g -fbacktrace -fsanitize=address,undefined -fno-omit-frame-pointer>)
   target_link_options(${target} PRIVATE $<$<CONFIG:Sanitize>:-fsanitize=address,undefined>)

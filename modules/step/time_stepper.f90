@@ -9,6 +9,7 @@ module gravier_time_stepper
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_convergence_history, only: effort_t
+  use gravier_pass_backoff, only: pass_backoff_t
   use gravier_solve, only: solve_control_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
   use gravier_decomposition, only: decomposition_t
@@ -20,7 +21,7 @@ module gravier_time_stepper
   use gravier_load_areas, only: find_load_areas
   use gravier_problem_builder, only: build_problem
   use gravier_pair_laws, only: conclude_pairs
-  use gravier_contact_springs, only: conclude_springs
+  use gravier_contact_springs, only: conclude_springs, measure_springs
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_body_motion, only: move_to_middle, drive, count_fast, move_to_end
   use gravier_velocity_return, only: take_velocities
@@ -80,6 +81,8 @@ module gravier_time_stepper
     type(inflow_t) :: inflow
     class(method_t), allocatable :: method
     type(solve_control_t) :: control
+    !> whether solves may try a pass over layers
+    type(pass_backoff_t) :: pass_backoff
     !> where it is known
     class(exact_solution_t), allocatable :: exact
     ! ---- the present step
@@ -188,7 +191,7 @@ contains
 
     control = self%control
     ! a pass over layers would replace the impulses that were given
-    control%layered = control%layered .and. figures%started%matched == 0
+    control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
     iterations = 0
     do tries = 1, most_tries + 1
       call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
@@ -267,7 +270,7 @@ contains
       figures%max_overlap = max(figures%max_overlap, self%problem%sub(s)%overlap(yielding=.false.))
     end do
     figures%max_overlap = self%comm%highest(figures%max_overlap)
-    if (self%physics%laws%yields) call measure_springs(self)
+    if (self%physics%laws%yields) call measure_springs(self%problem, self%tally%deformation, self%tally%stiffest)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
     if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
@@ -323,22 +326,6 @@ contains
     listed = listed .or. figures%entered > 0
   end subroutine let_in
 
-  !> The largest deformation of compliant contacts, and how stiff they are for the step. Collective.
-  subroutine measure_springs(self)
-    class(time_stepper_t), intent(inout) :: self
-    real(dp) :: largest(2)
-    integer :: s
-
-    largest(:) = 0.0_dp
-    do s = 1, size(self%problem%sub)
-      largest(1) = max(largest(1), self%problem%sub(s)%overlap(yielding=.true.))
-      largest(2) = max(largest(2), self%problem%sub(s)%stiffest)
-    end do
-    call self%comm%highest_of(largest)
-    self%tally%deformation = max(self%tally%deformation, largest(1))
-    self%tally%stiffest = max(self%tally%stiffest, largest(2))
-  end subroutine measure_springs
-
   !> From the impulses of a solve to velocities of grains and boundaries, and to what the next step starts from. Collective.
   subroutine take_solution(self, figures, whole)
     class(time_stepper_t), intent(inout) :: self
@@ -389,6 +376,7 @@ contains
     associate (solve => figures%solve)
       if (solve%status /= solve_converged) self%failed = self%failed + 1
       call self%tally%add_solve(solve, self%velocity_scale%kind)
+      call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)
       if (solve%status == solve_diverged) then
         call find_divergence(self%problem, figures%cause)
         return
@@ -483,6 +471,7 @@ contains
     self%left = 0
     self%left_mass = 0.0_dp
     self%population = population_t()
+    self%pass_backoff = pass_backoff_t()
     self%fast = 0
     self%quiet = 0
     self%velocities_set = .false.

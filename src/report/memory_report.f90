@@ -155,6 +155,7 @@ contains
         call item%add("law of projections", 8, merge(2, 1, kernels%nf > 1))
         call item%add("impulse of projections", 8, kernels%nc)
         call item%add("velocity of projections", 8, kernels%nc)
+        call item%add("blocks of projections", 2, 1)
       end if
       call add_held(item, held, of_contacts=.true.)
     end associate
@@ -181,6 +182,7 @@ contains
       call add_held(item, held, of_contacts=.false.)
       call item%add("inverse_mass", 8, kernels%nw)
       call item%add("weight", 8, kernels%nw)
+      if (simulation%overlap_allowed < huge(1.0_dp)) call item%add("touched by projections", 4, 1)
     end associate
   end subroutine describe_body
 

@@ -11,6 +11,7 @@ module gravier_checkpoint
   use gravier_boundary, only: boundary_words, boundary_record
   use gravier_insertion, only: insertion_words, insertion_record
   use gravier_population, only: population_words, population_record
+  use gravier_pass_backoff, only: pass_backoff_words, pass_backoff_record
   use gravier_impulse_memory, only: pair_record
   use gravier_diagnostics, only: diagnostics_t
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
@@ -37,7 +38,8 @@ contains
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
       & "cell: "//period_record//", "//to_text(period_words)//" words"//newline// &
       & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
-      & "population: "//population_record//", "//to_text(population_words)//" words"//newline
+      & "population: "//population_record//", "//to_text(population_words)//" words"//newline// &
+      & "passes: "//pass_backoff_record//", "//to_text(pass_backoff_words)//" words"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
       associate (features => diagnostics(k)%diagnostic%features())
@@ -56,7 +58,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8), allocatable :: words(:)
-    integer(i8) :: seen(population_words)
+    integer(i8) :: seen(population_words), passes(pass_backoff_words)
 
     if (allocated(error)) return
     call file%create(simulation%comm, path, records_text(), error)
@@ -86,6 +88,8 @@ contains
     call file%write_scalar("next_id", simulation%inflow%next_id, error)
     call simulation%population%get_state(seen)
     call file%write_array("population", seen, error)
+    call simulation%pass_backoff%get_state(passes)
+    call file%write_array("passes", passes, error)
     call simulation%inflow%get_state(words)
     call file%write_array("insertions", words, error)
     associate (memory => simulation%halo%memory)
@@ -152,6 +156,8 @@ contains
     call load_insertions(simulation, file, path, error)
     call file%read_array("population", population_words, population_words, words, error)
     if (.not. allocated(error)) call simulation%population%set_state(words)
+    call file%read_array("passes", pass_backoff_words, pass_backoff_words, words, error)
+    if (.not. allocated(error)) call simulation%pass_backoff%set_state(words)
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written
     call take_count(last_written + 1, path//": last_written", own_last, error)

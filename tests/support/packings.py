@@ -14,7 +14,7 @@ FOLDER = os.path.join(SOURCE, "tests/packings")
 #: columns and rows of disks, spheres along each edge; steps of 1 ms that they settle. After 250 steps disks lie on each other and still
 #: move (kinetic energy 1 % of its peak), after 400 steps they are at rest (0.01 %)
 DISKS = (((24, 25), 400), ((24, 25), 340), ((24, 25), 250), ((24, 23), 400), ((18, 16), 250), ((16, 16), 400), ((14, 12), 400), ((12, 13), 400))
-SPHERES = ((5, 350), (7, 350), (10, 450))
+SPHERES = ((7, 350), (10, 450))
 #: bodies with shapes that fall together, by dimension: their counts along the axes of a lattice, its spacing [m], steps of 1 ms
 POURS = {2: ((6, 6), 0.17, 300), 3: ((3, 3, 4), 0.19, 220)}
 

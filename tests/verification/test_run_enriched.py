@@ -30,7 +30,7 @@ class Enriched(RunTestCase):
                        "check_every": 1, "warm_start": False},
             "output": {"directory": "results", "trace": True},
         }, PARTS)
-        spheres = settled_spheres(cls.scratch + "/spheres", 5, 350)
+        spheres = settled_spheres(cls.scratch + "/spheres", 7, 350)
         cls.spheres = merged(cls.disks, {"scene": {"dimension": 3, "bodies_file": spheres}})
 
     def play(self, jobs, ranks=1):

@@ -43,6 +43,7 @@ contains
     self%adhesion = values(2)
     self%range = values(3)
     self%attracts = .true.
+    self%sees_velocity = .false.
     self%largest%friction = self%friction
     call self%set_resistance(values(4), values(5))
   end subroutine adhesive_set

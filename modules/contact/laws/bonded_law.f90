@@ -54,6 +54,7 @@ contains
     self%bond_distance = values(4)
     self%range = self%bond_distance
     self%attracts = .true.
+    self%sees_velocity = .false.
     self%remembers = .true.
     self%largest%friction = max(self%friction, self%bond_friction)
     call self%set_resistance(values(5), values(6))

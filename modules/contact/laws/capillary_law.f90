@@ -55,6 +55,7 @@ contains
     self%debonding_distance = values(4)
     self%range = self%debonding_distance
     self%attracts = .true.
+    self%sees_velocity = .false.
     self%remembers = .true.
     self%largest%friction = self%friction
     call self%set_resistance(values(5), values(6))

@@ -104,6 +104,7 @@ contains
     self%pressure = values(4)
     self%ratio = values(5)
     call self%set_springs(values(1), values(6:11), 1.0_dp)
+    self%sees_velocity = .false.
     self%fault_key = ""
     if (self%stiffness > 0.0_dp .eqv. self%number > 0.0_dp) then
       self%fault_key = "normal_stiffness"

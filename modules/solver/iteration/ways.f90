@@ -1,8 +1,8 @@
 !> Shortest ways from bodies to others over closed contacts, counted in contacts or in lengths, across subdomains.
 !>
-!> Ways are shortened contact by contact, there and back through the list of contacts, until none can be shortened. The result does
-!> not depend on the order, because each way is a sum from its root on; nor on subdomains or ranks. What is prescribed hands on no
-!> way but its own.
+!> Bodies whose way has become shorter wait in a queue to hand it on to those that they touch, until none can be shortened: where each
+!> contact counts the same, every body waits once (breadth-first search). The result does not depend on the order, because each way is
+!> a sum from its root on; nor on subdomains or ranks. What is prescribed hands on no way but its own.
 module gravier_ways
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lanes
@@ -25,8 +25,10 @@ module gravier_ways
     integer :: n_closed = 0
     integer, allocatable, private :: pair(:, :)
     real(dp), allocatable, private :: step(:)
-    !> bodies whose way may be shortened (n_columns)
-    logical, allocatable, private :: open(:)
+    !> the closed contacts of each body, from `first(b)` to `first(b + 1) - 1` (2 n_closed), (n_columns + 1)
+    integer, allocatable, private :: contact(:), first(:)
+    !> bodies whose way may be shortened, and those that have one to hand on (n_columns)
+    logical, allocatable, private :: open(:), waits(:)
   end type ways_t
 
 contains
@@ -45,9 +47,10 @@ contains
     do s = 1, size(ways)
       associate (sub => problem%sub(s))
         allocate (ways(s)%length(sub%n_columns), source=unreached)
-        allocate (ways(s)%open(sub%n_columns), source=.false.)
+        allocate (ways(s)%open(sub%n_columns), ways(s)%waits(sub%n_columns), source=.false.)
         allocate (ways(s)%pair(2, sub%n_contacts), ways(s)%step(sub%n_contacts))
         if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, closed, ways(s), unit)
+        call list_by_body(ways(s))
       end associate
     end do
   end subroutine list_closed
@@ -82,6 +85,38 @@ contains
     ways%n_closed = n
   end subroutine take_closed
 
+  !> List the closed contacts of each body.
+  pure subroutine list_by_body(ways)
+    type(ways_t), intent(inout) :: ways
+    integer :: c, k, b, n
+
+    n = size(ways%open)
+    allocate (ways%first(n + 1), source=0)
+    allocate (ways%contact(2*ways%n_closed))
+    associate (first => ways%first)
+      do c = 1, ways%n_closed
+        do k = 1, 2
+          first(ways%pair(k, c)) = first(ways%pair(k, c)) + 1
+        end do
+      end do
+      ! the ends of all, which become their beginnings while they are filled from behind
+      do b = 2, n
+        first(b) = first(b) + first(b - 1)
+      end do
+      first(n + 1) = 2*ways%n_closed + 1
+      do b = 1, n
+        first(b) = first(b) + 1
+      end do
+      do c = ways%n_closed, 1, -1
+        do k = 1, 2
+          b = ways%pair(k, c)
+          first(b) = first(b) - 1
+          ways%contact(first(b)) = c
+        end do
+      end do
+    end associate
+  end subroutine list_by_body
+
   !> Find the ways of all bodies that have none yet, from those whose length is known. Collective.
   subroutine shorten_ways(problem, ways)
     type(contact_problem_t), intent(inout) :: problem
@@ -94,8 +129,9 @@ contains
     do s = 1, size(ways)
       ways(s)%open(:) = ways(s)%length >= unreached
       ways(s)%open(problem%sub(s)%n_bodies + 1:) = .false.
+      ways(s)%waits(:) = ways(s)%length < unreached
       shares = shares .or. problem%shared%part(s)%n_slots > 0
-      call shorten_own(ways(s)%n_closed, ways(s)%pair, ways(s)%step, ways(s)%open, ways(s)%length)
+      call shorten_own(ways(s))
     end do
     if (.not. problem%comm%any_true(shares)) return
     do
@@ -114,9 +150,10 @@ contains
             b = shared%slot_body(j)
             if (.not. (this%open(b) .and. shared%recv(1, j) < this%length(b))) cycle
             this%length(b) = shared%recv(1, j)
+            this%waits(b) = .true.
             shares = .true.
           end do
-          if (shares) call shorten_own(this%n_closed, this%pair, this%step, this%open, this%length)
+          if (shares) call shorten_own(this)
           changed = changed .or. shares
         end associate
       end do
@@ -124,34 +161,36 @@ contains
     end do
   end subroutine shorten_ways
 
-  !> Shorten ways over the contacts of a subdomain until none can be shortened. Contacts lie in memory about as the bodies do in
-  !> space.
-  pure subroutine shorten_own(n, pair, step, open, length)
-    integer, intent(in) :: n
-    integer, intent(in), contiguous :: pair(:, :)
-    real(dp), intent(in), contiguous :: step(:)
-    logical, intent(in), contiguous :: open(:)
-    real(dp), intent(inout), contiguous :: length(:)
-    integer :: c, i, j
-    logical :: shortened, forth
+  !> Shorten ways over the contacts of a subdomain until no body waits any more.
+  pure subroutine shorten_own(ways)
+    type(ways_t), intent(inout) :: ways
+    !> bodies that wait, in a ring
+    integer :: queue(size(ways%open)), n_waiting, head, b, i, j, k, c
+    real(dp) :: way
 
-    forth = .true.
-    do
-      shortened = .false.
-      do c = merge(1, n, forth), merge(n, 1, forth), merge(1, -1, forth)
-        i = pair(1, c)
-        j = pair(2, c)
-        if (length(j) + step(c) < length(i) .and. open(i)) then
-          length(i) = length(j) + step(c)
-          shortened = .true.
-        end if
-        if (length(i) + step(c) < length(j) .and. open(j)) then
-          length(j) = length(i) + step(c)
-          shortened = .true.
-        end if
+    n_waiting = 0
+    do b = 1, size(queue)
+      if (.not. ways%waits(b)) cycle
+      n_waiting = n_waiting + 1
+      queue(n_waiting) = b
+    end do
+    head = 1
+    do while (n_waiting > 0)
+      i = queue(head)
+      ways%waits(i) = .false.
+      head = merge(1, head + 1, head == size(queue))
+      n_waiting = n_waiting - 1
+      do k = ways%first(i), ways%first(i + 1) - 1
+        c = ways%contact(k)
+        j = ways%pair(1, c) + ways%pair(2, c) - i
+        way = ways%length(i) + ways%step(c)
+        if (.not. (way < ways%length(j) .and. ways%open(j))) cycle
+        ways%length(j) = way
+        if (ways%waits(j)) cycle
+        ways%waits(j) = .true.
+        n_waiting = n_waiting + 1
+        queue(modulo(head + n_waiting - 2, size(queue)) + 1) = j
       end do
-      if (.not. shortened) return
-      forth = .not. forth
     end do
   end subroutine shorten_own
 

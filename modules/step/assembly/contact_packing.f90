@@ -4,11 +4,12 @@ module gravier_contact_packing
   use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_terms_t
   use gravier_law_set, only: law_set_t
-  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, contact_jacobian, rolling_radius
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: subproblem_t
+  use gravier_cell_response, only: find_axes
   use gravier_halo, only: local_bodies_t
-  use gravier_surface_velocity, only: contact_place_t, find_start_velocity, approach_velocity, add_image_velocity
+  use gravier_surface_velocity, only: contact_place_t, add_image_velocity
   use gravier_pair_laws, only: law_of, terms_of
   use gravier_contact_springs, only: pack_spring
   use gravier_physics, only: physics_t
@@ -32,22 +33,27 @@ module gravier_contact_packing
 
 contains
 
-  !> Pack the contacts in the order in which they are swept, with the columns of boundaries that turn.
+  !> Pack the contacts in the order in which they are swept, with the columns of boundaries that turn: first normals, levers and
+  !> coefficients, one contact after the other; then what depends on the velocities at the start of the step, which the loops over
+  !> contacts of the solver make of those of the bodies.
   subroutine pack_contacts(view, found, boundaries, numbers, kernels, physics, sub)
     type(local_bodies_t), intent(in) :: view
-    type(contact_list_t), intent(in) :: found
+    !> gets the order of the sweep
+    type(contact_list_t), intent(inout) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(numbers_t), intent(in) :: numbers
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    integer, allocatable :: pair(:, :), order(:)
+    integer, allocatable :: pair(:, :)
+    !> velocities of the columns at the start of the step (nv, n_columns) [m/s, rad/s]
+    real(dp), allocatable :: start(:, :)
     integer :: c, before
     type(packed_t) :: this
 
-    allocate (pair(2, found%n), order(found%n))
+    allocate (pair(2, found%n), found%order(found%n))
     call find_pairs(view, found, boundaries, numbers, sub, pair)
-    call group_contacts(pair, sub%n_bodies, order, sub%n_grouped)
+    call group_contacts(pair, sub%n_bodies, found%order, sub%n_grouped)
     allocate (sub%pair(2, lanes*n_blocks(found%n)), source=1)
     allocate (sub%source(found%n), sub%gap(found%n))
     allocate (sub%hot(lanes, kernels%nh, n_blocks(found%n)))
@@ -57,28 +63,43 @@ contains
     if (physics%laws%yields) allocate (sub%spring(found%n))
     if (physics%cell%moves) allocate (sub%cell%branch(kernels%nd, found%n), sub%cell%way(kernels%nd, found%n), &
       & sub%cell%shift(kernels%nd, found%n))
+    call find_start_velocities(view, boundaries, numbers, kernels, sub, start)
     before = -1
     do c = 1, found%n
-      this%c = c
-      this%q = lane_of(c)
-      this%g = block_of(c)
-      this%f = order(c)
-      this%p = found%source(this%f)
-      this%i = view%list%candidate(this%p)
-      this%j = view%list%antagonist(this%p)
-      this%b = found%boundary(this%f)
+      call find_packed(view, found, c, this)
       sub%source(c) = this%p
       sub%gap(c) = found%gap(this%f)
       sub%pair(:, c) = pair(:, this%f)
       if (this%b > 0) then
-        if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub)
+        if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub, start)
       end if
       if (physics%cell%moves) call pack_image(view, this, sub)
       call take_terms(view, found, boundaries, physics%laws, before, this)
-      call pack_terms(view, found, boundaries, kernels, physics, this, sub)
-      if (physics%cell%moves) call keep_shifts(kernels, this, sub)
+      call pack_terms(view, found, kernels, physics%h, this, sub)
+    end do
+    if (physics%laws%returns .or. physics%laws%yields) call pack_returned(view, found, boundaries, kernels, physics, start, sub)
+    do c = 1, merge(found%n, 0, physics%cell%moves)
+      call keep_shifts(kernels, c, sub)
     end do
   end subroutine pack_contacts
+
+  !> Contact `c` of the sweep, to be packed.
+  pure subroutine find_packed(view, found, c, this)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: c
+    !> keeps the terms of the contact before
+    type(packed_t), intent(inout) :: this
+
+    this%c = c
+    this%q = lane_of(c)
+    this%g = block_of(c)
+    this%f = found%order(c)
+    this%p = found%source(this%f)
+    this%i = view%list%candidate(this%p)
+    this%j = view%list%antagonist(this%p)
+    this%b = found%boundary(this%f)
+  end subroutine find_packed
 
   !> What the law of a contact makes of the step. Without laws of materials, and where no law has other terms for each pair, all
   !> contacts with one boundary have the same, and so have all between grains.
@@ -116,15 +137,15 @@ contains
   end subroutine pack_image
 
   !> Keep what the law alone adds to the velocities of a contact.
-  pure subroutine keep_shifts(kernels, this, sub)
+  pure subroutine keep_shifts(kernels, c, sub)
     type(kernels_t), intent(in) :: kernels
-    type(packed_t), intent(in) :: this
+    integer, intent(in) :: c
     type(subproblem_t), intent(inout) :: sub
 
-    associate (row => kernels%row, shift => sub%cell%shift(:, this%c))
+    associate (row => kernels%row, shift => sub%cell%shift(:, c), q => lane_of(c), g => block_of(c))
       shift(:) = 0.0_dp
-      shift(1) = sub%hot(this%q, row%shift, this%g)
-      if (row%shift_t > 0) shift(2:) = sub%hot(this%q, row%shift_t:row%shift_t + kernels%nd - 2, this%g)
+      shift(1) = sub%hot(q, row%shift, g)
+      if (row%shift_t > 0) shift(2:) = sub%hot(q, row%shift_t:row%shift_t + kernels%nd - 2, g)
     end associate
   end subroutine keep_shifts
 
@@ -158,25 +179,28 @@ contains
   end subroutine find_pairs
 
   !> The point of a turning boundary that a contact touches, as a body of its own.
-  subroutine add_column(view, found, boundary, kernels, this, sub)
+  subroutine add_column(view, found, boundary, kernels, this, sub, start)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundary
     type(kernels_t), intent(in) :: kernels
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
+    real(dp), intent(inout), contiguous :: start(:, :)
     real(dp) :: points(kernels%nd, 2)
-    integer :: nd
+    integer :: nd, side
 
     nd = kernels%nd
+    side = merge(1, 2, view%bodies%glued(this%i) > 0)
     sub%n_columns = sub%n_columns + 1
     sub%id(sub%n_columns) = boundary%id
     sub%boundary(sub%n_columns) = this%b
     call find_touching_points(view, found, this, points)
-    call boundary%velocity_at(points(:, merge(1, 2, view%bodies%glued(this%i) > 0)), sub%v_free(1:nd, sub%n_columns))
+    call boundary%velocity_at(points(:, side), sub%v_free(1:nd, sub%n_columns))
+    call boundary%last_velocity_at(points(:, side), start(1:nd, sub%n_columns))
     ! levers of boundaries are 0: rolling alone sees the spin
     sub%v_free(nd + 1:, sub%n_columns) = boundary%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
-    sub%pair(merge(1, 2, view%bodies%glued(this%i) > 0), this%c) = sub%n_columns
+    sub%pair(side, this%c) = sub%n_columns
   end subroutine add_column
 
   !> The points of the candidate and of the antagonist that touch (nd, 2) [m].
@@ -198,13 +222,13 @@ contains
     end if
   end subroutine find_touching_points
 
-  !> The contact data: normal and levers, and what the law of the pair makes of the step.
-  subroutine pack_terms(view, found, boundaries, kernels, physics, this, sub)
+  !> The contact data: normal and levers, and what the law of the pair makes of the step, whatever the velocities.
+  subroutine pack_terms(view, found, kernels, h, this, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
-    type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
-    type(physics_t), intent(in) :: physics
+    !> [s]
+    real(dp), intent(in) :: h
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
 
@@ -217,16 +241,11 @@ contains
         sub%hot(q, row%lever_j, g) = 0.0_dp
         if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
       end if
-      if (terms%restitution > 0.0_dp) then
-        sub%hot(q, row%shift, g) = terms%restitution*returned_velocity(view, found, boundaries, kernels, physics, &
-          & this, sub)
-      else
-        sub%hot(q, row%shift, g) = terms%free_gap/physics%h
-      end if
-      if (allocated(sub%attraction)) sub%attraction(q, g) = physics%h*terms%attraction
+      sub%hot(q, row%shift, g) = terms%free_gap/h
+      if (allocated(sub%attraction)) sub%attraction(q, g) = h*terms%attraction
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction
-      if (row%shift_t > 0) call pack_tangential_shift(view, found, boundaries, kernels, physics, this, sub)
+      if (row%shift_t > 0) sub%hot(q, row%shift_t:row%shift_t + kernels%nd - 2, g) = 0.0_dp
       if (row%rolling_radius == 0) return
       sub%hot(q, row%rolling_radius, g) = rolling_radius(sub%hot(q, row%lever_i, g), sub%hot(q, row%lever_j, g))
       sub%hot(q, row%rolling_friction, g) = terms%rolling_friction
@@ -234,52 +253,91 @@ contains
     end associate
   end subroutine pack_terms
 
-  !> Normal velocity at the start of the step as far as the contact sends it back. It counts where the contact opens, too: what
-  !> strikes from behind would get energy from a contact that only holds. Where the loads of the step alone close it again,
-  !> the contact comes to rest.
-  real(dp) function returned_velocity(view, found, boundaries, kernels, physics, this, sub) result(returned)
+  !> Velocities at the start of the step, by columns: of grains and of boundaries that do not turn; those that turn have a column a
+  !> contact, which `add_column` fills. Loads give grains no spin, so that the spin without contacts is that of the start, which in
+  !> space goes round with the body and has its energy.
+  pure subroutine find_start_velocities(view, boundaries, numbers, kernels, sub, start)
+    type(local_bodies_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(numbers_t), intent(in) :: numbers
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> (nv, n_columns) [m/s, rad/s]
+    real(dp), allocatable, intent(out) :: start(:, :)
+    integer :: k, b
+
+    allocate (start, mold=sub%v_free)
+    start(:, sub%n_grains + 1:) = 0.0_dp
+    do k = 1, size(numbers%of_grain)
+      b = numbers%of_grain(k)
+      if (b == 0) cycle
+      start(:, b) = view%bodies%velocity(1:kernels%nv, k)
+      if (b <= sub%n_grains) start(kernels%nd + 1:, b) = sub%v_free(kernels%nd + 1:, b)
+    end do
+    do k = 1, size(boundaries)
+      if (numbers%of_boundary(k) == 0 .or. boundaries(k)%turns()) cycle
+      start(1:kernels%nd, numbers%of_boundary(k)) = boundaries(k)%last_velocity(1:kernels%nd)
+    end do
+  end subroutine find_start_velocities
+
+  !> What contacts send back of their velocities at the start of the step (Newton), and what springs make of them. A normal velocity
+  !> at which the bodies part is sent back where the contact opens, too: what strikes from behind would get energy from a contact
+  !> that only holds. Where the loads of the step alone close it again, the contact comes to rest.
+  subroutine pack_returned(view, found, boundaries, kernels, physics, start, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundaries(:)
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
+    real(dp), intent(in), contiguous :: start(:, :)
+    type(subproblem_t), intent(inout) :: sub
+    !> velocities of the contacts at the start of the step, and without contacts (lanes, nc, blocks) [m/s]
+    real(dp), allocatable :: v(:, :, :), free(:, :, :)
+    type(packed_t) :: this
+    integer :: c, before, nd
+
+    nd = kernels%nd
+    allocate (v, mold=sub%impulse)
+    call kernels%contact_velocity(sub%pair, sub%hot, start, v)
+    if (physics%laws%returns) then
+      allocate (free, mold=v)
+      call kernels%contact_velocity(sub%pair, sub%hot, sub%v_free, free)
+    end if
+    before = -1
+    do c = 1, found%n
+      call find_packed(view, found, c, this)
+      call take_terms(view, found, boundaries, physics%laws, before, this)
+      associate (q => this%q, g => this%g, row => kernels%row, terms => this%terms)
+        if (physics%cell%moves) call subtract_image(view, this, sub, v(q, 1:kernels%nf, g))
+        if (terms%restitution > 0.0_dp) then
+          if (physics%cell%moves) free(q, 1, g) = free(q, 1, g) + cell_adds(found, physics, this, sub)
+          sub%hot(q, row%shift, g) = terms%restitution*v(q, 1, g)
+          if (v(q, 1, g) > 0.0_dp .and. free(q, 1, g) < 0.0_dp) sub%hot(q, row%shift, g) = 0.0_dp
+        end if
+        if (row%shift_t == 0) cycle
+        sub%hot(q, row%shift_t:row%shift_t + nd - 2, g) = terms%tangential_restitution*v(q, 2:nd, g)
+        if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics%h, c, v(q, 1:nd, g), sub)
+      end associate
+    end do
+  end subroutine pack_returned
+
+  !> Take the velocity of the image that the candidate meets, in a cell that moves, from that of a contact.
+  subroutine subtract_image(view, this, sub, v)
+    type(local_bodies_t), intent(in) :: view
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(in) :: sub
-    real(dp) :: free
+    !> along n or along n, t and s
+    real(dp), intent(inout) :: v(:)
+    real(dp) :: image(size(view%bodies%position, 1)), frame(size(image), size(image))
     integer :: d
 
-    if (kernels%row%arm_i > 0) then
-      returned = returned_by_shapes(view, found, boundaries, kernels, physics, this, sub)
-      return
-    end if
-    returned = approach_velocity(view, boundaries, this%p, found%gap(this%f), found%normal(:, this%f))
-    if (returned <= 0.0_dp) return
-    free = cell_adds(found, physics, this, sub)
-    do d = 1, kernels%nd
-      free = free + (sub%v_free(d, sub%pair(1, this%c)) - sub%v_free(d, sub%pair(2, this%c)))*found%normal(d, this%f)
+    image(:) = 0.0_dp
+    call add_image_velocity(view, this%p, image)
+    call find_axes(sub, this%c, frame)
+    do d = 1, size(v)
+      v(d) = v(d) - sum(frame(:, d)*image)
     end do
-    if (free < 0.0_dp) returned = 0.0_dp
-  end function returned_velocity
-
-  !> The same of bodies with shapes, at the point where they touch.
-  real(dp) function returned_by_shapes(view, found, boundaries, kernels, physics, this, sub) result(returned)
-    type(local_bodies_t), intent(in) :: view
-    type(contact_list_t), intent(in) :: found
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(kernels_t), intent(in) :: kernels
-    type(physics_t), intent(in) :: physics
-    type(packed_t), intent(in) :: this
-    type(subproblem_t), intent(in) :: sub
-    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv)
-
-    call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
-    call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
-    returned = sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj)
-    if (returned <= 0.0_dp) return
-    vi(:) = sub%v_free(:, sub%pair(1, this%c))
-    vj(:) = sub%v_free(:, sub%pair(2, this%c))
-    if (sum(rows(1, :, 1)*vi + rows(1, :, 2)*vj) + cell_adds(found, physics, this, sub) < 0.0_dp) returned = 0.0_dp
-  end function returned_by_shapes
+  end subroutine subtract_image
 
   !> What a cell that moves adds to the normal velocity without contacts.
   pure real(dp) function cell_adds(found, physics, this, sub)
@@ -289,59 +347,9 @@ contains
     type(subproblem_t), intent(in) :: sub
     real(dp) :: added(size(found%normal, 1))
 
-    cell_adds = 0.0_dp
-    if (.not. physics%cell%moves) return
     added(:) = physics%cell%added(physics%cell%free, sub%cell%branch(:, this%c), sub%cell%way(:, this%c))
     cell_adds = sum(found%normal(:, this%f)*added)
   end function cell_adds
-
-  !> Tangential velocity at the start of the step as far as the contact sends it back (Newton), or what springs make of it.
-  subroutine pack_tangential_shift(view, found, boundaries, kernels, physics, this, sub)
-    type(local_bodies_t), intent(in) :: view
-    type(contact_list_t), intent(in) :: found
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(kernels_t), intent(in) :: kernels
-    type(physics_t), intent(in) :: physics
-    type(packed_t), intent(in) :: this
-    type(subproblem_t), intent(inout) :: sub
-    real(dp) :: rows(kernels%nc, kernels%nv, 2), vi(kernels%nv), vj(kernels%nv), v(kernels%nd)
-    integer :: d
-
-    call contact_jacobian(kernels, sub%hot, this%c, rows(:, :, 1), rows(:, :, 2))
-    call find_start_velocities(view, found, boundaries, this, sub, vi, vj)
-    do d = 1, kernels%nd
-      v(d) = sum(rows(d, :, 1)*vi + rows(d, :, 2)*vj)
-    end do
-    do d = 2, kernels%nd
-      sub%hot(this%q, kernels%row%shift_t + d - 2, this%g) = this%terms%tangential_restitution*v(d)
-    end do
-    if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics%h, this%c, v, sub)
-  end subroutine pack_tangential_shift
-
-  !> Velocities at the start of the step: of a free grain, translation and spin; of a boundary, that of its point that is touched.
-  !> Loads give grains no spin, so that the spin without contacts is that of the start, which in space goes round with the body and
-  !> has its energy.
-  subroutine find_start_velocities(view, found, boundaries, this, sub, vi, vj)
-    type(local_bodies_t), intent(in) :: view
-    type(contact_list_t), intent(in) :: found
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(packed_t), intent(in) :: this
-    type(subproblem_t), intent(in) :: sub
-    !> (nv) [m/s, rad/s]
-    real(dp), intent(out) :: vi(:), vj(:)
-    real(dp) :: points(size(found%normal, 1), 2)
-    integer :: nd
-
-    nd = size(points, 1)
-    call find_touching_points(view, found, this, points)
-    call find_start_velocity(view, boundaries, this%i, points(:, 1), vi)
-    call find_start_velocity(view, boundaries, this%j, points(:, 2), vj)
-    call add_image_velocity(view, this%p, vj(1:nd))
-    associate (i => sub%pair(1, this%c), j => sub%pair(2, this%c))
-      if (i <= sub%n_grains) vi(nd + 1:) = sub%v_free(nd + 1:, i)
-      if (j <= sub%n_grains) vj(nd + 1:) = sub%v_free(nd + 1:, j)
-    end associate
-  end subroutine find_start_velocities
 
   !> The arms of a contact between bodies with shapes (contact_rows_t); those of grains that are part of a boundary are 0.
   pure subroutine pack_arms(view, found, kernels, this, sub)

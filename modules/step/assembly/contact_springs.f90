@@ -13,7 +13,7 @@ module gravier_contact_springs
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: pack_spring, conclude_springs, spring_energies
+  public :: pack_spring, conclude_springs, measure_springs, spring_energies
 
 contains
 
@@ -51,6 +51,25 @@ contains
       end do
     end associate
   end subroutine pack_spring
+
+  !> The largest deformation of compliant contacts [m], and how stiff they are for the step, h sqrt(k/m), both raised to what they are
+  !> in this problem. Collective.
+  subroutine measure_springs(problem, deformation, stiffest)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), intent(inout) :: deformation, stiffest
+    real(dp) :: largest(2)
+    integer :: s
+
+    largest(1) = deformation
+    largest(2) = stiffest
+    do s = 1, size(problem%sub)
+      largest(1) = max(largest(1), problem%sub(s)%overlap(yielding=.true.))
+      largest(2) = max(largest(2), problem%sub(s)%stiffest)
+    end do
+    call problem%comm%highest_of(largest)
+    deformation = largest(1)
+    stiffest = largest(2)
+  end subroutine measure_springs
 
   !> Elongation of the tangential spring of contact `c` in its frame [m]. In space the vector that is kept is brought into the
   !> tangent plane of now, its length unchanged.

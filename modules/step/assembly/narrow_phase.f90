@@ -10,7 +10,7 @@ module gravier_narrow_phase
   use gravier_surface_velocity, only: contact_place_t, round_place
   use gravier_pair_points, only: pair_points_t, carry_memory
   use gravier_shape_contacts, only: shape_work_t, find_points
-  use gravier_pair_laws, only: boundary_of, law_of, terms_of, evaluate_pair
+  use gravier_pair_laws, only: boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair
   use gravier_physics, only: physics_t
   implicit none
   private
@@ -25,6 +25,8 @@ module gravier_narrow_phase
     integer, allocatable :: boundary(:)
     !> (n) [m], (nd, n)
     real(dp), allocatable :: gap(:), normal(:, :)
+    !> place of each contact of the sweep among those found, once they are packed (n)
+    integer, allocatable :: order(:)
     !> where some law has other terms for each pair (n)
     type(contact_terms_t), allocatable :: terms(:)
     !> where some law has springs (n)
@@ -50,6 +52,7 @@ contains
     room = view%list%n_watched()
     if (allocated(found%source)) deallocate (found%source, found%boundary, found%gap, found%normal, found%terms, &
       & found%spring, found%place)
+    if (allocated(found%order)) deallocate (found%order)
     allocate (found%source(room), found%boundary(room), found%gap(room), found%normal(nd, room))
     allocate (found%terms(merge(room, 0, physics%laws%varies)))
     allocate (found%spring(merge(room, 0, physics%laws%yields)))
@@ -240,8 +243,9 @@ contains
       pair%h = physics%h
       pair%gap = gap
       if (row > 0) pair%state = view%list%state(row, p)
-      call evaluate_pair(view, decomposition%boundaries, physics%laws%of(l)%law, p, place_of(view, found, c), found%normal(:, c), &
-        & pair)
+      if (physics%laws%of(l)%law%sees_velocity) call find_pair_velocity(view, decomposition%boundaries, p, &
+        & place_of(view, found, c), found%normal(:, c), pair)
+      call evaluate_pair(view, physics%laws%of(l)%law, p, pair)
       if (row > 0) view%list%state(row, p) = pair%state
     else
       pair%terms = terms_of(physics%laws, l, gap)

@@ -12,7 +12,7 @@ module gravier_pair_laws
   use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity, add_image_velocity
   implicit none
   private
-  public :: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair, conclude_pairs
+  public :: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair, conclude_pairs
 
 contains
 
@@ -67,16 +67,15 @@ contains
     terms%free_gap = max(gap, 0.0_dp)
   end function terms_of
 
-  !> The terms of pair `p` over a step under a law, and its state.
-  pure subroutine evaluate_pair(view, boundaries, law, p, place, normal, pair)
+  !> Relative velocity of pair `p` at the start of a step, for laws that see it.
+  pure subroutine find_pair_velocity(view, boundaries, p, place, normal, pair)
     type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
-    class(contact_law_t), intent(in) :: law
     integer, intent(in) :: p
     type(contact_place_t), intent(in) :: place
     !> (nd) from the antagonist to the candidate
     real(dp), intent(in) :: normal(:)
-    !> with its gap, its state and whether the step is the first
+    !> gets its normal velocity and its slip
     type(contact_pair_t), intent(inout) :: pair
     real(dp) :: v(size(normal)), w(size(normal))
     integer :: i, j, nd
@@ -84,10 +83,8 @@ contains
     nd = size(normal)
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
-    pair%radius = view%bodies%radius(i)
     call find_surface_velocity(view, boundaries, i, place%arm_i(1:nd), v)
     if (j > 0) then
-      pair%radius = sqrt(view%bodies%radius(i)*view%bodies%radius(j))
       call find_surface_velocity(view, boundaries, j, place%arm_j(1:nd), w)
       call add_image_velocity(view, p, w)
     else
@@ -96,8 +93,22 @@ contains
     v(:) = v - w
     pair%normal_velocity = sum(v*normal)
     pair%slip = norm2(v - pair%normal_velocity*normal)
+  end subroutine find_pair_velocity
+
+  !> The terms of pair `p` over a step under a law, and its state.
+  pure subroutine evaluate_pair(view, law, p, pair)
+    type(local_bodies_t), intent(in) :: view
+    class(contact_law_t), intent(in) :: law
+    integer, intent(in) :: p
+    !> with its gap, its state and whether the step is the first; and its velocity, if the law sees it
+    type(contact_pair_t), intent(inout) :: pair
+
+    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
+      pair%radius = view%bodies%radius(i)
+      if (j > 0) pair%radius = sqrt(view%bodies%radius(i)*view%bodies%radius(j))
+      if (law%yields) call find_reduced(view, i, j, size(view%bodies%position, 1), pair)
+    end associate
     pair%terms%free_gap = max(pair%gap, 0.0_dp)
-    if (law%yields) call find_reduced(view, i, j, nd, pair)
     pair%terms%rolling_friction = law%largest%rolling_friction
     pair%terms%pivoting_friction = law%largest%pivoting_friction
     call law%evaluate(pair)

@@ -65,7 +65,7 @@ contains
   !> a contact where the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
     type(local_bodies_t), intent(in) :: view
-    type(contact_list_t), intent(in) :: found
+    type(contact_list_t), intent(inout) :: found
     type(decomposition_t), intent(in) :: decomposition
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics

@@ -8,7 +8,7 @@ module gravier_surface_velocity
   use gravier_halo, only: local_bodies_t
   implicit none
   private
-  public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, approach_velocity, &
+  public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
     & add_image_velocity
 
   !> Where two bodies touch.
@@ -117,33 +117,5 @@ contains
     real(dp), intent(out) :: point(:)
     point(:) = view%bodies%position(:, i) - (view%bodies%radius(i) + gap)*normal
   end subroutine find_wall_point
-
-  !> Normal velocity of pair `p` [m/s], positive where the two part. Of round grains it is that of their centres.
-  pure real(dp) function approach_velocity(view, boundaries, p, gap, normal) result(approach)
-    type(local_bodies_t), intent(in) :: view
-    type(boundary_t), intent(in) :: boundaries(:)
-    integer, intent(in) :: p
-    !> [m]
-    real(dp), intent(in) :: gap
-    !> (nd) from the antagonist to the candidate
-    real(dp), intent(in) :: normal(:)
-    real(dp) :: w(3), point(3)
-    integer :: d, nd
-
-    nd = size(normal)
-    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      if (j > 0) then
-        w(1:nd) = view%bodies%velocity(1:nd, j)
-        call add_image_velocity(view, p, w(1:nd))
-      else
-        call find_wall_point(view, i, gap, normal, point(1:nd))
-        call find_start_velocity(view, boundaries, j, point(1:nd), w(1:nd))
-      end if
-      approach = 0.0_dp
-      do d = 1, nd
-        approach = approach + (view%bodies%velocity(d, i) - w(d))*normal(d)
-      end do
-    end associate
-  end function approach_velocity
 
 end module gravier_surface_velocity

@@ -4,8 +4,8 @@
 module gravier_overlap_projection
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_projection
-  use gravier_contact_kernels, only: lanes, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_contact_kernels, only: kernels_t, lanes, lane_of, block_of
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_cell_response, only: subtract_images
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
@@ -16,18 +16,23 @@ module gravier_overlap_projection
   public :: project_overlaps
 
   !> sweeps between two looks at what is left, and at most in one projection: what they leave is for the next steps
-  integer, parameter :: check_every = 10, max_sweeps = 200
+  integer, parameter :: check_every = 4, max_sweeps = 200
   !> excess that sweeps may leave, as a part of the overlap allowed, or of the excess at the start where that is larger
   real(dp), parameter :: remainder = 0.1_dp
   !> gap of a contact that is left out, over the overlap allowed
   real(dp), parameter :: out_of_reach = 1.0e9_dp
 
-  !> What a projection borrows of a subproblem, and its work space; src/report/memory_report.f90 counts them.
+  !> What a projection borrows of a subproblem, its work space, and what it sweeps; src/report/memory_report.f90 counts them.
   type :: borrowed_t
     !> shift and, with friction, mu of each contact (lanes, 1 or 2, blocks)
     real(dp), allocatable :: law(:, :, :)
     !> (lanes, nc, blocks)
     real(dp), allocatable :: impulse(:, :, :), work(:, :, :)
+    !> whether a body has moved, or is in a contact that overlaps too much (n_columns); whether a block is swept (blocks)
+    logical, allocatable :: is_touched(:), is_swept(:)
+    !> first and last block of each run of blocks that are swept (2, n_runs)
+    integer, allocatable :: run(:, :)
+    integer :: n_runs = 0
   end type borrowed_t
 
 contains
@@ -38,8 +43,10 @@ contains
   !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
   !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
   !> Compliant contacts are left out: their overlap is deformation.
-  !> The problem comes back as it was but for velocities and masses, with the lengths of the displacements of all grains summed up:
-  !> the same sum on any number of ranks. Collective.
+  !> Sweeps go over the contacts that overlap too much and over those of bodies that have moved. All others would give nothing: they
+  !> have room, and nothing has moved there.
+  !> The problem comes back as it was but for velocities, masses and local operators, with the lengths of the displacements of all
+  !> grains summed up: the same sum on any number of ranks. Collective.
   subroutine project_overlaps(decomposition, problem, h, allowed, shifts)
     type(decomposition_t), intent(inout) :: decomposition
     !> of a step that is over; gaps at its q_m, velocities at its end
@@ -49,7 +56,7 @@ contains
     !> sum of the lengths by which grains are moved [m]
     real(dp), intent(out) :: shifts
     type(borrowed_t) :: borrowed(size(problem%sub))
-    real(dp) :: enough, factor, sums(2)
+    real(dp) :: enough, factor
     integer :: s, k
     logical :: has_driven
 
@@ -60,15 +67,19 @@ contains
       call lend(problem, s, h, allowed, borrowed(s))
     end do
     if (has_driven) call weigh_boundaries(problem, size(decomposition%boundaries))
+    do s = 1, size(problem%sub)
+      call take_blocks(problem%kernels, problem%sub(s), borrowed(s))
+    end do
     enough = remainder*max(allowed, excess(problem, borrowed))
     do k = 1, max_sweeps
       do s = 1, size(problem%sub)
-        associate (sub => problem%sub(s))
-          call problem%kernels%sweep(sub%n_grouped, sub%pair, sub%hot, sub%weight, sub%velocity, sub%impulse, sums)
-        end associate
+        call sweep_runs(problem%kernels, borrowed(s), problem%sub(s))
       end do
       call average_copies(problem)
       if (mod(k, check_every) > 0) cycle
+      do s = 1, size(problem%sub)
+        call take_blocks(problem%kernels, problem%sub(s), borrowed(s))
+      end do
       if (excess(problem, borrowed) <= enough) exit
     end do
     factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
@@ -82,19 +93,76 @@ contains
     call stop_timer(phase_projection)
   end subroutine project_overlaps
 
+  !> One sweep over the blocks that are swept.
+  subroutine sweep_runs(kernels, borrowed, sub)
+    type(kernels_t), intent(in) :: kernels
+    type(borrowed_t), intent(in) :: borrowed
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: sums(2)
+    integer :: k, n_grouped
+
+    do k = 1, borrowed%n_runs
+      associate (first => borrowed%run(1, k), last => borrowed%run(2, k))
+        n_grouped = min(max(sub%n_grouped - (first - 1)*lanes, 0), (last - first + 1)*lanes)
+        call kernels%sweep(n_grouped, sub%pair(:, (first - 1)*lanes + 1:last*lanes), sub%hot(:, :, first:last), sub%weight, &
+          & sub%velocity, sub%impulse(:, :, first:last), sums)
+      end associate
+    end do
+  end subroutine sweep_runs
+
+  !> Take up the blocks that hold a contact of a body that has moved or overlaps too much, with the local operators of all copies.
+  subroutine take_blocks(kernels, sub, borrowed)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(inout) :: sub
+    type(borrowed_t), intent(inout) :: borrowed
+    real(dp), parameter :: whole(3) = 1.0_dp
+    integer :: b, c, g
+
+    do b = 1, sub%n_bodies
+      if (.not. borrowed%is_touched(b)) borrowed%is_touched(b) = any(abs(sub%velocity(:, b)) > 0.0_dp)
+    end do
+    borrowed%n_runs = 0
+    do g = 1, size(sub%hot, 3)
+      if (.not. borrowed%is_swept(g)) then
+        do c = (g - 1)*lanes + 1, min(g*lanes, sub%n_contacts)
+          if (borrowed%is_touched(sub%pair(1, c)) .or. borrowed%is_touched(sub%pair(2, c))) borrowed%is_swept(g) = .true.
+        end do
+        if (.not. borrowed%is_swept(g)) cycle
+        call kernels%set_operators(sub%pair(:, (g - 1)*lanes + 1:g*lanes), sub%hot(:, :, g:g), sub%weight, whole)
+        ! contacts of no effect are all zero
+        if (g*lanes > sub%n_contacts) sub%hot(lane_of(sub%n_contacts) + 1:, :, g) = 0.0_dp
+      end if
+      associate (n => borrowed%n_runs)
+        if (n > 0) then
+          if (borrowed%run(2, n) == g - 1) then
+            borrowed%run(2, n) = g
+            cycle
+          end if
+        end if
+        n = n + 1
+        borrowed%run(:, n) = g
+      end associate
+    end do
+  end subroutine take_blocks
+
   !> Largest overlap beyond what is allowed under the displacements of now [m]. Collective.
   real(dp) function excess(problem, borrowed)
     type(contact_problem_t), intent(in) :: problem
     type(borrowed_t), intent(inout) :: borrowed(:)
-    integer :: s, nd
+    integer :: s, k, nd
 
     nd = problem%kernels%nd
     excess = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), work => borrowed(s)%work)
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
-        ! lanes without a contact hold zeros
-        excess = max(excess, -minval(work(:, 1, :) + sub%hot(:, nd + 1, :)))
+      associate (sub => problem%sub(s))
+        do k = 1, borrowed(s)%n_runs
+          associate (first => borrowed(s)%run(1, k), last => borrowed(s)%run(2, k))
+            call problem%kernels%contact_velocity(sub%pair(:, (first - 1)*lanes + 1:last*lanes), sub%hot(:, :, first:last), &
+              & sub%velocity, borrowed(s)%work(:, :, first:last))
+            ! lanes without a contact hold zeros
+            excess = max(excess, -minval(borrowed(s)%work(:, 1, first:last) + sub%hot(:, nd + 1, first:last)))
+          end associate
+        end do
       end associate
     end do
     excess = problem%comm%highest(excess)
@@ -138,26 +206,36 @@ contains
   end function lengths
 
   !> Make a subproblem one of displacements: frictionless, from rest, with the gaps that the next step would find in the
-  !> place of velocities.
+  !> place of velocities. Bodies in contacts that overlap too much are touched.
   subroutine lend(problem, s, h, allowed, borrowed)
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
     real(dp), intent(in) :: h, allowed
     type(borrowed_t), intent(out) :: borrowed
-    integer :: c, nd
+    integer :: b, c, nd
 
     nd = problem%kernels%nd
     associate (sub => problem%sub(s))
-      borrowed%impulse = sub%impulse
       allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nf > 1), size(sub%hot, 3)))
       allocate (borrowed%work, mold=sub%impulse)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
       if (problem%cell%moves) call subtract_images(problem, s, borrowed%work)
+      call move_alloc(sub%impulse, borrowed%impulse)
+      allocate (sub%impulse, mold=borrowed%impulse)
+      allocate (borrowed%is_touched(sub%n_columns), borrowed%is_swept(size(sub%hot, 3)), source=.false.)
+      allocate (borrowed%run(2, (size(sub%hot, 3) + 1)/2))
       borrowed%law(:, 1, :) = sub%hot(:, nd + 1, :)
       do c = 1, sub%n_contacts
-        sub%hot(lane_of(c), nd + 1, block_of(c)) = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
-        if (sub%yields(c)) sub%hot(lane_of(c), nd + 1, block_of(c)) = out_of_reach*allowed
+        associate (gap => sub%hot(lane_of(c), nd + 1, block_of(c)))
+          gap = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
+          if (sub%yields(c)) gap = out_of_reach*allowed
+          if (gap < 0.0_dp) then
+            borrowed%is_touched(sub%pair(1, c)) = .true.
+            borrowed%is_touched(sub%pair(2, c)) = .true.
+          end if
+        end associate
       end do
+      borrowed%is_touched(sub%n_bodies + 1:) = .false.
       if (problem%kernels%nf > 1) then
         ! nothing turns then, and no moment is needed
         borrowed%law(:, 2, :) = sub%hot(:, problem%kernels%friction_row, :)
@@ -165,7 +243,10 @@ contains
       end if
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :, :) = 0.0_dp
-      call sub%share_masses(problem%kernels, .true.)
+      do b = 1, sub%n_bodies
+        sub%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
+      end do
+      sub%weight(:, sub%n_bodies + 1:) = sub%inverse_mass(:, sub%n_bodies + 1:)
     end associate
   end subroutine lend
 
@@ -211,7 +292,6 @@ contains
         do b = sub%n_grains + 1, sub%n_bodies
           where (sub%inverse_mass(:, b) > 0.0_dp) sub%weight(:, b) = sub%multiplicity(b)/masses(sub%boundary(b))
         end do
-        call sub%update_local_operator(problem%kernels)
       end associate
     end do
   end subroutine weigh_boundaries

@@ -67,6 +67,7 @@ program test_step_parts
   call check_left_behind()
   call check_starting_boundary()
   call check_projection()
+  call check_projected_row()
   call check_shared_lid()
   call finish_checks()
   call comm%free()
@@ -949,6 +950,40 @@ contains
     call check_close(x(2), 0.02_dp + 0.01_dp/3.0_dp, solved, "the other grain in proportion")
     call sim%free()
   end subroutine check_projection
+
+  !> Disks in a row overlap by what is allowed, but for two that overlap by more: what mends that pair moves the others, in whose
+  !> contacts too much overlap comes about, and so on to both ends. Half of the disks give way to each side.
+  subroutine check_projected_row()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    real(dp), parameter :: allowed = 1.0e-3_dp, excess = 4.0e-3_dp
+    !> an overlap that a projection may leave, as a part of what was too much
+    real(dp), parameter :: left = 0.1_dp*excess
+    integer, parameter :: n = 24
+    real(dp) :: x(n), before(n), shifts
+    integer :: k
+
+    do k = 1, n
+      before(k) = (k - 0.5_dp*(n + 1))*(0.2_dp - allowed)
+      if (k > n/4) before(k) = before(k) - excess
+      call add_grain(k, 2.0_dp, 0, before(k), 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    end do
+    call make(sim, "gravity = 0, 0, friction = 0.3, overlap_allowed = 1e-3 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call sim%assemble(figures)
+    call sim%problem%evaluate()
+    call project_overlaps(sim%decomposition, sim%problem, h, allowed, shifts)
+    do k = 1, n
+      x(k) = grain(sim, k, 1, .true.)
+    end do
+    do k = 2, n
+      call check(x(k) - x(k - 1) >= 0.2_dp - allowed - left - solved, "no pair overlaps too much, wherever it is in the row")
+    end do
+    call check(x(1) - before(1) < 0.0_dp .and. x(n) - before(n) > 0.0_dp, "both ends have moved")
+    call check_close(sum(x) - sum(before), 0.0_dp, solved, "the centre of mass stays")
+    call check_close(shifts, sum(abs(x - before)), solved, "lengths of the shifts")
+    call sim%free()
+  end subroutine check_projected_row
 
   !> A lid that forces move overlaps with two disks in two subdomains, and is as heavy as both in a projection: lid and disks share
   !> the excess in equal parts, whatever its own mass is. It moves alike on all ranks.

@@ -9,9 +9,8 @@ program test_narrow_phase
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_halo, only: local_bodies_t
-  use gravier_surface_velocity, only: round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
-    & approach_velocity
-  use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, evaluate_pair
+  use gravier_surface_velocity, only: round_place, find_start_velocity, find_surface_velocity, find_wall_point
+  use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_test_scenes, only: plane
@@ -268,8 +267,8 @@ contains
     view%bodies%velocity(:, 1) = [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp, 5.0_dp, 6.0_dp]
     view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
     call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
-    call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, round_place(view, 1, pair%gap, n), n, &
-        & pair)
+    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, n), n, pair)
+    call evaluate_pair(view, physics%laws%of(1)%law, 1, pair)
     ! V + w x (-0.1 n) of the first grain, less V + w x (0.1 n) of the second
     v = cross([4.0_dp, 5.0_dp, 6.0_dp], n)
     w = cross([-2.0_dp, 3.0_dp, 1.0_dp], n)
@@ -283,13 +282,13 @@ contains
     call make(2, reshape([0.0_dp, 0.1_dp], [2, 1]), view, decomposition)
     view%bodies%velocity(:, 1) = [0.3_dp, -0.2_dp, 5.0_dp]
     call list(view, reshape([1, -1], [2, 1]), pair_memory_t())
-    call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, &
-      & round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), [0.0_dp, 1.0_dp], pair)
+    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
+      & [0.0_dp, 1.0_dp], pair)
     call check_close(pair%normal_velocity, -0.2_dp, rounding, "a disk approaches a plane")
     call check_close(pair%slip, 0.8_dp, rounding, "and slips: 0.3 + 5 0.1")
     decomposition%boundaries(1)%last_velocity(1) = 0.8_dp
-    call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, &
-      & round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), [0.0_dp, 1.0_dp], pair)
+    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
+      & [0.0_dp, 1.0_dp], pair)
     call check_close(pair%slip, 0.0_dp, rounding, "a plane that moves with it")
   end subroutine check_velocities
 
@@ -328,15 +327,14 @@ contains
       call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
       n(1) = 0.0_dp
       n(2) = merge(-1.0_dp, 1.0_dp, order == 1)
-      call evaluate_pair(view, decomposition%boundaries, physics%laws%of(1)%law, 1, round_place(view, 1, pair%gap, n), n, &
-        & pair)
+      call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, n), n, pair)
       ! at (1, 0.1) the boundary has the velocity (-0.3, 3)
       call check_close(pair%slip, 0.8_dp, 10*rounding, "slip against a glued grain, in either order")
       call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")
     end do
   end subroutine check_turning_boundary
 
-  !> Velocities at the start of a step: of a grain that turns, of a glued one, of a boundary, and of a pair along its normal.
+  !> Velocities at the start of a step: of a grain that turns, of a glued one and of a boundary.
   subroutine check_start_velocities()
     type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
@@ -359,10 +357,6 @@ contains
     call check_close(v(3), 0.0_dp, 0.0_dp, "a boundary's velocity has no spin")
     call find_surface_velocity(view, decomposition%boundaries, 1, [0.0_dp, -0.1_dp], w)
     call check_close(w(1), 0.7_dp, rounding, "the spin carries the point below")
-    call check_close(approach_velocity(view, decomposition%boundaries, 1, 0.05_dp, [0.0_dp, 1.0_dp]), -0.375_dp, rounding, &
-      & "approach of a boundary")
-    call check_close(approach_velocity(view, decomposition%boundaries, 2, 0.0_dp, [0.0_dp, -1.0_dp]), 0.75_dp, rounding, &
-      & "two grains part")
     view%bodies%glued(1) = 2
     call find_surface_velocity(view, decomposition%boundaries, 1, [0.0_dp, -0.1_dp], w)
     call check_close(w(1), -0.15_dp, rounding, "a glued grain turns with its boundary, along x")
