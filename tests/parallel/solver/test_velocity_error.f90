@@ -2,7 +2,7 @@
 !> known:
 !> impulses a share of the exact ones leave every disk with the same velocity.
 program test_velocity_error
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
@@ -15,6 +15,7 @@ program test_velocity_error
   use gravier_velocity_error, only: velocity_error_t
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   use gravier_layered_start, only: carry_loads
+  use gravier_pass_backoff, only: pass_backoff_words
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -40,6 +41,7 @@ program test_velocity_error
   call test_decomposition()
   call test_layers(1)
   call test_layers(4)
+  call test_pauses()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -428,5 +430,34 @@ contains
     call check_close(sweeps, 0.0_dp, 0.0_dp, "no pass on what is not deep")
     call sim%free()
   end subroutine test_layers
+
+  !> A step makes no pass while the stepper pauses. One from which the solve goes on ends the row of those that were given up.
+  subroutine test_pauses()
+    integer, parameter :: count = 100
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    type(error_t), allocatable :: error
+    integer(i8) :: words(pass_backoff_words)
+
+    call make(count, 1, sim)
+    words(1) = 3
+    words(2) = 1
+    call sim%pass_backoff%set_state(words)
+    call sim%advance(figures, error)
+    call check(.not. allocated(error) .and. figures%solve%layered_sweeps <= 0.0_dp, "no pass before step 1")
+    call sim%free()
+    call make(count, 1, sim)
+    words(2) = 0
+    call sim%pass_backoff%set_state(words)
+    call sim%advance(figures, error)
+    call check(.not. allocated(error) .and. figures%solve%layered, "a solve goes on from its pass")
+    call sim%pass_backoff%get_state(words)
+    call check(words(1) == 0, "none was given up since")
+    call sim%free()
+    call make(count, 1, sim)
+    call sim%pass_backoff%get_state(words)
+    call check(words(1) == 0 .and. words(2) == 0, "a new scene knows of no passes")
+    call sim%free()
+  end subroutine test_pauses
 
 end program test_velocity_error
