@@ -20,6 +20,7 @@ program test_cell_motion
   call comm%init()
   call check_drive()
   call check_solved_steps()
+  call check_returned()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -79,6 +80,61 @@ contains
     call check(contacts > 60, "enough contacts to tell")
     call sim%free()
   end subroutine check_solved_steps
+
+  !> What contacts send back of their velocities at the start of a step: that of the image which the candidate meets counts, and
+  !> nothing is sent back where the bodies part and the cell and the loads close the contact again.
+  subroutine check_returned()
+    type(simulation_t) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    real(dp) :: n(2), v(2), free(2), way(2), branch(2), expected
+    integer :: s, c, k, across, apart, closed
+
+    call parse_config("cell", "&scene bodies = 'lattice', lattice_count = 6, 6, radius_min = 0.4, radius_max = 0.6, "// &
+      & "friction = 0.4, restitution = 0.5, density = 1, gravity = 0, 0, period = 7.6, 7.6, cell_shear_rate = 0.2, "// &
+      & "cell_pressure = 0, 1, overlap_projection = F /"// &
+      & new_line("a")//"&time step = 0.1, steps = 60 /"//new_line("a")// &
+      & "&solver method = 'nscdd', criterion = 'residual', tolerance = 1e-10, max_iterations = 20000 /"//new_line("a")// &
+      & "&decomposition grid = 2, 1 /", config, error)
+    if (.not. allocated(error)) call sim%init(comm, config, error)
+    call check(.not. allocated(error), "the scene with restitution is made")
+    across = 0
+    apart = 0
+    closed = 0
+    do k = 1, 30
+      call sim%advance(figures, error)
+      call check(.not. allocated(error), "a step with restitution is made")
+      if (mod(k, 10) > 0) cycle
+      call sim%assemble(figures)
+      do s = 1, size(sim%problem%sub)
+        associate (sub => sim%problem%sub(s), view => sim%halo%view(s), cell => sim%physics%cell)
+          do c = 1, sub%n_contacts
+            n(:) = sub%hot(lane_of(c), 1:2, block_of(c))
+            way(:) = sub%cell%way(:, c)
+            branch(:) = sub%cell%branch(:, c)
+            associate (i => view%list%candidate(sub%source(c)), j => view%list%antagonist(sub%source(c)))
+              v(:) = view%bodies%velocity(1:2, i) - view%bodies%velocity(1:2, j) - cell%before(1:2, 1)*way(1) &
+                & - cell%before(1:2, 2)*way(2)
+              free(:) = cell%added(cell%free, branch, way)
+              free(:) = free + sub%v_free(1:2, sub%pair(1, c)) - sub%v_free(1:2, sub%pair(2, c))
+              if (any(abs(way) > 0.0_dp)) across = across + 1
+            end associate
+            expected = 0.5_dp*dot_product(n, v)
+            if (expected > 0.0_dp) then
+              apart = apart + 1
+              if (dot_product(n, free) < 0.0_dp) closed = closed + 1
+              if (dot_product(n, free) < 0.0_dp) expected = 0.0_dp
+            end if
+            call check_close(sub%cell%shift(1, c), expected, 1.0e-14_dp, "what returns")
+          end do
+        end associate
+      end do
+    end do
+    call check(comm%any_true(across > 0), "contacts across the period")
+    call check(comm%any_true(apart > closed) .and. comm%any_true(closed > 0), "contacts that part, and some that are closed again")
+    call sim%free()
+  end subroutine check_returned
 
   !> K (now - before) = sum of p l - h V s, and contacts that press do not part or close, relative to the images that they meet.
   subroutine check_step(sim)

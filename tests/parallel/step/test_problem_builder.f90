@@ -549,7 +549,7 @@ contains
 
     call cloud%init(2, 4, 0.1_dp, 0.1_dp, 1)
     cloud%place(1, :) = [0.2_dp, 0.8_dp, 0.8_dp, 0.5_dp]
-    cloud%place(2, :) = [0.1_dp, 0.1_dp, 0.29_dp, 0.85_dp]
+    cloud%place(2, :) = [0.1_dp, 0.1_dp, 0.29_dp, 0.8515625_dp]
     cloud%place(2, 1) = cloud%place(2, 1) + height
     decomposition%rule = cloud%rule(alert, skin, rule_dual)
     allocate (decomposition%boundaries(3))
@@ -565,10 +565,14 @@ contains
       lid%free(2) = .true.
       lid%mass = 4.0_dp
       lid%velocity(2) = -0.25_dp
+      lid%last_velocity(2) = -0.5_dp
+      lid%contact%restitution = 0.25_dp
     end associate
     glue%id = 13
     glue%velocity(1:2) = [0.125_dp, 0.5_dp]
+    glue%last_velocity(2) = -0.25_dp
     glue%contact%friction = 0.3_dp
+    glue%contact%restitution = 0.5_dp
     glue%pivot(1) = 0.8_dp
     if (turning) glue%given_spin(3) = 1.0_dp
     if (turning) glue%spin(3) = 1.0_dp
@@ -578,6 +582,7 @@ contains
       associate (owned => decomposition%owned(s))
         where (owned%id == 2) owned%glued = 3
         where (owned%id == 1) owned%velocity(2, :) = -0.7_dp
+        where (owned%id == 4) owned%velocity(2, :) = 0.0_dp
       end associate
     end do
     call set_glued_velocities(decomposition)
@@ -655,6 +660,8 @@ contains
       call check(j > sub%n_grains .and. j <= sub%n_bodies, "lid: a body")
       call check_equal(sub%boundary(j), 2, "lid: its number")
       call check_close(sub%v_free(2, j), -0.25_dp, 0.0_dp, "lid: free velocity")
+      ! e (v - v of the lid before) along (0, -1)
+      call check_close(sub%hot(lane_of(c), 3, block_of(c)), -0.125_dp, 8*epsilon(1.0_dp), "lid: the velocity before is sent back")
       call check_close(sub%inverse_mass(2, j), 0.25_dp, 0.0_dp, "lid: inertia of the free component")
       call check(all(abs(sub%inverse_mass([1, 3], j)) <= 0.0_dp), "lid: other components cannot move")
       call check_equal(sub%owner(j), mod(1, problem%n_subdomains) + 1, "lid: one subdomain keeps account of it")
@@ -676,6 +683,8 @@ contains
       call check(i > sub%n_bodies .and. sub%id(sub%pair(2, c)) == 3, "glued: its boundary is the candidate")
       call check_close(hot(2), -1.0_dp, 8*epsilon(1.0_dp), "glued: normal towards the candidate")
       call check_close(sub%gap(c), -0.01_dp, 8*epsilon(1.0_dp), "glued: gap")
+      ! the two part at the start, and the boundary comes up in the step
+      call check_close(hot(3), 0.0_dp, 0.0_dp, "glued: nothing is sent back where the contact closes again")
       call check_close(sub%v_free(1, i), merge(-0.075_dp, 0.125_dp, turning), 8*epsilon(1.0_dp), "glued: velocity along")
       call check_close(sub%v_free(2, i), 0.5_dp, 8*epsilon(1.0_dp), "glued: velocity")
       call check_close(hot(6), 0.0_dp, 0.0_dp, "glued: no lever")
