@@ -4,15 +4,16 @@ smooth walls, then compression at constant lateral pressure with friction 0.5.
 
     ./gravier study biaxial [--out DIR] [--quick]        about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves in DIR study_biaxial.csv (the stress-strain curve), study_biaxial_summary.csv and study_biaxial.png. --quick takes 600 disks. The closing
-table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves in DIR study_biaxial.csv (the stress-strain curve), study_biaxial_summary.csv and study_biaxial.png. --quick takes 600 disks.
+The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import draw_disks, loose, plt, radii_by_volume, read_bodies, read_history, run, sized, states, write_csv, write_hdf5
+from study_support import (draw_disks, loose, plt, radii_by_volume, read_bodies, read_history, run, sized, states, write_csv,
+                           write_hdf5)
 from whole_file import save_figure
 
 PRESSURE = 1000.0  # N/m
@@ -134,7 +135,8 @@ def compress(options, centres, radii, size, mass):
 
 
 def stress_strain(path, size, volume):
-    """Axial and lateral strain, stresses on lid and side over the pressure, sin phi, solid fraction and coordination of each state, as columns."""
+    """Axial and lateral strain, stresses on lid and side over the pressure, sin phi, solid fraction and coordination of each state,
+    as columns."""
     rows = []
     for _, _, state in states(path):
         box = size_of(state)
@@ -150,18 +152,21 @@ def accepted(summary, n):
     off = 2.0 * SCATTER * np.sqrt(QUICK["grains"] / n) if n < FULL["grains"] else 0.0
     benchmark, page = "CEGEO benchmark, 2012", "doc/validation.md, Biaxial compression"
     table = Bounds()
-    table.add("solid fraction without friction, away from the walls", summary["solid_fraction_inner"], 0.84, 0.85, f"{benchmark}; {page}")
+    table.add("solid fraction without friction, away from the walls", summary["solid_fraction_inner"], 0.84, 0.85,
+              f"{benchmark}; {page}")
     table.near("coordination without friction and rattlers", summary["coordination_mu0"], 4.0, 0.1,
                f"isostatic packing of disks: 4; {page}: about 4; a tenth, for contacts that have opened")
     for name, side in (("right", "side"), ("lid", "lid")):
-        table.near(f"pressure of the disks on the {side} over that applied", summary[f"pressure_{name}"], 1.0, 0.01, "equilibrium; a hundredth")
+        table.near(f"pressure of the disks on the {side} over that applied", summary[f"pressure_{name}"], 1.0, 0.01,
+                   "equilibrium; a hundredth")
     table.add("sin phi with friction 0.5, at constant volume", summary["sin_phi"], 0.25 - off, 0.30 + off,
               f"{benchmark}: 0.25 to 0.30; {page}" + (f"; two standard deviations of samples of {n} disks" if off else ""))
     table.add("peak of sin phi over that at constant volume", summary["sin_phi_peak"] / summary["sin_phi"], 1.0, None,
               f"a dense sample has a peak; {page}: 0.42 and 0.29")
     table.near("solid fraction at constant volume", summary["solid_fraction_last"], 0.81, 0.02,
                "slow flow of disks (da Cruz et al., Phys. Rev. E 72 (2005) 021309); 0.02 as in the study of dense flow")
-    table.add("solid fraction at the end over that at the start", summary["solid_fraction_last"] / summary["solid_fraction_box"], None, 1.0,
+    table.add("solid fraction at the end over that at the start", summary["solid_fraction_last"] / summary["solid_fraction_box"],
+              None, 1.0,
               "a dense sample dilates (Reynolds)")
     table.add("largest overlap over the mean radius", summary["largest_overlap_over_radius"], None, 0.01 * EXCESS,
               f"doc/theory.md, Overlaps in long runs: {EXCESS:g} of what is allowed")

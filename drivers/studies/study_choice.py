@@ -9,8 +9,8 @@ leaves in DIR study_choice.csv, a row for each quantity of each run, and prints 
 time or with fewer grains. Further runs with the second step and 0.1, and with the smallest step and 0.03, begin from places of the grains that
 differ by a millionth of a diameter (the lattice of the settling: from other radii). The mean of those with the smallest step is the reference;
 twice the standard deviation in either group, the root mean square of both, is the scatter. A value is right where it deviates by no more than 2 %, or than the scatter where that is larger. Seconds are processor seconds of a run on
-one rank; cost is seconds over those of the cheapest run that is right. The closing table has the deviations of the default accuracy and of the
-tight one beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+one rank; cost is seconds over those of the cheapest run that is right. The closing table has the deviations of the default accuracy
+and of the tight one beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import resource
 import sys
@@ -193,7 +193,8 @@ def accepted(rows):
             continue
         case = f"{row['scene']}, step {1e3 * row['step']:g} ms, accuracy {row['accuracy']:g}"
         table.near(f"{case}: deviation of {row['quantity']} [%]", 100.0 * row["deviation"], 0.0,
-                   100.0 * max(RIGHT, (1.0 + UNCERTAIN) * row["scatter"]), f"{page}: 2 %, or the scatter, which is uncertain by a half")
+                   100.0 * max(RIGHT, (1.0 + UNCERTAIN) * row["scatter"]),
+                   f"{page}: 2 %, or the scatter, which is uncertain by a half")
     for name in dict.fromkeys(row["scene"] for row in rows):
         table.add(f"{name}: share of the solves that missed, the most of all runs [%]", 100.0 * max(row["missed"] for row in rows if
                   row["scene"] == name), None, 100.0 * MISSED, f"{page}: up to 0.25")

@@ -3,11 +3,12 @@
 radius.
 (r - r0)/r0 goes like a for flat columns, and for tall ones like a^(2/3) in 2D and a^(1/2) in 3D.
 
-    ./gravier study collapse [--out DIR] [--quick]                   about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    ./gravier study collapse [--out DIR] [--quick] --dimension 3     about 7 minutes
+    ./gravier study collapse [--out DIR] [--quick]            about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study collapse [--out DIR] [--quick] --dimension 3  about 7 minutes
 
-leaves in DIR study_collapse.csv, study_collapse_summary.csv and study_collapse.png, or the same with _3d. --quick takes fewer columns of fewer
-grains, which in 3D are too few for a slope of tall columns. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves in DIR study_collapse.csv, study_collapse_summary.csv and study_collapse.png, or the same with _3d. --quick takes fewer
+columns of fewer grains, which in 3D are too few for a slope of tall columns. The closing table has each measured quantity beside
+what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import sys
 from pathlib import Path
@@ -31,8 +32,9 @@ SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, grains=6000, aspects=(0.
 #: of the quick form
 QUICK = {2: {"grains": 700, "aspects": (0.5, 1.1, 5.0, 10.0), "falls": 4.0},
          3: {"grains": 1500, "aspects": (0.5, 0.8, 1.1, 3.0), "falls": 3.0, "settling": 0.25}}
-# published laws: exponent and range of the factor. In 2D the factors of experiments with sand (Lube) and of disks by contact dynamics
-# (Staron and Hinch) are far apart. In 3D those of Lube are of columns hundreds of grains wide; narrow columns run less far (Warnett).
+# published laws: exponent and range of the factor. In 2D the factors of experiments with sand (Lube) and of disks by contact
+# dynamics (Staron and Hinch) are far apart. In 3D those of Lube are of columns hundreds of grains wide; narrow columns run less far
+# (Warnett).
 LUBE_2D, STARON = "Lube et al., Phys. Rev. E 72 (2005) 041301", "Staron and Hinch, J. Fluid Mech. 545 (2005) 1"
 LUBE_3D, WARNETT = "Lube et al., J. Fluid Mech. 508 (2004) 175", "Warnett et al., Granular Matter 16 (2014) 115"
 LAWS = {2: {"flat": (1.0, (1.2, 2.5), f"{LUBE_2D}: 1.2; {STARON}: 2.5"),
@@ -128,7 +130,8 @@ def accepted(dimension, columns, chosen, slopes):
     for name, (exponent, (low, high), source) in LAWS[dimension].items():
         span = f"{name} columns, a from {ratio[chosen[name]].min():.2g} to {ratio[chosen[name]].max():.2g}"
         factor = np.exp(np.mean(np.log(out[chosen[name]] / ratio[chosen[name]]**exponent)))
-        table.add(f"run-out over a^{exponent:.2g} of {name} columns", factor, None if low is None else (1.0 - NEAR) * low, (1.0 + NEAR) * high,
+        table.add(f"run-out over a^{exponent:.2g} of {name} columns", factor, None if low is None else (1.0 - NEAR) * low,
+                  (1.0 + NEAR) * high,
                   f"{source}; a tenth")
         if chosen[name].sum() < 2:
             continue
@@ -137,7 +140,8 @@ def accepted(dimension, columns, chosen, slopes):
         # of a slope through places that are anywhere in their bins
         spread = 2.0 * np.sqrt((place**2 @ bins[chosen[name]]**2) / 3.0) / (place @ place)
         table.near(f"exponent of the run-out of {span}", slopes[name][0], exponent, NEAR + spread,
-                   f"{LUBE_2D if dimension == 2 else LUBE_3D}; doc/validation.md: +- {NEAR:g}; two deviations of a bin, {spread:.2g}")
+                   f"{LUBE_2D if dimension == 2 else LUBE_3D}; doc/validation.md: +- {NEAR:g}; "
+                   f"two deviations of a bin, {spread:.2g}")
     return table.close()
 
 

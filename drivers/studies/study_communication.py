@@ -5,9 +5,9 @@
     ./gravier study communication --quick [--out DIR]        a lattice of 32 768 spheres in the place of BODIES.h5
 
 Every run makes one step on one process: the program counts what each subdomain sends whether its neighbours are on other
-ranks or on its own. Writes communication.csv and communication.svg into DIR. On a lattice of touching spheres in a grid of subdomains
-messages and numbers are counted anew by their definition. The closing table has each measured quantity beside what is accepted. Exit
-status: 0 all are held; 1 one is missed.
+ranks or on its own. Writes communication.csv and communication.svg into DIR. On a lattice of touching spheres in a grid of
+subdomains messages and numbers are counted anew by their definition. The closing table has each measured quantity beside what is
+accepted. Exit status: 0 all are held; 1 one is missed.
 """
 
 import argparse
@@ -98,11 +98,14 @@ def lattice_of_spheres():
 
 
 def counted(centres, boxes):
-    """Messages, numbers and shared spheres of the lattice in a grid of so many boxes along each axis, by their definition: a contact is in the box
-    that holds the middle between its spheres, a sphere has a copy in each box of its contacts, and each copy sends six numbers to each other."""
+    """Messages, numbers and shared spheres of the lattice in a grid of so many boxes along each axis, by their definition: a
+    contact is in the box
+    that holds the middle between its spheres, a sphere has a copy in each box of its contacts, and each copy sends six numbers to
+    each other."""
     low, size = centres.min(0) - RADIUS, np.ptp(centres, axis=0) + 2.0 * RADIUS
     number = np.arange(EDGE**3).reshape([EDGE] * 3)
-    pairs = np.concatenate([np.stack([np.delete(number, -1, axis).ravel(), np.delete(number, 0, axis).ravel()], 1) for axis in range(3)])
+    pairs = np.concatenate([np.stack([np.delete(number, -1, axis).ravel(), np.delete(number, 0, axis).ravel()], 1)
+                            for axis in range(3)])
     middle = centres[pairs].mean(1)
     box = np.minimum(((middle - low) / size * boxes).astype(int), boxes - 1) @ [boxes**2, boxes, 1]
     held = np.zeros((EDGE**3, boxes**3), int)
@@ -172,21 +175,25 @@ def accepted(options, table, slopes, grains, dimension):
         write_hdf5(bodies, centres, np.full(len(centres), RADIUS))
         for boxes in GRIDS:
             row = run_case(options.gravier, bodies, 3, "grid", boxes**3)
-            for name, column, exact in zip(("messages", "numbers", "shared spheres"), ("exchange_messages", "exchange_values", "interface_bodies"),
+            for name, column, exact in zip(("messages", "numbers", "shared spheres"),
+                                           ("exchange_messages", "exchange_values", "interface_bodies"),
                                            counted(centres, boxes)):
-                bounds.near(f"lattice of {len(centres)} spheres in a grid of {boxes**3}: {name} of an exchange", int(row[column]), exact, 0.0,
+                bounds.near(f"lattice of {len(centres)} spheres in a grid of {boxes**3}: {name} of an exchange", int(row[column]),
+                            exact, 0.0,
                             "counted by their definition (doc/theory.md, 7)")
     for row in table:
         if row["subdomains"] == 2:
             copies = row["bytes_an_iteration"] / (8 * (3 if dimension == 2 else 6) * row["shared_share"] * grains)
             bounds.near(f"{row['partition']}, 2 subdomains: copies that each sends, over the shared grains", copies, 1.0, 1e-9,
                         "each subdomain has one copy of each shared grain")
-            bounds.near(f"{row['partition']}, 2 subdomains: messages of each", row["messages_an_iteration"], 1.0, 0.0, "one other subdomain")
+            bounds.near(f"{row['partition']}, 2 subdomains: messages of each", row["messages_an_iteration"], 1.0, 0.0,
+                        "one other subdomain")
     most = {(row["partition"], row["subdomains"]): row["most_bytes"] for row in table}
     several = [n for partition, n in most if partition == "grid" and n > 2]
     if several:
         bounds.add("most bytes by METIS over those by a grid, the most of all numbers of subdomains above 2",
-                   max(most["metis", n] / most["grid", n] for n in several), None, 1.33 * 1.1, f"{page}: 1.18 to 1.33; a tenth more")
+                   max(most["metis", n] / most["grid", n] for n in several), None, 1.33 * 1.1,
+                   f"{page}: 1.18 to 1.33; a tenth more")
     surface = 1.0 - 1.0 / dimension
     for partition, slope in slopes.items():
         # cells of METIS are a little wider than a sphere: on a lattice some have two layers of spheres, and its sides are uneven

@@ -4,8 +4,8 @@ tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of t
 
     ./gravier study drift [--out DIR] [--quick] [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
 
-leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png. --quick makes a tenth of the steps. The
-closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png. --quick makes a tenth of the
+steps. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import sys
 from pathlib import Path
@@ -26,7 +26,8 @@ LOOSE = (1.0e-2, 1.0e-3, 1.0e-4)
 PRESSURE, LID_MASS = 2.0e4, 20.0  # N/m, kg
 GROWN = 1.1  # grains that touch overlap by a fifth of their radius once they are larger by a tenth
 FULL, QUICK = {"steps": 20000}, {"steps": 2000}
-#: largest overlap over that allowed by the page, with what a fall of one step adds to it, and how much overlaps grow while they are removed
+#: largest overlap over that allowed by the page, with what a fall of one step adds to it, and how much overlaps grow while they are
+#: removed
 EXCESS, GROWTH = 1.3 + 9.81 * STEP**2 / ALLOWED, 4.0 / 3.0
 
 
@@ -106,23 +107,28 @@ def accepted(rows, curves):
         name, tolerance = row["run"], row["tolerance"]
         what, history = f"{name}, tolerance {tolerance:.0e}", curves[name, tolerance, bool(row["projection"])]
         if not row["projection"]:
-            table.near(f"{what}, without the projection: work that no load does, over m g R of a grain", row["projection_work"], 0.0, 1e-9,
+            table.near(f"{what}, without the projection: work that no load does, over m g R of a grain", row["projection_work"],
+                       0.0, 1e-9,
                        "balance of energy, to rounding")
             continue
-        table.add(f"{what}: largest overlap over that allowed, second half", row["largest_overlap"] * RADIUS / ALLOWED, None, EXCESS,
+        table.add(f"{what}: largest overlap over that allowed, second half", row["largest_overlap"] * RADIUS / ALLOWED, None,
+                  EXCESS,
                   f"{page}: about 1.3; g h^2 more, for one step without a sweep")
         if name in ("disks", "spheres"):
             table.add(f"{what}: kinetic energy of a grain over m g R", row["kinetic_energy"], None, 9.81 * STEP**2 / (2.0 * RADIUS),
                       "rest: velocities below g h")
         if name == "grown":
-            table.add(f"{what}: largest overlap over the first one", history["max_overlap"].max() / history["max_overlap"][0], None, GROWTH,
+            table.add(f"{what}: largest overlap over the first one", history["max_overlap"].max() / history["max_overlap"][0], None,
+                      GROWTH,
                       f"{page}: a third at most while they are removed")
         other = next(r for r in rows if (r["run"], r["tolerance"], r["projection"]) == (name, tolerance, 0))
         if history["max_overlap"].max() <= ALLOWED:
-            table.near(f"{what}: last overlap less that without the projection, over R", row["last_overlap"] - other["last_overlap"], 0.0, 0.0,
+            table.near(f"{what}: last overlap less that without the projection, over R",
+                       row["last_overlap"] - other["last_overlap"], 0.0, 0.0,
                        f"{page}: such a run is not changed at all")
         if name == "piston" and tolerance == max(LOOSE):
-            table.add(f"{what}: largest overlap without the projection, over that allowed", other["largest_overlap"] * RADIUS / ALLOWED, EXCESS,
+            table.add(f"{what}: largest overlap without the projection, over that allowed",
+                      other["largest_overlap"] * RADIUS / ALLOWED, EXCESS,
                       None, f"{page}: 39; a scene without drift would show nothing")
     return table.close()
 

@@ -3,8 +3,8 @@
 
     ./gravier study drum [--out DIR] [--quick]           about 2 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves in DIR study_drum.csv, study_drum_summary.csv and study_drum.png. --quick takes a shorter time. The closing table has each measured
-quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves in DIR study_drum.csv, study_drum_summary.csv and study_drum.png. --quick takes a shorter time. The closing table has each
+measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import sys
 from pathlib import Path
@@ -18,8 +18,8 @@ RADIUS, RATE = 0.2, 1.0  # m, rad/s
 START = 2.0  # s, when the flow has become steady
 DENSITY = 2500.0  # kg/m^2
 FULL, QUICK = 14000, 5000  # steps of 1 ms
-#: angles of heaps of disks: that of the friction at constant volume in biaxial tests with this friction (sin phi at least 0.25), and that at which
-#: a disk rolls off a close row of its like
+#: angles of heaps of disks: that of the friction at constant volume in biaxial tests with this friction (sin phi at least 0.25),
+#: and that at which a disk rolls off a close row of its like
 SLOWEST, STEEPEST = np.degrees(np.arcsin(0.25)), 30.0
 
 

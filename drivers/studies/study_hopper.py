@@ -2,11 +2,12 @@
 """Discharge through openings of many widths D in a flat floor: Beverloo's law, Q ~ (D - k d)^(3/2) for disks through a slot and
 (D - k d)^(5/2) for spheres through a square.
 
-    ./gravier study hopper [--out DIR] [--quick]                     about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    ./gravier study hopper [--out DIR] [--quick] --dimension 3       about 5 minutes
+    ./gravier study hopper [--out DIR] [--quick]              about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study hopper [--out DIR] [--quick] --dimension 3    about 5 minutes
 
-leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, or the same with _3d. --quick takes fewer openings and a shorter
-time. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, or the same with _3d. --quick takes fewer openings
+and a shorter time. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is
+missed."""
 import argparse
 import sys
 from pathlib import Path
@@ -20,8 +21,8 @@ from whole_file import save_figure
 STEP = 5.0e-4  # s
 DENSITY = 2500.0  # kg/m^3, kg/m^2 in 2D
 BEVERLOO_K = 1.4
-#: Beverloo's C of circles by experiments, and what makes it that of a slot and of a square of the same width: area times the root of the
-#: hydraulic diameter, over D^(5/2)
+#: Beverloo's C of circles by experiments, and what makes it that of a slot and of a square of the same width: area times the root
+#: of the hydraulic diameter, over D^(5/2)
 CONSTANT, SHAPE = (0.55, 0.65), {2: 4.0 / np.pi * np.sqrt(2.0), 3: 4.0 / np.pi}
 # radii [m], openings [mean diameters], half of the width [m], height of the loose fill [m], steps of the filling and of a
 # discharge, share of the grains that leaves while the rate is measured, exponent of the law
@@ -63,12 +64,14 @@ def groups(case, d, path, steps, every, final):
 
 
 def rate_of(history, number, share):
-    """Grains a second that leave while the flow is steady, and how that changes from the first half of this time to the second, over it."""
+    """Grains a second that leave while the flow is steady, and how that changes from the first half of this time to the second,
+    over it."""
     gone = number - history["grains"]
     # once the flow is steady, and while most of the fill is left
     steady = (history["time"] > 0.2) & (gone < share * number)
     time, gone = history["time"][steady], gone[steady]
-    whole, *halves = (np.polyfit(time[part], gone[part], 1)[0] for part in (slice(None), slice(len(time) // 2), slice(len(time) // 2, None)))
+    whole, *halves = (np.polyfit(time[part], gone[part], 1)[0]
+                      for part in (slice(None), slice(len(time) // 2), slice(len(time) // 2, None)))
     # of a count of independent grains in each half
     spread = 2.0 / np.sqrt(max(gone[-1] - gone[0], 1))
     return whole, (halves[1] - halves[0]) / whole, spread
@@ -81,7 +84,8 @@ def accepted(d, case, exponent, k, constant, changes):
     table.near(f"exponent of the rate against D - {BEVERLOO_K:g} d", exponent, case.exponent, 0.1, f"{law}; {page}: +- 0.1")
     table.add(f"k with the exponent {2.0 * case.exponent:g}/2", k, 1.0, 3.0, f"{law}: 1.4; {page}: 1 to 3")
     table.add(f"C with this exponent and k = {BEVERLOO_K:g}", constant, 0.9 * SHAPE[d] * CONSTANT[0], 1.1 * SHAPE[d] * CONSTANT[1],
-              f"{CONSTANT[0]:g} to {CONSTANT[1]:g} of circles (Nedderman 1992), by the hydraulic diameter; a tenth, for a k off by 0.2")
+              f"{CONSTANT[0]:g} to {CONSTANT[1]:g} of circles (Nedderman 1992), by the hydraulic diameter; "
+              "a tenth, for a k off by 0.2")
     table.add("change of the rate over the time of a discharge, mean of all openings", np.mean([change for change, _ in changes]),
               *(sign * (0.1 + 2.0 * np.sqrt(np.sum([spread**2 for _, spread in changes])) / len(changes)) for sign in (-1.0, 1.0)),
               f"{law}: none by the height of the fill; a tenth, and two standard deviations of a count")

@@ -4,11 +4,11 @@ the periods of the command script beside it.
 
     ./gravier study lmgc90 EXAMPLES [--out DIR] [--quick] [--steps N] [--seconds S] [--pylmgc90 PATH] [--only NAME...]
 
-EXAMPLES is a directory such as examples/RIGID_2D of the sources of LMGC90. Each run makes at most N steps (200, quick 20) in at most S seconds (120, quick 10). Where an
-example has a script gen_sample.py in the place of a DATBOX, the pre-processor of LMGC90 makes one in DIR: PATH is the directory that holds
-pylmgc90. Imports are made with --homogeneous, --drop-g0 and --slip 1e-4. Leaves DIR/study_lmgc90.csv, the table DIR/study_lmgc90.md, cases and runs.
-The closing table compares with that of doc/lmgc90.md. Exit status: 0 all examples that import have run, and all that import there do here; 1 one
-has not."""
+EXAMPLES is a directory such as examples/RIGID_2D of the sources of LMGC90. Each run makes at most N steps (200, quick 20) in at
+most S seconds (120, quick 10). Where an example has a script gen_sample.py in the place of a DATBOX, the pre-processor of LMGC90
+makes one in DIR: PATH is the directory that holds pylmgc90. Imports are made with --homogeneous, --drop-g0 and --slip 1e-4. Leaves
+DIR/study_lmgc90.csv, the table DIR/study_lmgc90.md, cases and runs. The closing table compares with that of doc/lmgc90.md. Exit
+status: 0 all examples that import have run, and all that import there do here; 1 one has not."""
 import csv
 import os
 import re
@@ -139,7 +139,8 @@ def accepted(rows):
     imported = [row for row in rows if row["imports"] == "yes"]
     table = Bounds()
     table.add("examples", len(rows), 1, None, "one at least: a study of nothing shows nothing")
-    table.add(f"examples that do not import, of {len(known)} that import on the page", sum(row["imports"] != "yes" for row in known), 0, 0, page)
+    table.add(f"examples that do not import, of {len(known)} that import on the page",
+              sum(row["imports"] != "yes" for row in known), 0, 0, page)
     table.add(f"examples that make no step, of {len(imported)} that import", sum(not row["steps"] for row in imported), 0, 0,
               "what imports runs")
     table.add("examples that end with another status than 0, 3 or at the limit of seconds",

@@ -4,12 +4,13 @@
     ./gravier study side_by_side EXAMPLE... [--out DIR] --pylmgc90 PATH [--quick] [--steps N] [--settle M]
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
-LMGC90 runs the command script of the example as it is, in a copy, for N steps (100, quick 20). Gravier runs what gravier_import makes of the DATBOX. With --settle
-LMGC90 makes M steps first, and its last state with its forces is the DATBOX of both: what is at rest there has to stay at rest here. Gravier then
-runs once more without these forces. A body counts as moved that is farther than 2 % of its size from its start after 100 steps. Displacements
-are compared body by body in the last step, over the radius of the ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
-those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. The closing table has what both agree in beside what is
-accepted. Exit status: 0 all are held; 1 one is missed; 2 LMGC90 is not there."""
+LMGC90 runs the command script of the example as it is, in a copy, for N steps (100, quick 20). Gravier runs what gravier_import
+makes of the DATBOX. With --settle LMGC90 makes M steps first, and its last state with its forces is the DATBOX of both: what is at
+rest there has to stay at rest here. Gravier then runs once more without these forces. A body counts as moved that is farther than
+2 % of its size from its start after 100 steps. Displacements are compared body by body in the last step, over the radius of the
+ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
+those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. The closing table has
+what both agree in beside what is accepted. Exit status: 0 all are held; 1 one is missed; 2 LMGC90 is not there."""
 import os
 import re
 import resource
@@ -244,21 +245,25 @@ def accepted(rows, settled_before):
     table = Bounds()
     for row in rows:
         name = row["example"]
-        table.add(f"{name}: mass in LMGC90 over mass here", row["mass_ratio"], 0.99, 1.09, f"the same densities; {page}: 1.08 of clusters")
+        table.add(f"{name}: mass in LMGC90 over mass here", row["mass_ratio"], 0.99, 1.09,
+                  f"the same densities; {page}: 1.08 of clusters")
         table.near(f"{name}: mean force on the ground, here over LMGC90",
                    row["mean_force_on_ground_over_weight_gravier"] / row["mean_force_on_ground_over_weight_lmgc90"], 1.0, 0.05,
                    f"{page}: 1.00 to 1.03; a twentieth")
         if np.isfinite(row["forces_found"]):
-            table.add(f"{name}: contacts with forces that the first step finds", row["forces_found"], 0.99, 1.0, f"{page}: 1108 of 1116, or all")
+            table.add(f"{name}: contacts with forces that the first step finds", row["forces_found"], 0.99, 1.0,
+                      f"{page}: 1108 of 1116, or all")
         if settled_before:
-            table.add(f"{name}: bodies that move here", row["moved_gravier"], 0, row["moved_lmgc90"], "what is at rest there is at rest here")
+            table.add(f"{name}: bodies that move here", row["moved_gravier"], 0, row["moved_lmgc90"],
+                      "what is at rest there is at rest here")
         elif row["steps"] <= QUICK["steps"]:
             table.add(f"{name}: largest difference of places over the size", row["largest_difference_over_size"], 0.0, 2e-3,
                       f"{page}: 1.2e-3 after 20 steps")
         else:
             table.add(f"{name}: median difference of places over the size", row["median_difference_over_size"], 0.0, 5e-3,
                       f"{page}: up to 3e-3 after 200 steps")
-            table.add(f"{name}: kinetic energy, here over LMGC90", row["energy_gravier"] / row["energy_lmgc90"], 0.75, 1.25, f"{page}: 0.96 to 1.20")
+            table.add(f"{name}: kinetic energy, here over LMGC90", row["energy_gravier"] / row["energy_lmgc90"], 0.75, 1.25,
+                      f"{page}: 0.96 to 1.20")
     return table.close()
 
 

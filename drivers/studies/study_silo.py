@@ -4,8 +4,8 @@ sigma = rho g lambda (1 - exp(-z/lambda)), lambda = width / (2 mu K).
 
     ./gravier study silo [--out DIR] [--quick]           about 3 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves in DIR study_silo.csv, study_silo_summary.csv and study_silo.png. --quick takes a lower fill and means over a shorter time. The closing
-table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves in DIR study_silo.csv, study_silo_summary.csv and study_silo.png. --quick takes a lower fill and means over a shorter time.
+The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import sys
 from pathlib import Path
@@ -45,7 +45,8 @@ def lower(options, centres, radii):
 
 
 def profiles(path, radii):
-    """Means over the states while the floor goes down, against depth: vertical stress, lateral stress on the sides, stress of the fill without
+    """Means over the states while the floor goes down, against depth: vertical stress, lateral stress on the sides, stress of the
+    fill without
     walls, what the sides hold in each slice, the stress on the floor, and the disks at the end."""
     weight = DENSITY * np.pi * radii**2 * 9.81
     n, samples, bottom = len(radii), [], []
@@ -78,7 +79,8 @@ def accepted(summary):
     page, law = "doc/validation.md, Silo", "Janssen's law"
     least, most = (1.0 - SINE) / (1.0 + SINE), (1.0 + SINE) / (1.0 - SINE)
     table = Bounds()
-    table.add("vertical stress against Janssen's curve, largest difference over the saturated stress", summary["largest_difference"], 0.0, 0.1,
+    table.add("vertical stress against Janssen's curve, largest difference over the saturated stress",
+              summary["largest_difference"], 0.0, 0.1,
               f"{law}; a tenth, for one sample")
     table.near("stress on the floor over that of Janssen's law at its depth", summary["bottom_stress_over_law"], 1.0, 0.1,
                f"{law}; a tenth, for one sample ({page}: 0.95 of saturation)")
@@ -100,7 +102,8 @@ def main():
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/silo"), help="default: out/silo")
     parser.add_argument("--quick", action="store_true", help="a lower fill, means over a shorter time")
     parser.add_argument("--layers", type=int, help=f"of the loose fill ({FULL['layers']}, quick {QUICK['layers']})")
-    parser.add_argument("--sampling", type=int, help=f"steps over which means are taken ({FULL['sampling']}, quick {QUICK['sampling']})")
+    parser.add_argument("--sampling", type=int,
+                        help=f"steps over which means are taken ({FULL['sampling']}, quick {QUICK['sampling']})")
     options = sized(parser.parse_args(), FULL, QUICK)
     options.out.mkdir(parents=True, exist_ok=True)
     centres, radii = lattice([0.0, 0.0], [WIDTH, options.layers * 2.05 * LARGEST], SMALLEST, LARGEST, np.random.default_rng(1895))
@@ -123,7 +126,8 @@ def main():
     write_csv(options.out / "study_silo_summary.csv", {"quantity": list(summary),
               "value": [float(value) for value in summary.values()]})
     curve = rho_g * length * (1.0 - np.exp(-depth / length))
-    draw(options.out / "study_silo.png", depth, (vertical, lateral, hydrostatic, curve), (length, summary["K_fitted"]), (position, radii))
+    draw(options.out / "study_silo.png", depth, (vertical, lateral, hydrostatic, curve), (length, summary["K_fitted"]),
+         (position, radii))
     weakest = WIDTH / (2.0 * 0.5 * FRICTION * (1.0 - SINE) / (1.0 + SINE))
     return accepted({**summary, "largest_difference": np.abs(curve - vertical).max() / (rho_g * length),
                      "bottom_stress_over_law": bottom / curve[-1],
@@ -138,7 +142,8 @@ def draw(path, depth, stresses, fit, disks):
     left.plot(depth / WIDTH, hydrostatic / 1e3, "--", color="0.6", label=r"$\rho g z$")
     left.plot(depth / WIDTH, vertical / 1e3, "o", color="#08519c", label=r"$\sigma_{zz}$")
     left.plot(depth / WIDTH, lateral / 1e3, "s", color="#b2182b", markersize=4, label=r"$\sigma_{xx}$ on the sides")
-    left.plot(depth / WIDTH, curve / 1e3, color="0.2", label=rf"Janssen, $\lambda$ = {fit[0] / WIDTH:.2f} widths, $K$ = {fit[1]:.2f}")
+    left.plot(depth / WIDTH, curve / 1e3, color="0.2",
+              label=rf"Janssen, $\lambda$ = {fit[0] / WIDTH:.2f} widths, $K$ = {fit[1]:.2f}")
     left.set_xlabel("depth / width")
     left.set_ylabel("stress [kN/m]")
     left.legend(frameon=False)
