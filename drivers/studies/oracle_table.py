@@ -1,4 +1,4 @@
-"""The table of studies that compare with oracles: a row an oracle, with what was measured beside what is accepted."""
+"""The tables of studies: each row has what was measured beside what is accepted."""
 import sys
 
 
@@ -33,6 +33,38 @@ class Table:
         return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in self.rows]) + "\n"
 
 
+class Bounds:
+    """The closing table of a study: each quantity with the range that is accepted, and the source of that range."""
+
+    HEADER = ("quantity", "measured", "accepted", "source of the bound", "outcome")
+
+    def __init__(self):
+        self.rows = []
+
+    def add(self, quantity, measured, low, high, source):
+        """The quantity is held if it lies from `low` to `high`; None means that there is no bound on that side."""
+        # a comparison with nan is false
+        held = (low is None or measured >= low) and (high is None or measured <= high) and measured == measured
+        accepted = f"at most {short(high)}" if low is None else f"at least {short(low)}" if high is None else \
+            short(low) if low == high else f"{short(low)} to {short(high)}"
+        self.rows.append((quantity, short(measured), accepted, source, "held" if held else "missed"))
+        return held
+
+    def near(self, quantity, measured, expected, difference, source):
+        """The quantity is held if it differs from the expected value by at most the given difference."""
+        return self.add(quantity, measured, expected - difference, expected + difference, source)
+
+    def close(self):
+        """The table is printed; the exit status is 0 if there are rows and all of them are held."""
+        widths = [max(len(row[k]) for row in (self.HEADER, *self.rows)) for k in range(len(self.HEADER))]
+        print()
+        for row in (self.HEADER, *self.rows):
+            print(" | ".join(f"{cell:<{width}}" for cell, width in zip(row, widths)).rstrip())
+        missed = sum(row[-1] == "missed" for row in self.rows)
+        print(f"{len(self.rows) - missed} of {len(self.rows)} within their bounds", flush=True)
+        return int(missed > 0 or not self.rows)
+
+
 def bound(value):
     """One digit, or two where one is not all of it."""
     return f"{value:.0e}" if float(f"{value:.0e}") == value else f"{value:.1e}"
@@ -44,6 +76,11 @@ def text(value):
     if isinstance(value, int):
         return str(value)
     return f"{value:.7g}"
+
+
+def short(value):
+    """Four digits of a number."""
+    return f"{float(value):.4g}"
 
 
 def say(words):

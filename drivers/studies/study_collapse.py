@@ -3,15 +3,19 @@
 radius.
 (r - r0)/r0 goes like a for flat columns, and for tall ones like a^(2/3) in 2D and a^(1/2) in 3D.
 
-    ./gravier study collapse [--out DIR]                   about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    ./gravier study collapse [--out DIR] --dimension 3     about 7 minutes
+    ./gravier study collapse [--out DIR] [--quick]            about 5 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study collapse [--out DIR] [--quick] --dimension 3  about 7 minutes
 
-leaves in DIR study_collapse.csv, study_collapse_summary.csv and study_collapse.png, or the same with _3d."""
+leaves in DIR study_collapse.csv, study_collapse_summary.csv and study_collapse.png, or the same with _3d. --quick takes fewer
+columns of fewer grains, which in 3D are too few for a slope of tall columns. The closing table has each measured quantity beside
+what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from oracle_table import Bounds
 from study_support import draw_disks, lattice, plt, read_bodies, run, states, write_csv, write_hdf5
 from whole_file import save_figure
 
@@ -25,6 +29,20 @@ PLANE = SimpleNamespace(smallest=0.004, largest=0.006, grains=1000, aspects=(0.5
 SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, grains=6000, aspects=(0.5, 0.75, 1.1, 1.5, 3.0, 5.0, 8.0, 12.0),
                         flat=1.7, tall=1.7, settling=0.3, falls=4.0, bin=1.0, alert=2.0e-3, name="study_collapse_3d",
                         solver={"tolerance": 2.0e-3, "max_iterations": 200, "acceleration": "momentum"})
+#: of the quick form
+QUICK = {2: {"grains": 700, "aspects": (0.5, 1.1, 5.0, 10.0), "falls": 4.0},
+         3: {"grains": 1500, "aspects": (0.5, 0.8, 1.1, 3.0), "falls": 3.0, "settling": 0.25}}
+# published laws: exponent and range of the factor. In 2D the factors of experiments with sand (Lube) and of disks by contact
+# dynamics (Staron and Hinch) are far apart. In 3D those of Lube are of columns hundreds of grains wide; narrow columns run less far
+# (Warnett).
+LUBE_2D, STARON = "Lube et al., Phys. Rev. E 72 (2005) 041301", "Staron and Hinch, J. Fluid Mech. 545 (2005) 1"
+LUBE_3D, WARNETT = "Lube et al., J. Fluid Mech. 508 (2004) 175", "Warnett et al., Granular Matter 16 (2014) 115"
+LAWS = {2: {"flat": (1.0, (1.2, 2.5), f"{LUBE_2D}: 1.2; {STARON}: 2.5"),
+            "tall": (2.0 / 3.0, (1.9, 3.25), f"{LUBE_2D}: 1.9; {STARON}: 3.25")},
+        3: {"flat": (1.0, (None, 1.24), f"{LUBE_3D}: 1.24; at most, {WARNETT}"),
+            "tall": (0.5, (None, 1.6), f"{LUBE_3D}: 1.6; at most, {WARNETT}")}}
+#: difference of an exponent, and of a factor over it, that a fit to a few columns may have
+NEAR = 0.1
 
 
 def column_2d(case, aspect, grains, rng):
@@ -105,14 +123,39 @@ def length_of(centres, radii, wide):
     return bins[np.flatnonzero(thickness < unit * mean**d / (2.0 * mean)**(d - 1))[0]]
 
 
+def accepted(dimension, columns, chosen, slopes):
+    """The closing table; columns: ratio, run-out, and half a bin over the run-out of each; chosen: the flat and the tall ones."""
+    ratio, out, bins = columns
+    table = Bounds()
+    for name, (exponent, (low, high), source) in LAWS[dimension].items():
+        span = f"{name} columns, a from {ratio[chosen[name]].min():.2g} to {ratio[chosen[name]].max():.2g}"
+        factor = np.exp(np.mean(np.log(out[chosen[name]] / ratio[chosen[name]]**exponent)))
+        table.add(f"run-out over a^{exponent:.2g} of {name} columns", factor, None if low is None else (1.0 - NEAR) * low,
+                  (1.0 + NEAR) * high,
+                  f"{source}; a tenth")
+        if chosen[name].sum() < 2:
+            continue
+        place = np.log(ratio[chosen[name]])
+        place -= place.mean()
+        # of a slope through places that are anywhere in their bins
+        spread = 2.0 * np.sqrt((place**2 @ bins[chosen[name]]**2) / 3.0) / (place @ place)
+        table.near(f"exponent of the run-out of {span}", slopes[name][0], exponent, NEAR + spread,
+                   f"{LUBE_2D if dimension == 2 else LUBE_3D}; doc/validation.md: +- {NEAR:g}; "
+                   f"two deviations of a bin, {spread:.2g}")
+    return table.close()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/collapse"), help="default: out/collapse")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
+    parser.add_argument("--quick", action="store_true", help="fewer columns of fewer grains")
     parser.add_argument("--grains", type=int, help="in each column: 1000 disks or 6000 spheres, about")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
     case, make = {2: (PLANE, column_2d), 3: (SPACE, column_3d)}[options.dimension]
+    if options.quick:
+        case = SimpleNamespace(**{**vars(case), **QUICK[options.dimension]})
     rng = np.random.default_rng(2005)
     rows, heaps = [], []
     for aspect in case.aspects:
@@ -123,13 +166,15 @@ def main():
     ratio, number, width, height, length, out = np.array(rows).T
     write_csv(options.out / f"{case.name}.csv", {"aspect": ratio, "grains": number, "width": width, "height": height,
                                            "length": length, "run_out": out})
-    slopes = {}
-    for name, chosen in (("flat", ratio < case.flat), ("tall", ratio > case.tall)):
-        slopes[name] = np.polyfit(np.log(ratio[chosen]), np.log(out[chosen]), 1)
-    write_csv(options.out / f"{case.name}_summary.csv", {"quantity": ["exponent_flat", "exponent_tall"],
-                                                   "value": [float(slopes[name][0]) for name in ("flat", "tall")]})
+    chosen = {"flat": ratio < case.flat, "tall": ratio > case.tall}
+    # of one column there is no exponent
+    slopes = {name: np.polyfit(np.log(ratio[those]), np.log(out[those]), 1) for name, those in chosen.items() if those.sum() > 1}
+    write_csv(options.out / f"{case.name}_summary.csv", {"quantity": [f"exponent_{name}" for name in slopes],
+                                                   "value": [float(slope[0]) for slope in slopes.values()]})
     print({name: slope[0] for name, slope in slopes.items()})
     draw(options.out / f"{case.name}.png", ratio, out, slopes, heaps)
+    bins = 0.5 * case.bin * np.array([heap[2].mean() for heap in heaps]) / (length - width)
+    return accepted(options.dimension, (ratio, out, bins), chosen, slopes)
 
 
 def draw(path, ratio, run_out, slopes, heaps):
@@ -137,8 +182,8 @@ def draw(path, ratio, run_out, slopes, heaps):
     side, the near ones last."""
     figure, axes = plt.subplot_mosaic("ab;ac", figsize=(11.0, 4.6), layout="constrained")
     axes["a"].loglog(ratio, run_out, "o", color="#08519c")
-    for name, x in (("flat", np.array([0.4, 2.5])), ("tall", np.array([2.5, 12.0]))):
-        power, factor = slopes[name]
+    for name, (power, factor) in slopes.items():
+        x = np.array({"flat": [0.4, 2.5], "tall": [2.5, 12.0]}[name])
         axes["a"].loglog(x, np.exp(factor) * x**power, "--", color="0.4", label=f"{name}: $a^{{{power:.2f}}}$")
     space = heaps[0][1].shape[1] == 3
     axes["a"].set_xlabel("$a$ = height / " + ("radius" if space else "width"))
@@ -162,4 +207,4 @@ def draw(path, ratio, run_out, slopes, heaps):
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -3,6 +3,7 @@
 many grains.
 
     ./gravier study convergence                 all: minutes on two cores
+    ./gravier study convergence --quick         momentum, heights and newton, with smaller scenes
     ./gravier study convergence --parts LIST    some of momentum,heights,subdomains,methods,warm,newton,large
 
 Packings of disks and spheres settle in a box. One step of each is solved from zero impulses by sweeps without a layered start, looked
@@ -12,14 +13,18 @@ the run goes. The estimate is that of doc/theory.md, section 24, over the veloci
 the solution of the same step. The solves of warm starts, of Newton's method and of 16 000 grains end by their
 own criterion each. `large` takes an hour and is made only where --parts names it.
 
-leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them."""
+leaves in out/convergence or the directory of --out a table a part, convergence_PART.csv, and prints them. The closing table has
+each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import csv
 import re
+import sys
 from pathlib import Path
 
+from bounds_of_convergence import BOUNDS
+from oracle_table import Bounds
 from study_error import measure
-from study_support import SOURCE, gravier, read_history, run, write_measured
+from study_support import SOURCE, gravier, read_history, run, sized, write_measured
 
 PARTS = ("momentum", "heights", "subdomains", "methods", "warm", "newton")
 LONG_PARTS = ("large",)
@@ -28,11 +33,17 @@ ERRORS = (0.1, 0.03)
 #: name: dimension, grains along each axis of the lattice that falls, steps of settling
 PACKINGS = {"1000 disks": (2, [32, 31], 700), "1000 spheres": (3, [10, 10, 10], 650), "10^4 spheres": (3, [21, 21, 23], 700)}
 HEIGHTS = (10, 20, 40, 80)
+#: lattice cells across the packings of several heights
+ACROSS = 10
 #: grains along each axis of packings that have fallen for 350 steps at friction 0.3, and frictions of the step that is solved
 TIGHT_PACKINGS = {"343 spheres": ([7, 7, 7], (0.3, 0.5, 0.8))}
 TIGHT_GOALS = [{"accuracy": accuracy} for accuracy in (0.1, 0.03, 0.01, 0.001)]
 #: grains along each axis of the lattice of data/large/settle.nml, made narrower
 LARGE = [14, 14, 80]
+#: parts of the quick form, and its scenes in the place of those above
+QUICK_PARTS = ("momentum", "heights", "newton")
+QUICK = {"PACKINGS": {"1000 disks": PACKINGS["1000 disks"]}, "HEIGHTS": (10, 20, 40), "ACROSS": 5,
+         "TIGHT_PACKINGS": {"343 spheres": ([7, 7, 7], (0.3, 0.5))}, "TIGHT_GOALS": TIGHT_GOALS[:2]}
 #: iterations with momentum, of plain ones three times as many; residual at which a run ends before
 MOST, TIGHT = 1500, 1e-6
 
@@ -125,10 +136,10 @@ def study_momentum(out):
 
 
 def study_heights(out):
-    """Spheres in boxes of ten lattice cells across, whose walls have no friction."""
+    """Spheres in boxes of some lattice cells across, whose walls have no friction."""
     rows = []
     for high in HEIGHTS:
-        bodies = settle(out, 3, [10, 10, high], 600 + 5 * high, wall_friction=0.0)
+        bodies = settle(out, 3, [ACROSS, ACROSS, high], 600 + 5 * high, wall_friction=0.0)
         groups = on_file(3, bodies, wall_friction=0.0)
         rows += [{"high": high, **row} for row in both(out, f"high {high}", groups)]
         rows[-1].update(by_true_error(out / "runs" / f"high_{high}" / "true", groups))
@@ -295,9 +306,13 @@ def show(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/convergence"))
-    parser.add_argument("--parts", metavar="LIST", default=",".join(PARTS), help=f"some of {','.join(PARTS + LONG_PARTS)}")
+    parser.add_argument("--quick", action="store_true", help="smaller scenes")
+    parser.add_argument("--parts", metavar="LIST", help=f"some of {','.join(PARTS + LONG_PARTS)}")
     parser.add_argument("--bodies", metavar="FILE", type=Path, help="the packing of large, made before")
-    options = parser.parse_args()
+    options = sized(parser.parse_args(), {"parts": ",".join(PARTS)}, {"parts": ",".join(QUICK_PARTS)})
+    if options.quick:
+        globals().update(QUICK)
+    table = Bounds()
     out = options.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     for part in options.parts.split(","):
@@ -307,7 +322,9 @@ def main():
         rows = globals()[f"study_{part}"](out, **more)
         names = list(dict.fromkeys(key for row in rows for key in row))
         write_measured(out / f"convergence_{part}.csv", {key: [row.get(key, "") for row in rows] for key in names})
+        BOUNDS[part](table, rows)
+    return table.close()
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -2,14 +2,17 @@
 """Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
 tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius, disks under a piston.
 
-    python3 drivers/studies/study_drift.py [--out DIR] [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
+    ./gravier study drift [--out DIR] [--quick] [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
 
-leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png."""
+leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png. --quick makes a tenth of the
+steps. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
-from study_support import BINARIES, lattice, plt, read_bodies, read_history, run, states, write_csv, write_hdf5
+from oracle_table import Bounds
+from study_support import BINARIES, lattice, plt, read_bodies, read_history, run, sized, states, write_csv, write_hdf5
 from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.008, 0.012  # m
@@ -22,6 +25,10 @@ DRUM, RATE = 0.34, 0.3  # m, rad/s
 LOOSE = (1.0e-2, 1.0e-3, 1.0e-4)
 PRESSURE, LID_MASS = 2.0e4, 20.0  # N/m, kg
 GROWN = 1.1  # grains that touch overlap by a fifth of their radius once they are larger by a tenth
+FULL, QUICK = {"steps": 20000}, {"steps": 2000}
+#: largest overlap over that allowed by the page, with what a fall of one step adds to it, and how much overlaps grow while they are
+#: removed
+EXCESS, GROWTH = 1.3 + 9.81 * STEP**2 / ALLOWED, 4.0 / 3.0
 
 
 def box(size):
@@ -92,12 +99,47 @@ def figures(folder, name, tolerance, projection, seconds, first, width):
         "sweeps": history["sweeps"].mean(), "seconds": seconds}, history
 
 
+def accepted(rows, curves):
+    """The closing table."""
+    page = "doc/theory.md, Overlaps in long runs"
+    table = Bounds()
+    for row in rows:
+        name, tolerance = row["run"], row["tolerance"]
+        what, history = f"{name}, tolerance {tolerance:.0e}", curves[name, tolerance, bool(row["projection"])]
+        if not row["projection"]:
+            table.near(f"{what}, without the projection: work that no load does, over m g R of a grain", row["projection_work"],
+                       0.0, 1e-9,
+                       "balance of energy, to rounding")
+            continue
+        table.add(f"{what}: largest overlap over that allowed, second half", row["largest_overlap"] * RADIUS / ALLOWED, None,
+                  EXCESS,
+                  f"{page}: about 1.3; g h^2 more, for one step without a sweep")
+        if name in ("disks", "spheres"):
+            table.add(f"{what}: kinetic energy of a grain over m g R", row["kinetic_energy"], None, 9.81 * STEP**2 / (2.0 * RADIUS),
+                      "rest: velocities below g h")
+        if name == "grown":
+            table.add(f"{what}: largest overlap over the first one", history["max_overlap"].max() / history["max_overlap"][0], None,
+                      GROWTH,
+                      f"{page}: a third at most while they are removed")
+        other = next(r for r in rows if (r["run"], r["tolerance"], r["projection"]) == (name, tolerance, 0))
+        if history["max_overlap"].max() <= ALLOWED:
+            table.near(f"{what}: last overlap less that without the projection, over R",
+                       row["last_overlap"] - other["last_overlap"], 0.0, 0.0,
+                       f"{page}: such a run is not changed at all")
+        if name == "piston" and tolerance == max(LOOSE):
+            table.add(f"{what}: largest overlap without the projection, over that allowed",
+                      other["largest_overlap"] * RADIUS / ALLOWED, EXCESS,
+                      None, f"{page}: 39; a scene without drift would show nothing")
+    return table.close()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/drift"), help="default: out/drift")
     parser.add_argument("--gravier", metavar="PROGRAM", type=Path, default=BINARIES / "gravier")
-    parser.add_argument("--steps", type=int, default=20000)
-    options = parser.parse_args()
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK['steps']} steps")
+    parser.add_argument("--steps", type=int, help=f"of the longest runs ({FULL['steps']}, quick {QUICK['steps']})")
+    options = sized(parser.parse_args(), FULL, QUICK)
     rng = np.random.default_rng(19)
     cell = 2.05 * LARGEST
     flat, cube, mouth = [20.1 * cell, 20.1 * cell], [7.1 * cell, 7.1 * cell, 8.1 * cell], [DRUM, DRUM]
@@ -113,7 +155,7 @@ def main():
     runs = [("disks", 2, disks, t, options.steps, box(flat)) for t in LOOSE]
     runs += [("spheres", 3, spheres, t, options.steps // 2, box(cube)) for t in LOOSE[:2]]
     runs += [("drum", 2, drummed, t, options.steps // 2, turning) for t in LOOSE[:2]]
-    runs += [("grown", 2, options.out / "grown.h5", 1.0e-3, options.steps // 10, box(flat))]
+    runs += [("grown", 2, options.out / "grown.h5", 1.0e-3, max(options.steps // 10, 1000), box(flat))]
     runs += [("piston", 2, disks, t, options.steps // 2, pressed) for t in LOOSE[:2]]
     rows, curves = [], {}
     for name, dimension, bodies, tolerance, steps, boundaries in runs:
@@ -129,6 +171,7 @@ def main():
             write_csv(options.out / "drift.csv", {key: [row[key] for row in rows] for key in rows[0]})
     write_curves(options.out / "drift_curves.csv", curves)
     draw(options.out / "drift.png", curves)
+    return accepted(rows, curves)
 
 
 def envelope(history, parts=200):
@@ -173,4 +216,4 @@ def draw(path, curves):
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -2,21 +2,28 @@
 """Discharge through openings of many widths D in a flat floor: Beverloo's law, Q ~ (D - k d)^(3/2) for disks through a slot and
 (D - k d)^(5/2) for spheres through a square.
 
-    ./gravier study hopper [--out DIR]                     about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    ./gravier study hopper [--out DIR] --dimension 3       about 5 minutes
+    ./gravier study hopper [--out DIR] [--quick]              about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study hopper [--out DIR] [--quick] --dimension 3    about 5 minutes
 
-leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, or the same with _3d."""
+leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, or the same with _3d. --quick takes fewer openings
+and a shorter time. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is
+missed."""
 import argparse
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-from study_support import draw_disks, lattice, plt, read_history, run, states, write_csv, write_hdf5
+from oracle_table import Bounds
+from study_support import draw_disks, lattice, plt, read_bodies, read_history, run, states, write_csv, write_hdf5
 from whole_file import save_figure
 
 STEP = 5.0e-4  # s
 DENSITY = 2500.0  # kg/m^3, kg/m^2 in 2D
 BEVERLOO_K = 1.4
+#: Beverloo's C of circles by experiments, and what makes it that of a slot and of a square of the same width: area times the root
+#: of the hydraulic diameter, over D^(5/2)
+CONSTANT, SHAPE = (0.55, 0.65), {2: 4.0 / np.pi * np.sqrt(2.0), 3: 4.0 / np.pi}
 # radii [m], openings [mean diameters], half of the width [m], height of the loose fill [m], steps of the filling and of a
 # discharge, share of the grains that leaves while the rate is measured, exponent of the law
 PLANE = SimpleNamespace(smallest=0.004, largest=0.006, openings=(7.0, 9.5, 12.0, 15.0, 18.0), half=0.25, height=0.65, filling=800,
@@ -25,6 +32,9 @@ PLANE = SimpleNamespace(smallest=0.004, largest=0.006, openings=(7.0, 9.5, 12.0,
 SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, openings=(4.5, 5.5, 7.0, 8.5), half=0.08713, height=0.215, filling=800,
                         discharge=2000, share=0.35, exponent=2.5, name="study_hopper_3d",
                         solver={"tolerance": 2.0e-3, "max_iterations": 500, "acceleration": "momentum"})
+#: of the quick form
+QUICK = {2: {"openings": (8.0, 12.0, 18.0), "discharge": 1000},
+         3: {"openings": (5.0, 8.5), "filling": 500, "discharge": 800, "height": 0.15}}
 
 
 def sides(case, d):
@@ -53,14 +63,53 @@ def groups(case, d, path, steps, every, final):
             "output": {"directory": ".", "every": every, "contacts": False, "final_bodies": final}}
 
 
+def rate_of(history, number, share):
+    """Grains a second that leave while the flow is steady, and how that changes from the first half of this time to the second,
+    over it."""
+    gone = number - history["grains"]
+    # once the flow is steady, and while most of the fill is left
+    steady = (history["time"] > 0.2) & (gone < share * number)
+    time, gone = history["time"][steady], gone[steady]
+    whole, *halves = (np.polyfit(time[part], gone[part], 1)[0]
+                      for part in (slice(None), slice(len(time) // 2), slice(len(time) // 2, None)))
+    # of a count of independent grains in each half
+    spread = 2.0 / np.sqrt(max(gone[-1] - gone[0], 1))
+    return whole, (halves[1] - halves[0]) / whole, spread
+
+
+def accepted(d, case, exponent, k, constant, changes):
+    """The closing table."""
+    law, page = "Beverloo et al., Chem. Eng. Sci. 15 (1961) 260", "doc/validation.md"
+    table = Bounds()
+    table.near(f"exponent of the rate against D - {BEVERLOO_K:g} d", exponent, case.exponent, 0.1, f"{law}; {page}: +- 0.1")
+    table.add(f"k with the exponent {2.0 * case.exponent:g}/2", k, 1.0, 3.0, f"{law}: 1.4; {page}: 1 to 3")
+    table.add(f"C with this exponent and k = {BEVERLOO_K:g}", constant, 0.9 * SHAPE[d] * CONSTANT[0], 1.1 * SHAPE[d] * CONSTANT[1],
+              f"{CONSTANT[0]:g} to {CONSTANT[1]:g} of circles (Nedderman 1992), by the hydraulic diameter; "
+              "a tenth, for a k off by 0.2")
+    table.add("change of the rate over the time of a discharge, mean of all openings", np.mean([change for change, _ in changes]),
+              *(sign * (0.1 + 2.0 * np.sqrt(np.sum([spread**2 for _, spread in changes])) / len(changes)) for sign in (-1.0, 1.0)),
+              f"{law}: none by the height of the fill; a tenth, and two standard deviations of a count")
+    return table.close()
+
+
+def bulk_density(path, case, d):
+    """Mass of the settled fill over the space that it takes, which is twice as high as its centre [kg/m^d]."""
+    centres, radii, _ = read_bodies(path)
+    volume = {2: np.pi, 3: 4.0 / 3.0 * np.pi}[d] * radii**d
+    return DENSITY * volume.sum()**2 / ((2.0 * case.half)**(d - 1) * 2.0 * (volume @ centres[:, -1]))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/hopper"), help="default: out/hopper")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
+    parser.add_argument("--quick", action="store_true", help="fewer openings, a shorter time")
     parser.add_argument("--height", type=float, help="of the loose fill [m]")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
     d, case = options.dimension, {2: PLANE, 3: SPACE}[options.dimension]
+    if options.quick:
+        case = SimpleNamespace(**{**vars(case), **QUICK[d]})
     diameter = case.smallest + case.largest
     rng = np.random.default_rng(1961)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -72,7 +121,7 @@ def main():
         run(options.out / "fill", groups(case, d, "../loose.h5", case.filling, 0, True),
             [*sides(case, d), {"name": "floor", "shape": "plane", "normal": up}])
     mean_mass = DENSITY * {2: np.pi, 3: 4.0 / 3.0 * np.pi}[d] * (radii**d).mean()
-    rates, histories = [], []
+    rates, histories, changes = [], [], []
     for opening in case.openings:
         folder = options.out / f"opening{opening:g}"
         if not options.measure:
@@ -80,21 +129,30 @@ def main():
                 *sides(case, d), *floor(case, d, 0.5 * opening * diameter),
                 {"name": "out", "shape": "outlet", "point": -0.03 * up, "normal": up}])
         history = read_history(folder)
-        gone = len(radii) - history["grains"]
-        # once the flow is steady, and while most of the fill is left
-        steady = (history["time"] > 0.2) & (gone < case.share * len(radii))
-        rates.append(mean_mass * np.polyfit(history["time"][steady], gone[steady], 1)[0])
-        histories.append((history["time"], gone))
+        rate, *change = rate_of(history, len(radii), case.share)
+        rates.append(mean_mass * rate)
+        changes.append(change)
+        histories.append((history["time"], len(radii) - history["grains"]))
     rates, width = np.array(rates), np.array(case.openings) * diameter
     # the exponent with Beverloo's k, and k with the exponent of the law
     exponent = np.polyfit(np.log(width - BEVERLOO_K * diameter), np.log(rates), 1)[0]
     slope, shift = np.polyfit(width, rates**(1.0 / case.exponent), 1)
     fitted = -shift / slope / diameter
-    constant = slope**case.exponent / ({2: 0.8, 3: 0.56}[d] * DENSITY * np.sqrt(9.81))
+    weight = bulk_density(options.out / "fill/final_bodies.h5", case, d) * np.sqrt(9.81)
+    constant = slope**case.exponent / weight
     write_csv(options.out / f"{case.name}.csv", {"opening_diameters": case.openings, "opening": width, "mass_rate": rates})
     write_csv(options.out / f"{case.name}_summary.csv", {"quantity": ["exponent", "k", "C"],
                                                    "value": [float(exponent), float(fitted), float(constant)]})
-    print(exponent, fitted, constant)
+    print({"exponent": float(exponent), "k": float(fitted), "C": float(constant)})
+    draw(options.out, d, case, (width, rates, exponent), histories)
+    usual = np.exp(np.mean(np.log(rates / (width - BEVERLOO_K * diameter)**case.exponent))) / weight
+    return accepted(d, case, exponent, fitted, usual, changes)
+
+
+def draw(out, d, case, found, histories):
+    """Grains that have left against time, rates against openings, and the grains in the middle of a discharge."""
+    width, rates, exponent = found
+    diameter = case.smallest + case.largest
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13.0, 4.2), layout="constrained")
     for opening, (time, gone) in zip(case.openings, histories):
         left.plot(time, gone, label=f"$D/d$ = {opening:g}")
@@ -109,8 +167,8 @@ def main():
     middle.set_ylabel("mass rate [kg/s]")
     middle.set_title(f"fitted exponent {exponent:.2f}", fontsize=10)
     middle.legend(frameon=False)
-    shown = case.openings[2]
-    for number, time, state in states(options.out / f"opening{shown:g}/results.h5"):
+    shown = case.openings[len(case.openings) // 2]
+    for number, time, state in states(out / f"opening{shown:g}/results.h5"):
         if number == case.discharge // 2:
             place = state["bodies/position"][:]
             # in 3D those behind the middle, the near ones last
@@ -119,8 +177,8 @@ def main():
             disks = draw_disks(right, place[seen][:, [0, -1]], state["bodies/radius"][:][seen], speed, "viridis", (0.0, 0.6))
             figure.colorbar(disks, ax=right, label="speed [m/s]", shrink=0.8)
             right.set_title(f"$D/d$ = {shown:g}, {time:.2g} s", fontsize=10)
-    save_figure(figure, options.out / f"{case.name}.png", dpi=130)
+    save_figure(figure, out / f"{case.name}.png", dpi=130)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

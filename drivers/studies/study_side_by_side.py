@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 """Examples of LMGC90 by LMGC90 itself and by Gravier, side by side: the same DATBOX, step, number of steps and law.
 
-    python3 drivers/studies/study_side_by_side.py EXAMPLE... [--out DIR] --pylmgc90 PATH [--steps N] [--settle M]
+    ./gravier study side_by_side EXAMPLE... [--out DIR] --pylmgc90 PATH [--quick] [--steps N] [--settle M]
 
 EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
-LMGC90 runs the command script of the example as it is, in a copy, for N steps (100). Gravier runs what gravier_import makes of the DATBOX. With --settle
-LMGC90 makes M steps first, and its last state with its forces is the DATBOX of both: what is at rest there has to stay at rest here. Gravier then
-runs once more without these forces. A body counts as moved that is farther than 2 % of its size from its start after 100 steps. Displacements
-are compared body by body in the last step, over the radius of the ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
-those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. Exit status: 0; 2 LMGC90 is not there."""
+LMGC90 runs the command script of the example as it is, in a copy, for N steps (100, quick 20). Gravier runs what gravier_import
+makes of the DATBOX. With --settle LMGC90 makes M steps first, and its last state with its forces is the DATBOX of both: what is at
+rest there has to stay at rest here. Gravier then runs once more without these forces. A body counts as moved that is farther than
+2 % of its size from its start after 100 steps. Displacements are compared body by body in the last step, over the radius of the
+ball that holds the body; kinetic energies are those of translation, in the last step; forces are means over the steps; seconds are
+those of the processor, without the start. Leaves DIR/study_side_by_side.csv and .md and DIR/side_by_side.png. The closing table has
+what both agree in beside what is accepted. Exit status: 0 all are held; 1 one is missed; 2 LMGC90 is not there."""
 import os
 import re
 import resource
@@ -21,7 +23,8 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from study_support import BINARIES, ENVIRONMENT, plt, read_history, states, write_csv
+from oracle_table import Bounds
+from study_support import BINARIES, ENVIRONMENT, plt, read_history, sized, states, write_csv
 
 import gravier
 from one_line import OneLineParser
@@ -30,6 +33,7 @@ from study_lmgc90 import convert
 
 #: a body has moved that is farther from its start than this part of its size, after so many steps
 MOVED, AFTER = 0.02, 100
+FULL, QUICK = {"steps": 100}, {"steps": 20}
 
 
 class Enough(Exception):
@@ -235,6 +239,34 @@ def draw(rows, kept, path):
     figure.savefig(path, dpi=130)
 
 
+def accepted(rows, settled_before):
+    """The closing table."""
+    page = "doc/lmgc90.md, Side by side"
+    table = Bounds()
+    for row in rows:
+        name = row["example"]
+        table.add(f"{name}: mass in LMGC90 over mass here", row["mass_ratio"], 0.99, 1.09,
+                  f"the same densities; {page}: 1.08 of clusters")
+        table.near(f"{name}: mean force on the ground, here over LMGC90",
+                   row["mean_force_on_ground_over_weight_gravier"] / row["mean_force_on_ground_over_weight_lmgc90"], 1.0, 0.05,
+                   f"{page}: 1.00 to 1.03; a twentieth")
+        if np.isfinite(row["forces_found"]):
+            table.add(f"{name}: contacts with forces that the first step finds", row["forces_found"], 0.99, 1.0,
+                      f"{page}: 1108 of 1116, or all")
+        if settled_before:
+            table.add(f"{name}: bodies that move here", row["moved_gravier"], 0, row["moved_lmgc90"],
+                      "what is at rest there is at rest here")
+        elif row["steps"] <= QUICK["steps"]:
+            table.add(f"{name}: largest difference of places over the size", row["largest_difference_over_size"], 0.0, 2e-3,
+                      f"{page}: 1.2e-3 after 20 steps")
+        else:
+            table.add(f"{name}: median difference of places over the size", row["median_difference_over_size"], 0.0, 5e-3,
+                      f"{page}: up to 3e-3 after 200 steps")
+            table.add(f"{name}: kinetic energy, here over LMGC90", row["energy_gravier"] / row["energy_lmgc90"], 0.75, 1.25,
+                      f"{page}: 0.96 to 1.20")
+    return table.close()
+
+
 def main():
     if sys.argv[1:2] == ["--play"]:
         play_lmgc90(int(sys.argv[2]))
@@ -242,9 +274,10 @@ def main():
     parser.add_argument("examples", type=Path, nargs="+", help="directories with a DATBOX and a command script")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/side_by_side"), help="directory of the tables, the picture and the runs; default: out/side_by_side")
     parser.add_argument("--pylmgc90", type=Path, required=True, help="directory that holds the Python package pylmgc90")
-    parser.add_argument("--steps", type=int, default=100, help="steps (100)")
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK['steps']} steps")
+    parser.add_argument("--steps", type=int, help=f"steps ({FULL['steps']}, quick {QUICK['steps']})")
     parser.add_argument("--settle", type=int, default=0, help="steps that LMGC90 makes before (0)")
-    options = parser.parse_args()
+    options = sized(parser.parse_args(), FULL, QUICK)
     options.out = options.out.resolve()
     there = subprocess.run([sys.executable, "-c", "from pylmgc90 import chipy; chipy.Initialize"], capture_output=True, text=True, check=False,
                            env={**os.environ, "PYTHONPATH": str(options.pylmgc90.resolve())})
@@ -261,7 +294,7 @@ def main():
     (options.out / "study_side_by_side.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     print("\n".join(lines))
     draw(rows, kept, options.out / "side_by_side.png")
-    return 0
+    return accepted(rows, options.settle > 0)
 
 
 if __name__ == "__main__":

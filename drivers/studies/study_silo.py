@@ -2,14 +2,17 @@
 """Janssen's law in 2D: the vertical stress in a silo whose floor goes down slowly saturates with the depth,
 sigma = rho g lambda (1 - exp(-z/lambda)), lambda = width / (2 mu K).
 
-    ./gravier study silo [--out DIR]           about 3 minutes on one core; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study silo [--out DIR] [--quick]           about 3 minutes on one core; GRAVIER_BIN_DIR says where gravier is
 
-leaves in DIR study_silo.csv, study_silo_summary.csv and study_silo.png."""
+leaves in DIR study_silo.csv, study_silo_summary.csv and study_silo.png. --quick takes a lower fill and means over a shorter time.
+The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
-from study_support import draw_disks, lattice, plt, run, states, write_csv, write_hdf5
+from oracle_table import Bounds
+from study_support import draw_disks, lattice, plt, run, sized, states, write_csv, write_hdf5
 from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.004, 0.006  # m
@@ -18,39 +21,43 @@ WIDTH = CELLS * 2.05 * LARGEST
 DENSITY = 2500.0  # kg/m^2
 FRICTION = 0.5
 STEP = 1.0e-3  # s
-SETTLING, WARMING, SAMPLING = 700, 500, 1000  # steps
+SETTLING, WARMING = 700, 500  # steps
+#: layers of the loose fill, and steps over which means are taken
+FULL, QUICK = {"layers": 120, "sampling": 1000}, {"layers": 50, "sampling": 500}
+SLICES = 24
+#: sin phi of disks with this friction at constant volume, at most, by which the stresses of a fill are limited
+SINE = 0.30
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/silo"), help="default: out/silo")
-    parser.add_argument("--layers", type=int, default=120)
-    options = parser.parse_args()
-    rng = np.random.default_rng(1895)
-    options.out.mkdir(parents=True, exist_ok=True)
-    centres, radii = lattice([0.0, 0.0], [WIDTH, options.layers * 2.05 * LARGEST], SMALLEST, LARGEST, rng)
+def lower(options, centres, radii):
+    """Run the silo, whose floor goes down once the disks have settled."""
     write_hdf5(options.out / "loose.h5", centres, radii)
     (options.out / "floor.csv").write_text(f"time,vx,vy\n0,0,0\n{SETTLING * STEP},0,0\n{(SETTLING + 100) * STEP},0,-0.02\n")
     run(options.out / "silo", {
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": "../loose.h5", "density": DENSITY, "friction": FRICTION,
                   "alert_distance": 1.5e-3, "skin": 2.5e-3},
-        "time": {"step": STEP, "steps": SETTLING + WARMING + SAMPLING},
+        "time": {"step": STEP, "steps": SETTLING + WARMING + options.sampling},
         "solver": {"acceleration": "none", "tolerance": 1.0e-4, "max_iterations": 1000},
         "output": {"directory": ".", "every": 10}}, [
             {"name": "floor", "shape": "plane", "normal": [0.0, 1.0], "table": "../floor.csv"},
             {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
             {"name": "right", "shape": "plane", "point": [WIDTH, 0.0], "normal": [-1.0, 0.0]}])
+
+
+def profiles(path, radii):
+    """Means over the states while the floor goes down, against depth: vertical stress, lateral stress on the sides, stress of the
+    fill without
+    walls, what the sides hold in each slice, the stress on the floor, and the disks at the end."""
     weight = DENSITY * np.pi * radii**2 * 9.81
-    n, slices = len(radii), 24
-    samples, bottom = [], []
-    for number, _, state in states(options.out / "silo/results.h5"):
+    n, samples, bottom = len(radii), [], []
+    for number, _, state in states(path):
         if number <= SETTLING + WARMING:
             continue
         position = state["bodies/position"][:]
         top = np.quantile(position[:, 1], 0.995)
         floor = state["boundaries/position"][0, 1]
         bottom.append(-state["boundaries/force"][0, 1] / WIDTH)
-        depth = np.linspace(0.0, top - floor, slices + 1)
+        depth = np.linspace(0.0, top - floor, SLICES + 1)
         antagonist = state["contacts/antagonist"][:]
         row = state["contacts/candidate"][:] - 1
         impulse = state["contacts/impulse"][:] / STEP
@@ -64,36 +71,86 @@ def main():
         vertical = np.concatenate([[0.0], np.cumsum(load - held)]) / WIDTH
         samples.append((depth, vertical, np.concatenate([[0.0], pushed]) / (2.0 * np.diff(depth)[0]),
                         np.concatenate([[0.0], np.cumsum(load)]) / WIDTH, np.concatenate([[0.0], held])))
-    depth, vertical, lateral, hydrostatic, held = np.array(samples).mean(axis=0)
+    return (*np.array(samples).mean(axis=0), np.mean(bottom), position)
+
+
+def accepted(summary):
+    """The closing table."""
+    page, law = "doc/validation.md, Silo", "Janssen's law"
+    least, most = (1.0 - SINE) / (1.0 + SINE), (1.0 + SINE) / (1.0 - SINE)
+    table = Bounds()
+    table.add("vertical stress against Janssen's curve, largest difference over the saturated stress",
+              summary["largest_difference"], 0.0, 0.1,
+              f"{law}; a tenth, for one sample")
+    table.near("stress on the floor over that of Janssen's law at its depth", summary["bottom_stress_over_law"], 1.0, 0.1,
+               f"{law}; a tenth, for one sample ({page}: 0.95 of saturation)")
+    table.add("stress on the floor over that of the fill without walls", summary["bottom_stress_over_hydrostatic"], 0.0,
+              summary["saturation_most"], f"{law} with Rankine's least K and half of the friction")
+    table.near("weight that floor and sides bear over the weight of the fill", summary["weight_borne"], 1.0, 0.03,
+               "equilibrium; the floor goes down slowly")
+    table.add("friction mobilised on the sides", summary["friction_mobilised"], 0.0, FRICTION, "Coulomb's law")
+    table.add("lateral over vertical stress", summary["K_measured"], least, most,
+              f"Rankine's active and passive states at sin phi = {SINE:g} (CEGEO benchmark, 2012)")
+    table.near("friction times K of the fit, over mobilised friction times measured ratio of stresses",
+               summary["K_fitted"] * FRICTION / (summary["friction_mobilised"] * summary["K_measured"]), 1.0, 0.1,
+               f"equilibrium of a slice ({page}: 0.265 and 0.267)")
+    return table.close()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/silo"), help="default: out/silo")
+    parser.add_argument("--quick", action="store_true", help="a lower fill, means over a shorter time")
+    parser.add_argument("--layers", type=int, help=f"of the loose fill ({FULL['layers']}, quick {QUICK['layers']})")
+    parser.add_argument("--sampling", type=int,
+                        help=f"steps over which means are taken ({FULL['sampling']}, quick {QUICK['sampling']})")
+    options = sized(parser.parse_args(), FULL, QUICK)
+    options.out.mkdir(parents=True, exist_ok=True)
+    centres, radii = lattice([0.0, 0.0], [WIDTH, options.layers * 2.05 * LARGEST], SMALLEST, LARGEST, np.random.default_rng(1895))
+    lower(options, centres, radii)
+    depth, vertical, lateral, hydrostatic, held, bottom, position = profiles(options.out / "silo/results.h5", radii)
     rho_g = np.polyfit(depth[3:], hydrostatic[3:], 1)[0]
     # least squares over lambda, for the depth that the grains fill
     lengths = np.linspace(0.2, 8.0, 2000) * WIDTH
     error = [((rho_g * x * (1.0 - np.exp(-depth / x)) - vertical)**2).sum() for x in lengths]
     length = lengths[int(np.argmin(error))]
     mobilised = held[3:].sum() / (lateral[3:].sum() * 2.0 * np.diff(depth)[0])
-    middle = slice(slices // 4, slices + 1)
+    middle = slice(SLICES // 4, SLICES + 1)
     ratio = (lateral[middle] / vertical[middle]).mean()
     summary = {"lambda_over_width": length / WIDTH, "K_fitted": WIDTH / (2.0 * FRICTION * length), "K_measured": float(ratio),
-               "friction_mobilised": mobilised, "bottom_stress_over_hydrostatic": float(np.mean(bottom) / hydrostatic[-1]),
-               "bottom_stress_over_saturation": float(np.mean(bottom) / (rho_g * length))}
+               "friction_mobilised": mobilised, "bottom_stress_over_hydrostatic": float(bottom / hydrostatic[-1]),
+               "bottom_stress_over_saturation": float(bottom / (rho_g * length))}
     print(summary)
     write_csv(options.out / "study_silo.csv", {"depth": depth, "vertical_stress": vertical, "lateral_stress": lateral,
                                          "hydrostatic": hydrostatic})
     write_csv(options.out / "study_silo_summary.csv", {"quantity": list(summary),
               "value": [float(value) for value in summary.values()]})
+    curve = rho_g * length * (1.0 - np.exp(-depth / length))
+    draw(options.out / "study_silo.png", depth, (vertical, lateral, hydrostatic, curve), (length, summary["K_fitted"]),
+         (position, radii))
+    weakest = WIDTH / (2.0 * 0.5 * FRICTION * (1.0 - SINE) / (1.0 + SINE))
+    return accepted({**summary, "largest_difference": np.abs(curve - vertical).max() / (rho_g * length),
+                     "bottom_stress_over_law": bottom / curve[-1],
+                     "saturation_most": weakest * (1.0 - np.exp(-depth[-1] / weakest)) / depth[-1],
+                     "weight_borne": (bottom * WIDTH + held.sum()) / (hydrostatic[-1] * WIDTH)})
+
+
+def draw(path, depth, stresses, fit, disks):
+    """Stresses against depth with Janssen's curve, of which `fit` has the length and K, and the disks at the end."""
+    vertical, lateral, hydrostatic, curve = stresses
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.0, 4.8), width_ratios=(3, 1), layout="constrained")
     left.plot(depth / WIDTH, hydrostatic / 1e3, "--", color="0.6", label=r"$\rho g z$")
     left.plot(depth / WIDTH, vertical / 1e3, "o", color="#08519c", label=r"$\sigma_{zz}$")
     left.plot(depth / WIDTH, lateral / 1e3, "s", color="#b2182b", markersize=4, label=r"$\sigma_{xx}$ on the sides")
-    left.plot(depth / WIDTH, rho_g * length * (1.0 - np.exp(-depth / length)) / 1e3, color="0.2",
-              label=rf"Janssen, $\lambda$ = {length / WIDTH:.2f} widths, $K$ = {summary['K_fitted']:.2f}")
+    left.plot(depth / WIDTH, curve / 1e3, color="0.2",
+              label=rf"Janssen, $\lambda$ = {fit[0] / WIDTH:.2f} widths, $K$ = {fit[1]:.2f}")
     left.set_xlabel("depth / width")
     left.set_ylabel("stress [kN/m]")
     left.legend(frameon=False)
-    draw_disks(right, position, radii)
+    draw_disks(right, *disks)
     right.set_xlabel("x [m]")
-    save_figure(figure, options.out / "study_silo.png", dpi=130)
+    save_figure(figure, path, dpi=130)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -119,6 +119,12 @@ def read_history(directory):
     return gravier.read_table(Path(directory) / "history.csv")
 
 
+def error_of(values, parts=8):
+    """Standard error of a mean, by parts of the time."""
+    means = [part.mean() for part in np.array_split(values, parts)]
+    return np.std(means, ddof=1) / np.sqrt(parts)
+
+
 def states(path):
     """Steps of results.h5 in order: (number, time, group of the open file)."""
     with h5py.File(path) as file:
@@ -146,6 +152,16 @@ def write_measured(path, columns):
             machine = next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), machine)
     rows = len(next(iter(columns.values()), ()))
     write_csv(path, {**columns, "machine": [machine] * rows, "version": [" ".join(said.split())] * rows})
+
+
+# ---- options
+
+def sized(options, full, quick):
+    """Options that were not given take their values of the full form, or of the quick one with --quick."""
+    for name, value in (quick if options.quick else full).items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
+    return options
 
 
 # ---- pictures

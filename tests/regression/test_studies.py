@@ -1,32 +1,243 @@
-"""`./gravier study NAME` needs no further words: each study writes in out/NAME, or in the directory of --out."""
+"""`./gravier study NAME` needs no further words: each study writes in out/NAME, or in the directory of --out, has a quick form, and
+ends with the status of its table."""
+import contextlib
+import io
 import os
 import re
+import sys
 import unittest
 from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
+sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
+import bounds_of_convergence  # noqa: E402
+import bounds_of_methods  # noqa: E402
+import study_biaxial  # noqa: E402
+import study_choice  # noqa: E402
+import study_collapse  # noqa: E402
+import study_drift  # noqa: E402
+import study_drum  # noqa: E402
+import study_hard  # noqa: E402
+import study_hopper  # noqa: E402
+import study_lmgc90  # noqa: E402
+import study_side_by_side  # noqa: E402
+import study_silo  # noqa: E402
+from oracle_table import Bounds  # noqa: E402
+
 #: studies that write nothing or, unless asked, only in a directory that goes
 NO_FILES = {"manifolds", "dem", "masonry"}
 #: studies of files that a user has to name
 NAMED = {"lmgc90": "examples", "side_by_side": "examples", "communication": "bodies"}
+#: ends of a main by which the status is that of the rows of a study, or of its closing table
+ENDS = (r"^    (sys\.exit\(|return )(1 if (table\.)?(misses|failures) else 0|int\(missed > 0\)|0 if all\(row\[-1\] == \"yes\")",
+        r"^    return (accepted\(|table\.close\(\))")
+
+
+def names():
+    for path in sorted(Path(SOURCE, "drivers/studies").glob("study_*.py")):
+        name = path.stem.removeprefix("study_")
+        if name != "support":
+            yield name, path.read_text(encoding="utf-8")
+
+
+def judged(function, *given):
+    """Status of a closing table and what is printed."""
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        status = function(*given)
+    return status, said.getvalue()
 
 
 class Studies(unittest.TestCase):
 
     def test_outputs(self):
-        names = set()
-        for path in sorted(Path(SOURCE, "drivers/studies").glob("study_*.py")):
-            name, text = path.stem.removeprefix("study_"), path.read_text(encoding="utf-8")
-            if name == "support":
-                continue
-            names.add(name)
+        found = set()
+        for name, text in names():
+            found.add(name)
             with self.subTest(name):
                 positional = re.findall(r'add_argument\("(\w+)"', text)
                 self.assertEqual(positional, [NAMED[name]] if name in NAMED else [])
                 if name not in NO_FILES:
                     self.assertRegex(text, rf'add_argument\("--out", .*default=(?:Path\()?"out/{name}"')
-        self.assertGreater(len(names), 15)
-        self.assertLessEqual(NO_FILES | set(NAMED), names)
+        self.assertGreater(len(found), 15)
+        self.assertLessEqual(NO_FILES | set(NAMED), found)
+
+    def test_quick_forms_and_statuses(self):
+        """Each study has --quick, says its exit status, and ends with that of a table."""
+        for name, text in names():
+            with self.subTest(name):
+                main = text[text.index("\ndef main("):]
+                self.assertTrue(re.search(r'add_argument\("--quick"', text), "has no --quick")
+                self.assertTrue(re.search(r"(?is)exit\s+status|ends with\s+status|the status\s+is", text),
+                                "does not say its status")
+                self.assertTrue(re.search("|".join(ENDS), main, re.MULTILINE), "does not end with the status of its table")
+                self.assertTrue("sys.exit(" in text, "does not leave its status")
+
+
+class ClosingTable(unittest.TestCase):
+    """The table by which studies end, and those of single studies with values that are held and with one that is not."""
+
+    def close(self, *rows):
+        table = Bounds()
+        for row in rows:
+            table.add(*row)
+        return judged(table.close)
+
+    def test_rows(self):
+        good, low = ("a", 1.0, 0.5, 1.5, "law"), ("b", 0.4, 0.5, 1.5, "law")
+        status, said = self.close(good)
+        self.assertEqual(status, 0)
+        self.assertRegex(said, r"a +\| 1 +\| 0\.5 to 1\.5 +\| law +\| held")
+        self.assertIn("1 of 1 within their bounds", said)
+        status, said = self.close(good, low)
+        self.assertEqual(status, 1)
+        self.assertRegex(said, r"b +\| 0\.4 .*\| missed")
+        for value in (1.6, np.nan, np.inf, -np.inf):
+            self.assertEqual(self.close(("c", value, 0.5, 1.5, "law"))[0], 1, value)
+        self.assertEqual(self.close(("d", 9.0, 0.5, None, "law"))[0], 0)
+        self.assertEqual(self.close(("d", 0.4, 0.5, None, "law"))[0], 1)
+        self.assertEqual(self.close(("e", -9.0, None, 1.5, "law"))[0], 0)
+        self.assertEqual(self.close(("e", 1.6, None, 1.5, "law"))[0], 1)
+        self.assertEqual(self.close(("f", np.nan, None, 1.5, "law"))[0], 1)
+        # nothing compared is nothing shown
+        self.assertEqual(self.close()[0], 1)
+
+    def breaks(self, function, good, changes):
+        """A table of the good values is held; each change of one of them breaks it."""
+        status, said = judged(function, good)
+        self.assertEqual(status, 0, said)
+        for name, value in changes.items():
+            status, said = judged(function, {**good, name: value})
+            self.assertEqual((status, len(re.findall(r"\| missed$", said, re.MULTILINE))), (1, 1), f"{name} {value}\n{said}")
+
+    def test_silo(self):
+        self.breaks(study_silo.accepted, {
+            "largest_difference": 0.05, "bottom_stress_over_law": 0.97, "bottom_stress_over_hydrostatic": 0.3,
+            "saturation_most": 0.46,
+            "weight_borne": 1.0, "friction_mobilised": 0.23, "K_measured": 1.16, "K_fitted": 0.53},
+            {"largest_difference": 0.2, "bottom_stress_over_law": 1.2, "bottom_stress_over_hydrostatic": 0.9, "weight_borne": 0.9,
+             "K_fitted": 0.7})
+
+    def test_hopper(self):
+        def judge(given):
+            return study_hopper.accepted(2, study_hopper.PLANE, given["exponent"], given["k"], given["C"],
+                                         [(given["change"], 0.01)] * 4)
+        self.breaks(judge, {"exponent": 1.52, "k": 1.6, "C": 1.05, "change": 0.02},
+                    {"exponent": 1.7, "k": 0.9, "C": 1.5, "change": -0.3})
+
+    def test_collapse(self):
+        ratio = np.array([0.4, 0.8, 4.0, 8.0])
+        chosen = {"flat": ratio < 2.0, "tall": ratio > 3.0}
+
+        def judge(given):
+            out = np.concatenate([given["flat"] * ratio[:2]**given["by"], given["tall"] * ratio[2:]**given["to"]])
+            slopes = {"flat": (given["by"], 0.0), "tall": (given["to"], 0.0)}
+            return study_collapse.accepted(2, (ratio, out, np.full(4, 1e-3)), chosen, slopes)
+        self.breaks(judge, {"flat": 2.0, "tall": 2.5, "by": 1.0, "to": 0.67}, {"flat": 4.0, "tall": 5.0, "by": 1.2, "to": 0.5})
+
+    def test_drum(self):
+        time = np.linspace(0.0, 14.0, 1401)
+
+        def judge(given):
+            angles = given["angle"] + np.tile([1.0, -1.0], 300) + np.repeat([0.0, given["more"]], 300)
+            return study_drum.accepted({"time": time, "boundary_work": given["power"] * time}, angles, np.full(600, 3.0))
+        self.breaks(judge, {"angle": 25.0, "more": 0.0, "power": 3.0}, {"angle": 35.0, "more": 5.0, "power": 3.5})
+
+    def test_biaxial(self):
+        good = {"solid_fraction_inner": 0.845, "coordination_mu0": 3.97, "pressure_right": 1.0, "pressure_lid": 1.0,
+                "sin_phi": 0.29,
+                "sin_phi_peak": 0.42, "solid_fraction_last": 0.81, "solid_fraction_box": 0.844,
+                "largest_overlap_over_radius": 0.011}
+        self.breaks(lambda given: study_biaxial.accepted(given, 5000), good, {
+            "solid_fraction_inner": 0.8, "coordination_mu0": 4.5, "pressure_right": 1.1, "pressure_lid": 0.9, "sin_phi": 0.32,
+            "sin_phi_peak": 0.2, "solid_fraction_box": 0.8, "largest_overlap_over_radius": 0.02})
+        self.assertEqual(judged(study_biaxial.accepted, {**good, "sin_phi": 0.32}, 600)[0], 0)
+
+    def test_drift(self):
+        def judge(given):
+            rows, curves = [], {}
+            for name in ("disks", "piston"):
+                for projection in (0, 1):
+                    rows.append({"run": name, "tolerance": 1e-2, "projection": projection, "projection_work": given["work"],
+                                 "largest_overlap": given["overlap"] if projection else given["without"],
+                                 "kinetic_energy": given["energy"]})
+                    curves[name, 1e-2, bool(projection)] = {"max_overlap": np.array([2e-4, 1e-4])}
+            return study_drift.accepted(rows, curves)
+        good = {"work": 0.0, "overlap": 0.011, "without": 0.1, "energy": 1e-5}
+        self.breaks(judge, good, {"without": 0.01, "energy": 1e-3})
+        for change in ({"work": 0.1}, {"overlap": 0.02}):
+            self.assertEqual(judged(judge, {**good, **change})[0], 1)
+
+    def test_choice(self):
+        def judge(given):
+            return study_choice.accepted([{"scene": "settling", "step": 1e-3, "accuracy": 0.1, "quantity": "q", "scatter": 0.03,
+                                           **given}])
+        self.breaks(judge, {"deviation": 0.04, "missed": 0.0}, {"deviation": 0.05, "missed": 0.01})
+
+    def test_convergence(self):
+        def of_newton(given):
+            table = Bounds()
+            bounds_of_convergence.of_newton(table, [{"friction": 0.3, "ends by": "error 0.1", "method": method, "converged": 1,
+                                                     "error": given["error"]
+                                                     if method == "nlgs" else 0.09, "iterations": given[method]}
+                                                     for method in ("nlgs", "newton")])
+            return table.close()
+        self.breaks(of_newton, {"error": 0.09, "nlgs": 47, "newton": 47}, {"error": 0.2, "newton": 60})
+
+        def of_heights(given):
+            table = Bounds()
+            bounds_of_convergence.of_heights(table, [{"by": "momentum", "high": high, "momentum: sweeps to true error 0.1": sweeps,
+                                                      "program: sweeps to true error 0.1": "-" if given["lost"] else sweeps,
+                                                      "true error at the end": given["error"] if high == 10 else 0.05}
+                                                     for high, sweeps in ((10, 34), (20, given["sweeps"]))])
+            return table.close()
+        good = {"sweeps": 66, "lost": False, "error": 0.05}
+        self.breaks(of_heights, good, {"error": 0.2})
+        for change in ({"sweeps": 200}, {"lost": True}):
+            self.assertEqual(judged(of_heights, {**good, **change})[0], 1)
+
+    def test_methods(self):
+        def judge(given):
+            same = {"packing": "disks 1e3", "friction": "0.3", "subdomains": "8", "sweeps": "3", "momentum": "True"}
+            rows = [{**same, "method": method, "direction": direction, "to error 0.3": given[method], "to 0.001": ""}
+                    for method, direction in (("nscdd", ""), ("nscdd_ep", "automatic"))]
+            columns = [{"method": "NSCDD-EP, l = 1e4, all", "sweeps": "10", "subdomains": str(n), "iterations": found}
+                       for n, found in ((2, "8"), (16, given["columns"]), (64, "45"))]
+            return bounds_of_methods.accepted(rows, columns, {"disks": {"newton": given["apart"]}})
+        good = {"nscdd": "74", "nscdd_ep": "24", "columns": "10", "apart": 1e-3}
+        self.breaks(judge, good, {"nscdd_ep": "50", "columns": "20", "apart": 1e-2})
+        # where one of both does not get there
+        self.assertEqual(judged(judge, {**good, "nscdd": ""})[0], 0)
+        self.assertEqual(judged(judge, {**good, "nscdd_ep": ""})[0], 1)
+
+    def test_hard(self):
+        def judge(given):
+            known = ("large disk in many subdomains", "nscdd, accelerated", 1)
+            options = SimpleNamespace(broken=[None, known, ("tower, light on heavy", "nlgs", 1) if given["broken"] else None],
+                                      apart=[given["apart"]])
+            return study_hard.accepted(options,
+                                       [{"case": "tower, light on heavy", "method": "nlgs", "ranks": 1, "status": given["status"]}])
+        self.breaks(judge, {"broken": False, "apart": False, "status": "converged"},
+                    {"broken": True, "apart": True, "status": "3 of 10 steps"})
+
+    def test_lmgc90(self):
+        def judge(given):
+            return study_lmgc90.accepted([{"example": "RIGID_3D/Wall_PR", **given}])
+        self.breaks(judge, {"imports": "yes", "steps": 20, "status": "0"}, {"imports": "no", "steps": 0, "status": "4"})
+        self.assertEqual(judged(study_lmgc90.accepted, [])[0], 1)
+
+    def test_side_by_side(self):
+        good = {"example": "wall", "mass_ratio": 1.0, "mean_force_on_ground_over_weight_gravier": 0.98,
+                "mean_force_on_ground_over_weight_lmgc90": 1.0,
+                "forces_found": 1.0, "moved_gravier": 0, "moved_lmgc90": 0, "steps": 20, "largest_difference_over_size": 1e-3,
+                "median_difference_over_size": 1e-3, "energy_gravier": 1.1, "energy_lmgc90": 1.0}
+        bad = {"mass_ratio": 1.2, "mean_force_on_ground_over_weight_gravier": 0.5, "forces_found": 0.5}
+        self.breaks(lambda given: study_side_by_side.accepted([given], False), good, {**bad, "largest_difference_over_size": 0.1})
+        self.breaks(lambda given: study_side_by_side.accepted([given], False), {**good, "steps": 100},
+                    {**bad, "median_difference_over_size": 0.1, "energy_gravier": 2.0})
+        self.breaks(lambda given: study_side_by_side.accepted([given], True), good, {**bad, "moved_gravier": 29})
 
 
 if __name__ == "__main__":
