@@ -255,7 +255,7 @@ contains
     type(shape_work_t) :: work
     type(contact_list_t) :: found
     real(dp) :: place(nd)
-    integer :: k, m
+    integer :: k, m, order(2*room)
 
     place(:) = 0.0_dp
     place(1) = 1.0_dp
@@ -263,6 +263,14 @@ contains
     call make(nd, [1, 1], place, room, view, decomposition, work)
     decomposition%no = merge(1, 4, nd == 2)
     view%bodies%glued(:) = 0
+    ! with keys that tell the points of a pair
+    call view%list%init(.false., 2)
+    call view%list%add(1, 2, merge_shift())
+    call view%list%add(1, -1, merge_shift())
+    do k = 1, 2*room
+      order(k) = 1 + (k - 1)/room
+    end do
+    call view%list%finish(order, pair_memory_t(key_row=1))
     call find_contacts(view, decomposition, physics, found)
     m = 2**(nd - 1)
     call check_equal(found%n, 2*m, "contacts of two pairs of boxes")
