@@ -91,7 +91,7 @@ contains
     integer :: i, n_sends
     logical :: arrived, sent, in_barrier, done
 
-    allocate (messages(8), requests(size(first)))
+    allocate (messages(2), requests(size(first)))
     n_messages = 0
     n_sends = 0
     do i = 1, size(first)

@@ -5,7 +5,8 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, merged, namelist, run_case, gravier, write
+from gravier_runs import differences, merged, namelist, run_case, gravier, write
+from loop_runs import LoopTestCase
 
 RADIUS, COUNT, STEPS = 0.01, (14, 8), 60
 FALL = {
@@ -16,6 +17,25 @@ FALL = {
     "decomposition": {"subdomains": 3},
     "output": {"every": 0, "checkpoint_every": 1000},
 }
+#: each step shears the cell by 0.005. Lists are due where half of the shear since the last ones, times the distance at which two of the
+#: largest disks are listed, is more than the 2 mm that a disk may go: 64.5 mm are so after 13 steps, and 24.5 mm of the small disks
+#: alone after 33
+SHEAR = {
+    "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "gravity": [0.0, 0.0], "friction": 0.3,
+              "period": [0.2, 0.2], "cell_shear_rate": [0.5], "alert_distance": 0.0005, "skin": 0.004, "list_steps": 0},
+    "time": {"step": 0.01, "steps": 60},
+    "solver": {"method": "nscdd"},
+    "decomposition": {"subdomains": 2},
+    "output": {"every": 0, "checkpoint_every": 1000},
+}
+#: the loop that takes the large disk away between two lists
+TAKE = """
+with gravier.Simulation(case, quiet=True) as s:
+    while s.goes_on:
+        if s.made == 15:
+            s.remove([1])
+        s.step()
+"""
 
 
 def grains():
@@ -29,9 +49,9 @@ def grains():
     return "\n".join(rows) + "\n"
 
 
-class Departures(RunTestCase):
+class Departures(LoopTestCase):
 
-    def play(self, title, steps, ranks=1):
+    def fall(self, title, steps, ranks=1):
         directory = self.here(title)
         os.makedirs(directory)
         write(os.path.join(directory, "grains.csv"), grains())
@@ -48,7 +68,7 @@ class Departures(RunTestCase):
 
     def test_lists_last(self):
         """Grains leave in many steps, of which few make lists; each leaves at the end of the step in whose middle it is behind."""
-        table = self.play("straight", STEPS).history()
+        table = self.fall("straight", STEPS).history()
         leaving = table["left"] > 0
         self.assertGreater(leaving.sum(), 15)
         self.assertGreater((leaving & (table["listed"] == 0)).sum(), 10)
@@ -58,18 +78,40 @@ class Departures(RunTestCase):
         self.assertTrue((COUNT[0] * COUNT[1] + 1 - np.cumsum(table["left"]) == table["grains"]).all())
 
     def test_ranks(self):
-        tables = [self.history(self.play(f"on {ranks}", STEPS, ranks)) for ranks in (1, 2)]
+        tables = [self.history(self.fall(f"on {ranks}", STEPS, ranks)) for ranks in (1, 2)]
         self.assertEqual(differences(*tables), [])
 
     def test_restart(self):
         """Just after the fast grain has left, and later, between two lists."""
-        whole = self.history(self.play("whole", STEPS))
+        whole = self.history(self.fall("whole", STEPS))
         for steps in (3, 33, 38):
-            part = self.play(f"part {steps}", steps)
+            part = self.fall(f"part {steps}", steps)
             write(os.path.join(part.directory, "case.nml"), namelist(FALL))
             again = gravier("--restart", "case.nml", ranks=2, directory=part.directory)
             self.assert_status(again, 0)
             self.assertEqual(differences(whole, self.history(again)), [], f"from step {steps} on")
+
+    def test_largest_grain_leaves_a_sheared_cell(self):
+        """How soon lists of a cell that moves are made anew depends on the largest grain that was there when they were made, before
+        and after a restart, and then on the largest of those that stay."""
+        rows = ["id,x,y,radius", "1,0.1,0.1,0.03"]
+        rows += [f"{k + 2},{0.05 * (k % 4) + 0.025},{0.15 * (k // 4) + 0.025},{RADIUS}" for k in range(8)]
+        runs = []
+        for title, steps in (("kept", 60), ("taken", 60), ("taken half", 18)):
+            os.makedirs(self.here(title))
+            write(self.here(title, "grains.csv"), "\n".join(rows) + "\n")
+            groups = merged(SHEAR, {"time": {"steps": steps}})
+            runs.append(self.play(title, groups, TAKE) if "taken" in title else run_case(groups, directory=self.here(title)))
+            self.assert_status(runs[-1], 0)
+        kept, whole, half = runs
+        write(half.path("case.nml"), namelist(SHEAR))
+        again = gravier("--restart", "case.nml", directory=half.directory)
+        self.assert_status(again, 0)
+        self.assertEqual(differences(self.history(whole), self.history(again)), [])
+        listed = [np.flatnonzero(run.history()["listed"]) for run in (kept, whole)]
+        self.assertEqual(list(np.diff(listed[0])), [13] * (len(listed[0]) - 1))
+        self.assertEqual(list(np.diff(listed[1])), [13, 13, 33])
+        self.assertEqual(list(listed[0][:3]), list(listed[1][:3]))
 
 
 if __name__ == "__main__":

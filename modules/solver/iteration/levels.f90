@@ -78,7 +78,8 @@ contains
   end subroutine levels_forget
 
   !> Depth of every body: contacts to the nearest boundary that supports, over contacts that press or are closed; in parts without
-  !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks. Collective.
+  !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks, and is found
+  !> once in a solve. Collective.
   subroutine levels_find_depth(self, problem)
     class(levels_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -107,14 +108,13 @@ contains
     end do
     most = 0.0_dp
     do s = 1, size(ways)
-      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
+      allocate (self%part(s)%depth(problem%sub(s)%n_columns))
       do b = 1, size(ways(s)%length)
         self%part(s)%depth(b) = afloat
         if (.not. ways(s)%length(b) < unreached) cycle
         self%part(s)%depth(b) = nint(ways(s)%length(b))
         most = max(most, ways(s)%length(b))
       end do
-      if (allocated(self%part(s)%contact)) deallocate (self%part(s)%contact, self%part(s)%first)
     end do
     self%most_depth = nint(problem%comm%highest(most))
   end subroutine levels_find_depth
@@ -176,10 +176,10 @@ contains
     self%mean_of_bodies = self%fastest_body
   end subroutine levels_add
 
-  !> The level that a contact between two depths crosses, 0 for none.
+  !> The level that a contact between two depths crosses, 0 for none. Next to what is afloat there is only depth 0, which has none.
   pure integer function level_of(i, j) result(level)
     integer, intent(in) :: i, j
-    level = merge(max(i, j), 0, abs(i - j) == 1 .and. min(i, j) /= afloat)
+    level = merge(max(i, j), 0, abs(i - j) == 1)
   end function level_of
 
   !> How fast each body sinks, one depth after the other, after `add`. Subdomains exchange what they have found of the bodies that

@@ -41,8 +41,6 @@ contains
     end do
     call build_problem(decomposition, halo, solved%kernels, physics, whole, ignored)
     call recall_impulses(halo, whole)
-    whole%load(:) = solved%load
-    whole%error_scale = solved%error_scale
     call whole%evaluate()
     do s = 1, size(halo%view)
       associate (view => halo%view(s))

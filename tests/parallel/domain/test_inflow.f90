@@ -9,7 +9,7 @@ program test_inflow
   use gravier_box_counts, only: choose_boxes
   use gravier_boundary, only: boundary_t
   use gravier_surface_registry, only: make_surface
-  use gravier_insertion, only: insertion_words
+  use gravier_insertion, only: insertion_words, new_grain_t
   use gravier_decomposition, only: decomposition_t
   use gravier_inflow, only: inflow_t, is_clear
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -32,6 +32,7 @@ program test_inflow
     call test_entry(nd, 1, cell, digest)
     call test_entry(nd, 6, cell, digest)
   end do
+  call test_given()
   call test_full()
   call test_state()
   call finish_checks()
@@ -201,6 +202,42 @@ contains
     end do
     call check(gap >= -1.0e-15_dp, "nothing overlaps")
   end subroutine check_apart
+
+  !> Grains of a loop enter in two steps: the first two get the next identifiers, in their order, wherever they lie, and the third
+  !> one the identifier behind these.
+  subroutine test_given()
+    type(decomposition_t) :: decomposition
+    type(inflow_t) :: inflow
+    integer(i8) :: at(4)
+    integer :: step, s, k
+
+    call make(2, 4, none, decomposition)
+    inflow%next_id = 11
+    do step = 1, 2
+      inflow%given%n = 3 - step
+      inflow%given%grain = [new_grain_t(radius=0.01_dp, mass=0.25_dp), new_grain_t(radius=0.02_dp, mass=0.5_dp)]
+      inflow%given%position = reshape([0.1_dp, 0.9_dp, 0.9_dp, 0.1_dp], [2, 2])
+      if (step == 2) inflow%given%position(1, 1) = 0.2_dp
+      inflow%given%material = [1, 1]
+      call inflow%enter(decomposition, 0.0_dp, h)
+    end do
+    at(:) = 0
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          at(4) = at(4) + 1
+          if (norm2(owned%position(:, k) - [0.1_dp, 0.9_dp]) < 0.01_dp) at(1) = owned%id(k)
+          if (norm2(owned%position(:, k) - [0.9_dp, 0.1_dp]) < 0.01_dp) at(2) = owned%id(k)
+          if (norm2(owned%position(:, k) - [0.2_dp, 0.9_dp]) < 0.01_dp) at(3) = owned%id(k)
+        end do
+      end associate
+    end do
+    call comm%sum_counts(at)
+    call check(all(at == [11_i8, 12_i8, 13_i8, 4_i8]), "identifiers of the grains of a loop, one after the other")
+    call check_equal(inflow%next_id, 14_i8, "the next one")
+    call check_equal(inflow%entered(), 3_i8, "grains of a loop that have entered")
+    call check_close(inflow%mass(), 1.0_dp, 0.0_dp, "their mass")
+  end subroutine test_given
 
   !> Where there is no place, grains are put off, and nothing changes but the count of that.
   subroutine test_full()

@@ -37,6 +37,7 @@ contains
     call scatter(n, spacing, base, records)
     call order_rows(comm, 1, records, ordered)
     call check_equal(size(ordered, 1), 3, "words of a record")
+    call check(.not. allocated(records), "records are deallocated")
     first = comm%offset(size(ordered, 2, kind=i8))
     call check_equal(first, int(n, i8)*comm%rank/comm%size, "first row of the rank")
     call check_equal(first + size(ordered, 2), int(n, i8)*(comm%rank + 1)/comm%size, "last row of the rank")

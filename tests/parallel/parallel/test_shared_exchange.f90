@@ -247,7 +247,42 @@ contains
       end do
     end associate
     call check(right, "sums over the copies in subdomain order, bit for bit")
+    call check_fields(shared, p, id, trial)
   end subroutine check_sums
+
+  !> The same of all shared bodies at once, as sums and as means.
+  subroutine check_fields(shared, p, id, trial)
+    type(shared_exchange_t), intent(in) :: shared
+    integer, intent(in) :: p, id(:), trial
+    real(dp) :: sums(shared%width, n_grains), means(shared%width, n_grains), expected
+    integer :: k, j, i
+    logical :: right(2)
+
+    right(:) = .true.
+    associate (part => shared%part(p))
+      sums(:, :) = 0.0_dp
+      do k = 1, part%n_shared
+        do i = 1, shared%width
+          sums(i, part%body(k)) = value_of(part%subdomain, id(part%body(k)), i, trial)
+        end do
+      end do
+      means(:, :) = sums
+      call shared%sum_copies(p, sums, mean=.false.)
+      call shared%sum_copies(p, means, mean=.true.)
+      do k = 1, part%n_shared
+        do i = 1, shared%width
+          expected = 0.0_dp
+          do j = part%first(k), part%first(k + 1) - 1
+            expected = expected + value_of(part%sharer(j), id(part%body(k)), i, trial)
+          end do
+          right(1) = right(1) .and. same_bits(sums(i, part%body(k)), expected)
+          right(2) = right(2) .and. same_bits(means(i, part%body(k)), expected/part%multiplicity(k))
+        end do
+      end do
+    end associate
+    call check(right(1), "sums of all shared bodies")
+    call check(right(2), "means of all shared bodies")
+  end subroutine check_fields
 
   pure logical function same_bits(a, b)
     real(dp), intent(in) :: a, b

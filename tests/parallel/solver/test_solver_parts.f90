@@ -45,6 +45,7 @@ program test_solver_parts
   do k = 1, 3
     call check_ways(k)
     call check_levels(k)
+    call check_depths(k)
   end do
   call check_layers()
   call check_layer_trial()
@@ -203,6 +204,9 @@ contains
     call check_equal(levels%most_depth, n, "depth of the column")
     call check_close(levels%fastest, sinks(n), rounding, "how fast the top sinks")
     call check_close(levels%error, sqrt(sum(sinks**2)/n), rounding, "mean by mass")
+    ! each of the n levels may sink by the largest violation over the mean cosine
+    call check_close(levels%fastest_body, n/0.65_dp, rounding, "bound on how fast a disk sinks")
+    call check_close(levels%mean_of_bodies, n/0.65_dp, rounding, "bound on the mean over disks")
     call levels%follow(sim%problem, 1.0_dp)
     call check_close(levels%fastest_body, sinks(n), rounding, "how fast the top disk sinks")
     call check_close(levels%mean_of_bodies, sqrt(sum(sinks**2)/n), rounding, "mean over disks")
@@ -213,6 +217,29 @@ contains
     call check_close(levels%error + levels%fastest, 0.0_dp, 0.0_dp, "nothing is known any more")
     call sim%free()
   end subroutine check_levels
+
+  !> Without a load nothing supports a column under a lid that forces move: depths are then counted from the floor alone, which moves
+  !> as prescribed, up to the lid.
+  subroutine check_depths(subdomains)
+    integer, intent(in) :: subdomains
+    integer, parameter :: n = 4
+    type(simulation_t) :: sim
+    type(levels_t) :: levels
+    integer :: s, b
+
+    call make_column(n, subdomains, "&boundary shape = 'plane', point = 0, 8, normal = 0, -1, free(2) = .true., mass = 1 /"// &
+      & newline//"&solver method = 'nscdd' /", sim)
+    sim%problem%load(:) = 0.0_dp
+    call levels%start(sim%problem)
+    call levels%find_depth(sim%problem)
+    call check_equal(levels%most_depth, n + 1, "the lid is the deepest")
+    do s = 1, size(sim%problem%sub)
+      do b = 1, sim%problem%sub(s)%n_grains
+        call check_equal(levels%part(s)%depth(b), int(sim%problem%sub(s)%id(b)), "depth of a disk")
+      end do
+    end do
+    call sim%free()
+  end subroutine check_depths
 
   !> A pass over layers brings a cold column near its impulses; it does nothing where the way is too short, and is given up in a
   !> layer that converges slowly.
@@ -230,6 +257,7 @@ contains
     call check(.not. (carried .or. sim%problem%any_impulse()), "leaves impulses as they are")
     call carry_loads(sim%problem, 10.0_dp, work, sweeps, carried)
     call check(sweeps > 0.0_dp .and. carried, "a pass")
+    call check_work(sim%problem, work, sweeps)
     worst = 0.0_dp
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
@@ -254,8 +282,21 @@ contains
     end do
     call carry_loads(sim%problem, 10.0_dp, work, of_one_layer, carried)
     call check(of_one_layer > 0.0_dp .and. of_one_layer < sweeps .and. .not. carried, "a pass that is given up")
+    call check_work(sim%problem, work, sweeps + of_one_layer)
     call sim%free()
   end subroutine check_layers
+
+  !> Relaxations of passes, over all ranks: those of their sweeps over all contacts.
+  subroutine check_work(problem, work, sweeps)
+    type(contact_problem_t), intent(in) :: problem
+    type(work_t), intent(in) :: work
+    real(dp), intent(in) :: sweeps
+    integer(i8) :: relaxations(1)
+
+    relaxations(1) = work%relaxations
+    call comm%sum_counts(relaxations)
+    call check_equal(relaxations(1), nint(sweeps*problem%n_contacts, i8), "relaxations of passes")
+  end subroutine check_work
 
   !> A pass may be tried first where the residual at the start is large and there is a load.
   subroutine check_layer_trial()

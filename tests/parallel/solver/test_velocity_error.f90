@@ -12,10 +12,11 @@ program test_velocity_error
   use gravier_contact_problem, only: contact_problem_t
   use gravier_vain_impulses, only: kept_impulses_t
   use gravier_test_impulses, only: test_impulses_t
-  use gravier_velocity_error, only: velocity_error_t
+  use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   use gravier_layered_start, only: carry_loads
   use gravier_pass_backoff, only: pass_backoff_words
+  use gravier_layer_trial, only: layer_trial_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -42,6 +43,10 @@ program test_velocity_error
   call test_layers(1)
   call test_layers(4)
   call test_pauses()
+  call test_passes_kept(1)
+  call test_passes_kept(4)
+  call test_pass_in_vain()
+  call test_pass_given_up()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -459,5 +464,155 @@ contains
     call check(words(1) == 0 .and. words(2) == 0, "a new scene knows of no passes")
     call sim%free()
   end subroutine test_pauses
+
+  !> Iterations, a check after the last of them, and what a trial of passes over layers makes of it.
+  subroutine go_on(first, last, sim, velocity, trial, anew)
+    integer, intent(in) :: first, last
+    type(simulation_t), intent(inout) :: sim
+    type(velocity_error_t), intent(inout) :: velocity
+    type(layer_trial_t), intent(inout) :: trial
+    logical, intent(out) :: anew
+    type(error_t), allocatable :: error
+    real(dp) :: jump, residual, defect
+    integer :: k
+
+    do k = first, last
+      call check(trial%calls(k) .eqv. k == last, "a trial calls for a check after the last iteration")
+      call sim%method%iterate(sim%problem, k == last, jump, error)
+    end do
+    call sim%problem%evaluate()
+    call velocity%assess(sim%problem, sim%method, last, residual, defect)
+    call trial%advance(sim%problem, sim%method, velocity, last, anew, error)
+    call check(.not. allocated(error), "a trial of a pass")
+  end subroutine go_on
+
+  !> A trial of passes in a cold solve of a column of 100, of which the velocity error may be a millionth of its scale; a heavy disk
+  !> lies on top on request.
+  subroutine begin_trial(n_subdomains, heavy, sim, velocity, trial)
+    integer, intent(in) :: n_subdomains
+    logical, intent(in) :: heavy
+    type(simulation_t), intent(inout) :: sim
+    type(velocity_error_t), intent(inout) :: velocity
+    type(layer_trial_t), intent(inout) :: trial
+    integer, parameter :: count = 100
+    integer :: s, b
+
+    call make(count, n_subdomains, sim)
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do b = 1, sub%n_grains
+          if (heavy .and. place(sim%problem, s, b, count) == count) sub%inverse_mass(:, b) = 1.0e-3_dp*sub%inverse_mass(:, b)
+        end do
+      end associate
+    end do
+    call velocity%start(sim%problem, 1.0e-6_dp*sim%problem%error_scale)
+    call trial%start(sim%problem, 1.0_dp, 1.0e-6_dp)
+  end subroutine begin_trial
+
+  !> Relaxations of a method so far, over all ranks, as sweeps over all contacts.
+  real(dp) function sweeps_of(sim) result(sweeps)
+    type(simulation_t), intent(in) :: sim
+    integer(i8) :: relaxations(1)
+
+    relaxations(1) = sim%method%work%relaxations
+    call comm%sum_counts(relaxations)
+    sweeps = real(relaxations(1), dp)/real(sim%problem%n_contacts, dp)
+  end function sweeps_of
+
+  !> A first pass over a deep column lowers the error and is kept, and a second one then lowers what it has left. Sweeps count those
+  !> of both, and all is one solve.
+  subroutine test_passes_kept(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    type(layer_trial_t) :: trial
+    integer(i8) :: solves
+    real(dp) :: first, before
+    logical :: anew
+
+    call begin_trial(n_subdomains, .false., sim, velocity, trial)
+    solves = sim%method%work%solves
+    call go_on(1, copies_ready, sim, velocity, trial, anew)
+    call check(anew .and. trial%layered .and. trial%sweeps > 0.0_dp, "a pass is tried")
+    first = trial%sweeps
+    ! sweeps of the pass, and those of two iterations
+    call check_close(sweeps_of(sim), first + copies_ready, 1.0e-9_dp*first, "relaxations of one pass")
+    call go_on(copies_ready + 1, copies_ready + 6, sim, velocity, trial, anew)
+    before = sweeps_of(sim)
+    call check(anew .and. trial%layered .and. trial%sweeps > first, "it is kept, and another one is tried")
+    call check_close(before, trial%sweeps + copies_ready + 6, 1.0e-9_dp*before, "relaxations of both passes")
+    call check_equal(sim%method%work%solves, solves, "one solve")
+    call sim%free()
+  end subroutine test_passes_kept
+
+  !> A pass that has brought nothing is undone, and none is tried after it: the impulses are those of a solve of its own that has made
+  !> the iterations before the pass.
+  subroutine test_pass_in_vain()
+    type(simulation_t) :: sim, other
+    type(velocity_error_t) :: velocity, ignored
+    type(layer_trial_t) :: trial, none
+    type(error_t), allocatable :: error
+    real(dp) :: sweeps, jump
+    logical :: anew
+    integer :: s, k
+
+    call begin_trial(4, .false., sim, velocity, trial)
+    call begin_trial(4, .false., other, ignored, none)
+    do k = 1, copies_ready
+      call other%method%iterate(other%problem, k == copies_ready, jump, error)
+    end do
+    call go_on(1, copies_ready, sim, velocity, trial, anew)
+    call check(anew .and. trial%layered, "a pass is tried")
+    sweeps = trial%sweeps
+    ! as if it had left nothing
+    do s = 1, size(sim%problem%sub)
+      sim%problem%sub(s)%impulse(:, :, :) = 0.0_dp
+    end do
+    call sim%method%start(sim%problem, error)
+    call check(.not. allocated(error), "a start from nothing")
+    call go_on(copies_ready + 1, copies_ready + 6, sim, velocity, trial, anew)
+    call check(anew .and. .not. trial%layered, "a pass that has brought nothing is not kept")
+    call check_close(trial%sweeps, sweeps, 0.0_dp, "but its sweeps were made")
+    do s = 1, size(sim%problem%sub)
+      call check(all(abs(sim%problem%sub(s)%impulse - other%problem%sub(s)%impulse) <= 0.0_dp), "impulses before the pass")
+    end do
+    call other%free()
+    call sim%free()
+  end subroutine test_pass_in_vain
+
+  !> Under a heavy disk layers converge slowly: the pass is given up, the solve goes on from the impulses before it, and none is
+  !> tried later on.
+  subroutine test_pass_given_up()
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    type(layer_trial_t) :: trial
+    type(kept_impulses_t), allocatable :: before(:)
+    type(error_t), allocatable :: error
+    real(dp) :: jump, residual, defect, sweeps
+    logical :: anew
+    integer :: s, k
+
+    call begin_trial(4, .true., sim, velocity, trial)
+    allocate (before(size(sim%problem%sub)))
+    do k = 1, 40
+      call sim%method%iterate(sim%problem, .true., jump, error)
+      if (k /= copies_ready .and. k < 40) cycle
+      call sim%problem%evaluate()
+      call velocity%assess(sim%problem, sim%method, k, residual, defect)
+      do s = 1, size(before)
+        before(s)%value = sim%problem%sub(s)%impulse
+      end do
+      call trial%advance(sim%problem, sim%method, velocity, k, anew, error)
+      call check(.not. (allocated(error) .or. trial%layered), "a solve without a pass")
+      do s = 1, size(before)
+        call check(all(abs(sim%problem%sub(s)%impulse - before(s)%value) <= 0.0_dp), "goes on from the impulses before it")
+      end do
+      call check(anew .eqv. k == copies_ready, "a pass is tried once")
+      if (k == copies_ready) sweeps = trial%sweeps
+    end do
+    call check(sweeps > 0.0_dp, "sweeps of a pass that was given up")
+    call check_close(trial%sweeps, sweeps, 0.0_dp, "there are no others")
+    call sim%free()
+  end subroutine test_pass_given_up
 
 end program test_velocity_error

@@ -826,6 +826,7 @@ contains
     call check_equal(whole%n_contacts, 3_i8, "another problem has them")
     do s = 1, size(whole%sub)
       call check(all(whole%sub(s)%boundary > 0), "in which no grain counts as one that cannot move")
+      call check(all(sim%halo%view(s)%bodies%wakes_at > 0.0_dp), "though all of them sleep on")
     end do
     call check_equal(sim%problem%n_contacts, 0_i8, "beside the one that was solved")
     call check_close(sim%boundary_impulses(2, 1), 0.0_dp, 0.0_dp, "the plane feels what is solved alone")

@@ -2,7 +2,7 @@
 !> bits on any number of ranks, and the factor of a velocity under another choice of units.
 program test_velocity_scale
   use mpi_f08, only: MPI_COMM_SELF
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
@@ -40,6 +40,8 @@ program test_velocity_scale
     real(dp) :: adhesion = 0.0_dp, spin = 0.0_dp, given = 0.0_dp
     !> size of the velocities that the grains have, and of one that they have in common [m/s]
     real(dp) :: motion = 0.0_dp, wind = 0.0_dp
+    !> largest component of the forces that a loop applies to grains, another force to each [N]
+    real(dp) :: push = 0.0_dp
     !> the box is taken away
     logical :: open = .false.
     type(units_t) :: units
@@ -56,6 +58,7 @@ program test_velocity_scale
     call test_loads(nd)
     call test_drives(nd)
     call test_own(nd)
+    call test_applied(nd)
     call test_given(nd)
     call test_ranks(nd)
     call test_units(nd)
@@ -88,6 +91,7 @@ contains
       deallocate (sim%decomposition%boundaries)
       allocate (sim%decomposition%boundaries(0))
     end if
+    if (scene%push > 0.0_dp) call sim%take_forces()
     speed = scene%units%length/scene%units%time
     do s = 1, size(sim%decomposition%owned)
       associate (owned => sim%decomposition%owned(s))
@@ -96,6 +100,7 @@ contains
             owned%velocity(d, k) = scene%motion*speed*(2.0_dp*hash_uniform(5, owned%id(k), d) - 1.0_dp)
           end do
           owned%velocity(1, k) = owned%velocity(1, k) + scene%wind*speed
+          if (scene%push > 0.0_dp) owned%force(:, k) = push_on(owned%id(k), scene%nd, scene%push)
         end do
       end associate
     end do
@@ -307,6 +312,40 @@ contains
     own = sqrt(own_square - sum(mean**2))
     call check_close(sim%velocity_scale%own, own, 1.0e-11_dp*own, "a gas that flies")
   end subroutine test_own
+
+  !> The force that a loop applies to grain `k`.
+  pure function push_on(k, nd, most) result(push)
+    integer(i8), intent(in) :: k
+    integer, intent(in) :: nd
+    !> along each axis [N]
+    real(dp), intent(in) :: most
+    real(dp) :: push(nd)
+    integer :: d
+
+    do d = 1, nd
+      push(d) = most*hash_uniform(9, k, d)
+    end do
+  end function push_on
+
+  !> Forces of a loop, other ones for each grain, in one subdomain and in many that share grains: a load of their root mean square,
+  !> since all grains are in contact and have one mass, and at rest under them nothing moves.
+  subroutine test_applied(nd)
+    integer, intent(in) :: nd
+    type(simulation_t) :: sim
+    real(dp) :: square
+    integer :: k, n, subdomains
+
+    n = merge(48, 64, nd == 2)
+    square = 0.0_dp
+    do k = 1, n
+      square = square + sum((step*push_on(int(k, i8), nd, 5.0_dp)/grain_mass(nd, radius, density))**2)/n
+    end do
+    do subdomains = 1, 7, 6
+      call assemble(comm, scene_t(nd=nd, subdomains=subdomains, push=5.0_dp), sim)
+      call check_scale(sim, sqrt(square), "load of a step", "forces of a loop")
+      call check_close(sim%velocity_scale%own, 0.0_dp, rounding*sqrt(square), "at rest under forces of a loop nothing moves")
+    end do
+  end subroutine test_applied
 
   subroutine test_given(nd)
     integer, intent(in) :: nd

@@ -52,6 +52,9 @@ contains
     ! without its second part the entry (1, 3) is too large
     call mirrored(compressed_rows(3, 3, half_row(2:), half_column(2:), half_value(2:)), back, bad_row)
     call check_equal(bad_row, 1, "half of no positive matrix")
+    ! two large entries of one column, each of which may be
+    call mirrored(compressed_rows(3, 3, [1, 2, 3, 1, 2], [1, 2, 3, 3, 3], [1.0_dp, 1.0_dp, 1.0_dp, 0.9_dp, 0.9_dp]), back, bad_row)
+    call check_equal(bad_row, 0, "each entry is compared by itself")
   end subroutine check_halves
 
   !> The full matrix.

@@ -298,6 +298,7 @@ contains
     bodies%inertia(:) = 1.0_dp
     bodies%image(:, :) = 0
     bodies%rest(2) = 7
+    call check(.not. bodies%sleeps(2), "a body that has rested for some steps is awake")
     bodies%wakes_at(2) = 0.25_dp
     allocate (record(bodies%record_words()), renewed(bodies%renewed_words()))
     call bodies%get_record(2, record)

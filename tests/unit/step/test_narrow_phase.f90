@@ -28,6 +28,8 @@ program test_narrow_phase
   call check_restitution()
   call check_materials()
   call check_memory()
+  call check_terms()
+  call check_watched()
   call check_velocities()
   call check_turning_boundary()
   call check_start_velocities()
@@ -249,6 +251,67 @@ contains
     call check_equal(found%n, 0, "a bridge that breaks is no contact any more")
     call check_equal(view%list%state(1, 1), 0, "and is forgotten")
   end subroutine check_memory
+
+  !> Each contact has the terms of its own law, also where a pair between two contacts is none, and the boundary that takes part.
+  subroutine check_terms()
+    type(local_bodies_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(contact_list_t) :: found
+
+    call make(2, reshape([0.0_dp, 0.5_dp, 0.2_dp, 0.5_dp, 0.9_dp, 0.5_dp, 0.0_dp, 0.7_dp], [2, 4]), view, decomposition)
+    view%bodies%material(4) = 2
+    view%bodies%glued(4) = 2
+    decomposition%boundaries(2)%material = 2
+    call list(view, reshape([1, 2, 1, 3, 1, 4], [2, 3]), pair_memory_t(law_row=1))
+    call physics%laws%init(2, 2)
+    call add_law(physics%laws, 1, 1, "capillary", "friction capillarity decay_length debonding_distance", &
+      & [0.3_dp, 50.0_dp, 0.02_dp, 0.05_dp])
+    call add_law(physics%laws, 1, 2, "coulomb", coulomb_keys, [0.4_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp])
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 2, "contacts under two laws")
+    if (found%n /= 2) return
+    call check(all(found%source(1:2) == [1, 3]), "their places in the list")
+    call check(all(found%boundary(1:2) == [0, 2]), "the boundary of a glued grain, and none")
+    call check_close(found%terms(1)%friction, 0.3_dp, 0.0_dp, "friction of the first")
+    call check_close(found%terms(1)%attraction, 50.0_dp*0.1_dp, rounding*5.0_dp, "attraction of the first")
+    call check_close(found%terms(2)%friction, 0.4_dp, 0.0_dp, "friction of the second")
+    call check_close(found%terms(2)%attraction, 0.0_dp, 0.0_dp, "the second attracts nothing")
+  end subroutine check_terms
+
+  !> What is forgotten of the pairs that are looked at alone; where a body has gone, all are looked at, with what they keep.
+  subroutine check_watched()
+    type(local_bodies_t) :: view
+    type(decomposition_t) :: decomposition
+    integer :: p
+
+    call make(2, reshape([0.0_dp, 0.5_dp, 0.2_dp, 0.5_dp, 0.4_dp, 0.5_dp, 0.6_dp, 0.5_dp], [2, 4]), view, decomposition)
+    call list(view, reshape([1, 2, 1, -1, 2, 3, 3, 4], [2, 4]), pair_memory_t(n_impulse=2, n_spring=1))
+    associate (pairs => view%list)
+      do p = 1, 4
+        pairs%impulse(:, p) = real(p, dp)
+        pairs%spring(:, p) = -real(p, dp)
+      end do
+      call check_equal(pairs%n_watched(), 4, "all pairs are looked at")
+      call check_equal(pairs%watched_place(3), 3, "each at its place")
+      pairs%watched = [2, 4]
+      call check_equal(pairs%n_watched(), 2, "pairs that are looked at")
+      call check_equal(pairs%watched_place(2), 4, "place of the last of them")
+      call pairs%forget_impulses()
+      call check(all(nint(pairs%impulse(2, 1:4)) == [1, 0, 3, 0]), "they forget their impulses, the others do not")
+      call check(all(nint(pairs%spring(1, 1:4)) == [-1, -2, -3, -4]), "and no elongation")
+      call pairs%forget_elongations()
+      call check(all(nint(pairs%spring(1, 1:4)) == [-1, 0, -3, 0]), "they forget their elongations, the others do not")
+      call pairs%drop([1, 2, 3, 0])
+      call check_equal(pairs%n, 3, "pairs of bodies that stay")
+      call check_equal(pairs%n_watched(), 3, "all of which are looked at")
+      call check(all(nint(pairs%impulse(1, 1:3)) == [1, 0, 3]), "with what they keep")
+      call pairs%forget_impulses()
+      call pairs%forget_elongations()
+      call check_close(maxval(abs(pairs%impulse(:, 1:3))), 0.0_dp, 0.0_dp, "until all forget their impulses")
+      call check_close(maxval(abs(pairs%spring(:, 1:3))), 0.0_dp, 0.0_dp, "and their elongations")
+    end associate
+  end subroutine check_watched
 
   !> Normal velocity and slip of two grains that move and turn, against velocities of their points of contact.
   subroutine check_velocities()

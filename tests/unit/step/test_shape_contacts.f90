@@ -10,6 +10,8 @@ program test_shape_contacts
   use gravier_halo, only: local_bodies_t
   use gravier_pair_points, only: pair_points_t
   use gravier_shape_contacts, only: shape_work_t, find_points
+  use gravier_physics, only: physics_t
+  use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_test_scenes, only: plane
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -27,6 +29,8 @@ program test_shape_contacts
   call test_plane(2)
   call test_plane(3)
   call test_period()
+  call test_contacts(2)
+  call test_contacts(3)
   call finish_checks()
 
 contains
@@ -240,5 +244,55 @@ contains
       call check_close(points%normal(1, k), -1.0_dp, tight, "across a period: the normal")
     end do
   end subroutine test_period
+
+  !> The contacts of two pairs: each pair stands in the list as often as it may have points, and has contacts in the first of these
+  !> places. A box lies on a plane, and bears another one with a half of its side.
+  subroutine test_contacts(nd)
+    integer, intent(in) :: nd
+    type(local_bodies_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(shape_work_t) :: work
+    type(contact_list_t) :: found
+    real(dp) :: place(nd)
+    integer :: k, m, order(2*room)
+
+    place(:) = 0.0_dp
+    place(1) = 1.0_dp
+    place(nd) = 2.0_dp + gap
+    call make(nd, [1, 1], place, room, view, decomposition, work)
+    decomposition%no = merge(1, 4, nd == 2)
+    view%bodies%glued(:) = 0
+    ! with keys that tell the points of a pair
+    call view%list%init(.false., 2)
+    call view%list%add(1, 2, merge_shift())
+    call view%list%add(1, -1, merge_shift())
+    do k = 1, 2*room
+      order(k) = 1 + (k - 1)/room
+    end do
+    call view%list%finish(order, pair_memory_t(key_row=1))
+    call find_contacts(view, decomposition, physics, found)
+    m = 2**(nd - 1)
+    call check_equal(found%n, 2*m, "contacts of two pairs of boxes")
+    do k = 1, m
+      call check_equal(found%source(k), k, "contacts of a pair: their places in the list")
+      call check_equal(found%source(m + k), room + k, "contacts of the next pair: their places in the list")
+      call check(found%boundary(k) == 0 .and. found%boundary(m + k) == 1, "the boundary of a contact")
+      call check_close(found%normal(nd, m + k) - found%normal(nd, k), 2.0_dp, tight, "normals down to the first, up from the plane")
+      call check_close(found%place(k)%arm_i(nd), 1.0_dp + 0.5_dp*gap, tight, "the arm of the first box")
+      call check_close(found%place(k)%arm_j(nd), -1.0_dp - 0.5_dp*gap, tight, "the arm of the second box")
+      call check_close(found%place(k)%arm_i(1) - found%place(k)%arm_j(1), 1.0_dp, tight, "arms to one place")
+      call check_close(found%place(m + k)%arm_i(nd), -1.0_dp - 0.5_dp*gap, tight, "the arm to the plane")
+      call check_close(found%place(m + k)%on_wall(nd), -1.0_dp - gap, tight, "the place on the plane")
+    end do
+    ! the places of the second pair alone
+    allocate (view%list%watched(room))
+    do k = 1, room
+      view%list%watched(k) = room + k
+    end do
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, m, "contacts of the pair that is looked at")
+    call check(all(found%source(1:m) > room), "which is the second one")
+  end subroutine test_contacts
 
 end program test_shape_contacts
