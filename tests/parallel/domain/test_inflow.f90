@@ -215,7 +215,9 @@ contains
     inflow%next_id = 11
     do step = 1, 2
       inflow%given%n = 3 - step
-      inflow%given%grain = [new_grain_t(radius=0.01_dp, mass=0.25_dp), new_grain_t(radius=0.02_dp, mass=0.5_dp)]
+      if (.not. allocated(inflow%given%grain)) allocate (inflow%given%grain(2))
+      inflow%given%grain(1) = new_grain_t(radius=0.01_dp, mass=0.25_dp)
+      inflow%given%grain(2) = new_grain_t(radius=0.02_dp, mass=0.5_dp)
       inflow%given%position = reshape([0.1_dp, 0.9_dp, 0.9_dp, 0.1_dp], [2, 2])
       if (step == 2) inflow%given%position(1, 1) = 0.2_dp
       inflow%given%material = [1, 1]
