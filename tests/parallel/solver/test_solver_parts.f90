@@ -218,8 +218,8 @@ contains
     call sim%free()
   end subroutine check_levels
 
-  !> Without a load nothing supports a column under a lid that forces move: depths are then counted from the floor alone, which moves
-  !> as prescribed, up to the lid.
+  !> Without a load nothing supports a column under a lid that forces move: depths are then counted from the floor alone, which
+  !> moves as prescribed, up to the lid.
   subroutine check_depths(subdomains)
     integer, intent(in) :: subdomains
     integer, parameter :: n = 4

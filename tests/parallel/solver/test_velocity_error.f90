@@ -545,7 +545,7 @@ contains
     call sim%free()
   end subroutine test_passes_kept
 
-  !> A pass that has brought nothing is undone, and none is tried after it: the impulses are those of a solve of its own that has made
+  !> A pass that has brought nothing is undone, and none is tried after it: the impulses are those of another solve that has made
   !> the iterations before the pass.
   subroutine test_pass_in_vain()
     type(simulation_t) :: sim, other

@@ -15,6 +15,7 @@ program test_step_parts
   use gravier_sleeping, only: count_rest
   use gravier_waking, only: resting_t, watch_awake, wake_all
   use gravier_whole_problem, only: build_whole
+  use gravier_supports, only: supports_t, find_supports
   use gravier_contact_problem, only: contact_problem_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -790,13 +791,16 @@ contains
     call sim%free()
   end subroutine check_moving_plane
 
-  !> Three disks of 1 kg, one upon the other on a plane, that sleep.
-  subroutine make_chain(sim)
+  !> Disks of 1 kg, one upon the other on a plane, that sleep: three, or as many as are given.
+  subroutine make_chain(sim, count)
     type(simulation_t), intent(inout) :: sim
+    integer, intent(in), optional :: count
     type(step_figures_t) :: figures
-    integer :: k
+    integer :: k, n
 
-    do k = 1, 3
+    n = 3
+    if (present(count)) n = count
+    do k = 1, n
       call add_grain(k, 1.0_dp, 0, 0.0_dp, 0.2_dp*k - 0.1_dp, 0.0_dp, 0.0_dp, 0.0_dp)
     end do
     call make(sim, "gravity = 0, -9.81, friction = 0.5, overlap_projection = F /"//newline// &
@@ -806,7 +810,7 @@ contains
     do k = 1, 7
       call advance(sim, figures)
     end do
-    call check_equal(figures%asleep, 3_i8, "a chain sleeps")
+    call check_equal(figures%asleep, int(n, i8), "a chain sleeps")
     call check_equal(sim%problem%n_contacts, 0_i8, "and leaves an empty problem")
   end subroutine make_chain
 
@@ -816,6 +820,7 @@ contains
     type(step_figures_t) :: figures
     type(resting_t) :: resting
     type(contact_problem_t) :: whole
+    type(supports_t), allocatable :: supports(:)
     integer :: s
 
     call make_chain(sim)
@@ -840,6 +845,10 @@ contains
     call check_equal(figures%asleep, 2_i8, "the two others sleep on")
     call check_equal(sim%problem%n_contacts, 1_i8, "the problem is that of the upper contact")
     call check_close(grain(sim, 3, 2), 0.0_dp, solved, "beside a sleeper that cannot move")
+    call find_supports(sim%problem, supports)
+    do s = 1, size(supports)
+      call check(all(supports(s)%column(sim%problem%sub(s)%n_bodies + 1:)), "but bears what lies on it")
+    end do
     call wake_all(sim%decomposition)
     call check_equal(counted(sim, 1), 0, "all are woken")
     call sim%halo%refresh(sim%decomposition)
@@ -867,6 +876,22 @@ contains
     call advance(sim, figures)
     call check_equal(figures%tries, 2, "a load that goes away is noticed")
     call check_close(sim%boundary_impulses(2, 1), -2*g*h, solved, "and the plane bears the two that stay")
+    call sim%free()
+    ! each solve wakes the next disk, with one below it, then two, then as many as are left
+    call make_chain(sim, 8)
+    call push(sim, 8, -1.0_dp)
+    call advance(sim, figures)
+    call check_equal(figures%tries, 4, "a blow goes down a chain of eight in three tries")
+    call check_close(sim%boundary_impulses(2, 1), -8*g*h - 1.0_dp, 10*solved, "down to the plane")
+    call sim%free()
+    ! beside bodies that sleep a solve that does not reach its tolerance is made anew with all awake
+    call make_chain(sim)
+    call push(sim, 3, -0.014_dp)
+    sim%control%tolerance = -1.0_dp
+    sim%control%max_iterations = 3
+    call advance(sim, figures)
+    call check_equal(figures%asleep, 0_i8, "none sleeps where no solution is found")
+    call check_equal(sim%problem%n_contacts, 3_i8, "all contacts are solved")
     call sim%free()
   end subroutine check_chain_disturbed
 
