@@ -100,7 +100,10 @@ contains
             owned%velocity(d, k) = scene%motion*speed*(2.0_dp*hash_uniform(5, owned%id(k), d) - 1.0_dp)
           end do
           owned%velocity(1, k) = owned%velocity(1, k) + scene%wind*speed
-          if (scene%push > 0.0_dp) owned%force(:, k) = push_on(owned%id(k), scene%nd, scene%push)
+          if (.not. scene%push > 0.0_dp) cycle
+          do d = 1, scene%nd
+            owned%force(d, k) = push_on(owned%id(k), d, scene%push)
+          end do
         end do
       end associate
     end do
@@ -314,17 +317,14 @@ contains
   end subroutine test_own
 
   !> The force that a loop applies to grain `k`.
-  pure function push_on(k, nd, most) result(push)
+  pure real(dp) function push_on(k, d, most) result(push)
     integer(i8), intent(in) :: k
-    integer, intent(in) :: nd
+    !> axis
+    integer, intent(in) :: d
     !> along each axis [N]
     real(dp), intent(in) :: most
-    real(dp) :: push(nd)
-    integer :: d
 
-    do d = 1, nd
-      push(d) = most*hash_uniform(9, k, d)
-    end do
+    push = most*hash_uniform(9, k, d)
   end function push_on
 
   !> Forces of a loop, other ones for each grain, in one subdomain and in many that share grains: a load of their root mean square,
@@ -333,12 +333,14 @@ contains
     integer, intent(in) :: nd
     type(simulation_t) :: sim
     real(dp) :: square
-    integer :: k, n, subdomains
+    integer :: k, d, n, subdomains
 
     n = merge(48, 64, nd == 2)
     square = 0.0_dp
     do k = 1, n
-      square = square + sum((step*push_on(int(k, i8), nd, 5.0_dp)/grain_mass(nd, radius, density))**2)/n
+      do d = 1, nd
+        square = square + (step*push_on(int(k, i8), d, 5.0_dp)/grain_mass(nd, radius, density))**2/n
+      end do
     end do
     do subdomains = 1, 7, 6
       call assemble(comm, scene_t(nd=nd, subdomains=subdomains, push=5.0_dp), sim)
