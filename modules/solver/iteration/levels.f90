@@ -78,8 +78,8 @@ contains
   end subroutine levels_forget
 
   !> Depth of every body: contacts to the nearest boundary that supports, over contacts that press or are closed; in parts without
-  !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks, and is found
-  !> once in a solve. Collective.
+  !> one, to the nearest that moves as prescribed, or else that forces move. It does not depend on subdomains or ranks. It is
+  !> found once in a solve, and anew for each state that gravier_error looks at. Collective.
   subroutine levels_find_depth(self, problem)
     class(levels_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -108,13 +108,14 @@ contains
     end do
     most = 0.0_dp
     do s = 1, size(ways)
-      allocate (self%part(s)%depth(problem%sub(s)%n_columns))
+      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
       do b = 1, size(ways(s)%length)
         self%part(s)%depth(b) = afloat
         if (.not. ways(s)%length(b) < unreached) cycle
         self%part(s)%depth(b) = nint(ways(s)%length(b))
         most = max(most, ways(s)%length(b))
       end do
+      if (allocated(self%part(s)%contact)) deallocate (self%part(s)%contact, self%part(s)%first)
     end do
     self%most_depth = nint(problem%comm%highest(most))
   end subroutine levels_find_depth
