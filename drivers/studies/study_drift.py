@@ -26,9 +26,8 @@ LOOSE = (1.0e-2, 1.0e-3, 1.0e-4)
 PRESSURE, LID_MASS = 2.0e4, 20.0  # N/m, kg
 GROWN = 1.1  # grains that touch overlap by a fifth of their radius once they are larger by a tenth
 FULL, QUICK = {"steps": 20000}, {"steps": 2000}
-#: largest overlap over that allowed by the page, with what a fall of one step adds to it, and how much overlaps grow while they are
-#: removed
-EXCESS, GROWTH = 1.3 + 9.81 * STEP**2 / ALLOWED, 4.0 / 3.0
+#: largest overlap over that allowed by the page, and how much overlaps grow while they are removed
+EXCESS, GROWTH = 1.3, 4.0 / 3.0
 
 
 def box(size):
@@ -113,7 +112,7 @@ def accepted(rows, curves):
             continue
         table.add(f"{what}: largest overlap over that allowed, second half", row["largest_overlap"] * RADIUS / ALLOWED, None,
                   EXCESS,
-                  f"{page}: about 1.3; g h^2 more, for one step without a sweep")
+                  f"{page}: about 1.3")
         if name in ("disks", "spheres"):
             table.add(f"{what}: kinetic energy of a grain over m g R", row["kinetic_energy"], None, 9.81 * STEP**2 / (2.0 * RADIUS),
                       "rest: velocities below g h")

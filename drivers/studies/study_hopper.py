@@ -83,9 +83,8 @@ def accepted(d, case, exponent, k, constant, changes):
     table = Bounds()
     table.near(f"exponent of the rate against D - {BEVERLOO_K:g} d", exponent, case.exponent, 0.1, f"{law}; {page}: +- 0.1")
     table.add(f"k with the exponent {2.0 * case.exponent:g}/2", k, 1.0, 3.0, f"{law}: 1.4; {page}: 1 to 3")
-    table.add(f"C with this exponent and k = {BEVERLOO_K:g}", constant, 0.9 * SHAPE[d] * CONSTANT[0], 1.1 * SHAPE[d] * CONSTANT[1],
-              f"{CONSTANT[0]:g} to {CONSTANT[1]:g} of circles (Nedderman 1992), by the hydraulic diameter; "
-              "a tenth, for a k off by 0.2")
+    table.add(f"C with this exponent and k = {BEVERLOO_K:g}", constant, *(SHAPE[d] * c for c in CONSTANT),
+              f"{CONSTANT[0]:g} to {CONSTANT[1]:g} of circles (Nedderman 1992), by the hydraulic diameter")
     table.add("change of the rate over the time of a discharge, mean of all openings", np.mean([change for change, _ in changes]),
               *(sign * (0.1 + 2.0 * np.sqrt(np.sum([spread**2 for _, spread in changes])) / len(changes)) for sign in (-1.0, 1.0)),
               f"{law}: none by the height of the fill; a tenth, and two standard deviations of a count")
