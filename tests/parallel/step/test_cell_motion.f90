@@ -3,6 +3,7 @@
 program test_cell_motion
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
+  use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_periodic, only: period_t
   use gravier_moving_cell, only: cell_motion_t
@@ -53,22 +54,31 @@ contains
     call check_close(added(2), (motion%free(2, 2) + 0.1_dp)*(-0.4_dp) + 0.1_dp*3.0_dp, 1.0e-15_dp, "what is added along y")
   end subroutine check_drive
 
-  !> Disks come together under a pressure while they are sheared.
-  subroutine check_solved_steps()
-    type(simulation_t) :: sim
+  !> Disks in a cell that is sheared under a pressure.
+  subroutine make_scene(restitution, sim)
+    real(dp), intent(in) :: restitution
+    type(simulation_t), intent(inout) :: sim
     type(config_t) :: config
     type(error_t), allocatable :: error
-    type(step_figures_t) :: figures
-    integer :: k, contacts
 
     call parse_config("cell", "&scene bodies = 'lattice', lattice_count = 6, 6, radius_min = 0.4, radius_max = 0.6, "// &
-      & "friction = 0.4, density = 1, gravity = 0, 0, period = 7.6, 7.6, cell_shear_rate = 0.2, cell_pressure = 0, 1, "// &
-      & "overlap_projection = F /"// &
+      & "friction = 0.4, restitution = "//to_text(restitution)//", density = 1, gravity = 0, 0, period = 7.6, 7.6, "// &
+      & "cell_shear_rate = 0.2, cell_pressure = 0, 1, overlap_projection = F /"// &
       & new_line("a")//"&time step = 0.1, steps = 60 /"//new_line("a")// &
       & "&solver method = 'nscdd', criterion = 'residual', tolerance = 1e-10, max_iterations = 20000 /"//new_line("a")// &
       & "&decomposition grid = 2, 1 /", config, error)
     if (.not. allocated(error)) call sim%init(comm, config, error)
     call check(.not. allocated(error), "the scene is made")
+  end subroutine make_scene
+
+  !> Disks come together under a pressure while they are sheared.
+  subroutine check_solved_steps()
+    type(simulation_t) :: sim
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    integer :: k, contacts
+
+    call make_scene(0.0_dp, sim)
     contacts = 0
     do k = 1, 40
       call sim%advance(figures, error)
@@ -85,20 +95,12 @@ contains
   !> nothing is sent back where the bodies part and the cell and the loads close the contact again.
   subroutine check_returned()
     type(simulation_t) :: sim
-    type(config_t) :: config
     type(error_t), allocatable :: error
     type(step_figures_t) :: figures
     real(dp) :: n(2), v(2), free(2), way(2), branch(2), expected
     integer :: s, c, k, across, apart, closed
 
-    call parse_config("cell", "&scene bodies = 'lattice', lattice_count = 6, 6, radius_min = 0.4, radius_max = 0.6, "// &
-      & "friction = 0.4, restitution = 0.5, density = 1, gravity = 0, 0, period = 7.6, 7.6, cell_shear_rate = 0.2, "// &
-      & "cell_pressure = 0, 1, overlap_projection = F /"// &
-      & new_line("a")//"&time step = 0.1, steps = 60 /"//new_line("a")// &
-      & "&solver method = 'nscdd', criterion = 'residual', tolerance = 1e-10, max_iterations = 20000 /"//new_line("a")// &
-      & "&decomposition grid = 2, 1 /", config, error)
-    if (.not. allocated(error)) call sim%init(comm, config, error)
-    call check(.not. allocated(error), "the scene with restitution is made")
+    call make_scene(0.5_dp, sim)
     across = 0
     apart = 0
     closed = 0
