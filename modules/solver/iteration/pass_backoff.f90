@@ -11,14 +11,15 @@ module gravier_pass_backoff
   integer, parameter :: pass_backoff_words = 2
   !> what they are, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: pass_backoff_record = "given_up next_step"
-  !> passes given up one after the other that are followed by no pause: what settles keeps some of them and not others
+  !> So many passes may be given up one after the other without a pause, because a scene that settles keeps one pass in several.
   integer, parameter :: patience = 4
-  !> steps without a pass after the next one that is given up, twice as many after each further one, and at most
+  !> The next pass that is given up is followed by `first_pause` steps without a pass. Each further one is followed by twice as many, and
+  !> by `longest_pause` at most.
   integer, parameter :: first_pause = 2, longest_pause = 64
 
   type :: pass_backoff_t
     private
-    !> passes given up since the last one that a solve went on from, as far as they matter
+    !> passes given up since the last one that a solve went on from; it stays as it is once the pause is longest
     integer :: given_up = 0
     !> step from which on a pass may be tried
     integer :: next_step = 0

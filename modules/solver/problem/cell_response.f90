@@ -7,7 +7,7 @@ module gravier_cell_response
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: start_response, respond, carry_along, image_velocity, subtract_images, find_axes
+  public :: start_response, respond, carry_along, image_velocity, subtract_images
 
 contains
 

@@ -7,9 +7,9 @@ module gravier_contact_packing
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: subproblem_t
-  use gravier_cell_response, only: find_axes
+  use gravier_cell_response, only: image_velocity
   use gravier_halo, only: local_bodies_t
-  use gravier_surface_velocity, only: contact_place_t, add_image_velocity
+  use gravier_surface_velocity, only: contact_place_t
   use gravier_pair_laws, only: law_of, terms_of
   use gravier_contact_springs, only: pack_spring
   use gravier_physics, only: physics_t
@@ -46,9 +46,10 @@ contains
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
     integer, allocatable :: pair(:, :)
-    !> velocities of the columns at the start of the step (nv, n_columns) [m/s, rad/s]
+    !> velocities of the columns at the start of the step (nv, n_columns), where some law needs them; else (nv, 0) [m/s, rad/s]
     real(dp), allocatable :: start(:, :)
     integer :: c, before
+    logical :: needs_start
     type(packed_t) :: this
 
     allocate (pair(2, found%n), found%order(found%n))
@@ -63,7 +64,12 @@ contains
     if (physics%laws%yields) allocate (sub%spring(found%n))
     if (physics%cell%moves) allocate (sub%cell%branch(kernels%nd, found%n), sub%cell%way(kernels%nd, found%n), &
       & sub%cell%shift(kernels%nd, found%n))
-    call find_start_velocities(view, boundaries, numbers, kernels, sub, start)
+    needs_start = physics%laws%returns .or. physics%laws%yields
+    if (needs_start) then
+      call find_start_velocities(view, boundaries, numbers, kernels, sub, start)
+    else
+      allocate (start(kernels%nv, 0))
+    end if
     before = -1
     do c = 1, found%n
       call find_packed(view, found, c, this)
@@ -77,7 +83,7 @@ contains
       call take_terms(view, found, boundaries, physics%laws, before, this)
       call pack_terms(view, found, kernels, physics%h, this, sub)
     end do
-    if (physics%laws%returns .or. physics%laws%yields) call pack_returned(view, found, boundaries, kernels, physics, start, sub)
+    if (needs_start) call pack_returned(view, found, boundaries, kernels, physics, start, sub)
     do c = 1, merge(found%n, 0, physics%cell%moves)
       call keep_shifts(kernels, c, sub)
     end do
@@ -197,7 +203,7 @@ contains
     sub%boundary(sub%n_columns) = this%b
     call find_touching_points(view, found, this, points)
     call boundary%velocity_at(points(:, side), sub%v_free(1:nd, sub%n_columns))
-    call boundary%last_velocity_at(points(:, side), start(1:nd, sub%n_columns))
+    if (size(start, 2) > 0) call boundary%last_velocity_at(points(:, side), start(1:nd, sub%n_columns))
     ! levers of boundaries are 0: rolling alone sees the spin
     sub%v_free(nd + 1:, sub%n_columns) = boundary%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
     sub%pair(side, this%c) = sub%n_columns
@@ -293,6 +299,8 @@ contains
     type(subproblem_t), intent(inout) :: sub
     !> velocities of the contacts at the start of the step, and without contacts (lanes, nc, blocks) [m/s]
     real(dp), allocatable :: v(:, :, :), free(:, :, :)
+    !> velocity of the image that the candidate meets, along n, t and s [m/s]
+    real(dp) :: image(kernels%nd)
     type(packed_t) :: this
     integer :: c, before, nd
 
@@ -308,7 +316,10 @@ contains
       call find_packed(view, found, c, this)
       call take_terms(view, found, boundaries, physics%laws, before, this)
       associate (q => this%q, g => this%g, row => kernels%row, terms => this%terms)
-        if (physics%cell%moves) call subtract_image(view, this, sub, v(q, 1:kernels%nf, g))
+        if (physics%cell%moves) then
+          image(:) = image_velocity(sub, nd, c, physics%cell%before)
+          v(q, 1:kernels%nf, g) = v(q, 1:kernels%nf, g) - image(1:kernels%nf)
+        end if
         if (terms%restitution > 0.0_dp) then
           if (physics%cell%moves) free(q, 1, g) = free(q, 1, g) + cell_adds(found, physics, this, sub)
           sub%hot(q, row%shift, g) = terms%restitution*v(q, 1, g)
@@ -320,24 +331,6 @@ contains
       end associate
     end do
   end subroutine pack_returned
-
-  !> Take the velocity of the image that the candidate meets, in a cell that moves, from that of a contact.
-  subroutine subtract_image(view, this, sub, v)
-    type(local_bodies_t), intent(in) :: view
-    type(packed_t), intent(in) :: this
-    type(subproblem_t), intent(in) :: sub
-    !> along n or along n, t and s
-    real(dp), intent(inout) :: v(:)
-    real(dp) :: image(size(view%bodies%position, 1)), frame(size(image), size(image))
-    integer :: d
-
-    image(:) = 0.0_dp
-    call add_image_velocity(view, this%p, image)
-    call find_axes(sub, this%c, frame)
-    do d = 1, size(v)
-      v(d) = v(d) - sum(frame(:, d)*image)
-    end do
-  end subroutine subtract_image
 
   !> What a cell that moves adds to the normal velocity without contacts.
   pure real(dp) function cell_adds(found, physics, this, sub)
