@@ -83,6 +83,8 @@ module gravier_time_stepper
     type(solve_control_t) :: control
     !> whether solves may try a pass over layers
     type(pass_backoff_t) :: pass_backoff
+    !> what the last solve tells the next one about when to check
+    real(dp) :: figure_ratio = 0.0_dp
     !> where it is known
     class(exact_solution_t), allocatable :: exact
     ! ---- the present step
@@ -190,6 +192,7 @@ contains
     logical :: woken, finds_none
 
     control = self%control
+    control%figure_ratio = self%figure_ratio
     ! a pass over layers would replace the impulses that were given
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
     iterations = 0
@@ -376,6 +379,7 @@ contains
     associate (solve => figures%solve)
       if (solve%status /= solve_converged) self%failed = self%failed + 1
       call self%tally%add_solve(solve, self%velocity_scale%kind)
+      self%figure_ratio = solve%figure_ratio
       call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)
       if (solve%status == solve_diverged) then
         call find_divergence(self%problem, figures%cause)
@@ -472,6 +476,7 @@ contains
     self%left_mass = 0.0_dp
     self%population = population_t()
     self%pass_backoff = pass_backoff_t()
+    self%figure_ratio = 0.0_dp
     self%fast = 0
     self%quiet = 0
     self%velocities_set = .false.

@@ -39,7 +39,8 @@ contains
       & "cell: "//period_record//", "//to_text(period_words)//" words"//newline// &
       & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
       & "population: "//population_record//", "//to_text(population_words)//" words"//newline// &
-      & "passes: "//pass_backoff_record//", "//to_text(pass_backoff_words)//" words"//newline
+      & "passes: "//pass_backoff_record//", "//to_text(pass_backoff_words)//" words"//newline// &
+      & "solves: figure_ratio"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
       associate (features => diagnostics(k)%diagnostic%features())
@@ -90,6 +91,7 @@ contains
     call file%write_array("population", seen, error)
     call simulation%pass_backoff%get_state(passes)
     call file%write_array("passes", passes, error)
+    call file%write_scalar("figure_ratio", simulation%figure_ratio, error)
     call simulation%inflow%get_state(words)
     call file%write_array("insertions", words, error)
     associate (memory => simulation%halo%memory)
@@ -158,6 +160,7 @@ contains
     if (.not. allocated(error)) call simulation%population%set_state(words)
     call file%read_array("passes", pass_backoff_words, pass_backoff_words, words, error)
     if (.not. allocated(error)) call simulation%pass_backoff%set_state(words)
+    call file%read_scalar("figure_ratio", simulation%figure_ratio, error)
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written
     call take_count(last_written + 1, path//": last_written", own_last, error)

@@ -4,7 +4,8 @@
 !> them and comes for nothing. A check is therefore left out where that, times the ratio of the two at the last check, is far from
 !> the goal; accelerated sweeps, whose sums are there after each iteration, are checked as soon as these indicate convergence. The
 !> estimate follows these sums loosely and costs more: checks that ask for it keep longer pauses, and come after it is trusted,
-!> unless the scene is nearly at rest.
+!> unless the scene is nearly at rest. The ratio at the end of a solve holds for the first checks of the next one, because a step
+!> changes little.
 module gravier_check_schedule
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
@@ -24,6 +25,10 @@ module gravier_check_schedule
   integer, parameter :: early_check = 2
   !> iterations between two checks, over those made: at least where they are not due, and at most
   real(dp), parameter :: least_pause = 0.06_dp, most_pause = 0.25_dp
+  !> Checks that ask for the estimate: so many regular ones may be left out one after the other, and more where the figure that is
+  !> expected is above so many times the goal.
+  integer, parameter :: most_left_out = 1, most_left_out_far = 3
+  real(dp), parameter :: far_from_goal = 1.5_dp
   !> what a check costs that asks for the estimate, in iterations
   real(dp), parameter :: estimate_cost = 3.0_dp
   !> times the goal: a figure of the start that may meet it in the first iterations
@@ -42,8 +47,13 @@ module gravier_check_schedule
     !> longer than a part of the iterations made
     logical :: by_estimate = .false.
     integer :: trusted = 0
-    !> figure at the last check over what the sweeps before it moved impulses by, relative to them; 0 where it is not known
-    real(dp), private :: ratio = 0.0_dp, progress = 0.0_dp
+    !> the first residual was within its tolerance: the estimate is asked for as soon as it is trusted, unless a ratio is known
+    logical :: settled = .false.
+    !> figure at the last check over what the sweeps before it moved impulses by, relative to them; before that what a solve before
+    !> this one has ended with; 0 where it is not known
+    real(dp) :: ratio = 0.0_dp
+    !> what the sweeps before the last check moved impulses by
+    real(dp), private :: progress = 0.0_dp
     real(dp), private :: last_figure = huge(1.0_dp), pause = 0.0_dp
     integer, private :: skips = 0, last_check = 0
     !> the first iteration that a check of accelerated sweeps may follow before it is due
@@ -81,6 +91,7 @@ contains
     ! sums of the iterations before are there where sweeps are accelerated
     if (self%chooses .and. (calls .or. (method%acceleration%on .and. iteration >= self%earliest))) &
       & calls = is_worth_a_check(self, problem, method, iteration, goal, reference, history)
+    if (self%settled .and. iteration == self%trusted) calls = calls .or. .not. self%ratio > 0.0_dp
   end function check_schedule_calls
 
   !> Whether the sweeps of the iteration before speak for a check. Collective.
@@ -101,7 +112,6 @@ contains
     is_worth = regular
     expected = 0.0_dp
     due = self%skips >= most_skips
-    if (self%by_estimate) due = due .or. iteration - self%last_check >= most_pause*iteration
     if (all(ieee_is_finite(sums))) then
       if (sums(2) > 0.0_dp) self%progress = sqrt(sums(1)/sums(2))
       expected = self%ratio*self%progress
@@ -110,6 +120,7 @@ contains
         if (.not. self%ratio > 0.0_dp) expected = first_ratio*self%progress
         enough = 1.0_dp
       end if
+      if (self%by_estimate) due = due .or. is_long_ago(self, iteration, expected > far_from_goal*goal)
       if (expected > 0.0_dp) is_worth = (expected <= enough*goal .and. has_paused(self, iteration, regular)) .or. &
         & (regular .and. (.not. self%ratio > 0.0_dp .or. due .or. sqrt(sums(1)) > watched_growth(method)*reference))
     end if
@@ -139,6 +150,19 @@ contains
     end associate
   end function has_paused
 
+  !> Whether the last check lies so far back that the next regular one is made whatever figure is expected, because the ratio may
+  !> have changed: the estimate is asked for.
+  pure logical function is_long_ago(self, iteration, is_far)
+    class(check_schedule_t), intent(in) :: self
+    integer, intent(in) :: iteration
+    !> the figure that is expected is far from the goal
+    logical, intent(in) :: is_far
+    integer :: regular
+
+    regular = 1 + merge(most_left_out_far, most_left_out, is_far)
+    is_long_ago = iteration - self%last_check >= max(most_pause*iteration, real(regular*self%check_every, dp))
+  end function is_long_ago
+
   !> Growth of the changes that is worth a check: methods that lower what makes them grow are left to do so.
   pure real(dp) function watched_growth(method) result(growth)
     class(method_t), intent(in) :: method
@@ -146,16 +170,19 @@ contains
   end function watched_growth
 
   !> A check was made after an iteration, and found this figure.
-  pure subroutine check_schedule_note_check(self, iteration, figure, goal)
+  pure subroutine check_schedule_note_check(self, iteration, figure, goal, is_known)
     class(check_schedule_t), intent(inout) :: self
     integer, intent(in) :: iteration
     real(dp), intent(in) :: figure, goal
+    !> false where the figure is a bound, because the estimate was not asked for
+    logical, intent(in) :: is_known
 
     if (iteration == 0) then
       ! before the estimate is trusted only what is nearly at rest may meet the goal
       if (self%by_estimate .and. .not. figure <= near_the_goal*goal) self%earliest = max(early_check, self%trusted)
     else
-      if (self%progress > 0.0_dp) self%ratio = figure/self%progress
+      ! the ratio of a bound tells less than that of a solve before
+      if (self%progress > 0.0_dp .and. (is_known .or. .not. self%ratio > 0.0_dp)) self%ratio = figure/self%progress
       self%pause = merge(0.0_dp, min(2.0_dp*max(self%pause, 1.0_dp), most_pause*iteration), figure < falling*self%last_figure)
     end if
     self%last_figure = figure

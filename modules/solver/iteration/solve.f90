@@ -47,6 +47,8 @@ module gravier_solve
     logical :: trace = .false.
     !> try a start that carries loads across layers
     logical :: layered = .true.
+    !> `figure_ratio` of the report of a solve before this one, 0 where there was none: it tells when checks are worth making
+    real(dp) :: figure_ratio = 0.0_dp
   end type solve_control_t
 
   !> The known impulses of a problem, for the criterion 'error'.
@@ -85,6 +87,9 @@ module gravier_solve
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
+    !> that figure over what the last iteration moved impulses by, relative to them; of a solve that ended without an estimate as it
+    !> was before
+    real(dp) :: figure_ratio = 0.0_dp
     !> of a solve that stagnated
     type(creep_t) :: creep
     !> how the figure came down
@@ -126,8 +131,8 @@ module gravier_solve
     !> iteration from which on the defect has been above the reference, -1 where it is not; whether that is too long
     integer :: exceeded_at = -1
     logical :: grows = .false.
-    !> the criterion is by_velocity; the first residual was within its tolerance; by_residual: the verdict on one that is
-    logical :: by_estimate = .false., settled = .false.
+    !> the criterion is by_velocity; by_residual: the verdict on a residual that is within its tolerance
+    logical :: by_estimate = .false.
     integer :: verdict = residual_ends
   end type solve_state_t
 
@@ -150,13 +155,13 @@ contains
     call prepare(state, problem, method, control, report, error)
     if (allocated(error)) return
     call check(state, problem, method, control, report, done, exact)
-    state%settled = report%residual <= control%tolerance
+    state%schedule%settled = state%by_estimate .and. report%residual <= control%tolerance
     if (state%by_estimate .and. control%layered) call state%trial%start(problem, report%residual, control%accuracy)
     do while (.not. done)
       report%iterations = report%iterations + 1
       measure = state%schedule%calls(problem, method, report%iterations, report%goal, state%reference, report%history)
       measure = measure .or. method%check_next .or. report%iterations == control%max_iterations .or. &
-        & (state%settled .and. state%by_estimate .and. report%iterations == copies_ready) .or. state%trial%calls(report%iterations)
+        & state%trial%calls(report%iterations)
       call method%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
       if (problem%cell%is_driven) call respond(problem)
@@ -170,6 +175,8 @@ contains
       call state%velocity%tests%keep_copy(problem, method, report%iterations)
       if (present(watch)) call watch%look(report)
     end do
+    report%figure_ratio = control%figure_ratio
+    if (report%status == solve_converged .and. has_estimate(state)) report%figure_ratio = state%schedule%ratio
     report%layered = state%trial%layered
     report%layered_sweeps = state%trial%sweeps
     if (report%status /= solve_converged .and. report%status /= solve_diverged .and. method%keeps_best) &
@@ -193,6 +200,7 @@ contains
     state%schedule%chooses = .not. (control%trace .or. control%criterion == by_error)
     state%schedule%by_estimate = state%by_estimate
     state%schedule%trusted = copies_ready
+    state%schedule%ratio = control%figure_ratio
     report%goal = merge(control%accuracy, control%tolerance, state%by_estimate)
     report%velocity_scale = problem%error_scale
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale
@@ -249,10 +257,16 @@ contains
     call judge(state, problem, method, control, report, defect, finished)
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
-    call state%schedule%note_check(report%iterations, report%figure, report%goal)
+    call state%schedule%note_check(report%iterations, report%figure, report%goal, has_estimate(state))
     state%checking = state%checking + clock() - start
     call stop_timer(phase_check)
   end subroutine check
+
+  !> Whether the figure of the last check is what the criterion asks for, and no bound.
+  pure logical function has_estimate(state)
+    type(solve_state_t), intent(in) :: state
+    has_estimate = state%velocity%is_assessed .or. .not. state%by_estimate
+  end function has_estimate
 
   !> Whether the criterion is met; the velocity error as far as that needs it. Collective.
   subroutine find_whether_met(state, problem, method, control, report, is_met)

@@ -52,6 +52,7 @@ program test_solver_parts
   call test_schedule(.false.)
   call test_schedule(.true.)
   call test_schedule_of_estimates()
+  call test_ratio_of_a_run()
   call check_vain_impulses()
   call check_stagnation()
   call check_creep(1)
@@ -350,7 +351,7 @@ contains
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(.not. calls(schedule, sim%problem, method, 9), "no check before it is due")
     call check(calls(schedule, sim%problem, method, 10), "the first one is made")
-    call schedule%note_check(10, 0.05_dp, 1.0e-3_dp)
+    call schedule%note_check(10, 0.05_dp, 1.0e-3_dp, is_known=.true.)
     ! the ratio is 5 from here on
     call set_progress(sim%problem, 2.3e-4_dp)
     call check(calls(schedule, sim%problem, method, 20), "1.15 times the goal is expected")
@@ -368,7 +369,7 @@ contains
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(calls(schedule, sim%problem, method, 210), "and so with momentum")
     ! the figure has fallen, the ratio is 4, and no pause is longer than 0.06 of the iterations made
-    call schedule%note_check(210, 0.04_dp, 1.0e-3_dp)
+    call schedule%note_check(210, 0.04_dp, 1.0e-3_dp, is_known=.true.)
     call set_progress(sim%problem, 2.0e-4_dp)
     call check(.not. calls(schedule, sim%problem, method, 223), "0.8 times the goal is expected, but too soon")
     call check(calls(schedule, sim%problem, method, 225) .eqv. chooses, "and late enough")
@@ -390,23 +391,82 @@ contains
     schedule%by_estimate = .true.
     schedule%trusted = 4
     call set_progress(sim%problem, 1.0e-4_dp)
-    call schedule%note_check(0, 2.9e-3_dp, 1.0e-3_dp)
+    call schedule%note_check(0, 2.9e-3_dp, 1.0e-3_dp, is_known=.true.)
     call check(calls(schedule, sim%problem, method, 2), "nearly at rest: a check before the estimate is trusted")
-    call schedule%note_check(0, 3.1e-3_dp, 1.0e-3_dp)
+    call schedule%note_check(0, 3.1e-3_dp, 1.0e-3_dp, is_known=.true.)
     call check(.not. calls(schedule, sim%problem, method, 3), "far from rest: none before it is trusted")
     call check(calls(schedule, sim%problem, method, 4), "the first when it is trusted")
     ! the ratio is 15 from here on
-    call schedule%note_check(4, 1.5e-3_dp, 1.0e-3_dp)
+    call schedule%note_check(4, 1.5e-3_dp, 1.0e-3_dp, is_known=.true.)
     call set_progress(sim%problem, 6.0e-5_dp)
     call check(.not. calls(schedule, sim%problem, method, 7), "0.9 times the goal is expected, but too soon")
     call check(calls(schedule, sim%problem, method, 8), "and late enough")
-    call schedule%note_check(40, 9.0e-4_dp, 1.0e-3_dp)
+    call schedule%note_check(40, 9.0e-4_dp, 1.0e-3_dp, is_known=.true.)
     do iteration = 41, 60
       if (calls(schedule, sim%problem, method, iteration)) exit
     end do
     call check_equal(iteration, 49, "the root of 1.5 times the iterations made")
+    call test_ratio_of_before(sim%problem, method)
     call sim%free()
   end subroutine test_schedule_of_estimates
+
+  !> A solve that knows the ratio by which the last one ended, 10: no check where it does not expect the goal, but for regular ones,
+  !> of which one is left out, or three far from the goal; one as soon as it expects the goal.
+  subroutine test_ratio_of_before(problem, method)
+    type(contact_problem_t), intent(inout) :: problem
+    type(nlgs_t), intent(in) :: method
+    type(check_schedule_t) :: schedule
+
+    schedule%chooses = .true.
+    schedule%by_estimate = .true.
+    schedule%trusted = 4
+    schedule%settled = .true.
+    call schedule%note_check(0, 1.0_dp, 1.0e-3_dp, is_known=.false.)
+    call set_progress(problem, 1.0e-4_dp)
+    call check(calls(schedule, problem, method, 4), "a settled scene is checked as soon as the estimate is trusted")
+    schedule%ratio = 10.0_dp
+    call set_progress(problem, 1.4e-4_dp)
+    call check_equal(first_call(schedule, problem, method), 20, "1.4 times the goal is expected: the second regular check")
+    call set_progress(problem, 1.6e-4_dp)
+    call check_equal(first_call(schedule, problem, method), 40, "1.6 times the goal is expected: the fourth")
+    call set_progress(problem, 0.9e-4_dp)
+    call check_equal(first_call(schedule, problem, method), 4, "the goal is expected")
+    call schedule%note_check(4, 1.0_dp, 1.0e-3_dp, is_known=.false.)
+    call check_close(schedule%ratio, 10.0_dp, 0.0_dp, "a bound tells less than the solve before")
+    call schedule%note_check(4, 1.8e-3_dp, 1.0e-3_dp, is_known=.true.)
+    call check_close(schedule%ratio, 20.0_dp, 1.0e-12_dp, "an estimate tells more")
+  end subroutine test_ratio_of_before
+
+  !> The first iteration after which a schedule calls for a check, with the goal 1e-3.
+  integer function first_call(schedule, problem, method)
+    type(check_schedule_t), intent(inout) :: schedule
+    type(contact_problem_t), intent(inout) :: problem
+    type(nlgs_t), intent(in) :: method
+
+    do first_call = 1, 99
+      if (calls(schedule, problem, method, first_call)) exit
+    end do
+  end function first_call
+
+  !> The ratio goes from the solve of one step to that of the next: where one is far too large 40 iterations follow the check that
+  !> passes over layers ask for, and the estimate that the next check finds corrects it. A plane that moves along the column
+  !> keeps it from rest.
+  subroutine test_ratio_of_a_run()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    type(error_t), allocatable :: error
+
+    call make_column(4, 2, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0, velocity = 0, 0.3 /"//newline// &
+      & "&solver method = 'nscdd', acceleration = 'momentum' /", sim)
+    call check_close(sim%figure_ratio, 0.0_dp, 0.0_dp, "none is known at first")
+    sim%figure_ratio = 1.0e12_dp
+    call sim%advance(figures, error)
+    call check(.not. allocated(error), "a step is made")
+    call check_equal(figures%solve%iterations, 50, "none but the check after 4 iterations in the 40 before")
+    call check(sim%figure_ratio > 0.0_dp .and. sim%figure_ratio < 1.0e9_dp, "the ratio is that of this solve")
+    call sim%free()
+    call check_close(sim%figure_ratio, 0.0_dp, 0.0_dp, "another scene knows nothing of it")
+  end subroutine test_ratio_of_a_run
 
   !> Whether a schedule calls for a check after an iteration, with the goal 1e-3.
   logical function calls(schedule, problem, method, iteration)
