@@ -87,8 +87,7 @@ module gravier_solve
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
-    !> that figure over what the last iteration moved impulses by, relative to them; of a solve that ended without an estimate as it
-    !> was before
+    !> that figure over what the last iteration moved impulses by, relative to them; 0 of a solve that did not end by an estimate
     real(dp) :: figure_ratio = 0.0_dp
     !> of a solve that stagnated
     type(creep_t) :: creep
@@ -175,7 +174,6 @@ contains
       call state%velocity%tests%keep_copy(problem, method, report%iterations)
       if (present(watch)) call watch%look(report)
     end do
-    report%figure_ratio = control%figure_ratio
     if (report%status == solve_converged .and. has_estimate(state)) report%figure_ratio = state%schedule%ratio
     report%layered = state%trial%layered
     report%layered_sweeps = state%trial%sweeps
