@@ -405,7 +405,7 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
-    self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy)
+    self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy .and. figures%entered == 0)
     call self%population%note(self%n_grains - self%n_glued, self%mass)
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast

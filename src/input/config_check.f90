@@ -368,6 +368,8 @@ contains
     call expect(report, config%output%every >= 0, "output", "every", error)
     call expect(report, config%output%checkpoint_every >= 0, "output", "checkpoint_every", error)
     call expect(report, config%output%fclib_step >= 0, "output", "fclib_step", error)
+    call expect(report, config%output%fclib_step <= config%time%steps, "output", "fclib_step", error, &
+                "at most "//shown_text(report, "time", "steps"))
     call expect(report, config%output%final_bodies .or. .not. config%output%final_forces, "output", "final_forces", error, &
                 ".false. without final_bodies = .true., whose file holds them")
     call expect(report, config%output%checkpoint_seconds >= 0.0_dp, "output", "checkpoint_seconds", error)

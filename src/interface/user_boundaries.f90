@@ -5,6 +5,7 @@ module gravier_user_boundaries
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_boundary, only: boundary_t
+  use gravier_scene_boundaries, only: check_pressed
   use gravier_user_loop, only: user_loop_t
   implicit none
   private
@@ -92,7 +93,10 @@ contains
       case ("applied_force")
         call set_force(boundary, values, error)
       case ("pressure")
-        call set_pressure(boundary, nd, values(1), error)
+        call check_pressure(boundary, nd, error)
+        if (.not. allocated(error)) call check_pressed(loop%run%simulation%decomposition%boundaries, b, nd, &
+          & loop%run%simulation%decomposition%period%length, error)
+        if (.not. allocated(error)) boundary%given_pressure = values(1)
       case ("friction")
         call loop%set_friction(b, values(1), error)
         if (allocated(error)) error%message = "boundary '"//boundary%name//"': "//error%message
@@ -155,11 +159,10 @@ contains
     if (.not. allocated(error)) boundary%given_force(1:size(values)) = values
   end subroutine set_force
 
-  subroutine set_pressure(boundary, nd, value, error)
-    type(boundary_t), intent(inout) :: boundary
+  !> Refuse a pressure on what does not move along its normal, or has it from a table.
+  subroutine check_pressure(boundary, nd, error)
+    type(boundary_t), intent(in) :: boundary
     integer, intent(in) :: nd
-    !> [Pa], in the plane [N/m]
-    real(dp), intent(in) :: value
     type(error_t), allocatable, intent(inout) :: error
     logical :: pressed
 
@@ -168,8 +171,7 @@ contains
     if (.not. pressed) call refuse(boundary, "pressure", "is for a plane of which a component along its normal is free", error)
     if (in_table(boundary, merge(6, 10, nd == 2))) call refuse(boundary, "pressure", &
       & "is given by its table; expected a boundary without this column", error)
-    if (.not. allocated(error)) boundary%given_pressure = value
-  end subroutine set_pressure
+  end subroutine check_pressure
 
   !> Whether the table of the boundary has column `k`.
   pure logical function in_table(boundary, k)

@@ -17,6 +17,7 @@ module gravier_checkpoint_output
     character(len=:), allocatable :: path
   contains
     procedure, nopass :: wanted => checkpoint_output_wanted
+    procedure, nopass :: files => checkpoint_output_files
     procedure :: open => checkpoint_output_open
     procedure :: write => checkpoint_output_write
   end type checkpoint_output_t
@@ -28,6 +29,15 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%checkpoint_every >= 0
   end function checkpoint_output_wanted
+
+  pure function checkpoint_output_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = checkpoint_name
+  end function checkpoint_output_files
 
   subroutine checkpoint_output_open(self, simulation, directory, command, error)
     class(checkpoint_output_t), intent(inout) :: self

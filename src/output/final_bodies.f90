@@ -17,6 +17,7 @@ module gravier_final_bodies
     character(len=:), allocatable :: path
   contains
     procedure, nopass :: wanted => final_bodies_wanted
+    procedure, nopass :: files => final_bodies_files
     procedure :: open => final_bodies_open
     procedure :: write => final_bodies_write
   end type final_bodies_output_t
@@ -27,6 +28,15 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%final_bodies
   end function final_bodies_wanted
+
+  pure function final_bodies_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = "final_bodies.h5"
+  end function final_bodies_files
 
   subroutine final_bodies_open(self, simulation, directory, command, error)
     class(final_bodies_output_t), intent(inout) :: self

@@ -17,8 +17,10 @@ module gravier_history_output
     type(csv_writer_t) :: table
   contains
     procedure, nopass :: wanted => history_output_wanted
+    procedure, nopass :: files => history_output_files
     procedure :: open => history_output_open
     procedure :: write => history_output_write
+    procedure :: sync => history_output_sync
     procedure :: finish => history_output_finish
   end type history_output_t
 
@@ -35,6 +37,15 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%every >= 0
   end function history_output_wanted
+
+  pure function history_output_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = "history.csv"
+  end function history_output_files
 
   subroutine history_output_open(self, simulation, directory, command, error)
     class(history_output_t), intent(inout) :: self
@@ -128,6 +139,12 @@ contains
       call table%end_row(error)
     end associate
   end subroutine history_output_write
+
+  subroutine history_output_sync(self, error)
+    class(history_output_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%table%sync(error)
+  end subroutine history_output_sync
 
   subroutine history_output_finish(self, error)
     class(history_output_t), intent(inout) :: self

@@ -22,8 +22,10 @@ module gravier_output
     integer :: last = -1
   contains
     procedure(wanted_interface), deferred, nopass :: wanted
+    procedure(files_interface), deferred, nopass :: files
     procedure(open_interface), deferred :: open
     procedure(write_interface), deferred :: write
+    procedure :: sync => output_sync
     procedure :: finish => output_finish
   end type output_t
 
@@ -34,6 +36,14 @@ module gravier_output
       implicit none
       type(config_t), intent(in) :: config
     end function wanted_interface
+
+    !> The names of the files that it has in the output directory, with commas between.
+    pure function files_interface(config) result(names)
+      import :: config_t
+      implicit none
+      type(config_t), intent(in) :: config
+      character(len=:), allocatable :: names
+    end function files_interface
 
     !> Create the files in the output directory or, where the simulation is restarted, go on with those that are there: what they
     !> hold of later steps goes. It sets stage and schedule even after an error. Rank 0 may fail alone. Collective.
@@ -62,6 +72,15 @@ module gravier_output
   end interface
 
 contains
+
+  !> Bring what a checkpoint counts on to the disk, before one is written. By default nothing. Rank 0 may fail alone. Collective.
+  subroutine output_sync(self, error)
+    class(output_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (unused_self => self, unused => error)
+    end associate
+  end subroutine output_sync
 
   !> Close the files; called also after an error, and for files that could not be opened. By default nothing. Collective.
   subroutine output_finish(self, error)

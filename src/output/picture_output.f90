@@ -25,6 +25,7 @@ module gravier_picture_output
     logical :: facets_due = .false.
   contains
     procedure, nopass :: wanted => picture_output_wanted
+    procedure, nopass :: files => picture_output_files
     procedure :: open => picture_output_open
     procedure :: write => picture_output_write
     procedure :: finish => picture_output_finish
@@ -42,6 +43,15 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%vtk
   end function picture_output_wanted
+
+  pure function picture_output_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = bodies_name//","//contacts_name//","//facets_name
+  end function picture_output_files
 
   !> Create the files, or go on with those of a run that was interrupted. Collective.
   subroutine picture_output_open(self, simulation, directory, command, error)

@@ -17,6 +17,7 @@ module gravier_problem_output
     character(len=:), allocatable :: directory
   contains
     procedure, nopass :: wanted => problem_output_wanted
+    procedure, nopass :: files => problem_output_files
     procedure :: open => problem_output_open
     procedure :: write => problem_output_write
   end type problem_output_t
@@ -27,6 +28,21 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%fclib_step > 0
   end function problem_output_wanted
+
+  pure function problem_output_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    names = ""
+    if (config%output%fclib_step > 0) names = name_of(config%output%fclib_step)
+  end function problem_output_files
+
+  !> The file of a step.
+  pure function name_of(step) result(name)
+    integer, intent(in) :: step
+    character(len=:), allocatable :: name
+    name = "step_"//to_text(step)//".hdf5"
+  end function name_of
 
   subroutine problem_output_open(self, simulation, directory, command, error)
     class(problem_output_t), intent(inout) :: self
@@ -50,7 +66,7 @@ contains
 
     associate (unused => figures, unused_seconds => seconds)
     end associate
-    call write_problem(simulation, self%directory//"step_"//to_text(simulation%step)//".hdf5", error)
+    call write_problem(simulation, self%directory//name_of(simulation%step), error)
   end subroutine problem_output_write
 
 end module gravier_problem_output

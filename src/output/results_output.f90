@@ -26,6 +26,7 @@ module gravier_results_output
     type(results_file_t) :: file
   contains
     procedure, nopass :: wanted => results_output_wanted
+    procedure, nopass :: files => results_output_files
     procedure :: open => results_output_open
     procedure :: write => results_output_write
     procedure :: finish => results_output_finish
@@ -41,6 +42,15 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%every >= 0
   end function results_output_wanted
+
+  pure function results_output_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = "results.h5"
+  end function results_output_files
 
   subroutine results_output_open(self, simulation, directory, command, error)
     class(results_output_t), intent(inout) :: self

@@ -5,7 +5,7 @@ module gravier_run_output
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: start_timer, stop_timer, phase_output
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_output, only: after_solve, of_states, of_end
+  use gravier_output, only: after_solve, of_states, of_checkpoints, of_end
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
   private
@@ -95,6 +95,7 @@ contains
         if (.not. (all_due .or. item%schedule%due(simulation%step))) cycle
         ! contacts of bodies that sleep come back for whoever writes contacts
         if (any(stage == [after_solve, of_states, of_end])) call simulation%make_whole()
+        if (stage == of_checkpoints) call sync(self, error)
         call item%write(simulation, figures, seconds, error)
         item%last = simulation%step
         wrote = .true.
@@ -103,6 +104,18 @@ contains
     if (wrote) call self%comm%agree(error)
     call stop_timer(phase_output)
   end subroutine run_output_write
+
+  !> Bring the tables to the disk: a checkpoint goes on from their rows. Collective; errors are the same on all ranks.
+  subroutine sync(self, error)
+    class(run_output_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    do k = 1, size(self%output)
+      call self%output(k)%output%sync(error)
+    end do
+    call self%comm%agree(error)
+  end subroutine sync
 
   !> Write the last state and what belongs to the end, and close. Collective; errors are the same on all ranks.
   subroutine run_output_finish(self, simulation, keep_last, error)

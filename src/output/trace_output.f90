@@ -19,8 +19,10 @@ module gravier_trace_output
     logical :: has_error = .false.
   contains
     procedure, nopass :: wanted => trace_output_wanted
+    procedure, nopass :: files => trace_output_files
     procedure :: open => trace_output_open
     procedure :: write => trace_output_write
+    procedure :: sync => trace_output_sync
     procedure :: finish => trace_output_finish
   end type trace_output_t
 
@@ -30,6 +32,15 @@ contains
     type(config_t), intent(in) :: config
     wanted = config%output%trace
   end function trace_output_wanted
+
+  pure function trace_output_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = "trace.csv"
+  end function trace_output_files
 
   subroutine trace_output_open(self, simulation, directory, command, error)
     class(trace_output_t), intent(inout) :: self
@@ -72,6 +83,12 @@ contains
       end do
     end associate
   end subroutine trace_output_write
+
+  subroutine trace_output_sync(self, error)
+    class(trace_output_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%table%sync(error)
+  end subroutine trace_output_sync
 
   subroutine trace_output_finish(self, error)
     class(trace_output_t), intent(inout) :: self

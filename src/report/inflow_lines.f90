@@ -122,6 +122,8 @@ contains
       text = text//", *** "//to_text(grains)//" fewer than its rate owes: they found no place"
     else if (mass > 0.0_dp) then
       text = text//", *** "//to_text(mass, 3)//" kg less than its rate owes: grains found no place"
+    else if (insertion%is_complete()) then
+      text = text//", all that its bounds allow"
     else if (insertion%rate < huge(1.0_dp) .or. insertion%mass_rate < huge(1.0_dp)) then
       text = text//", all that its rate owes"
     end if

@@ -16,6 +16,8 @@ module gravier_run_summary
   !> phases that are named, the dearest first, and the least fraction that is [%]
   integer, parameter :: named = 4
   real(dp), parameter :: least_share = 3.0_dp
+  !> part of the paths of grains below which their shifts by projections are small
+  real(dp), parameter :: little = 0.01_dp
   !> contacts of rank 0 below which more ranks do not pay
   integer(i8), parameter :: contacts_a_rank = 5000
   !> velocity error over its scale that a looser goal may lead to
@@ -129,8 +131,14 @@ contains
       if (tally%worst_error > far_off .and. .not. (simulation%failed == 0 .and. is_doubtful(simulation))) text = text// &
         & trim(merge(", but", ";    ", simulation%failed == 0))//" velocities were wrong by up to "//plain(tally%worst_error)// &
         & " of U in "//to_text(tally%far_off)//" of "//steps
-      if (tally%mended_share() > often_mended) text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "// &
-        & steps//": the results are not those of the contact law"
+      if (tally%mended_share() > often_mended) then
+        text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "//steps
+        if (tally%shift < little*tally%path) then
+          text = text//", by "//to_text(100.0_dp*tally%shift/tally%path, 2)//" % of the paths of grains"
+        else
+          text = text//": the results are not those of the contact law"
+        end if
+      end if
       if (simulation%restarted) text = text//"; errors and overlaps are those since the restart"
     end associate
   end function verdict_text

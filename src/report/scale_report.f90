@@ -72,6 +72,8 @@ contains
     type(scene_scales_t), intent(in) :: scales
     character(len=:), allocatable, intent(out) :: text
     integer, intent(out) :: number
+    !> velocity that solves may be wrong by [m/s]
+    real(dp) :: error
     real(dp) :: g, a, most
 
     text = ""
@@ -91,6 +93,14 @@ contains
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
+      error = solver%accuracy*max(g*h, scales%load)
+      if (scales%gain > 0.0_dp .and. scales%gain < error .and. solver%criterion == "velocity_error") then
+        associate (boundary => simulation%decomposition%boundaries(scales%heaviest))
+          call warn("boundary '"//boundary%name//"': its load gives it "//figure(scales%gain)//" m/s in a step, less than the "// &
+            & "error of "//figure(error)//" m/s that solves may leave: forces under it may be wrong in single steps; a mass of "// &
+            & "at most "//figure(boundary%mass*scales%gain/error)//" kg would do")
+        end associate
+      end if
       ! error over speed of the wall = 2 tolerance a/I = 2 tolerance load/(rate d), measured
       if (scales%shear .and. scales%load > 0.0_dp .and. solver%criterion == "residual") then
         most = error_share*scales%rate*d/(2.0_dp*scales%load)

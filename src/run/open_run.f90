@@ -25,6 +25,7 @@ module gravier_open_run
   use gravier_accuracy_lines, only: goal_name
   use gravier_output, only: after_solve, of_each_step, of_states, of_checkpoints
   use gravier_run_output, only: run_output_t
+  use gravier_output_files, only: check_inputs, older_files
   use gravier_run_end, only: has_ended, end_line
   implicit none
   private
@@ -89,12 +90,14 @@ contains
     logical, intent(in), optional :: quiet
     type(config_t) :: config
     type(body_set_t), allocatable :: grains
+    character(len=:), allocatable :: older
 
     self%interruption%start = MPI_Wtime()
     call catch_signals()
     call reset_timers()
     call self%log%init(comm, quiet)
     call read_config(comm, path, config, error)
+    call check_inputs(comm, config, error)
     allocate (grains)
     if (.not. allocated(error)) call self%simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
@@ -105,8 +108,12 @@ contains
     if (.not. restart) call claim_directory(comm, config, command, self%lock, error)
     if (allocated(error)) return
     self%is_made = .true.
-    call write_beginning(self%simulation, self%log, restart, self%lock%unknown, error)
+    older = ""
+    if (comm%rank == 0 .and. .not. self%simulation%restarted) older = older_files(config)
+    ! files of an older run may be refused, before the log says anything
     call self%output%open(self%simulation, command, error)
+    if (allocated(error)) return
+    call write_beginning(self%simulation, self%log, restart, self%lock%unknown, older, error)
     if (allocated(error)) return
     self%is_open = .true.
     self%interruption%first_step = MPI_Wtime()
@@ -247,11 +254,13 @@ contains
   end subroutine conclude
 
   !> What the log begins with, and the file that it goes to. Collective.
-  subroutine write_beginning(simulation, log, restart, unlocked, error)
+  subroutine write_beginning(simulation, log, restart, unlocked, older, error)
     type(simulation_t), intent(inout) :: simulation
     type(run_log_t), intent(inout) :: log
     !> whether this was asked for; whether nothing keeps others out of the directory
     logical, intent(in) :: restart, unlocked
+    !> files of an older run, on rank 0; empty where there are none
+    character(len=*), intent(in) :: older
     type(error_t), allocatable, intent(inout) :: error
     type(scene_scales_t) :: scales
     character(len=:), allocatable :: directory
@@ -263,6 +272,8 @@ contains
     call log%write_scales(simulation, scales, .false., warnings, error)
     if (unlocked) call log%line("warning     the file system of "//directory// &
       & " keeps no locks: a second run there is not refused", error)
+    if (older /= "") call log%line("warning     "//directory//" holds files of an older run, which stay as they are: "// &
+      & older, error)
     if (restart) call log%write_restart(simulation, error)
     call log%write_head(error)
     call log%open(directory//"/run.log", simulation%restarted, error)

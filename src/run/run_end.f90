@@ -101,10 +101,11 @@ contains
 
   end function strain_reason
 
-  !> Whether the scene rests, in a run that ends by that.
+  !> Whether the scene rests and no grains are to enter, in a run that ends by that.
   pure logical function rests(simulation)
     type(simulation_t), intent(in) :: simulation
     rests = simulation%rest_energy > 0.0_dp .and. simulation%quiet >= steps_at_rest
+    if (rests) rests = .not. simulation%inflow%awaits(simulation%time)
   end function rests
 
   !> How far the boundary of stop_boundary is from its place at the start of the scene [m].

@@ -27,7 +27,7 @@ module gravier_scene
   use gravier_config_laws, only: density_of, collect_laws
   use gravier_run_memory, only: check_planned_grains, check_read_grains, check_entering_grains
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
-  use gravier_scene_boundaries, only: make_boundaries
+  use gravier_scene_boundaries, only: make_boundaries, check_pressures
   use gravier_scene_insertions, only: make_insertions, check_regions
   use gravier_scene_regions, only: check_mean_regions
   implicit none
@@ -105,6 +105,7 @@ contains
     do b = 1, size(scene%boundaries)
       scene%boundaries(b)%period(:) = scene%period%length
     end do
+    call check_pressures(config%file, config%scene%dimension, scene%period%length, scene%boundaries, error)
     call check_cell(config, scene%period, size(scene%boundaries), error)
     call check_regions(config, scene%insertions, scene%period, scene%boundaries, error)
     call check_mean_regions(config, scene%period, error)

@@ -8,12 +8,13 @@ module gravier_scene_boundaries
   use gravier_surface_registry, only: make_surface
   use gravier_mesh_file, only: read_mesh
   use gravier_boundary, only: boundary_t, drive_names
+  use gravier_facing_planes, only: faces_along, open_axis
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_config_surfaces, only: set_surface
   use gravier_config_laws, only: material_number
   implicit none
   private
-  public :: make_boundaries
+  public :: make_boundaries, check_pressures, check_pressed
 
 contains
 
@@ -115,6 +116,58 @@ contains
     end subroutine refuse
 
   end subroutine check_table
+
+  !> Refuse a pressure whose area is not known.
+  subroutine check_pressures(file, nd, period, boundaries, error)
+    !> of the case
+    character(len=*), intent(in) :: file
+    integer, intent(in) :: nd
+    !> 0 along axes that are not periodic [m]
+    real(dp), intent(in) :: period(:)
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: presses
+    integer :: b
+
+    do b = 1, size(boundaries)
+      if (allocated(error)) return
+      presses = abs(boundaries(b)%given_pressure) > 0.0_dp
+      if (allocated(boundaries(b)%table%has)) presses = presses .or. boundaries(b)%table%has(merge(6, 10, nd == 2))
+      if (.not. presses) cycle
+      call check_pressed(boundaries, b, nd, period, error)
+      if (allocated(error)) error%message = file//": "//error%message
+    end do
+  end subroutine check_pressures
+
+  !> Refuse a pressure on plane `b` whose area is not known: it is the distance of planes that face each other, or a period, along
+  !> each other axis.
+  subroutine check_pressed(boundaries, b, nd, period, error)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: b, nd
+    !> 0 along axes that are not periodic [m]
+    real(dp), intent(in) :: period(:)
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+    integer :: axis
+
+    axis = faces_along(boundaries(b))
+    if (axis == 0) then
+      call refuse("a plane whose normal lies along an axis")
+      return
+    end if
+    axis = open_axis(boundaries, nd, period, axis)
+    if (axis > 0) call refuse("two planes that face each other along "//axes(axis)//" in the whole run, or a period, because "// &
+      & "their distance gives the area; or `force` instead")
+
+  contains
+
+    subroutine refuse(expected)
+      character(len=*), intent(in) :: expected
+
+      call raise(error, status_input, "boundary '"//boundaries(b)%name//"': pressure: expected "//expected)
+    end subroutine refuse
+
+  end subroutine check_pressed
 
   subroutine set_boundary(config, nd, boundary)
     type(boundary_config_t), intent(in) :: config

@@ -28,6 +28,9 @@ module gravier_scene_scales
     integer :: pressed = 0
     !> what that pressure does to the mean grain in a step [m/s]
     real(dp) :: load = 0.0_dp
+    !> boundary that its largest load gives the least velocity in a step, and that [m/s]
+    integer :: heaviest = 0
+    real(dp) :: gain = 0.0_dp
     !> largest difference of imposed velocities [m/s], and the boundary that moves fastest then
     real(dp), private :: drive = 0.0_dp
     integer :: driver = 0
@@ -188,11 +191,14 @@ contains
     type(physics_t) :: physics
     type(imposed_motion_t) :: motion
     real(dp) :: area(size(simulation%decomposition%boundaries)), acceleration(3), pressure, speed
+    !> velocity that the largest load of a boundary gives it in a step [m/s]
+    real(dp) :: gain(size(simulation%decomposition%boundaries))
     integer :: k, b, d, nd
 
     nd = simulation%decomposition%nd
     boundaries(:) = simulation%decomposition%boundaries
     physics = simulation%physics
+    gain(:) = 0.0_dp
     call find_load_areas(simulation%decomposition, area)
     do k = 1, size(times)
       if (allocated(simulation%gravity_table%has)) then
@@ -211,6 +217,7 @@ contains
           self%pressure = pressure
           self%pressed = b
         end if
+        if (pressure > 0.0_dp) gain(b) = max(gain(b), simulation%physics%h*pressure*area(b)/boundaries(b)%mass)
         speed = imposed_speed(boundaries(b), simulation%velocity_scale%lever(b))
         if (speed > self%speed) then
           self%speed = speed
@@ -223,6 +230,10 @@ contains
         call find_rate(self, boundaries, simulation%velocity_scale%lever, extent)
       end if
     end do
+    if (any(gain > 0.0_dp)) then
+      self%heaviest = minloc(gain, dim=1, mask=gain > 0.0_dp)
+      self%gain = gain(self%heaviest)
+    end if
     self%load = simulation%physics%h*self%pressure*self%diameter**(nd - 1)/simulation%velocity_scale%mass
   end subroutine scan
 

@@ -80,6 +80,8 @@ module gravier_insertion
     procedure :: list_owed => insertion_list_owed
     procedure :: grains_behind => insertion_grains_behind
     procedure :: mass_behind => insertion_mass_behind
+    procedure :: is_complete => insertion_is_complete
+    procedure :: awaits => insertion_awaits
     procedure :: place => insertion_place
     procedure :: mean_mass => insertion_mean_mass
     procedure :: planned => insertion_planned
@@ -177,8 +179,10 @@ contains
     real(dp) :: owed
 
     behind = 0
-    if (.not. self%rate < huge(1.0_dp)) return
+    if (.not. self%rate < huge(1.0_dp) .or. self%is_complete()) return
     owed = min(self%rate*max(min(time, self%end) - self%start, 0.0_dp) + rounding, real(self%most_grains, dp))
+    ! the bound on the mass lets in about so many
+    if (self%most_mass < huge(1.0_dp)) owed = min(owed, self%entered + max(1.0_dp, (self%most_mass - self%mass)/self%mean_mass()))
     if (self%owes(self%entered, self%mass, 0.0_dp, time)) behind = int(owed, i8) - self%entered
   end function insertion_grains_behind
 
@@ -195,6 +199,30 @@ contains
     if (self%owes(self%entered, self%mass, next%mass, time)) behind = min(self%mass_rate*(min(time, self%end) - self%start), &
       & self%most_mass) - self%mass
   end function insertion_mass_behind
+
+  !> Whether as many grains have entered as its bounds allow.
+  pure logical function insertion_is_complete(self) result(is_complete)
+    class(insertion_t), intent(in) :: self
+    type(new_grain_t) :: next
+
+    is_complete = self%entered >= self%most_grains
+    if (is_complete .or. .not. self%most_mass < huge(1.0_dp)) return
+    next = self%grain(self%entered + 1)
+    is_complete = self%mass + (1.0_dp - rounding)*next%mass > self%most_mass
+  end function insertion_is_complete
+
+  !> Whether grains are to enter later: it has not begun, or its rate owes none now and will owe some. One that finds no places
+  !> awaits nothing.
+  pure logical function insertion_awaits(self, time) result(awaits)
+    class(insertion_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: time
+
+    awaits = time < self%end .and. .not. self%is_complete()
+    if (.not. awaits .or. time < self%start) return
+    awaits = min(self%rate, self%mass_rate) < huge(1.0_dp) .and. self%grains_behind(time) == 0 .and. &
+      & .not. self%mass_behind(time) > 0.0_dp
+  end function insertion_awaits
 
   !> A place for a grain, wholly in the region: all are as likely.
   pure subroutine insertion_place(self, candidate, radius, position)

@@ -34,6 +34,7 @@ module gravier_inflow
     procedure :: exists => inflow_exists
     procedure :: is_due => inflow_is_due
     procedure :: enter => inflow_enter
+    procedure :: awaits => inflow_awaits
     procedure :: entered => inflow_entered
     procedure :: mass => inflow_mass
     procedure :: get_state => inflow_get_state
@@ -62,6 +63,20 @@ contains
 
     due = self%exists() .or. self%given%n > 0
   end function inflow_is_due
+
+  !> Whether grains are to enter after a time.
+  pure logical function inflow_awaits(self, time) result(awaits)
+    class(inflow_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: time
+    integer :: k
+
+    awaits = self%given%n > 0
+    if (.not. self%exists()) return
+    do k = 1, size(self%insertions)
+      awaits = awaits .or. self%insertions(k)%awaits(time)
+    end do
+  end function inflow_awaits
 
   !> Grains that have entered so far.
   pure integer(i8) function inflow_entered(self) result(entered)

@@ -37,6 +37,7 @@ module gravier_csv_writer
     procedure, private :: add_real => csv_add_real
     procedure, private :: add_logical => csv_add_logical
     procedure :: end_row => csv_end_row
+    procedure :: sync => csv_sync
     procedure :: close => csv_close
     procedure :: is_open => csv_is_open
     procedure, private :: append_cell
@@ -62,9 +63,10 @@ contains
   end subroutine csv_open
 
   !> Go on with a table whose first column counts steps: keep its rows up to step `last_step`, without a last line that
-  !> has no end, and append to them. A table that is missing or died within its header is begun anew. What is kept
-  !> replaces the older file in one indivisible operation; after a failure that file is as it was. Failure: status_input
-  !> for another header, or a row that has not a step and numbers under the names, status_failure where the system refuses.
+  !> has no end, and append to them. Each step from that of the first row to `last_step` must have a row. A table that is missing or
+  !> died within its header is begun anew. What is kept replaces the older file in one indivisible operation; after a failure that
+  !> file is as it was. Failure: status_input for another header, or a row that has not a step and numbers under the names, or that
+  !> is missing; status_failure where the system refuses.
   subroutine csv_resume(self, path, header, last_step, error, options)
     class(csv_writer_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -113,6 +115,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(csv_option_t), intent(in), optional :: options(:)
     character(len=:), allocatable :: text, row
+    !> of the row before the present one
+    integer(i8) :: before
     integer(i8) :: position, length, step
     integer :: line, unit, first, last
 
@@ -129,6 +133,7 @@ contains
     position = len(text)
     if (position == len(first_line)) kept = position
     line = 2
+    before = -1
     row = ""
     rows: do while (position < length .and. .not. allocated(error))
       call read_text(path, unit, narrow(min(length - position, int(block_length, i8))), text, error)
@@ -139,7 +144,10 @@ contains
         last = first + last - 1
         row = row//text(first:last - 1)
         call check_row(path, line, n_columns, row, step, error)
+        if (.not. allocated(error) .and. before >= 0 .and. step > before + 1) call raise(error, status_input, path// &
+          & ": line "//to_text(line)//": step "//to_text(step)//", but rows of step "//to_text(before + 1)//" were expected")
         if (allocated(error) .or. step > last_step) exit rows
+        before = step
         kept = position + last
         line = line + 1
         row = ""
@@ -149,6 +157,9 @@ contains
       position = position + len(text)
     end do rows
     close (unit)
+    if (before >= 0 .and. before < last_step .and. .not. allocated(error)) call raise(error, status_input, path// &
+      & ": its last row is of step "//to_text(before)//", but rows up to step "//to_text(last_step)//" were expected; "// &
+      & "without this file a new table begins")
   end subroutine find_kept
 
   !> Say which column a header lacks or has beside those expected, and what option makes it.
@@ -388,6 +399,13 @@ contains
     self%row = ""
     self%n_cells = 0
   end subroutine csv_end_row
+
+  !> Bring the rows to the disk, so that a loss of power leaves them. Failure: status_failure, with the system's reason.
+  subroutine csv_sync(self, error)
+    class(csv_writer_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+    call self%file%sync(error)
+  end subroutine csv_sync
 
   !> Close; without effect on a table not open.
   subroutine csv_close(self, error)

@@ -6,8 +6,8 @@ module gravier_text_file
   use gravier_text, only: to_text
   use gravier_file_system, only: is_device, remove_file
   use gravier_own_files, only: part_of, give_name, note_own
-  use gravier_system_calls, only: c_close, c_creat, c_ftruncate, c_lseek, c_open, c_write, c_text, last_error, reason, o_wronly, &
-    & file_mode, seek_set, seek_end, eintr
+  use gravier_system_calls, only: c_close, c_creat, c_fsync, c_ftruncate, c_lseek, c_open, c_write, c_text, last_error, &
+    & reason, o_wronly, file_mode, seek_set, seek_end, eintr
   implicit none
   private
   public :: text_file_t
@@ -27,6 +27,7 @@ module gravier_text_file
     procedure :: show => text_file_show
     procedure :: continue => text_file_continue
     procedure :: append => text_file_append
+    procedure :: sync => text_file_sync
     procedure :: close => text_file_close
     procedure :: is_open => text_file_is_open
   end type text_file_t
@@ -131,6 +132,18 @@ contains
     end do
     self%length = self%length + done
   end subroutine text_file_append
+
+  !> Bring what was written to the disk. Without effect on a file not open, and on what has no room on a disk. Failure:
+  !> status_failure, with the system's reason.
+  subroutine text_file_sync(self, error)
+    class(text_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (self%descriptor < 0 .or. allocated(error)) return
+    if (is_device(self%path)) return
+    if (c_fsync(self%descriptor) /= 0) call raise(error, status_failure, self%path//": cannot bring this file to the disk: "// &
+      & reason(last_error()))
+  end subroutine text_file_sync
 
   !> Close; a failure that the system had kept to itself shows here. Without effect on a file not open.
   subroutine text_file_close(self, error)

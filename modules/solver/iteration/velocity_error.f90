@@ -191,7 +191,8 @@ contains
       & self%levels%mean_of_bodies/bodies_allowed)
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
-    if (self%is_early .and. self%is_restless) criterion = max(criterion, self%bound_by_rest/share_at_rest)
+    ! what is reported then is the bound by rest, which has to be within the error allowed, too
+    if (self%is_early) criterion = max(criterion, self%bound_by_rest/merge(share_at_rest, 1.0_dp, self%is_restless))
   end function velocity_error_criterion
 
   !> The share of the error allowed that E may have where nearly all bodies are at rest and some move: C is what moves there.

@@ -21,7 +21,7 @@ contains
   end function facing_area
 
   !> Area of the scene across axis `main`: along every other axis, the way between the two planes that face each other
-  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m.
+  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m: no pressure works there (check_pressed).
   pure real(dp) function area_across(decomposition, main) result(area)
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: main

@@ -1,6 +1,7 @@
 !> The contact problem of all bodies after a step that was solved without those that sleep: for diagnostics and files.
 module gravier_whole_problem
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
+  use gravier_sorting, only: argsort, find_sorted
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
@@ -20,7 +21,8 @@ module gravier_whole_problem
 
 contains
 
-  !> Build it from the views of the step, with the impulses that their pairs keep, and the velocities under these. Collective.
+  !> Build it from the views of the step, with the impulses that their pairs keep. Grains that were solved have the velocities of
+  !> the solve, and those that sleep none: the impulses that they keep balance their loads only about. Collective.
   subroutine build_whole(decomposition, halo, physics, solved, whole)
     type(decomposition_t), intent(in) :: decomposition
     !> comes back as it was
@@ -43,12 +45,32 @@ contains
     call recall_impulses(halo, whole)
     call whole%evaluate()
     do s = 1, size(halo%view)
+      call take_velocities(solved%sub(s), whole%sub(s))
       associate (view => halo%view(s))
         call move_alloc(aside(s)%wakes_at, view%bodies%wakes_at)
         call move_alloc(aside(s)%watched, view%list%watched)
       end associate
     end do
   end subroutine build_whole
+
+  !> Velocities of the grains of a subdomain as they were solved; 0 of those that were left out.
+  subroutine take_velocities(solved, whole)
+    type(subproblem_t), intent(in) :: solved
+    type(subproblem_t), intent(inout) :: whole
+    integer(i8), allocatable :: id(:)
+    integer, allocatable :: order(:)
+    integer :: b, k
+
+    allocate (order(solved%n_grains))
+    id = solved%id(1:solved%n_grains)
+    call argsort(id, order)
+    id(:) = id(order)
+    do b = 1, whole%n_grains
+      k = find_sorted(id, whole%id(b))
+      whole%v_global(:, b) = 0.0_dp
+      if (k > 0) whole%v_global(:, b) = solved%v_global(:, order(k))
+    end do
+  end subroutine take_velocities
 
   !> Let the problem of all bodies take the place of the one that was solved.
   subroutine take_whole(whole, problem, is_whole)

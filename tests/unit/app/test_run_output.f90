@@ -18,6 +18,7 @@ module own_outputs
   type, extends(output_t) :: state_output_t
   contains
     procedure, nopass :: wanted => state_wanted
+    procedure, nopass :: files => no_files
     procedure :: open => state_open
     procedure :: write => state_write
     procedure :: finish => state_finish
@@ -27,11 +28,21 @@ module own_outputs
   type, extends(output_t) :: last_output_t
   contains
     procedure, nopass :: wanted => last_wanted
+    procedure, nopass :: files => no_files
     procedure :: open => last_open
     procedure :: write => last_write
   end type last_output_t
 
 contains
+
+  pure function no_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    associate (unused => config)
+    end associate
+    names = ""
+  end function no_files
 
   pure logical function state_wanted(config) result(wanted)
     type(config_t), intent(in) :: config

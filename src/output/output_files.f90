@@ -1,0 +1,104 @@
+!> The files that a run has in its output directory, before it begins: none of them may be one that it reads, and those of an older
+!> run that it does not replace are named in the log.
+module gravier_output_files
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_communicator, only: communicator_t
+  use gravier_file_system, only: place_of, place_t
+  use gravier_config_types, only: config_t
+  use gravier_output_registry, only: output_holder_t, registered_outputs
+  implicit none
+  private
+  public :: check_inputs, older_files
+
+  !> of every run
+  character(len=*), parameter :: log_name = "run.log"
+
+contains
+
+  !> Refuse an input that the run would replace by an output. Rank 0 looks. Failure: status_input, with the key. Collective.
+  subroutine check_inputs(comm, config, error)
+    type(communicator_t), intent(in) :: comm
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: names
+    integer :: b
+
+    if (allocated(error)) return
+    if (comm%rank == 0) then
+      names = file_names(config, wanted=.true.)
+      call check_input(config%file, "the case itself")
+      if (config%scene%bodies == "file") call check_input(config%scene%bodies_file, "&scene bodies_file")
+      call check_input(config%scene%shapes, "&scene shapes")
+      call check_input(config%scene%gravity_table, "&scene gravity_table")
+      do b = 1, size(config%boundaries)
+        call check_input(config%boundaries(b)%table, "&boundary '"//trim(config%boundaries(b)%name)//"' table")
+        call check_input(config%boundaries(b)%file, "&boundary '"//trim(config%boundaries(b)%name)//"' file")
+      end do
+      do b = 1, size(config%insertions)
+        call check_input(config%insertions(b)%radius_table, "&insertion '"//trim(config%insertions(b)%name)//"' radius_table")
+      end do
+    end if
+    call comm%agree(error)
+
+  contains
+
+    subroutine check_input(path, key)
+      character(len=*), intent(in) :: path, key
+      type(place_t) :: place
+      integer :: first, last
+
+      if (path == "" .or. allocated(error)) return
+      place = place_of(trim(path))
+      if (.not. place%is_there()) return
+      first = 1
+      do while (first <= len(names))
+        last = first + index(names(first:)//",", ",") - 2
+        if (place_of(trim(config%output%directory)//"/"//names(first:last)) == place) call raise(error, status_input, &
+          & config%file//": "//key//" = '"//trim(path)//"': this run would replace the file by its own "//names(first:last)// &
+          & "; expected a copy in another place, or another `directory` of &output")
+        first = last + 2
+      end do
+    end subroutine check_input
+
+  end subroutine check_inputs
+
+  !> Names of files that an older run has left in the output directory and that this one does not replace, with commas between.
+  function older_files(config) result(found)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: found
+    character(len=:), allocatable :: names
+    integer :: first, last
+    logical :: exists
+
+    found = ""
+    names = file_names(config, wanted=.false.)
+    first = 1
+    do while (first <= len(names))
+      last = first + index(names(first:)//",", ",") - 2
+      inquire (file=trim(config%output%directory)//"/"//names(first:last), exist=exists)
+      if (exists) found = found//", "//names(first:last)
+      first = last + 2
+    end do
+    found = found(3:)
+  end function older_files
+
+  !> Names of the files of the outputs that the input wants, or does not want, with commas between.
+  function file_names(config, wanted) result(names)
+    type(config_t), intent(in) :: config
+    logical, intent(in) :: wanted
+    character(len=:), allocatable :: names
+    type(output_holder_t), allocatable :: all_kinds(:)
+    integer :: k
+
+    names = ""
+    if (wanted) names = log_name
+    call registered_outputs(all_kinds)
+    do k = 1, size(all_kinds)
+      associate (item => all_kinds(k)%output)
+        if ((item%wanted(config) .eqv. wanted) .and. item%files(config) /= "") names = names//","//item%files(config)
+      end associate
+    end do
+    if (.not. wanted) names = names(2:)
+  end function file_names
+
+end module gravier_output_files
