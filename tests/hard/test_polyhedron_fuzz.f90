@@ -7,7 +7,8 @@ program test_polyhedron_fuzz
   use gravier_check, only: check, check_close, finish_checks
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, place_a, place_b
   use gravier_convex_piece, only: convex_piece_t
-  use gravier_fuzz_pairs, only: fuzz_library_t, make_library, draw_pair, families, family_names, parallel_faces
+  use gravier_fuzz_pairs, only: fuzz_library_t, make_library, draw_pair, families, family_names, parallel_faces, &
+    & parallel_edges
   use gravier_hull_oracle, only: find_hull_distance, qp
   use gravier_manifold, only: manifold_t, most_points
   use gravier_polyhedra, only: draws_t, vector_t
@@ -98,6 +99,7 @@ contains
     if (manifold%n > 0) found%contacts = found%contacts + 1
     call examine(a%piece(1), b%piece(1), pair, core, alert, manifold, name)
     if (family == parallel_faces .and. .not. core%overlap) call find_missing(a, b, pair, core, name)
+    if (family == parallel_edges .and. .not. core%overlap) call find_single(a%piece(1), b%piece(1), pair, core, name)
   end subroutine try_pair
 
   !> Proof by duality: the points are in the hulls of the cores, so that the distance is not above theirs; a slab across the normal
@@ -254,6 +256,29 @@ contains
     end do
     tally(parallel_faces)%points = tally(parallel_faces)%points + manifold%n
   end subroutine find_missing
+
+  !> Prisms whose edges along the third axis are nearest to each other, or such an edge and a side, touch all along the common
+  !> stretch of both: a point at each of its ends, at least.
+  subroutine find_single(a, b, pair, core, name)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    type(core_distance_t), intent(in) :: core
+    character(len=*), intent(in) :: name
+    type(manifold_t) :: manifold
+    real(dp) :: low, high
+
+    if (abs(core%normal(3)) > exact) return
+    low = max(pair%radius_a*minval(a%vertex(3, :)), pair%way(3) + pair%radius_b*minval(b%vertex(3, :)))
+    high = min(pair%radius_a*maxval(a%vertex(3, :)), pair%way(3) + pair%radius_b*maxval(b%vertex(3, :)))
+    if (high - low < 1.0e-3_dp) return
+    call find_polyhedron_manifold(a, b, pair, core%distance + 1.0_dp, most_points, manifold)
+    call expect(manifold%n >= 2, name, "edges side by side with a single point")
+    if (manifold%n < 2) return
+    associate (along => manifold%point(3, 1:manifold%n))
+      ! both ends are there, but for their blending
+      call expect(maxval(along) - minval(along) >= high - low - exact, name, "edges side by side without a point at one end")
+    end associate
+  end subroutine find_single
 
   !> Sides of a prism's faces across the third axis as lines n . x = d.
   subroutine add_lines(piece, radius, placed, pair, line, n)

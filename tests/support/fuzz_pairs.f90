@@ -9,12 +9,12 @@ module gravier_fuzz_pairs
   use gravier_shape_library, only: body_shape_t
   implicit none
   private
-  public :: fuzz_library_t, make_library, draw_pair, families, family_names, parallel_faces
+  public :: fuzz_library_t, make_library, draw_pair, families, family_names, parallel_faces, parallel_edges
 
   integer, parameter :: families = 7
   character(len=*), parameter :: family_names(families) = [character(len=24) :: "random hulls", "parallel faces", &
     & "parallel edges", "corner on corner", "slivers", "faces nearly parallel", "far from the origin"]
-  integer, parameter :: parallel_faces = 2
+  integer, parameter :: parallel_faces = 2, parallel_edges = 3
   integer, parameter :: n_hulls = 60, n_prisms = 30, n_slivers = 30
   !> sides of a prism at most
   integer, parameter :: most_sides = 8

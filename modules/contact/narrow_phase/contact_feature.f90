@@ -5,7 +5,7 @@ module gravier_contact_feature
   implicit none
   private
   public :: placement_t, feature_t, frame_t
-  public :: find_feature, lay_out_feature, edge_number, face_number, place_vertex, turn_back
+  public :: find_feature, lay_out_feature, edge_number, face_number, turn_back
 
   !> Where a piece is: its lengths times a radius, its axes as columns, its centre [m].
   type :: placement_t
@@ -59,11 +59,12 @@ contains
     integer, intent(in) :: known(:)
     type(feature_t), intent(out) :: feature
     real(dp) :: greatest, found
-    integer :: f
+    integer :: f, k
 
     feature%vertex = known(1)
     greatest = least_cosine
-    do f = 1, size(piece%face_normal, 2)
+    do k = piece%vertex_face_first(known(1)), piece%vertex_face_first(known(1) + 1) - 1
+      f = piece%vertex_face(k)
       found = along(1)*piece%face_normal(1, f) + along(2)*piece%face_normal(2, f) + along(3)*piece%face_normal(3, f)
       if (found <= greatest) cycle
       if (.not. has_all(piece, f, known)) cycle
@@ -104,17 +105,15 @@ contains
     type(convex_piece_t), intent(in) :: piece
     integer, intent(in) :: f, known(:)
     integer :: k, i
-    logical :: found
 
-    has_all = .false.
-    do i = 1, size(known)
-      found = .false.
-      do k = piece%face_first(f), piece%face_first(f + 1) - 1
-        found = found .or. piece%face_vertex(k) == known(i)
-      end do
-      if (.not. found) return
-    end do
     has_all = .true.
+    do i = 1, size(known)
+      has_all = .false.
+      do k = piece%vertex_face_first(known(i)), piece%vertex_face_first(known(i) + 1) - 1
+        if (piece%vertex_face(k) == f) has_all = .true.
+      end do
+      if (.not. has_all) return
+    end do
   end function has_all
 
   !> Sine of the angle between a side and the plane across a unit vector; 0 for a side without length.
@@ -277,15 +276,6 @@ contains
     integer, intent(in) :: f
     face_number = size(piece%vertex, 2) + size(piece%neighbour) + f - 1
   end function face_number
-
-  !> Where a vertex is [m].
-  pure subroutine place_vertex(piece, at, v, x)
-    type(convex_piece_t), intent(in) :: piece
-    type(placement_t), intent(in) :: at
-    integer, intent(in) :: v
-    real(dp), intent(out) :: x(3)
-    call place_point(at, piece%vertex(:, v), x)
-  end subroutine place_vertex
 
   !> Where a point of a piece is [m].
   pure subroutine place_point(at, point, x)

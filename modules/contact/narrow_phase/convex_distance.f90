@@ -6,12 +6,12 @@
 !> the lowest of them.
 module gravier_convex_distance
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t, sector_of
+  use gravier_convex_piece, only: convex_piece_t, find_support
   use gravier_nearest_simplex, only: find_nearest
   implicit none
   private
   public :: placed_pair_t, core_distance_t
-  public :: find_core_distance, find_support, support_a, support_b, place_a, place_b
+  public :: find_core_distance, support_a, support_b, place_a, place_b
 
   !> Two pieces, where they are.
   type :: placed_pair_t
@@ -63,7 +63,7 @@ contains
     type(core_distance_t), intent(out) :: found
     real(dp) :: w(3, 4), x(3, 4), y(3), v(3), u(3), share(4), squared, along, size_squared
     integer :: i, j, n, back
-    logical :: walk, done
+    logical :: done
 
     v(:) = -pair%way
     if (.not. dot_product(v, v) > 0.0_dp) v(3) = 1.0_dp
@@ -73,22 +73,18 @@ contains
     along = 0.0_dp
     back = 0
     done = .false.
-    walk = allocated(a%start) .or. allocated(b%start)
     do while (found%steps < most_steps)
       found%steps = found%steps + 1
-      call support_a(a, v, walk, i)
-      call support_b(b, pair, v, walk, j)
+      call support_a(a, v, i)
+      call support_b(b, pair, v, j)
       call place_a(a, pair, i, x(:, n + 1))
       call place_b(b, pair, j, y)
       w(:, n + 1) = x(:, n + 1) - y
       along = dot_product(v, w(:, n + 1))
       ! the difference that is farthest along -v bounds the distance from below
       if (along > 0.0_dp .and. along*along > min(beyond, endless)**2*dot_product(v, v)) then
-        found%beyond = .not. walk
-        if (found%beyond) return
-        ! a walk may have ended early, so that its bound is none: all vertices have the last word
-        walk = .false.
-        cycle
+        found%beyond = .true.
+        return
       end if
       size_squared = max(size_squared, dot_product(w(:, n + 1), w(:, n + 1)))
       done = is_known(found, n, i, j)
@@ -99,12 +95,7 @@ contains
         if (n > 0 .and. dot_product(u, u) >= squared) back = back + 1
         done = .not. share(n + 1) > 0.0_dp .or. back > most_back
       end if
-      if (done) then
-        ! the same holds for the end of the search
-        if (.not. walk) exit
-        walk = .false.
-        cycle
-      end if
+      if (done) exit
       n = n + 1
       found%vertex_a(n) = i
       found%vertex_b(n) = j
@@ -242,24 +233,21 @@ contains
   end subroutine settle_shares
 
   !> The vertex of a that is farthest along -v.
-  pure subroutine support_a(a, v, walk, i)
+  pure subroutine support_a(a, v, i)
     type(convex_piece_t), intent(in) :: a
     real(dp), intent(in) :: v(3)
-    !> whether a search along edges will do
-    logical, intent(in) :: walk
     integer, intent(out) :: i
     real(dp) :: along(3)
 
     along(:) = -v
-    call find_support(a, along, walk, i)
+    call find_support(a, along, i)
   end subroutine support_a
 
   !> The vertex of b that is farthest along v.
-  pure subroutine support_b(b, pair, v, walk, j)
+  pure subroutine support_b(b, pair, v, j)
     type(convex_piece_t), intent(in) :: b
     type(placed_pair_t), intent(in) :: pair
     real(dp), intent(in) :: v(3)
-    logical, intent(in) :: walk
     integer, intent(out) :: j
     real(dp) :: along(3)
     integer :: k
@@ -267,47 +255,8 @@ contains
     do k = 1, 3
       along(k) = pair%rotation(1, k)*v(1) + pair%rotation(2, k)*v(2) + pair%rotation(3, k)*v(3)
     end do
-    call find_support(b, along, walk, j)
+    call find_support(b, along, j)
   end subroutine support_b
-
-  !> The vertex that is farthest along a direction, the lowest of those equally far. In a piece of many vertices a walk goes along
-  !> edges that lead farther, from the farthest vertex along a direction nearby; it may end a rounding too early.
-  pure subroutine find_support(piece, along, walk, best)
-    type(convex_piece_t), intent(in) :: piece
-    real(dp), intent(in) :: along(3)
-    logical, intent(in) :: walk
-    integer, intent(out) :: best
-    real(dp) :: farthest, reach
-    integer :: k, from
-
-    if (.not. walk .or. .not. allocated(piece%start)) then
-      best = 1
-      farthest = along(1)*piece%vertex(1, 1) + along(2)*piece%vertex(2, 1) + along(3)*piece%vertex(3, 1)
-      do k = 2, size(piece%vertex, 2)
-        reach = along(1)*piece%vertex(1, k) + along(2)*piece%vertex(2, k) + along(3)*piece%vertex(3, k)
-        if (reach > farthest) then
-          farthest = reach
-          best = k
-        end if
-      end do
-      return
-    end if
-    best = piece%start(sector_of(along))
-    farthest = along(1)*piece%vertex(1, best) + along(2)*piece%vertex(2, best) + along(3)*piece%vertex(3, best)
-    do
-      from = best
-      do k = piece%neighbour_first(from), piece%neighbour_first(from + 1) - 1
-        associate (x => piece%vertex(:, piece%neighbour(k)))
-          reach = along(1)*x(1) + along(2)*x(2) + along(3)*x(3)
-        end associate
-        if (reach > farthest) then
-          farthest = reach
-          best = piece%neighbour(k)
-        end if
-      end do
-      if (best == from) return
-    end do
-  end subroutine find_support
 
   !> Vertex i of a in the axes of a [m].
   pure subroutine place_a(a, pair, i, x)

@@ -65,20 +65,13 @@ contains
     type(core_distance_t), intent(inout) :: found
     real(dp) :: x(3), y(3), separation
     integer :: i, j
-    logical :: walk
 
-    ! walks are fast and bound the separation from above; all vertices tell it
-    walk = .true.
-    do
-      call support_a(a, n, walk, i)
-      call support_b(b, pair, n, walk, j)
-      call place_a(a, pair, i, x)
-      call place_b(b, pair, j, y)
-      separation = dot_product(n, x) - dot_product(n, y)
-      if (.not. separation > found%distance + better*(pair%radius_a + pair%radius_b)) return
-      if (.not. walk) exit
-      walk = .false.
-    end do
+    call support_a(a, n, i)
+    call support_b(b, pair, n, j)
+    call place_a(a, pair, i, x)
+    call place_b(b, pair, j, y)
+    separation = dot_product(n, x) - dot_product(n, y)
+    if (.not. separation > found%distance + better*(pair%radius_a + pair%radius_b)) return
     found%distance = separation
     found%normal(:) = n
     ! half-way between the two vertices, across the axis

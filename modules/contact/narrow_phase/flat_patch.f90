@@ -2,12 +2,12 @@
 module gravier_flat_patch
   use gravier_kinds, only: dp
   use gravier_facet, only: find_facet_normal
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, list_faces
   use gravier_convex_distance, only: placed_pair_t, core_distance_t
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature
   use gravier_contact_patch, only: patch_point_t, add_point, fill_manifold
   use gravier_face_patch, only: add_face_points
-  use gravier_polyhedron_pair, only: make_frame, needs_exact, largest_face, number_of, same_gap
+  use gravier_polyhedron_pair, only: make_frame, needs_exact, number_of, same_gap
   use gravier_manifold, only: manifold_t, feature_base
   implicit none
   private
@@ -31,6 +31,7 @@ contains
     sheet%face_vertex = [1, 2, 3, 3, 2, 1]
     sheet%neighbour_first = [1, 3, 5, 7]
     sheet%neighbour = [2, 3, 1, 3, 1, 2]
+    call list_faces(sheet)
   end subroutine make_facet_piece
 
   !> Make the piece the facet of three corners.
@@ -78,7 +79,7 @@ contains
     type(placement_t) :: at
     type(feature_t) :: feature_a, feature_b, nearest_b
     type(frame_t) :: frame
-    type(patch_point_t) :: part(2*largest_face(a) + 8), point(4*largest_face(a) + 64), exact
+    type(patch_point_t) :: part(2*a%largest_face + 8), point(4*a%largest_face + 64), exact
     real(dp) :: along(3)
     integer :: n, m, f, k
 

@@ -5,6 +5,10 @@ module gravier_polygon_clip
   private
   public :: clip_polygon, room_for_clip
 
+  !> a corner that is beyond a side by less than this part of the size of the polygon lies on it: where two edges are parallel and
+  !> nearest to each other, they lie on one line, seen along the normal, and rounding is not to put one beside the other
+  real(dp), parameter :: on_side = 1.0e-13_dp
+
 contains
 
   !> Corners that the common part of polygons of n and m corners can have, and some more for polygons that rounding bends.
@@ -13,7 +17,8 @@ contains
     room_for_clip = 2*(n + m)
   end function room_for_clip
 
-  !> Clip a polygon, or a segment as a polygon of two corners, against a convex one.
+  !> Clip a polygon, or a segment as a polygon of two corners, against a convex one. What lies on a side of it, but for rounding, is
+  !> common to both.
   pure subroutine clip_polygon(subject, clip, sense, n, place, label)
     !> corners in turn, first and second coordinate in the first two rows (3, corners)
     real(dp), intent(in) :: subject(:, :), clip(:, :)
@@ -25,9 +30,11 @@ contains
     real(dp), intent(out) :: place(:, :)
     !> whose side leads from a corner to the next: k that of the subject from its corner k on, -k that of `clip` (room)
     integer, intent(out) :: label(:)
-    real(dp) :: way(2), height(size(label)), old(2, size(label)), part
+    real(dp) :: way(2), height(size(label)), old(2, size(label)), part, room
     integer :: old_label(size(label)), s, k, next, m
+    logical :: within(size(label))
 
+    room = on_side*maxval(abs(clip(1:2, :)))
     n = size(subject, 2)
     do k = 1, n
       place(:, k) = subject(1:2, k)
@@ -40,7 +47,8 @@ contains
       m = 0
       do k = 1, n
         height(k) = way(1)*(place(2, k) - clip(2, s)) - way(2)*(place(1, k) - clip(1, s))
-        if (height(k) >= 0.0_dp) m = m + 1
+        within(k) = height(k) >= -room*(abs(way(1)) + abs(way(2)))
+        if (within(k)) m = m + 1
       end do
       if (m == n) cycle
       if (m == 0) then
@@ -52,11 +60,11 @@ contains
       m = 0
       do k = 1, n
         next = merge(1, k + 1, k == n)
-        if (height(k) >= 0.0_dp) call put(old(:, k), old_label(k), m, place, label)
-        if ((height(k) >= 0.0_dp) .eqv. (height(next) >= 0.0_dp)) cycle
-        part = height(k)/(height(k) - height(next))
+        if (within(k)) call put(old(:, k), old_label(k), m, place, label)
+        if (within(k) .eqv. within(next)) cycle
+        part = min(max(height(k)/(height(k) - height(next)), 0.0_dp), 1.0_dp)
         way(:) = old(:, k) + part*(old(:, next) - old(:, k))
-        call put(way, merge(-s, old_label(k), height(k) >= 0.0_dp), m, place, label)
+        call put(way, merge(-s, old_label(k), within(k)), m, place, label)
       end do
       n = m
     end do

@@ -5,11 +5,11 @@
 !> Neither face is the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
 module gravier_polyhedron_pair
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t
-  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, find_support
+  use gravier_convex_piece, only: convex_piece_t, find_support
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
   use gravier_core_overlap, only: find_least_separation
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, lay_out_feature, edge_number, face_number, &
-    & place_vertex, turn_back
+    & turn_back
   use gravier_contact_patch, only: patch_point_t, add_point, fill_manifold
   use gravier_edge_patch, only: add_edge_points
   use gravier_face_patch, only: add_face_points
@@ -17,7 +17,7 @@ module gravier_polyhedron_pair
   implicit none
   private
   public :: find_polyhedron_manifold, find_halfspace_manifold, find_patch
-  public :: make_frame, needs_exact, largest_face, number_of, same_gap
+  public :: make_frame, needs_exact, number_of, same_gap
 
   real(dp), parameter :: unturned(3, 3) = reshape([1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 1.0_dp], [3, 3])
   real(dp), parameter :: origin(3) = 0.0_dp
@@ -67,7 +67,7 @@ contains
     type(placement_t) :: at_b
     type(feature_t) :: feature_a, feature_b
     type(frame_t) :: frame
-    type(patch_point_t) :: point(2*(largest_face(a) + largest_face(b)) + 1), exact
+    type(patch_point_t) :: point(2*(a%largest_face + b%largest_face) + 1), exact
     real(dp) :: along(3), rounding(2)
     integer :: n
 
@@ -113,17 +113,6 @@ contains
       needs_exact = needs_exact .and. gap < point(k)%gap - deeper*reach
     end do
   end function needs_exact
-
-  !> Corners of the largest face of a piece, at least 2.
-  pure integer function largest_face(piece)
-    type(convex_piece_t), intent(in) :: piece
-    integer :: f
-
-    largest_face = 2
-    do f = 1, size(piece%face_first) - 1
-      largest_face = max(largest_face, piece%face_first(f + 1) - piece%face_first(f))
-    end do
-  end function largest_face
 
   !> Number of a feature among those of a piece.
   pure integer function number_of(piece, feature)
@@ -183,9 +172,9 @@ contains
     type(placement_t) :: at
     type(feature_t) :: feature
     type(frame_t) :: frame
-    type(patch_point_t) :: point(largest_face(a) + size(a%vertex, 2))
-    integer :: vertex(largest_face(a)), n, m, k, lowest(1)
-    real(dp) :: place(3, largest_face(a)), along(3), x(3), corner(3)
+    type(patch_point_t) :: point(a%largest_face + size(a%vertex, 2))
+    integer :: vertex(a%largest_face), n, m, k, lowest(1)
+    real(dp) :: place(3, a%largest_face), along(3), x(3), corner(3)
 
     manifold%n = 0
     manifold%cores_overlap = .false.
@@ -196,7 +185,7 @@ contains
     frame%normal(:) = normal
     call find_tangents(frame)
     along(:) = -normal
-    call find_support(a, along, .false., lowest(1))
+    call find_support(a, along, lowest(1))
     call find_feature(a, along, lowest, feature)
     feature%at = at
     if (feature%n > 1) then
@@ -206,11 +195,13 @@ contains
     end if
     n = 0
     do k = 1, size(a%vertex, 2)
+      x(:) = radius*a%vertex(:, k)
+      corner(3) = dot_product(x, normal)
+      ! most vertices are far from the plane
+      if (.not. corner(3) + distance - radius*a%rounding < alert) cycle
       if (any(vertex(1:m) == k)) cycle
-      call place_vertex(a, at, k, x)
       corner(1) = dot_product(x, frame%first)
       corner(2) = dot_product(x, frame%second)
-      corner(3) = dot_product(x, normal)
       call add_point(point_of(k, corner), alert, radius, n, point)
     end do
     do k = 1, m

@@ -1,7 +1,7 @@
 !> The points in which two bodies touch, or a body and a boundary, where bodies have shapes.
 module gravier_shape_contacts
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, list_faces
   use gravier_convex_distance, only: placed_pair_t
   use gravier_shape_library, only: shape_library_t, of_face
   use gravier_boundary, only: boundary_t
@@ -46,6 +46,7 @@ contains
     allocate (self%ball%vertex(nd, 1), self%ball%corner(nd, 1), source=0.0_dp)
     allocate (self%ball%face_first(1), self%ball%neighbour_first(2), source=1)
     allocate (self%ball%face_vertex(0), self%ball%neighbour(0), self%ball%face_normal(3, 0))
+    call list_faces(self%ball)
   end subroutine shape_work_init
 
   !> The points of pair `p` of a view whose gap is at most the alert distance; at most as many as the pair has places in the list,
@@ -364,6 +365,7 @@ contains
     sheet%face_vertex = [1, 2, 3, 4, 4, 3, 2, 1]
     sheet%neighbour_first = [1, 3, 5, 7, 9]
     sheet%neighbour = [2, 4, 1, 3, 2, 4, 1, 3]
+    call list_faces(sheet)
     allocate (sheet%face_normal(3, 2))
     sheet%face_normal(1, 1) = across(2, 3)
     sheet%face_normal(2, 1) = across(3, 1)

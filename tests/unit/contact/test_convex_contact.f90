@@ -1,11 +1,12 @@
 !> What contacts of convex pieces are made of: nearest points of simplices, distances of cores, polygons cut out of each
 !> other, and the points of edges and faces that lie on each other.
 program test_convex_contact
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_convex_piece, only: convex_piece_t, sector_of
+  use gravier_convex_piece, only: convex_piece_t, find_support, number_of_sectors
   use gravier_nearest_simplex, only: find_nearest
-  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, find_support, support_a, support_b, &
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, support_a, support_b, &
     & place_a, place_b
   use gravier_polygon_clip, only: clip_polygon, room_for_clip
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, edge_number
@@ -26,8 +27,7 @@ program test_convex_contact
   call test_simplices()
   call test_random_simplices()
   call test_support()
-  call test_walk()
-  call test_sectors()
+  call test_candidates()
   call test_distance()
   call test_turned_distance()
   call test_needle()
@@ -118,7 +118,7 @@ contains
     type(vector_t) :: along
     type(placed_pair_t) :: pair
     real(dp) :: x(3), y(3), against(3)
-    integer :: best, walked, trial, d
+    integer :: best, other, trial, d
     logical :: farthest, same
 
     farthest = .true.
@@ -126,16 +126,14 @@ contains
     call put_pair(box, box, [3.0_dp, 1.0_dp, -2.0_dp], random_turn(draws), pair)
     do trial = 1, 200
       along = draws%direction()
-      call find_support(box%piece(1), along%x, .false., best)
+      call find_support(box%piece(1), along%x, best)
       do d = 1, 3
         farthest = farthest .and. box%piece(1)%vertex(d, best)*along%x(d) > 0.0_dp
       end do
-      call find_support(box%piece(1), along%x, .true., walked)
-      same = same .and. walked == best
       against(:) = -along%x
-      call support_a(box%piece(1), against, .false., walked)
-      same = same .and. walked == best
-      call support_b(box%piece(1), pair, along%x, .false., best)
+      call support_a(box%piece(1), against, other)
+      same = same .and. other == best
+      call support_b(box%piece(1), pair, along%x, best)
       call place_b(box%piece(1), pair, best, y)
       farthest = farthest .and. dot_product(along%x, y - pair%way) > 0.0_dp
       do d = 1, 8
@@ -144,75 +142,96 @@ contains
       end do
     end do
     call check(farthest, "the vertex farthest along a direction")
-    call check(same, "a piece of few vertices knows no walk")
+    call check(same, "the vertex of the first piece that is farthest against a direction")
     call place_a(box%piece(1), pair, 1, x)
     call check_close(norm2(x), sqrt(3.0_dp)*half, tight, "the corner of a core is where it was made")
   end subroutine test_support
 
-  !> In a stone of many vertices a walk along edges ends at the farthest vertex, but for rounding.
-  subroutine test_walk()
+  !> The farthest vertex of a stone, of a flake and of a cube is the lowest of those that are farthest of all: along any direction,
+  !> along the borders of sectors, and along normals of faces, where all corners of a face are equally far but for rounding.
+  subroutine test_candidates()
+    type(draws_t) :: draws
+    type(vector_t) :: along
+    type(convex_piece_t) :: piece
+    integer :: trial, k, wrong(3)
+
+    wrong(:) = 0
+    do trial = 1, 20000
+      along = draws%direction()
+      call count_wrong(along%x, wrong(1))
+      do k = 1, 3
+        along%x(k) = nint(12*along%x(k))/12.0_dp
+      end do
+      call count_wrong(along%x, wrong(2))
+    end do
+    piece = stone(0.5_dp)
+    do k = 1, size(piece%face_normal, 2)
+      call count_wrong(piece%face_normal(:, k), wrong(3))
+    end do
+    call check(allocated(piece%candidate), "a piece of some vertices has candidates")
+    call check(size(piece%candidate) < size(piece%vertex, 2)*number_of_sectors/8, "and few of them in each sector")
+    call check(.not. allocated(rod%piece(1)%candidate), "a rod has none")
+    call check_equal(wrong(1), 0, "the farthest vertex along any direction")
+    call check_equal(wrong(2), 0, "the farthest vertex along the borders of sectors")
+    call check_equal(wrong(3), 0, "the farthest vertex along normals of faces")
+    along%x(:) = 0.0_dp
+    call find_support(piece, along%x, k)
+    call check(k >= 1 .and. k <= size(piece%vertex, 2), "a vector without length has a vertex")
+    along%x(:) = ieee_value(1.0_dp, ieee_quiet_nan)
+    call find_support(piece, along%x, k)
+    call check(k >= 1 .and. k <= size(piece%vertex, 2), "and what is no number has one")
+  end subroutine test_candidates
+
+  !> The piece of a stone of 60 corners, as thick as told.
+  function stone(thickness) result(piece)
+    real(dp), intent(in) :: thickness
+    type(convex_piece_t) :: piece
     integer, parameter :: corners = 60
     type(draws_t) :: draws
     type(vector_t) :: along
-    type(body_shape_t) :: stone
+    type(body_shape_t) :: shape
     type(error_t), allocatable :: error
     real(dp) :: point(3, corners)
-    integer :: best, walked, trial, k
-    logical :: same
+    integer :: k
 
     do k = 1, corners
       along = draws%direction()
-      point(:, k) = along%x*[1.0_dp, 0.8_dp, 0.5_dp]
+      point(1, k) = along%x(1)
+      point(2, k) = 0.8_dp*along%x(2)
+      point(3, k) = thickness*along%x(3)
     end do
-    call make_polyhedron("stone", point, 0.001_dp, stone, error)
+    call make_polyhedron("stone", point, 0.002_dp*thickness, shape, error)
     call check(.not. allocated(error), "a stone")
-    if (allocated(error)) return
-    associate (piece => stone%piece(1))
-      call check(allocated(piece%start), "a piece of many vertices has starts of walks")
-      same = .true.
-      do trial = 1, 5000
-        along = draws%direction()
-        call find_support(piece, along%x, .false., best)
-        call find_support(piece, along%x, .true., walked)
-        same = same .and. dot_product(along%x, piece%vertex(:, walked)) >= dot_product(along%x, piece%vertex(:, best)) - tight
-      end do
-      call check(same, "a walk along edges finds the farthest vertex")
-      same = .true.
-      do k = 1, 3
-        do trial = -1, 1, 2
-          ! the middle of a sector
-          along%x(:) = 0.25_dp
-          along%x(k) = real(trial, dp)
-          call find_support(piece, along%x, .false., best)
-          same = same .and. piece%start(sector_of(along%x)) == best
-        end do
-      end do
-      call check(same, "a walk starts from the vertex that is farthest along the middle of the sector")
-    end associate
-  end subroutine test_walk
+    piece = shape%piece(1)
+  end function stone
 
-  !> Sectors are those of the six sides of a cube, each with four by four parts.
-  subroutine test_sectors()
-    type(draws_t) :: draws
-    type(vector_t) :: along
-    logical :: met(96), within
-    integer :: trial, sector
+  !> Count pieces whose farthest vertex along a direction is not the first that is farthest of all.
+  subroutine count_wrong(along, wrong)
+    real(dp), intent(in) :: along(3)
+    integer, intent(inout) :: wrong
+    type(convex_piece_t), save :: piece(3)
+    real(dp) :: farthest, reach
+    integer :: k, v, best, expected
 
-    met(:) = .false.
-    within = .true.
-    do trial = 1, 5000
-      along = draws%direction()
-      sector = sector_of(along%x)
-      within = within .and. sector >= 1 .and. sector <= size(met)
-      if (within) met(sector) = .true.
+    if (.not. allocated(piece(1)%vertex)) then
+      piece(1) = stone(0.5_dp)
+      piece(2) = stone(1.0e-4_dp)
+      piece(3) = box%piece(1)
+    end if
+    do k = 1, size(piece)
+      expected = 1
+      farthest = -huge(1.0_dp)
+      do v = 1, size(piece(k)%vertex, 2)
+        reach = along(1)*piece(k)%vertex(1, v) + along(2)*piece(k)%vertex(2, v) + along(3)*piece(k)%vertex(3, v)
+        if (reach > farthest) expected = v
+        farthest = max(farthest, reach)
+      end do
+      call find_support(piece(k), along, best)
+      ! two vertices that differ by rounding alone are equally far: compilers may fuse products and sums here and there otherwise
+      reach = dot_product(along, piece(k)%vertex(:, best))
+      if (best /= expected .and. reach < farthest - 1.0e-15_dp) wrong = wrong + 1
     end do
-    call check(within, "a direction lies in one of 96 sectors")
-    call check(all(met), "each sector has directions")
-    call check_equal(sector_of([2.0_dp, 0.1_dp, 0.1_dp]), sector_of([5.0_dp, 0.9_dp, 0.2_dp]), "the length does not matter")
-    call check(sector_of([-2.0_dp, 0.1_dp, 0.1_dp]) /= sector_of([2.0_dp, 0.1_dp, 0.1_dp]), "opposite sides have their own")
-    call check_equal(sector_of([1.0_dp, 1.0_dp, 1.0_dp]), sector_of([1.0_dp, 0.99_dp, 0.99_dp]), "a corner has a sector")
-    call check(sector_of([0.0_dp, 0.0_dp, 0.0_dp]) >= 1, "a vector without length has a sector")
-  end subroutine test_sectors
+  end subroutine count_wrong
 
   !> Cubes and balls beside each other: faces, edges, corners.
   subroutine test_distance()
@@ -384,6 +403,19 @@ contains
     other(1, :) = other(1, :) + 4.0_dp
     call clip_polygon(square, other, 1.0_dp, n, place, label)
     call check_equal(n, 0, "squares apart have nothing in common")
+    ! side by side, seen from both: rounding does not decide
+    do k = -1, 1
+      other(:, :) = square
+      other(1, :) = square(1, :) + 2.0_dp + k*4*epsilon(1.0_dp)
+      other(2, :) = square(2, :) + 0.5_dp
+      call clip_polygon(square, other, 1.0_dp, n, place, label)
+      call check(n >= 2, "squares side by side have a stretch of their sides in common")
+      call check_close(maxval(place(2, 1:n)) - minval(place(2, 1:n)), 1.5_dp, tight, "all of it")
+      call check_close(area_of(n, place), 0.0_dp, tight, "which has no area")
+    end do
+    other(1, :) = square(1, :) + 2.0_dp + 1.0e-9_dp
+    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call check_equal(n, 0, "squares that are just apart have nothing in common")
   end subroutine test_clip
 
   subroutine test_clip_segment()
@@ -435,7 +467,7 @@ contains
     type(vector_t) :: along
 
     along = vec(x, y, z)
-    call find_support(piece, along%x, .false., best)
+    call find_support(piece, along%x, best)
   end function farthest
 
   !> A cube on a cube, shifted: the corners of their common part.
