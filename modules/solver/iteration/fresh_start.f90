@@ -1,8 +1,9 @@
 !> Starts of a method in the course of a solve, from the impulses that the problem holds.
 !>
-!> Sweeps change velocities by additions, and these keep the roundings of the largest impulses that they have had. Where the impulses
-!> of a solve are far below those that it started from, as after a shock of a group on which nothing acts, these roundings are more
-!> than the tolerance of the residual. The method then starts anew: its velocities are made from the impulses of now.
+!> Sweeps change velocities by additions, and these keep the roundings of the impulses that they started from. Where the impulses of a
+!> solve are far below those, as after a shock of a group on which nothing acts, these roundings are more than the tolerance of the
+!> residual. The method then starts anew: its velocities are made from the impulses of now. Impulses that have grown in between do not
+!> count: what a safeguard of the method has learned from their growth would be forgotten.
 module gravier_fresh_start
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -13,17 +14,17 @@ module gravier_fresh_start
   private
   public :: fresh_start_t, begin_anew
 
-  !> roundings of the largest impulses, a contact, that velocities may keep; part of the tolerance that these may take
+  !> roundings of impulses, a contact, that velocities may keep; part of the tolerance that these may take
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp), share = 0.1_dp
   !> impulses are not far below others above this part of them, however small the tolerance is
   real(dp), parameter :: far_below = 0.1_dp
 
   type :: fresh_start_t
     private
-    !> part of the largest impulses below which velocities are made anew
+    !> part of the first impulses below which velocities are made anew
     real(dp) :: part = 0.0_dp
-    !> largest root mean square of the impulses at a check since velocities were made from them [N s]
-    real(dp) :: largest = 0.0_dp
+    !> root mean square of the impulses that velocities were made from [N s]
+    real(dp) :: first = 0.0_dp
   contains
     procedure :: init => fresh_start_init
     procedure :: renew => fresh_start_renew
@@ -39,7 +40,7 @@ contains
     real(dp), intent(in) :: tolerance
 
     self%part = min(far_below, rounding/(share*max(tolerance, rounding)))
-    self%largest = problem%impulse_scale
+    self%first = problem%impulse_scale
   end subroutine fresh_start_init
 
   !> After a check that did not end the solve: let the method start anew where its velocities keep too large roundings. Collective.
@@ -53,9 +54,8 @@ contains
     logical, intent(inout) :: anew
     type(error_t), allocatable, intent(inout) :: error
 
-    self%largest = max(self%largest, problem%impulse_scale)
-    if (.not. problem%impulse_scale < self%part*self%largest) return
-    self%largest = problem%impulse_scale
+    if (.not. problem%impulse_scale < self%part*self%first) return
+    self%first = problem%impulse_scale
     call begin_anew(problem, method, velocity, iteration, error)
     anew = .true.
   end subroutine fresh_start_renew
