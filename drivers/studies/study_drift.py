@@ -101,10 +101,10 @@ def figures(folder, name, tolerance, projection, seconds, first, width):
 
 
 def promised(history, dimension):
-    """Overlap over that allowed that each step may leave to the next one. In a step of residual e contacts that touch approach each other
-    with at most W e |r|, where W is 1/m of both grains: a local solve would change an impulse by the approach over W, and all these
-    changes together are e |r|. A step that is not projected adds the way of that in a step; one that is projected leaves a tenth of what
-    it finds, which is the overlap of the next step."""
+    """Overlap over that allowed that each step may leave to the next one. In a step of residual e bodies that touch approach each
+    other with at most W e |r|, where W is 1/m of both: a local solve would change an impulse by the approach over W, and all these
+    changes together are e |r|. A step that is not projected adds the way of that in a step. One that is projected leaves a tenth of
+    what it finds, which is the overlap of the next step."""
     lightest = DENSITY * (np.pi * SMALLEST**2 if dimension == 2 else 4.0 / 3.0 * np.pi * SMALLEST**3)
     forces = history["force_mean"] * np.sqrt((1.0 + history["force_deviation"]**2) * history["contacts"] * (1.0 + FRICTION**2))
     way = STEP**2 * 2.0 / lightest * history["residual"] * forces / ALLOWED
@@ -126,8 +126,8 @@ def accepted(rows, curves):
             continue
         overlaps, half = history["max_overlap"] / ALLOWED, len(history["step"]) // 2
         before = promised(history, 3 if name == "spheres" else 2)[half - 1:-1]
-        table.add(f"{what}: largest overlap over what the step before promises, second half", (overlaps[half:] / before).max(), None, 1.0,
-                  f"{page}, Between projections")
+        table.add(f"{what}: largest overlap over what the step before promises, second half", (overlaps[half:] / before).max(),
+                  None, 1.0, f"{page}, Between projections")
         table.add(f"{what}: mean of the largest overlaps over that allowed, second half", overlaps[half:].mean(), None, 1.0 + LEFT,
                   f"{page}: a tenth is left")
         if name in ("disks", "spheres"):

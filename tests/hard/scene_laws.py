@@ -252,8 +252,8 @@ def check_numbers(run):
 
 
 class Sleepers:
-    """The momenta that grains which stand still may have by their impulses, l of theory.md, section 12: a grain that sleeps that of the
-    step in which it fell asleep, any other half of that of now."""
+    """The momenta that grains which stand still may have by their impulses, l of theory.md, section 12: a grain that sleeps that of
+    the step in which it fell asleep, any other half of that of now."""
     #: of the normal impulses on a grain
     SHARE = 0.1
 
@@ -263,7 +263,7 @@ class Sleepers:
         self.known = {}
 
     def limits(self, contacts, rest):
-        """Of all bodies (grains, walls), infinite where it is not known, from the steps at rest of the last state and of this one."""
+        """Of all bodies (grains, walls), infinite where it is not known, by the steps at rest in the last state and in this one."""
         grains = len(contacts.identifiers)
         now = np.zeros(len(contacts.mass), bool)
         now[:grains] = rest[1] >= self.after

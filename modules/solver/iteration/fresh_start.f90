@@ -1,9 +1,9 @@
 !> Starts of a method in the course of a solve, from the impulses that the problem holds.
 !>
-!> Sweeps change velocities by additions, and these keep the roundings of the impulses that they started from. Where the impulses of a
-!> solve are far below those, as after a shock of a group on which nothing acts, these roundings are more than the tolerance of the
-!> residual. The method then starts anew: its velocities are made from the impulses of now. Impulses that have grown in between do not
-!> count: what a safeguard of the method has learned from their growth would be forgotten.
+!> Sweeps change velocities by additions, and these keep the roundings of the impulses that they started from. Where the impulses of
+!> a solve are far below those, as after a shock of a group on which nothing acts, these roundings are more than the tolerance of
+!> the residual. The method then starts anew: its velocities are made from the impulses of now. Impulses that have grown in between
+!> do not count: what a safeguard of the method has learned from their growth would be forgotten.
 module gravier_fresh_start
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t

@@ -1,8 +1,8 @@
 !> What bodies that sleep bear of the contacts that are left out of the problem: the sum of their impulses, `held`, with its owner.
 !>
-!> A contact is left out when the last of its bodies falls asleep, and comes back when the first of them wakes. In between nothing about
-!> it changes, so that `held` takes its impulse up when it leaves and gives it back when it returns, from the impulse with which the
-!> next solve starts. The pair has a mark in the meantime.
+!> A contact is left out when the last of its bodies falls asleep, and comes back when the first of them wakes. None of its bodies
+!> has moved then, so that `held` takes its impulse up when it leaves, and gives the same one back when it returns: the impulse from
+!> which the next solve starts. The pair has a mark in the meantime.
 module gravier_borne_impulses
   use gravier_kinds, only: dp, i8
   use gravier_sparse_exchange, only: sparse_exchange
@@ -97,7 +97,7 @@ contains
     end do
   end subroutine find_borne
 
-  !> Impulses r of some contacts of subdomain `s` on its columns, without what pairs attract each other with beyond them: H r.
+  !> H r of some contacts of subdomain `s` of this rank.
   pure subroutine sum_impulses(problem, s, some, reaction)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
@@ -150,7 +150,8 @@ contains
     call change_held(problem, returning, 0, halo, decomposition)
   end subroutine take_back
 
-  !> Mark contacts as left out (1) or as solved (0), and add their impulses to what sleeping bodies bear, or take them away. Collective.
+  !> Mark contacts as left out (1) or as solved (0), and add their impulses to what sleeping bodies bear, or take them away.
+  !> Collective.
   subroutine change_held(problem, some, mark, halo, decomposition)
     type(contact_problem_t), intent(in) :: problem
     type(contacts_t), intent(in) :: some(:)

@@ -107,8 +107,8 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for pairs of a list; the antagonist
-  !> of a boundary is minus its number.
+  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for pairs of a list; the
+  !> antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, pairs, records)
     type(local_bodies_t), intent(in) :: view
     !> words left free before those of a record

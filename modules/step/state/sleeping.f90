@@ -9,9 +9,9 @@
 !> else add up, step by step. After `after` steps it sleeps.
 !>
 !> Contacts between grains that sleep, or with boundaries at rest, leave the problem with the impulses that they have. Contacts with
-!> grains that are awake stay: there the sleeper is a body that cannot move. Where the impulses of a solve and those that were left out
-!> would together give it a momentum of more than the l of the step in which it fell asleep, it wakes with those around it, and the
-!> step is solved anew. See doc/theory.md, section 12.
+!> grains that are awake stay: there the sleeper is a body that cannot move. Where the impulses of a solve and those that were left
+!> out would together give it a momentum of more than the l of the step in which it fell asleep, it wakes with those around it, and
+!> the step is solved anew. See doc/theory.md, section 12.
 module gravier_sleeping
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
@@ -59,8 +59,9 @@ contains
     may_push = boundary%is_moved() .or. boundary%is_driven()
   end function may_push
 
-  !> Count the steps at rest of the grains of a solved problem, before its impulses are kept; those that fall asleep get the momentum
-  !> that wakes them, and bear the contacts that are left out from now on. Grains that are in no contact start anew. Collective.
+  !> Count the steps at rest of the grains of a solved problem, before its impulses are kept; those that fall asleep get the
+  !> momentum that wakes them, and bear the contacts that are left out from now on. Grains that are in no contact start anew.
+  !> Collective.
   subroutine count_rest(rule, stops, halo, problem, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
     !> grains may come to stand still: v_global of those at rest becomes zero

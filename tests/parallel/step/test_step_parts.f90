@@ -920,7 +920,8 @@ contains
     call sim%free()
   end subroutine check_turned_sleeper
 
-  !> What lies on a sleeper is swept away so fast that the pair is no longer near: the sleeper wakes, and its support bears it alone.
+  !> What lies on a sleeper is swept away so fast that the pair is no longer near: the sleeper wakes, and its support bears it
+  !> alone.
   subroutine check_swept_off()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures

@@ -408,8 +408,8 @@ contains
     call sim%free()
   end subroutine test_warm_start
 
-  !> A solve that starts from impulses 10^12 times those that it ends with loses the roundings of these on the way: it takes about as many
-  !> iterations as from zero, or more by the decades that each of them gains, and its velocities are those of the solution.
+  !> A solve that starts from impulses 10^12 times those that it ends with loses the roundings of these on the way: its velocities
+  !> are those of the solution, and those that sweeps work with are the same.
   subroutine test_rest_after_shock(dimension, accelerated)
     integer, intent(in) :: dimension
     logical, intent(in) :: accelerated
